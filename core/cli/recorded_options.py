@@ -32,8 +32,52 @@ def add_options(run: argparse.ArgumentParser) -> None:
         ),
     )
     group.add_argument(
+        "--engine-command",
+        action="append",
+        default=[],
+        metavar="COMMAND",
+        help=(
+            'a program as an engine: "prog {case} {samples} {out}" reads the case (TOML) and its'
+            " samples (CSV), and writes outputs or poses (CSV)"
+        ),
+    )
+    group.add_argument(
+        "--fmu",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help=(
+            "a functional mock-up unit (FMI 2 or 3) as an engine; --map VARIABLE=NAME says which"
+            " variables are drivers and outputs of the case"
+        ),
+    )
+    group.add_argument(
         "--analysis", metavar="NAME", help="one of several analyses of results of Adams"
     )
+
+
+def foreign_engines(options: argparse.Namespace, cases: Sequence[Case]) -> list[Engine]:
+    """Return the programs of --engine-command and the FMUs of --fmu as engines.
+
+    Raises:
+        KincheckError: a command has another form, or an FMU cannot run.
+    """
+    if not (options.engine_command or options.fmu):
+        return []
+    from ..recorded.fmu import read_fmu
+    from ..recorded.program import ProgramEngine
+
+    if options.fmu and len(cases) != 1:
+        raise KincheckError(
+            f"{options.fmu[0]}: found {len(cases)} cases, expected the one of the FMU"
+        )
+    if options.fmu and options.jobs == 0:
+        raise KincheckError("--fmu runs foreign machine code in workers alone; leave out --jobs 0")
+    return [
+        *(ProgramEngine(command) for command in options.engine_command),
+        *(read_fmu(file, cases[0], options.map) for file in options.fmu),
+    ]
 
 
 def recorded_engines(options: argparse.Namespace, case: Case) -> tuple[Case, list[Engine]]:

@@ -153,7 +153,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     curve = curve_options(options)
-    if not options.reference and not options.recorded and curve != type(curve)():
+    if not (options.reference or options.recorded or options.fmu) and curve != type(curve)():
         problems.append("options for measured curves need a curve: give --reference FILE")
     if options.reference and not problems:
         try:
@@ -164,7 +164,16 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
     engines, baseline = _engines(options, registry, problems)
     if recorded and recorded_options.undriven(cases[0]):
         engines, baseline = [], None
-    engines += recorded
+    try:
+        engines += [*recorded_options.foreign_engines(options, cases), *recorded]
+    except KincheckError as error:
+        problems += str(error).splitlines()
+    keys = [(engine.name, engine.mode) for engine in engines]
+    problems += [
+        f"engine {name}: found twice; rename one"
+        for name, mode in keys
+        if keys.count((name, mode)) > 1
+    ][:1]
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does

@@ -28,8 +28,9 @@ class Engine(Protocol):
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
         settings: the settings in the report that a reader needs to repeat the run.
 
-    Two attributes are optional, and False by default. `in_process`: the engine loads no foreign
-    code. `bounds_error`: the engine itself bounds the error of each pose.
+    Three attributes are optional, and False by default. `in_process`: the engine loads no foreign
+    code. `bounds_error`: the engine itself bounds the error of each pose. `untimed`: its time means
+    nothing, and it solves each case once.
     """
 
     @property
@@ -76,6 +77,11 @@ def may_run_here(engine: Engine) -> bool:
     engines run in separate processes.
     """
     return bool(getattr(engine, "in_process", False))
+
+
+def untimed(engine: Engine) -> bool:
+    """Return whether the time of an engine means nothing, by its attribute `untimed`."""
+    return bool(getattr(engine, "untimed", False))
 
 
 def bounds_error(engine: Engine) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import Case, Series
-from ..errors import KincheckError
+from ..errors import KincheckError, UnsupportedError
 from ..failures import FailureKind
 from ..forces import Forces
 from ..trajectory import Array, Trajectory
@@ -104,7 +104,7 @@ class Answer:
                 solved=int(solved.sum()),
                 iterations=0,
                 residual=found.residual,
-                message="",
+                message=bounded(found.message),
                 details=plain(found.facts),
                 faults=found.faults,
                 reported=True,
@@ -144,6 +144,8 @@ class Failure:
     @staticmethod
     def of(error: BaseException) -> Failure:
         """Return the failure that an error of the engine stands for."""
+        if isinstance(error, UnsupportedError):
+            return Failure(Outcome.UNSUPPORTED, bounded(error))
         kind = error.kind if isinstance(error, KincheckError) else None
         return Failure(Outcome.ERROR, error_text(error), kind=kind)
 

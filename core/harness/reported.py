@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..case.case import Series
 from ..trajectory import Trajectory
@@ -34,7 +35,10 @@ class Reported(Trajectory):
         faults: Sequence[str] = (),
         judged: bool = False,
         details: Mapping[str, Any] | None = None,
+        solved: NDArray[np.bool_] | None = None,
+        message: str = "",
     ) -> None:
-        solved, none = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.int64)
-        super().__init__({}, solved, none, residual, details=details)
+        known = np.ones(count, dtype=np.bool_) if solved is None else solved
+        none = np.zeros(count, dtype=np.int64)
+        super().__init__({}, known, none, residual, message=message, details=details)
         self.__dict__.update(outputs=outputs, faults=faults, judged=judged)

@@ -14,7 +14,7 @@ import msgspec
 from ..case.case import Case, Truth
 from ..errors import CaseError
 from .compare import as_numbers
-from .engine import RECORDED, Engine
+from .engine import Engine, untimed
 from .evidence import Evidence, evidence
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, here
 from .provenance import results, truth_of
@@ -99,7 +99,7 @@ def run(
         case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases
     }
     pairs = [
-        Pair(case, engine, tol, timed=engine.mode != RECORDED)
+        Pair(case, engine, tol, timed=not untimed(engine))
         for case, engine in _to_solve(cases, ordered, baseline, records, judging)
     ]
 

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..case.case import Case, Quantity, Series, Sweep
 from ..case.measures import ForceMeasure
@@ -45,7 +46,7 @@ class RecordedEngine:
     accuracy: Accuracy
     mode = RECORDED
     loop = "none"
-    in_process = True
+    in_process = untimed = True
 
     @property
     def settings(self) -> Mapping[str, Any]:
@@ -76,6 +77,17 @@ class RecordedEngine:
 
     def solve(self, model: None, case: Case, tol: float) -> Reported:
         """Return the recorded outputs, judged by the rows if poses are recorded."""
+        return self.report(case)
+
+    def report(
+        self, case: Case, solved: NDArray[np.bool_] | None = None, message: str = ""
+    ) -> Reported:
+        """Return the outputs and the verdict of the rows.
+
+        Args:
+            solved: samples with values, shape (n,); all by default.
+            message: on the others.
+        """
         outputs = {output.name: self._series(case, output) for output in case.outputs}
         judged = judge_rows(case, self.samples, self.accuracy)
         standard = {**self._native, **case.reference}
@@ -101,6 +113,8 @@ class RecordedEngine:
             faults=[*judged.faults, *out_of_balance],
             judged=bool(judged.largest or forces),
             details=details,
+            solved=solved,
+            message=message,
         )
 
     def _series(self, case: Case, output: Quantity) -> Series:
@@ -117,7 +131,7 @@ class RecordedEngine:
             values, halves = self._of_poses(case, output)
         position = values[0]
         if position is None:
-            lack = "the recording has no column of it, and no poses of its bodies"
+            lack = "there is no column of it, and no poses of its bodies"
             return Series(np.full(count, np.nan), possible=False, reason=lack)
         if not self.resampled.rated:
             values = [position, None, None]
@@ -170,8 +184,8 @@ class RecordedEngine:
         found: dict[str, Stated] = {}
         for name, use in self.samples.meaning.numbers.items():
             column = self.samples.recording.columns[use.column]
-            unit, size = unit_of(self.samples.recording, use)
-            offset = use.offset * size
+            recording = self.samples.recording
+            unit, size, offset = unit_of(recording.file, column.head, use, recording.angle)
             found[name] = Stated(column.head.name, use.sign, offset, unit, size, use.si)
         return found
 

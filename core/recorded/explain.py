@@ -7,10 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from ..case.case import TIME, Case, Quantity, Series, Sweep
+from ..case.io.reference_columns import DERIVATIVES
 from ..errors import shortened
 from ..harness.compare import deviation
 from ..harness.slips import Held, Uncertain, slips
@@ -135,7 +137,8 @@ def explained(
     if not off or lead not in stated:
         return sentences
     free = not all_known
-    readings = [*dict.fromkeys(_of_driver(case, off, stated, lead, sweep, solve, free=free))]
+    phrases = dict.fromkeys(_of_driver(case, off, stated, lead, sweep, solve, free=free))
+    readings = sorted(phrases, key=lambda text: (text.count(MAP), len(text)))  # the simplest first
     if not readings:
         return sentences
     return [*sentences * all_known, f"{' or '.join(readings[:_NAMED])}: say so if it is meant"]
@@ -175,12 +178,13 @@ def _of_driver(
                 dense = np.linspace(*ends, _DENSE)
                 curves = change.curves(dense)
                 left = [change.left(curves, dense, factor * x + zero) for zero in grid.tolist()]
-                best = [k for k in np.argsort(left).tolist() if left[k] < math.inf]
+                around = [math.inf, *left, math.inf]
+                lowest = [k for k, x in enumerate(left) if math.inf > x <= min(around[k : k + 3])]
+                best = sorted(lowest, key=left.__getitem__)
                 zeros = [float(grid[k]) for k in best[:_TRIED]]
             for zero in zeros:
                 if found := change.refined(unit, factor, zero):
                     yield found
-                    break
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,13 +263,18 @@ class _Change:
         own, sweep = self.stated[self.lead], self.sweep
         rate = sweep.rate if self.lead == TIME != sweep.driver else 1.0
         size = own.size * abs(factor)
-        for decimals in range(13):
-            offset = (factor * own.offset + zero / rate) / size
+        exact = (factor * own.offset + zero / rate) / size
+        turn = 2.0 * math.pi / size
+        # the angle of a driver without its whole turns, if they do not matter
+        places = [math.remainder(exact, turn)] * (own.si == "rad") + [exact]
+        for offset, decimals in product(dict.fromkeys(places), range(13)):
             short = round(offset, decimals)
             rest = self._rest(factor, rate * (short * size - factor * own.offset))
             if rest is None:
                 continue
             maps = [_map(own, self.lead, factor * own.sign, short, unit)]
+            if short and unit != own.unit:  # a unit beside an offset is that of the offset
+                maps = [f"column {own.column} in {unit} and", *maps]
             fits, largest = True, (0.0, "")
             for each, sign, middle, left, _ in rest:
                 total = 0.0
@@ -278,6 +287,9 @@ class _Change:
                     if sign < 0.0 or total != column.offset / column.size:
                         part = each.output.name, sign * column.sign, total, column.unit
                         maps.append(_map(column, *part))
+                    for key in (f"{each.output.name}{ending}" for ending in DERIVATIVES):
+                        if sign < 0.0 and (rate := self.stated.get(key)):
+                            maps.append(_map(rate, key, -rate.sign, 0.0, rate.unit))
                 fits = fits and each.fits(left - middle)
                 largest = max(largest, (float(np.abs(left - middle).max()), each.output.unit))
             if fits:

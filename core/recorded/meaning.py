@@ -62,8 +62,7 @@ class Use:
 
     Attributes:
         si: SI unit of the quantity.
-        unit: of the column as the user states it; empty for the unit of the head.
-        offset: in the unit of the column.
+        unit: as the user states it, of the offset and of a column without a unit.
     """
 
     column: int
@@ -112,16 +111,21 @@ class Meaning:
         return [*self.numbers.values(), *poses]
 
 
-def targets_of(case: Case) -> dict[str, str]:
-    """Return the possible names of a column, with their SI units."""
+def inputs_of(case: Case) -> dict[str, str]:
+    """Return the possible names of columns of time and drivers, with their SI units."""
     units = {TIME: "s"}
     for driver in case.mechanism.drivers:
         si = "rad" if driver.turns else "m"
         rates = zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
         units |= {driver.name + ending: si + per for ending, per in rates}
+    return units
+
+
+def targets_of(case: Case) -> dict[str, str]:
+    """Return the possible names of a column, with their SI units."""
     joints = case.mechanism.joints if case.mechanism.has_loads else ()
-    units |= {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
-    return units | known_columns(case.outputs)
+    reactions = {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
+    return inputs_of(case) | reactions | known_columns(case.outputs)
 
 
 @dataclass
@@ -331,21 +335,33 @@ def _term(text: str, known: Collection[str]) -> tuple[str, float, float] | None:
     return None
 
 
-def unit_of(recording: Recording, use: Use) -> tuple[str, float]:
-    """Return the unit of a column, and its size in SI.
+def unit_of(file: Path, head: Head, use: Use, angle: str = "") -> tuple[str, float, float]:
+    """Return the unit of a column and its size in SI, and the offset in SI.
+
+    A stated unit is that of the offset, and of a column without one; without an offset it replaces
+    the column's.
+
+    Args:
+        angle: unit of angles without one.
 
     Raises:
-        CaseError: the unit is unknown, or of something else.
+        CaseError: a unit is unknown, or of something else.
     """
-    head = recording.columns[use.column].head
-    unit = use.unit or head.unit or use.si.replace("rad", recording.angle or "rad")
-    return unit, required_unit(recording.file, "", head.name, unit, use.si).convert(1.0)
+
+    def size_of(unit: str) -> float:
+        return required_unit(file, "", head.name, unit, use.si).convert(1.0)
+
+    own = head.unit or use.si.replace("rad", angle or "rad")
+    stated = use.unit or own
+    unit = own if head.unit and use.offset else stated
+    return unit, size_of(unit), use.offset * size_of(stated)
 
 
 def si_values(recording: Recording, use: Use) -> Column:
     """Return a column as its quantity, in SI; see `unit_of`."""
-    column, (_, size) = recording.columns[use.column], unit_of(recording, use)
-    values = (use.sign * column.values + use.offset) * size
+    column = recording.columns[use.column]
+    _, size, offset = unit_of(recording.file, column.head, use, recording.angle)
+    values = use.sign * size * column.values + offset
     return Column(column.head, values, column.half * abs(use.sign) * size)
 
 

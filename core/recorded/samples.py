@@ -29,7 +29,7 @@ from ..mechanism.mechanism import Mechanism
 from ..primitives.base import Pose as Placed
 from ..primitives.base import Twist
 from ..trajectory import Array, BodyMotion, PointMotion
-from .meaning import EVENT, MAP, Meaning, Pose, si_values
+from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
 from .recording import Column, Recording
 
 # Two steps may be equal by chance.
@@ -75,19 +75,28 @@ class Samples:
 
 
 def samples_of(
-    case: Case, recording: Recording, meaning: Meaning, *, digits: bool = True
+    case: Case,
+    recording: Recording,
+    meaning: Meaning,
+    *,
+    digits: bool = True,
+    whole: bool = False,
 ) -> Samples:
     """Return the samples of a recording.
 
     Args:
-        digits: whether to count what printed digits allow.
+        whole: whether to keep all rows, also those without time, driver or pose.
+        digits: whether to count printed digits.
 
     Raises:
         CaseError: columns have different lengths, a unit is wrong, rows at one time differ, or no
             sample is left.
     """
-    notes = [*recording.notes, *_assumed(recording, meaning)]
-    kept = replace(recording, columns=_kept(case, recording, meaning, notes))
+    notes = [*recording.notes]
+    kept = recording
+    if not whole:
+        notes += _assumed(recording, meaning)
+        kept = replace(recording, columns=_kept(case, recording, meaning, notes))
     numbers = {name: si_values(kept, use) for name, use in meaning.numbers.items()}
     motions: dict[str, BodyMotion] = {}
     moved: dict[str, list[BodyMotion]] = {}
@@ -108,7 +117,7 @@ def samples_of(
                     moved[name].append(motion_of(body, pose, given, changed))
     found = Samples(kept, meaning, numbers, motions, moved, [*dict.fromkeys(notes)])
     there = _driven(case, found)
-    if there.all() or not there.any():
+    if whole or there.all() or not there.any():
         return found
     rows = np.flatnonzero(there)
     columns = {k: Column(c.head, c.values[rows], c.half[rows]) for k, c in kept.columns.items()}
@@ -126,6 +135,12 @@ def _assumed(recording: Recording, meaning: Meaning) -> Iterator[str]:
         if not (use.unit or recording.columns[use.column].head.unit or use.si == "1")
         and not ("rad" in use.si and recording.angle)
     }
+    for use in meaning.uses:
+        head = recording.columns[use.column].head
+        unit, *_ = unit_of(recording.file, head, use)
+        if head.unit and unit != head.unit:
+            text = f"column {head.name} is taken in {unit}, as stated, and not in {head.unit}"
+            yield f"{recording.file}: {text}"
     if bare:
         units = " and ".join(dict.fromkeys(bare.values()))
         names = shortened([*bare], MOST_NAMED)

@@ -82,6 +82,11 @@ class Resampled:
     values: Sweep
 
 
+def as_is(case: Case) -> Resampled:
+    """Return a case at its own samples."""
+    return Resampled(case, True, (), (), "", case.sweep)
+
+
 def at_samples(case: Case, samples: Samples) -> Resampled:
     """Return a case at the samples of a recording.
 

@@ -167,10 +167,15 @@ ANGLES = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
 
 
 def test_other_zeros_are_explained_and_then_pass(judged):
-    status, record = judged(DATA / "fourbar_angles.csv", *ANGLES)
+    rate = ["--map", "JOINT_4.angle.velocity=rocker rate"]
+    status, record = judged(DATA / "fourbar_angles.csv", *ANGLES, *rate)
     stated = re.findall(r'--map "([^"]*)"', record["message"])
     assert status == 1
-    assert stated == ["MOTION_1=crank-50 [deg]", "JOINT_4.angle=-rocker+90 [deg]"]
+    assert stated == [
+        "MOTION_1=crank-50 [deg]",
+        "JOINT_4.angle=-rocker+90 [deg]",
+        "JOINT_4.angle.velocity=-rocker rate [deg/s]",
+    ]
     options = [word for text in stated for word in ("--map", text)]
     status, record = judged(DATA / "fourbar_angles.csv", *options)
     assert status == 0
@@ -184,6 +189,10 @@ def shifted(rows):
     return [rows[0], *([a[0], *b[1:]] for a, b in zip(rows[2:], rows[1:], strict=False))]
 
 
+def from_zero(rows):
+    return [rows[0], *([f"{float(row[0]) - 50:.4f}", *row[1:]] for row in rows[1:])]
+
+
 @pytest.mark.parametrize(
     ("options", "change", "text"),
     [
@@ -194,14 +203,14 @@ def shifted(rows):
             'read with --map "MOTION_1=crank-50 [deg]" the recording leaves',
         ),
         (
-            [*RIGHT[:3], "JOINT_4.angle=-rocker+90 [rad]"],
+            [*RIGHT[:3], "JOINT_4.angle=-rocker [rad]"],
             list,
             "times pi/180",
         ),
         (
-            ["--map", "MOTION_1=crank-50 [rad]", *RIGHT[2:]],
-            list,
-            'read with --map "MOTION_1=crank-50 [deg]" the recording leaves',
+            ["--map", "MOTION_1=crank [rad]", *RIGHT[2:]],
+            from_zero,
+            'read with --map "MOTION_1=crank [deg]" the recording leaves',
         ),
     ],
     ids=["late", "driver sign", "output unit", "driver unit"],
@@ -210,6 +219,11 @@ def test_slip_is_named_and_not_applied(judged, table, options, change, text):
     status, record = judged(table("fourbar_angles.csv", change), *options)
     assert status == 1
     assert text in record["message"]
+
+
+def test_offset_has_a_unit_of_its_own(judged):
+    options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
+    assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
 
 
 def test_joints_without_poses_are_not_judged(judged):
