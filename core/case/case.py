@@ -209,6 +209,7 @@ class Case:
         hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
         rig: of compliance studies, if the case has one.
         wheels: each `Vehicle` of [suspension], whether outputs read it or not.
+        unforced: drivers without a force, which only follow a recording.
     """
 
     name: str
@@ -226,6 +227,7 @@ class Case:
     hardpoints: tuple[Hardpoint, ...] = ()
     rig: Rig | None = None
     wheels: tuple[Any, ...] = ()
+    unforced: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""
@@ -304,7 +306,7 @@ def pace(case: Case) -> float:
     _, rates, seconds = path.drive(list(path.motions), path.times)
     extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
-    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
+    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max(initial=0.0))
 
 
 def without_forces(case: Case) -> Case:

@@ -119,7 +119,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help="sheet of a workbook with several tables, or section of a tree, such as front",
     )
     model = command.add_argument_group(
-        "models", "Models (MJCF, URDF, SDF). They do not state drivers."
+        "models",
+        "Models (MJCF, URDF, SDF), which do not state drivers, and datasets of Adams (.adm).",
     )
     model.add_argument(
         "--drive",
@@ -145,6 +146,14 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help="hold as many joints as needed: free bodies, joints with an actuator, others",
     )
     model.add_argument(
+        "--without",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="statements of a dataset of Adams to leave out, as BUSHING or BUSHING/3",
+    )
+    model.add_argument(
         "--start",
         nargs="+",
         action="extend",
@@ -158,10 +167,10 @@ def add_options(command: argparse.ArgumentParser) -> None:
 
 
 def return_cases(options: argparse.Namespace) -> None:
-    """Move files from --hold and --start back to the cases: these options take several names, and
-    in `run --hold knee hip model.xml` also the file.
+    """Move files from --hold, --start and --without back to the cases: these options take several
+    names, and in `run --hold knee hip model.xml` also the file.
     """
-    for given in (options.hold, options.start):
+    for given in (options.hold, options.start, options.without):
         files = [name for name in given if os.path.isfile(name)]
         options.case += files
         given[:] = [name for name in given if name not in files]
@@ -169,8 +178,13 @@ def return_cases(options: argparse.Namespace) -> None:
 
 def supplied(options: argparse.Namespace) -> Supplied:
     """Return the facts supplied by options."""
-    given: dict[str, Any] = {each.name: getattr(options, each.name) for each in fields(Supplied)}
-    given |= {name: (*given[name],) for name in ("drive", "hold", "start")}
+    given: dict[str, Any] = {
+        each.name: getattr(options, each.name)
+        for each in fields(Supplied)
+        if each.name != "recorded"
+    }
+    given |= {name: (*given[name],) for name in ("drive", "hold", "start", "without")}
+    given["recorded"] = bool(getattr(options, "recorded", ()))
     return Supplied(**given)
 
 

@@ -172,6 +172,8 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
+    if recorded and recorded_options.undriven(cases[0]):
+        engines, baseline = [], None
     try:
         engines += [*recorded_options.foreign_engines(options, cases), *recorded]
     except KincheckError as error:

@@ -15,6 +15,7 @@ Solve:
     followed_attitude  the attitude of a body with its turns, followed from the design
     count_turns        an angle known up to whole turns, from sample to sample
     residuals          what poses from elsewhere leave of the rows, and what their digits allow
+    needed_forces      the forces that a motion from elsewhere needs, and what nothing holds
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -85,6 +86,7 @@ if TYPE_CHECKING:
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
     from .replay import Residuals, Worst, count_turns, judged_part, replayed, residuals
+    from .replayed_forces import Needed, needed_forces
     from .statics.equations import LoadPoint
     from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
@@ -115,6 +117,7 @@ _NAMES = {
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
     "replay": "Residuals Worst count_turns judged_part replayed residuals",
+    "replayed_forces": "Needed needed_forces",
     "statics.equations": "LoadPoint",
     "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",

@@ -22,6 +22,7 @@ from ..harness.record import ROWS
 from ..harness.reported import Reported
 from ..trajectory import QUANTITIES, Array, Trajectory
 from .explain import Stated, explained
+from .forces import judge_forces
 from .meaning import Accuracy, unit_of
 from .rows import judge_rows
 from .samples import Samples, jet_of, point_motion
@@ -100,7 +101,8 @@ class RecordedEngine:
         if judged.not_judged:
             joints = ", ".join(f"{name} ({body})" for name, body in judged.not_judged.items())
             notes.append(f"joints not judged, without the pose of a body: {joints}")
-        details: dict[str, Any] = {"notes": notes}
+        forces, out_of_balance = judge_forces(case, self.samples, self.accuracy)
+        details: dict[str, Any] = {"notes": notes, **({"forces": forces} if forces else {})}
         if judged.largest:
             details[ROWS] = dict(judged.largest)
         gap = judged.largest.get("position", float("nan"))
@@ -108,8 +110,8 @@ class RecordedEngine:
             self.samples.count,
             outputs,
             gap,
-            faults=judged.faults,
-            judged=bool(judged.largest),
+            faults=[*judged.faults, *out_of_balance],
+            judged=bool(judged.largest or forces),
             details=details,
             solved=solved,
             message=message,

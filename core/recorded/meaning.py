@@ -14,7 +14,7 @@ from pathlib import Path
 from ..case.case import TIME, Case
 from ..case.io.document import decimal, fault, shown, unknown_name
 from ..case.io.reference_samples import DERIVATIVES, known_columns
-from ..case.io.table import required_unit
+from ..case.io.table import read_unit, required_unit
 from ..errors import MOST_NAMED, brief, shortened
 from ..trajectory import QUANTITIES
 from .attitudes import ORDERS, SEQUENCES, Reading
@@ -38,6 +38,10 @@ _NEEDS = (
     *(("velocity", "omega"), ("omega", "velocity"), ("acceleration", "velocity")),
     *(("acceleration", "alpha"), ("alpha", "acceleration")),
 )
+REACTIONS = {"FX": "N", "FY": "N", "FZ": "N", "TX": "N m", "TY": "N m", "TZ": "N m"}
+"""Endings of columns of a joint's reaction, with units: on its second body, about its point, along
+global axes; as Adams names those on the marker I.
+"""
 _IN_BRACKETS = re.compile(r"(.*?)\s+\[([^\[\]]*)\]")
 _QUATERNIONS = {"wxyz": ("e0", "e1", "e2", "e3"), "xyzw": ("qx", "qy", "qz", "qw")}
 FORM = (
@@ -119,7 +123,9 @@ def inputs_of(case: Case) -> dict[str, str]:
 
 def targets_of(case: Case) -> dict[str, str]:
     """Return the possible names of a column, with their SI units."""
-    return inputs_of(case) | known_columns(case.outputs)
+    joints = case.mechanism.joints if case.mechanism.has_loads else ()
+    reactions = {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
+    return inputs_of(case) | reactions | known_columns(case.outputs)
 
 
 @dataclass
@@ -179,6 +185,8 @@ class Reader:
             # Adams names the abscissa time.TIME
             name = names.get(_normal(head.name), TIME if head.name == "time.TIME" else "")
             if name == "" or name in stated or k in taken:
+                continue
+            if name.rpartition(".")[2] in REACTIONS and read_unit(head.unit or "N") is None:
                 continue
             if name in found:
                 both = f"{shown(self.heads[found[name].column].name)} and {shown(head.name)}"

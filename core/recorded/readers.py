@@ -127,7 +127,8 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
     }
     note = f"{file}: read the analysis {names[chosen[0]]}"
     program = " ".join(analysis.attributes.get("Solver", "").split())
-    return Recording(file, columns, program or "Adams", notes=[note])
+    kinematic = chosen[0][1].lower().startswith("kinematic")
+    return Recording(file, columns, program or "Adams", notes=[note], kinematic=kinematic)
 
 
 def _heads(analysis: Element) -> Mapping[int, Head]:

@@ -49,6 +49,7 @@ class Recording:
         program: its writer, by the file.
         angle: unit of angles whose column has none, if the file has it.
         notes: for the user, on the reading.
+        kinematic: whether it is a kinematic analysis of Adams, of driven freedoms alone.
     """
 
     file: Path
@@ -56,6 +57,7 @@ class Recording:
     program: str = ""
     angle: str = ""
     notes: Sequence[str] = ()
+    kinematic: bool = False
 
 
 def column_of(file: Path, where: str, head: Head, cells: Iterable[str]) -> Column:

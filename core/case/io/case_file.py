@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
-from ...errors import MechanismError, unknown
+from ...errors import CaseError, MechanismError, unknown
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
@@ -139,9 +139,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         comments: comment lines at the top.
 
     Raises:
-        CaseError: no case file can express the case: samples on no even grid, outputs of several
-            axles, or names and texts beyond their limits.
+        CaseError: no case file can express the case: nothing drives it, samples on no even grid,
+            outputs of several axles, or names and texts beyond their limits.
     """
+    if not case.mechanism.drivers:
+        raise CaseError(f"case {case.name!r}: nothing drives it; drive a joint or a point")
     values = values_in_file(case)
     reference = reference_lines(case, values)
     lines = [f"# {line}" for line in comments]

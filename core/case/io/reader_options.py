@@ -30,6 +30,9 @@ class Supplied:
         hold: joints or free bodies of a model to hold in place.
         hold_rest: whether to hold further joints of a model as needed.
         start: start of a model: "keyframe:NAME", "JOINT=VALUE" [rad, m].
+        without: statements of a dataset of Adams to leave out, although they force the motion: KIND
+            or KIND/id.
+        recorded: whether a recording is there, whose motion a dataset without its own follows.
         closure: tolerance of rows redundant but for the digits of a file [m].
     """
 
@@ -52,17 +55,19 @@ class Supplied:
     hold_rest: bool = False
     start: tuple[str, ...] = ()
     closure: float | None = None
+    without: tuple[str, ...] = ()
+    recorded: bool = False
 
     @property
     def given(self) -> list[str]:
         """Names of the given options, as on the command line."""
         values = (getattr(self, each.name) for each in fields(self))
-        return [name for name, value in zip(_NAMES, values, strict=True) if value]
+        named = zip(_NAMES, values, strict=True)
+        return [name for name, value in named if value and name != "recorded"]
 
 
 _NAMES = tuple(each.name.replace("_", "-") for each in fields(Supplied))
-_SHEET = _NAMES.index("sheet")
-OF_HARDPOINTS, OF_MODELS = _NAMES[:_SHEET], _NAMES[_SHEET + 1 :]
+OF_HARDPOINTS = _NAMES[: _NAMES.index("sheet")]
 """Options of each kind of file; those of hardpoints may have a sheet, too."""
 NOTHING = Supplied()
 

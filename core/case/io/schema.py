@@ -44,6 +44,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          amplitude sin(2 pi frequency t + phase)
                          type = "table": times [s], values: the natural cubic spline through them;
                          the times must cover the sweep
+                         type = "formula": formula over TIME, such as "STEP(TIME, 0, 0, 1, 1)",
+                         (scale) = 1 and (offset) = 0, in driver units, (second) = 1 [s], TIME's
+                         unit: offset + scale formula
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
                          (rate) = 1, in driver units per second; 0: at rest at every sample, for
                          static efforts and reactions; times are then those of rate 1

@@ -87,6 +87,7 @@ _FACTORS: Mapping[str, tuple[float, _Powers]] = {
     "sec": (1.0, _TIME),
     "ms": (1e-3, _TIME),
     "n": (1.0, _FORCE),
+    "newton": (1.0, _FORCE),
     "kn": (1e3, _FORCE),
     "nm": (1.0, (1, 0, 0, 1)),
     "nmm": (1e-3, (1, 0, 0, 1)),

@@ -9,7 +9,7 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, Supplied
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, Supplied
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
@@ -21,10 +21,11 @@ TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
 TREES = (".yaml", ".yml")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
-SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS)
+DATASETS = (".adm",)
+SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS, *DATASETS)
 """Suffixes of names that are files, whether they exist or not."""
 
-CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
+CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "case file",
     "Project Chrono suspension",
     "Adams/Car hardpoints",
@@ -32,13 +33,15 @@ CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
     "tree of hardpoints",
     "workbook of hardpoints",
     "model",
+    "dataset of Adams Solver",
 )
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     ".mjb": "is compiled; give the MJCF that it is made of",
     ".osim": "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case",
-    ".adm": "is a model of Adams/View; give its hardpoints (.sub, .csv), or MJCF, URDF or SDF",
+    ".cmd": "is a script of Adams/View; export the dataset of Adams Solver, .adm",
+    ".acf": "holds commands of Adams Solver; give the dataset that it names, .adm",
     **dict.fromkeys(
         (
             ".usd",
@@ -61,7 +64,8 @@ UNREAD = {
 """Files that people have beside their models, and what to do, by suffix."""
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: OF_MODELS,
+    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
+    DATASET: ("drive", "hold", "hold-rest", "without", "closure"),
     **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
     **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
 }
@@ -95,6 +99,10 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "",
             "found a file name with control characters, expected printable ones; rename the file",
         )
+    if kind == DATASET:
+        from .adams.read import read_adams
+
+        return read_adams(file, _text(file, of_spreadsheet=True), supplied)
     if kind == MODEL:
         from .trees.case import case_of
 
@@ -154,6 +162,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         (WORKBOOK, WORKBOOKS),
         (ADAMS, ADAMS_FILES),
         (MODEL, MODELS),
+        (DATASET, DATASETS),
     ):
         if suffix in suffixes:
             return kind
