@@ -142,12 +142,23 @@ Earth). Points and vectors are global, at the design position. Results are alway
                          (inertia) = [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], entries of the matrix about the
                          centre of mass, global axes at design [kg length^2]; the products have the
                          sign of the matrix entry, Ixy = -sum of m x y; default: zero, a point mass
+    [joints.NAME.bushings.X]   keys of a bushing; bodies and point are the joint's unless given; it
+                         stands for its bushings in `run`, and they for it in `kc`
     [forces.NAME]        type = "spring_damper": bodies = [first, second], points = [on first, on
                          second], stiffness [N/length], (damping) = 0 [N s/length],
                          (free_length), default: the length at design; tension is positive
                          type = "torsion_spring_damper": joint with a rotation, stiffness
                          [N length/angle], (damping) = 0 [N length s/angle], (free_angle) = 0: the
                          joint's angle is zero at design
+                         both: (curve) = [[deflection, force or torque], ...], of progressive rates
+                         and bump stops, smooth through the rows and straight beyond; it adds to the
+                         stiffness, which may then be left out
+                         type = "bushing": bodies = [first, second], point, (axes), the first and
+                         second, fixed in the first body, default: global; one number or three, by
+                         the axes: (stiffness) = 0 [N/length], (damping) = 0 [N s/length],
+                         (preload) = 0 [N], on the first body; about them:
+                         (turning_stiffness) = 0 [N length/angle], (turning_damping) = 0;
+                         (curve), one or one for each axis; (law) = "euler_parameters" or "cardan"
                          type = "force": body, point, vector [N], (frame) = "global": its direction
                          is constant; "body": it turns with the body
                          type = "torque": body, vector [N length], (frame) = "global"
