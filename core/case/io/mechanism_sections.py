@@ -141,10 +141,10 @@ def _built(
     Args:
         driver: unit of the driver of a motion.
     """
-    if issubclass(cls, Joint):  # bushings are read with the mechanism
+    if cls.type in Joint.registry:  # bushings are read with the mechanism
         own = {name: each for name, each in section.table.items() if name != "bushings"}
         section = Section(section.file, section.key, own)
-    sprung = cls in (SpringDamper, TorsionSpringDamper)
+    sprung = cls.type in (SpringDamper.type, TorsionSpringDamper.type)
     if sprung and not {"stiffness", "curve"} & section.table.keys():
         raise section.at("stiffness").fault(
             "missing, expected a number; add the key 'stiffness', or a curve"
