@@ -9,7 +9,7 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, Supplied
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, OF_SEVERAL, Supplied
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ _OPTIONS = {
     CASE: ("closure",),
     MODEL: OF_MODELS,
     **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
-    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, *OF_SEVERAL)),
 }
 
 
@@ -130,10 +130,10 @@ def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:
-        return read_spreadsheet(file, supplied.sheet)
+        return read_spreadsheet(file, supplied)
     text = _text(file, of_spreadsheet=kind in (TABLE, ADAMS))
     if kind in (TREE, TABLE):
-        return {TREE: read_tree, TABLE: read_plain}[kind](file, text, supplied.sheet)
+        return {TREE: read_tree, TABLE: read_plain}[kind](file, text, supplied)
     return {CHRONO: read_chrono, ADAMS: read_adams}[kind](file, text)
 
 

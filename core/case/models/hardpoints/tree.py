@@ -19,7 +19,8 @@ from typing import Any, TypeAlias, cast
 
 from ....errors import brief, remedy, shortened
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, parse, parse_yaml, shown
+from ...io.document import fault, parse, parse_yaml, shown, unknown_name
+from ...io.reader_options import NOTHING, Supplied
 from ...io.table import is_number
 from ...units import LENGTHS
 from .programs import without_comments
@@ -32,8 +33,9 @@ from .table import (
     number,
     one_unit,
     twice,
+    wanted_corner,
 )
-from .templates import ROLES, TEMPLATE_NAMES, compact, normal
+from .templates import ROLES, TEMPLATE_NAMES, agree, compact, corner_of, normal
 
 FEWEST = 3
 """Fewest points, rows or assignments to recognise a form."""
@@ -45,7 +47,7 @@ _AXIS = re.compile(
     r"(?P<name>.*[^\s_.\-\[(:])(?:[\s_.\-\[(:]+(?P<axis>[xyzXYZ])|(?<=[a-z0-9])(?P<bare>[XYZ]))[\])]?"
 )
 _AXIS_FIRST = re.compile(r"(?P<axis>[xyzXYZ])[\s_.\-:]+(?P<name>.+)")
-_FACT = re.compile(r"#?\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
+_FACT = re.compile(r"#?\s*(unit|axes|template|side)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
 _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc", "xyz", "point")
 _NAMES = ("name", "id", "label", "point")
 # Three numbers that are no place.
@@ -102,18 +104,18 @@ class Leaf:
         return ((*above, split[0]), split[1]) if split else None
 
 
-def read_tree(file: Path, text: str, wanted: str | None) -> HardpointTable:
+def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
     """Return the points of a YAML or JSON file.
 
     Args:
-        wanted: section of the tree, if several have points.
+        supplied: section or corner of the tree, if several have points.
 
     Raises:
         CaseError: no YAML or JSON, no points, or points of several suspensions.
     """
     if file.suffix.lower() == ".json":
-        return _table(file, "JSON", json_tree(file, without_comments(text)), wanted)
-    return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], wanted)
+        return _table(file, "JSON", json_tree(file, without_comments(text)), supplied)
+    return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], supplied)
 
 
 def json_tree(file: Path, text: str) -> list[Leaf]:
@@ -156,14 +158,15 @@ def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
 
 
 def read_assignments(
-    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], wanted: str | None
+    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], supplied: Supplied
 ) -> HardpointTable:
     """Return the points of assignments.
 
     Args:
         lines: places and texts of the lines.
         facts: unit, axes and template, from comments.
-        wanted: section of the names, such as `front` in `front.lca_front`, if several have points.
+        supplied: section or corner of the names, such as `front` in `front.lca_front`, if several
+            have points.
 
     Raises:
         CaseError: no points, several units, or points of several suspensions.
@@ -203,7 +206,7 @@ def read_assignments(
             raise fault(file, units[unit], f"{problem}; correct either")
         facts.setdefault("unit", unit)
     stated_facts = [Leaf((key,), value, key) for key, value in facts.items()]
-    return _table(file, "Assigned", [*found, *stated_facts], wanted, left_out)
+    return _table(file, "Assigned", [*found, *stated_facts], supplied, left_out)
 
 
 def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
@@ -237,13 +240,9 @@ def _named(item: Any) -> tuple[str, Any]:
 
 
 def _table(
-    file: Path, tool: str, tree: Sequence[Leaf], wanted: str | None, left_out: Sequence[str] = ()
+    file: Path, tool: str, tree: Sequence[Leaf], supplied: Supplied, left_out: Sequence[str] = ()
 ) -> HardpointTable:
-    """Return the points of a tree.
-
-    Args:
-        wanted: section of the tree, if several have points.
-    """
+    """Return the points of a tree."""
     points, others = _points(file, tree)
     facts = _facts(others)
     if not points:
@@ -253,7 +252,7 @@ def _table(
             "found no point, expected three numbers such as lca_front: [0.1, 0.3, 0.2], or x, y and"
             " z below a name; give a file of hardpoints (beside a URDF, give the URDF)",
         )
-    chosen, dropped = _of_one_suspension(file, [*points], wanted)
+    chosen, dropped, corner = _of_one_suspension(file, [*points], supplied)
     found: dict[str, Hardpoint] = {}
     for keys, name in chosen.items():
         if name in found:
@@ -266,7 +265,9 @@ def _table(
     if unused := [leaf.where for leaf in others if leaf.value not in facts.values()]:
         listed.append(f"values {shortened([brief(each) for each in unused], 8)}")
     return HardpointTable(
-        file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed
+        *(file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed),
+        side=facts.get("side") or (corner or ("", ""))[1] or None,
+        corner=corner,
     )
 
 
@@ -321,13 +322,18 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
             compact(value) in TEMPLATE_NAMES
         ):
             facts.setdefault("template", value)
+        elif key == "side" and value.lower() in ("left", "right"):
+            facts.setdefault("side", value)
     return facts
 
 
 def _of_one_suspension(
-    file: Path, paths: Sequence[Keys], wanted: str | None
-) -> tuple[dict[Keys, str], list[str]]:
-    """Return the names of the points of one suspension by their paths, and what was left out."""
+    file: Path, paths: Sequence[Keys], supplied: Supplied
+) -> tuple[dict[Keys, str], list[str], tuple[str, str] | None]:
+    """Return the names of the points of one suspension by their paths, what was left out, and the
+    corner that keys name, if it is asked for.
+    """
+    wanted = supplied.sheet
     left_out: list[str] = []
     kept = {keys: keys for keys in paths}
     contained = {
@@ -354,6 +360,22 @@ def _of_one_suspension(
         if rest := len(kept) - len(found):
             left_out.append(f"{rest} points of other sections")
         kept = found
+    corner = None
+    named = {keys: [k for k in short[:-1] if corner_of(k)] for keys, short in kept.items()}
+    if supplied.corner is not None and any(named.values()):
+        corner = wanted_corner(file, supplied.corner)
+        short = {
+            keys: tuple(
+                key for k, key in enumerate(short) if k + 1 == len(short) or not corner_of(key)
+            )
+            for keys, short in kept.items()
+            if all(agree(corner_of(key) or ("", ""), corner) for key in named[keys])
+        }
+        if not any(named[keys] for keys in short):
+            known = dict.fromkeys(key for keys in named.values() for key in keys)
+            raise unknown_name(file, "--corner", supplied.corner, known, "a corner of the file")
+        left_out += [f"{len(kept) - len(short)} points of other corners"]
+        kept = short
     sides = {keys: _side(short) for keys, short in kept.items()}
     right = [keys for keys, side in sides.items() if side is _RIGHT]
     if right and _LEFT in sides.values():
@@ -378,7 +400,7 @@ def _of_one_suspension(
         )
         for keys, short in kept.items()
     }
-    return names, left_out
+    return names, left_out, corner
 
 
 def _below(keys: Keys, wanted: str) -> Keys:
