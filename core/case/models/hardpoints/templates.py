@@ -49,7 +49,7 @@ _WORDS: Mapping[str, tuple[str, str]] = {
     "hr": ("rear", "right"),
 }
 _ARM = re.compile(r"([ul])ca_(front|rear|outer)")
-_ARMS = ("{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
+_ARMS = ("{}", "{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
 _ENDS: Mapping[str, Sequence[str]] = {
     end: (
         *(f"{word}{joined}" for word in words for joined in ("", "_pivot", "_inboard", "_inner")),
@@ -223,7 +223,7 @@ def agree(found: tuple[str, str], wanted: tuple[str, str]) -> bool:
 
 def _further_names(role: str) -> Iterable[str]:
     """Yield names of wishbones and tie rods in tables of Adams/Car, Lotus Suspension Analysis,
-    suspension-explorer, OptimumK and others.
+    suspension-explorer, OptimumK, Assetto Corsa and others.
     """
     yield from (f"{rod}_{end}" for rod in _RODS for end in _ROD_ENDS.get(role, ()))
     if found := _ARM.fullmatch(role):
@@ -232,6 +232,8 @@ def _further_names(role: str) -> Iterable[str]:
         if end == "outer":
             yield from (f"{level}_ball_joint", f"{level[0]}bj")
         yield _OPTIMUM[end].format(level[:3].capitalize())
+        place = {"u": "top", "l": "bottom"}[found[1]]
+        yield f"wbtyre_{place}" if end == "outer" else f"wbcar_{place}_{end}"
 
 
 def _read_templates() -> dict[str, Template]:

@@ -10,10 +10,11 @@ one suspension are read.
 
 from __future__ import annotations
 
+import ast
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
@@ -105,17 +106,85 @@ class Leaf:
 
 
 def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
-    """Return the points of a YAML or JSON file.
+    """Return the points of a YAML, JSON or TOML file.
 
     Args:
         supplied: section or corner of the tree, if several have points.
 
     Raises:
-        CaseError: no YAML or JSON, no points, or points of several suspensions.
+        CaseError: no such text, no points, or points of several suspensions.
     """
     if file.suffix.lower() == ".json":
         return _table(file, "JSON", json_tree(file, without_comments(text)), supplied)
+    if file.suffix.lower() == ".toml":
+        return _table(file, "TOML", toml_tree(file, text), supplied)
     return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], supplied)
+
+
+def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+    """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
+    evaluated; what is no number, text, list or dictionary of these is left out.
+
+    Raises:
+        CaseError: not Python, no points, or points of several suspensions.
+    """
+    left_out: list[str] = []
+    leaves = [Leaf((key,), value, key) for key, value in _facts_of_comments(text)]
+    try:
+        for each in ast.parse(text).body:
+            targets = each.targets if isinstance(each, ast.Assign) else []
+            if isinstance(each, ast.AnnAssign):
+                targets = [each.target]
+            value = _literal(getattr(each, "value", None))
+            if not targets or value is None:
+                left_out.append(f"line {each.lineno}")
+                continue
+            for target in targets:
+                path = _KEY.sub(r".\1", ast.unparse(target)).split(".")
+                where = f"line {each.lineno} "
+                found = _leaves(value, tuple(path))
+                leaves += [replace(leaf, where=where + leaf.where) for leaf in found]
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        why = brief(f"{type(error).__name__}: {error}".replace("\n", " "))
+        raise fault(file, "", f"is no Python script of points ({why}); correct it") from None
+    return _table(file, "Python", leaves, supplied, left_out)
+
+
+def _literal(node: ast.AST | None) -> Any:
+    """Return the value of an expression of literals; None for another one. A call with one list, or
+    with three numbers, is a point: `np.array([1, 2, 3])`, `Vector(1, 2, 3)`.
+    """
+    match node:
+        case ast.Constant(value=bool() | None):
+            return None
+        case ast.Constant(value=int() | float() | str()):
+            return node.value
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
+            return -number
+        case ast.List(elts=items) | ast.Tuple(elts=items):
+            values = [_literal(item) for item in items]
+            return None if None in values else values
+        case ast.Dict():
+            pairs = zip(node.keys, node.values, strict=True)
+            return _named_values((_literal(key), _literal(value)) for key, value in pairs)
+        case ast.Call(func=ast.Name(id="dict"), args=[]):
+            return _named_values((each.arg, _literal(each.value)) for each in node.keywords)
+        case ast.Call(args=[ast.List() | ast.Tuple() as only], keywords=[]):
+            return _literal(only)
+        case ast.Call(args=[_, _, _] as items, keywords=[]):
+            return _literal(ast.List(items))
+        case _:
+            return None
+
+
+def _named_values(pairs: Iterable[tuple[Any, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if isinstance(key, str | int | float) and value is not None:
+            if str(key) in found:
+                raise ValueError(f"the key {key!r} stands twice")
+            found[str(key)] = value
+    return found
 
 
 def json_tree(file: Path, text: str) -> list[Leaf]:
@@ -126,6 +195,17 @@ def json_tree(file: Path, text: str) -> list[Leaf]:
     """
     listed = text.lstrip().startswith("[")
     return [*_leaves(parse(file, f'{{"points": {text}}}' if listed else text))]
+
+
+def toml_tree(file: Path, text: str) -> list[Leaf]:
+    """Return the values of a TOML text, and facts of its comments.
+
+    Raises:
+        CaseError: not TOML.
+    """
+    facts = _facts_of_comments(text)
+    stated = [Leaf((key,), value, key) for key, value in facts]
+    return [*_leaves(parse(file, text)), *stated]
 
 
 def has_points(tree: Sequence[Leaf]) -> bool:
@@ -149,6 +229,11 @@ def fact_of(text: str) -> tuple[str, str] | None:
     """Return the fact in a comment or title, `units: mm`: its name and its value; None without."""
     found = _FACT.fullmatch(text.strip())
     return (found[1].lower(), found[2].strip()) if found else None
+
+
+def _facts_of_comments(text: str) -> list[tuple[str, str]]:
+    comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
+    return [fact for comment in comments if (fact := fact_of(comment))]
 
 
 def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
