@@ -57,6 +57,11 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points.add_argument(
+        "--side",
+        metavar="SIDE",
+        help="side of the wheel, left or right; without it, the side follows from the points",
+    )
+    points.add_argument(
         "--names",
         type=Path,
         metavar="FILE",
@@ -112,6 +117,11 @@ def add_options(command: argparse.ArgumentParser) -> None:
     )
     points.add_argument(
         "--drive-share", metavar="X", help="share of the driving force at this axle, 0 to 1"
+    )
+    points.add_argument(
+        "--corner",
+        metavar="NAME",
+        help="wheel of a table of the whole car: FL, FR, RL, RR, or in words",
     )
     points.add_argument(
         "--sheet",

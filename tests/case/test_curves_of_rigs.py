@@ -168,7 +168,7 @@ FAULTS = {
     "stated unit contradicts": ({}, {"columns": ["toe=toe [rad]"]}, ["in 'deg' and 'rad'"]),
     "accuracy of two outputs": ({}, {"accuracy": ["0.1"]}, ["--accuracy", "with a column"]),
     "accuracy of nothing": ({}, {"accuracy": ["caster=1 deg"]}, ["'caster'", "with a column"]),
-    "a gap": ({"form": "{},,{}"}, {}, ["line 2", "''", "finite number"]),
+    "a gap": ({"form": "{},,{}"}, {}, ["'toe [deg]'", "0 numbers", "expected 4"]),
 }
 
 

@@ -176,11 +176,8 @@ def test_what_is_no_point_is_listed(tmp_path):
     assert listed.split(", ") == [*RIGHT]
 
 
-def test_the_right_side_is_read_as_the_left(tmp_path, plain):
-    """Mirrored by its axes, as the message says."""
+def test_right_points_are_read_as_left_ones_by_axes(tmp_path, plain):
     text = table(points={name: (x, -y, z) for name, (x, y, z) in POINTS.items()})
-    with pytest.raises(CaseError, match="those of the right side are read as left ones if --axes"):
-        read(tmp_path, text)
     said = Supplied("double_wishbone", "mm", "rearward,left,up")
     assert read(tmp_path, text, said).mechanism == plain
 

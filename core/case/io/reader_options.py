@@ -17,6 +17,8 @@ class Supplied:
         travel: wheel travel of a suspension, up and down: "METRES", "METRES:SAMPLES" or
             "START:STOP:SAMPLES".
         rack: simultaneous travel of the rack to the left: "METRES" or "START:STOP".
+        side: side of the wheel of hardpoints, "left" or "right"; by default from the points.
+        corner: corner of a car of which hardpoints are read: "FL", "rear right", ...
         sheet: sheet of a workbook with several tables.
         names: file of the user's own names of hardpoints, by role of the template.
         wheel_radius: loaded radius of the wheel of hardpoints [m].
@@ -49,6 +51,8 @@ class Supplied:
     cg_height: str | None = None
     brake_share: str | None = None
     drive_share: str | None = None
+    side: str | None = None
+    corner: str | None = None
     sheet: str | None = None
     drive: tuple[str, ...] = ()
     hold: tuple[str, ...] = ()
@@ -67,8 +71,9 @@ class Supplied:
 
 
 _NAMES = tuple(each.name.replace("_", "-") for each in fields(Supplied))
-OF_HARDPOINTS = _NAMES[: _NAMES.index("sheet")]
-"""Options of each kind of file; those of hardpoints may have a sheet, too."""
+_CORNER = _NAMES.index("corner")
+OF_HARDPOINTS, OF_SEVERAL = _NAMES[:_CORNER], _NAMES[_CORNER : _CORNER + 2]
+"""Options of all hardpoints, and of files with those of several wheels."""
 NOTHING = Supplied()
 
 LEFT_OUT = "; left out: "

@@ -520,9 +520,7 @@ def required_unit(file: Path, where: str, column: str, unit: str, si: str) -> Un
 
 
 def is_unit_row(cells: Sequence[object]) -> bool:
-    """Return whether cells are units, as in a row below the heads."""
-    texts = [cell for cell in cells if cell != ""]
-    return bool(texts) and all(
-        isinstance(each, str) and each.strip() != "1" and read_unit(each.strip("[]() ")) is not None
-        for each in texts
-    )
+    """Return whether most cells are units, as in a row below the heads."""
+    texts = [str(cell).strip("[]() ") for cell in cells if cell != ""]
+    units = [text for text in texts if text != "1" and read_unit(text) is not None]
+    return bool(texts) and 2 * len(units) > len(texts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, OF_HARDPOINTS, Supplied
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_SEVERAL, Supplied
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
@@ -18,17 +19,21 @@ if TYPE_CHECKING:
 
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
-TREES = (".yaml", ".yml")
+TREES = (".yaml", ".yml", ".py")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
 DATASETS = (".adm",)
-SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS, *DATASETS)
+SUFFIXES = (
+    *(*CASE_FILES, ".ini", ".pm", *TABLES, *TREES, *WORKBOOKS),
+    *(*ADAMS_FILES, *MODELS, *DATASETS),
+)
 """Suffixes of names that are files, whether they exist or not."""
 
-CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
+CASE, CHRONO, ADAMS, ASSETTO, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "case file",
     "Project Chrono suspension",
     "Adams/Car hardpoints",
+    "Assetto Corsa suspension",
     "hardpoint table",
     "tree of hardpoints",
     "workbook of hardpoints",
@@ -37,6 +42,8 @@ CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
 )
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
+    ".pm": "is a suspension of rFactor, whose bars have no names of points; write their ends into a"
+    " table, name,x,y,z, with --units m --axes left,up,rearward",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     ".mjb": "is compiled; give the MJCF that it is made of",
     ".osim": "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case",
@@ -62,12 +69,13 @@ UNREAD = {
     ),
 }
 """Files that people have beside their models, and what to do, by suffix."""
+_OF_CASE = re.compile(r"^\s*(?:schema\s*=|\[+\s*(?:bodies|joints|drivers|sweep)\b)", re.MULTILINE)
 _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
     DATASET: ("drive", "hold", "hold-rest", "without", "closure"),
     **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
-    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE, ASSETTO), (*OF_HARDPOINTS, *OF_SEVERAL)),
 }
 
 
@@ -133,15 +141,18 @@ def read_tree(file: Path) -> Tree:
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.programs import read_adams, read_chrono
+    from .hardpoints.programs import read_adams, read_assetto, read_chrono
     from .hardpoints.rows import read_plain, read_spreadsheet
-    from .hardpoints.tree import read_tree
+    from .hardpoints.tree import read_python, read_tree
 
     if kind == WORKBOOK:
-        return read_spreadsheet(file, supplied.sheet)
+        return read_spreadsheet(file, supplied)
     text = _text(file, of_spreadsheet=kind in (TABLE, ADAMS))
-    if kind in (TREE, TABLE):
-        return {TREE: read_tree, TABLE: read_plain}[kind](file, text, supplied.sheet)
+    if kind == TREE and file.suffix.lower() == ".py":
+        return read_python(file, text, supplied)
+    if kind in (TREE, TABLE, ASSETTO):
+        readers = {TREE: read_tree, TABLE: read_plain, ASSETTO: read_assetto}
+        return readers[kind](file, text, supplied)
     return {CHRONO: read_chrono, ADAMS: read_adams}[kind](file, text)
 
 
@@ -153,7 +164,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     """
     suffix = file.suffix.lower()
     if suffix == ".toml":
-        return CASE
+        return _kind_of_toml(file)
     if suffix == ".json":
         return _kind_of_json(file, supplied)
     for kind, suffixes in (
@@ -166,12 +177,25 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     ):
         if suffix in suffixes:
             return kind
+    from .hardpoints.programs import is_assetto
+
     text = _text(file, of_spreadsheet=True)
     if "[HARDPOINT]" in text:
         return ADAMS
     if text.lstrip().startswith("<"):
         return MODEL
+    if suffix == ".ini" and is_assetto(text):
+        return ASSETTO
     return TABLE if supplied.template or suffix == ".txt" else CASE
+
+
+def _kind_of_toml(file: Path) -> str:
+    text = _text(file)
+    if _OF_CASE.search(text):
+        return CASE
+    from .hardpoints.tree import has_points, toml_tree
+
+    return TREE if has_points(toml_tree(file, text)) else CASE
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:

@@ -116,16 +116,23 @@ class AxleMotion(StrEnum):
 
 
 def mechanism_of(
-    file: Path, said: str | None, template: Template, at: Mapping[str, Vector], travels: Travels
+    file: Path,
+    said: str | None,
+    template: Template,
+    at: Mapping[str, Vector],
+    travels: Travels,
+    side: Side,
 ) -> tuple[Mechanism, Sweep]:
     """Return the mechanism of a template and its motion.
 
-    The left wheel travels up and down, with the rack if it moves. Of an axle the right side mirrors
-    the left, and both wheels travel, or the rack to the left and to the right. The rack carries the
+    The wheel travels up and down, with the rack if it moves. The right side mirrors the left; of an
+    axle, and both wheels travel, or the rack to the left and to the right. The rack carries the
     inner joints of the tie rods, and slides along y. Without tie rods there is no rack.
 
     Args:
         said: motion of both wheels of an axle; None for one wheel.
+        at: positions by role of a left wheel, or of the mirror image of a right one [m].
+        side: of the one wheel.
 
     Raises:
         CaseError: an unknown motion, or the rack moves and there are no tie rods.
@@ -144,7 +151,7 @@ def mechanism_of(
         problem = "found it beside --axle steer, whose --travel is that of the rack"
         raise fault(file, "--rack", f"{problem}, expected one of them; leave it out")
     racked = bool(template.steered) and (said is not None or travels.rack is not None)
-    sides = {"": 1} if said is None else {f"{side}_": side.left for side in Side}
+    sides = {"": side.left} if said is None else {f"{side}_": side.left for side in Side}
     joints: list[Joint] = []
     points: list[Point] = []
     drivers: list[Driver] = []
@@ -160,7 +167,9 @@ def mechanism_of(
         drivers.append(PointCoordinate(prefix + STROKE, prefix + WHEEL_CENTER, AXES["z"]))
     strokes = [driver.name for driver in drivers]
     if racked:
-        joints.append(Translational(SLIDE, GROUND, RACK, at[TIEROD_INNER], AXES["y"]))
+        x, y, z = at[TIEROD_INNER]
+        middle = (x, sides.get("", 1) * y, z)
+        joints.append(Translational(SLIDE, GROUND, RACK, middle, AXES["y"]))
         drivers.append(JointDisplacement(RACK_TRAVEL, SLIDE))
     names = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
     bodies = [Body(name) for name in names]

@@ -41,13 +41,14 @@ def vehicle_of(
     named: Mapping[str, str],
     at: Mapping[str, Vector],
     supplied: Supplied,
+    side: Side,
 ) -> Vehicle:
-    """Return the vehicle around the left wheel; the wheel's radius and axis follow from points if
+    """Return the vehicle around the wheel; the wheel's radius and axis follow from points if
     the table has them.
 
     Args:
         named: names of the points in the file, by role.
-        at: positions by role [m].
+        at: positions by role of a left wheel, or of the mirror image of a right one [m].
 
     Raises:
         CaseError: a length is unusable or contradicts the points, the axis points inboard, or an
@@ -82,7 +83,7 @@ def vehicle_of(
         raise unknown_name(file, "--position", position, [*Axle], "an axle")
     return Vehicle(
         convention=Convention.ISO_8855,
-        side=Side.LEFT,
+        side=side,
         forward=(1.0, 0.0, 0.0),
         up=(0.0, 0.0, 1.0),
         wheel_center=WHEEL_CENTER,
@@ -163,7 +164,7 @@ def with_suspension_outputs(
     template's watched points.
 
     Args:
-        vehicle: the vehicle around the left wheel.
+        vehicle: the vehicle around the wheel.
         motion: motion of both wheels; None for one wheel.
         steered: whether the rack moves during the wheel's travel.
     """
