@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
+    from .replay import Residuals, Worst, judged_part, replayed, residuals
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
     from .verified.exact import Exact, Reading, as_decimal, as_double
@@ -105,6 +106,7 @@ _NAMES = {
     "formulation.parameters": "LoadPlace kinds load_places placed places",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
+    "replay": "Residuals Worst judged_part replayed residuals",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",
