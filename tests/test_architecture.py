@@ -74,7 +74,7 @@ IMPORTS = {
     "case/io": ". joints mechanism kinematics case case/suspension",
     "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
     "case/models/trees": ". joints mechanism kinematics case case/io",
-    "case/models": ". case case/io case/models/hardpoints case/models/trees",
+    "case/models": ". joints mechanism case case/io case/models/hardpoints case/models/trees",
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
@@ -83,7 +83,7 @@ IMPORTS = {
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/truth": ". program mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/truth",
-    "studies": ". program joints kinematics case case/io harness report",
+    "studies": ". program joints kinematics case case/io harness",
     "studies/checks": (
         ". primitives program joints mechanism kinematics case case/io "
         "harness harness/workers report"
@@ -98,6 +98,7 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
+    "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
@@ -107,7 +108,7 @@ IMPORTS = {
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/diagnosis studies/bench"
+        "studies/paper studies/same studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": "case case/io harness harness/workers studies/checks cli __init__",

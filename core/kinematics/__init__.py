@@ -10,6 +10,8 @@ Solve:
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
+    residuals          what poses from elsewhere leave of the rows
+    FreeMotion         poses reached without drivers, and bodies placed to fit others
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
@@ -77,6 +79,7 @@ if TYPE_CHECKING:
     from .formulation.cartesian import COLUMNS, Cartesian
     from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
+    from .free_motion import FreeMotion, Poses, Walked
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
     from .replay import Residuals, Worst, judged_part, replayed, residuals
@@ -104,6 +107,7 @@ _NAMES = {
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
+    "free_motion": "FreeMotion Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
     "replay": "Residuals Worst judged_part replayed residuals",
