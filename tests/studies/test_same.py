@@ -137,6 +137,14 @@ def test_converted_file_is_within_its_digits(tmp_path, capsys):
     assert "velocity limit of left, right" in text
 
 
+def test_other_mechanisms_differ_by_freedoms():
+    pair = (undriven_case(cases.load(name), name) for name in ("four_bar", "five_bar"))
+    found = compare(*pair, {})
+    assert found.verdict == "differs"
+    assert "freedom 1 against 2" in found.reason
+    assert found.largest is None
+
+
 def test_one_file_asks_for_another(tmp_path, capsys):
     (file := Path(tmp_path) / "gripper.urdf").write_text(GRIPPER)
     assert main(["same", str(file)]) == 2

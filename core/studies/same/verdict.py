@@ -162,7 +162,9 @@ class _Pair:
             placement=None,
         )
         if found.reason:
-            return found
+            differ = [*self._freedoms(walked)]
+            kind = "differs" if differ else "not judged"
+            return replace(found, verdict=kind, reason="; ".join([*differ, found.reason]))
         own = walked[0].poses
         place = placement(a, b, match, own, self.motions[1], self.enough)
         back, reverse = place.reversed, match.reversed
