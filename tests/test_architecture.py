@@ -80,7 +80,7 @@ IMPORTS = {
     "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
     "case/models/trees": ". joints mechanism kinematics case case/io",
     "case/models/adams": ". joints mechanism kinematics case case/io",
-    "case/models": ". case case/io case/models/adams case/models/hardpoints case/models/trees",
+    "case/models": ". joints mechanism case case/io case/models/adams case/models/hardpoints case/models/trees",
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
@@ -106,6 +106,7 @@ IMPORTS = {
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/compliance": (". mechanism kinematics case case/suspension report"),
+    "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
@@ -115,7 +116,7 @@ IMPORTS = {
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/diagnosis studies/bench studies/compliance"
+        "studies/paper studies/same studies/diagnosis studies/bench studies/compliance"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (

@@ -18,6 +18,7 @@ COMMANDS = (
     "reference",
     "explain",
     "assemblies",
+    "same",
     "trace",
     "kc",
     "doctor",

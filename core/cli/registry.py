@@ -48,6 +48,8 @@ class Registry:
         summary: returns kind of reference and source of a built-in case by its name, without
             loading it.
         simulations: names of the engines in simulate mode.
+        converters: names of the simulators that save models.
+        converter: returns the function of such a name, from a file to the text of another.
     """
 
     engines: Sequence[str]
@@ -58,6 +60,8 @@ class Registry:
     writer: Callable[[str], Writer]
     summary: Callable[[str], tuple[str, str]]
     simulations: Sequence[str] = ()
+    converters: Sequence[str] = ()
+    converter: Callable[[str], Callable[[Path], str]] | None = None
 
     def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
         """Return the case of a name or in a file.

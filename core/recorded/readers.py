@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..case.io.document import fault, read_bytes, read_text, shown
-from ..case.io.reference_samples import head_of, read_table, samples_of
+from ..case.io.reference_samples import layout_of, read_table, samples_of
 from ..case.io.table import unit_of_head
 from ..case.models.trees.element import Element, parse_xml
 from ..errors import CaseError, brief, remedy
@@ -71,14 +71,14 @@ def read_recording(
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     opensim = file.suffix.lower() in _OPENSIM
     table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
-    where, texts = head_of(table)
-    chosen = choose([Head(*unit_of_head(file, where, text)) for text in texts])
+    layout = layout_of(table)
+    chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
     samples = samples_of(table, chosen, gaps=True)
     columns: dict[int, Column] = {}
     for k, values, printed, text in zip(
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
-        head = Head(*unit_of_head(file, where, text))  # with the unit of a row of units
+        head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
         columns[k] = Column(head, values, printed.half(np.nan_to_num(values)))
     if not opensim:
         return Recording(file, columns)

@@ -15,6 +15,7 @@ from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
+    from .trees.element import Element
     from .trees.tree import Tree
 
 CASE_FILES = (".toml", ".json")
@@ -126,9 +127,7 @@ def read_tree(file: Path) -> Tree:
     Raises:
         CaseError: it is no such model, or something in it makes no sense.
     """
-    from .trees.element import parse_xml
-
-    root = parse_xml(file, _text(file))
+    root = root_of(file)
     match root.tag:
         case "robot":
             from .trees.urdf import read_urdf as read
@@ -136,7 +135,20 @@ def read_tree(file: Path) -> Tree:
             from .trees.sdf import read_sdf as read
         case _:
             from .trees.mjcf import read_mjcf as read
-    return read(file, root)
+    tree = read(file, root)
+    tree.dialect = root.tag
+    return tree
+
+
+def root_of(file: Path) -> Element:
+    """Return the root element of a model in XML.
+
+    Raises:
+        CaseError: it is no XML.
+    """
+    from .trees.element import parse_xml
+
+    return parse_xml(file, _text(file))
 
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:

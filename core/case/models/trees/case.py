@@ -26,11 +26,11 @@ from ....joints import (
     Translational,
 )
 from ....joints.base import triad
-from ....kinematics import degrees_of_freedom
+from ....kinematics import degrees_of_freedom, reduce_rows
 from ....mechanism.body import Body, Inertia, checked_inertia
 from ....mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ....mechanism.mechanism import GROUND, Mechanism, Point
-from ....mechanism.motions import Absolute, JointAngle, JointDisplacement, Motion, Table
+from ....mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
@@ -62,6 +62,22 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
             joint for one of its ties.
     """
     return _Parts(*model_of(tree, supplied)).case()
+
+
+def undriven(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
+    """Return the mechanism of a tree without drivers, the tree in its closed start, and its links
+    with a free turn about themselves.
+
+    Raises:
+        CaseError: its start does not close, or there is no joint for one of its ties.
+    """
+    _require_coupled(tree)
+    model = assemble(read_start(tree, ()), None)
+    spins = find_spins(model.tree, ())
+    whole = _Parts(model, Driving({}, (), ()), spins).mechanism()
+    if not model.is_exact:
+        whole = reduce_rows(whole, model.closing.tolerance, [*tree.joints]).mechanism
+    return whole, model.tree, {spin.move.inner for spin in spins.values()}
 
 
 def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
@@ -120,8 +136,6 @@ class _Parts:
     def case(self) -> Case:
         """Return the case, without rows that are redundant within the digits."""
         tree, model, closing = self.tree, self.model, self.model.closing
-        bodies = [*self._bodies()]
-        weighed = any(body.mass for body in bodies)
         with explained(tree.file):
             drivers = [
                 (JointAngle if isinstance(self.joints[name], Revolute) else JointDisplacement)(
@@ -129,12 +143,8 @@ class _Parts:
                 )
                 for name in self.driving.moves
             ]
-            mechanism = Mechanism(
-                *(tree.file.stem, bodies, [*self.joints.values()], [*self._points()], drivers),
-                [*self.couplers.values()],
-                gravity=tree.gravity if weighed else NO_GRAVITY,
-                forces=[*self._springs()],
-            )
+        mechanism = self.mechanism(drivers)
+        weighed = any(body.mass for body in mechanism.bodies)
         left_out = [*self.left_out, *(f"{what} ({n})" for what, n in tree.left_out.items())]
         heavy = ", with the masses of its bodies" * weighed
         others = ", ".join(left_out) or "nothing"
@@ -158,6 +168,18 @@ class _Parts:
                 " --closure",
             )
         return with_all_motions(case)
+
+    def mechanism(self, drivers: Sequence[Driver] = ()) -> Mechanism:
+        """Return the mechanism with all its rows."""
+        tree, bodies = self.tree, [*self._bodies()]
+        weighed = any(body.mass for body in bodies)
+        with explained(tree.file):
+            return Mechanism(
+                *(tree.file.stem, bodies, [*self.joints.values()], [*self._points()], drivers),
+                [*self.couplers.values()],
+                gravity=tree.gravity if weighed else NO_GRAVITY,
+                forces=[*self._springs()],
+            )
 
     def _unused(self, wanted: str) -> str:
         """Return an unused name: ties, moves and links of a model may share names."""

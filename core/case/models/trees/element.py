@@ -317,10 +317,15 @@ _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")
 
 
 def significant_digits(root: Element) -> int:
+    """Return `printed_digits` of a model; one without any is taken to have six."""
+    return printed_digits(root) or _FEWEST
+
+
+def printed_digits(root: Element) -> int:
     """Return the number of significant digits of the places of a model, without zeros at the end.
 
-    Numbers of six digits and more count, half of which have as many or more; a model without any is
-    taken to have six.
+    Numbers of six digits and more count, half of which have as many or more; 0 without any, whose
+    numbers are a designer's own.
     """
     counts: list[int] = []
     for element in root.below():
@@ -329,4 +334,4 @@ def significant_digits(root: Element) -> int:
         for found in map(_NUMBER.fullmatch, " ".join(texts).split()):
             if found and (count := len(found[1].replace(".", "").rstrip("0"))) >= _FEWEST:
                 counts.append(count)
-    return int(statistics.median(counts)) if counts else _FEWEST
+    return int(statistics.median(counts)) if counts else 0

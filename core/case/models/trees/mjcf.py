@@ -156,6 +156,7 @@ class _Reader:
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
         driven = [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS]
         tree.actuated.update(filter(None, driven))
+        tree.degrees, tree.limited = self.compiler.degrees, self.compiler.limited
         if tree.masses:
             tree.gravity = self._gravity()
         return tree

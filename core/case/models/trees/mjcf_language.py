@@ -189,6 +189,7 @@ class Compiler:
         least: lower bounds of mass and principal moments [kg, kg m^2].
         balanced: principal moments that break the triangle inequality become their mean.
         total: mass of the whole model [kg]; negative for no such rule.
+        limited: a joint with a range is limited, unless it says otherwise.
     """
 
     degrees: bool = True
@@ -199,6 +200,7 @@ class Compiler:
     least: tuple[float, float] = (0.0, 0.0)
     balanced: bool = False
     total: float = -1.0
+    limited: bool = True
 
     def angle(self, value: float) -> float:
         """Return an angle of the file [rad]."""
@@ -308,6 +310,7 @@ def read_compiler(root: Element) -> Compiler:
             (element.number("boundmass", mass), element.number("boundinertia", moment)),
             element.flag("balanceinertia", default=found.balanced),
             element.number("settotalmass", found.total),
+            element.flag("autolimits", default=found.limited),
         )
     return found
 
