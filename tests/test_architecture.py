@@ -23,6 +23,7 @@ LAYERS = (
     ("history",),
     ("report",),
     ("studies",),
+    ("live",),
     ("cli",),
     ("__init__",),
     ("kincheck",),
@@ -103,12 +104,16 @@ IMPORTS = {
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
     ),
+    "live": (
+        ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "
+        "harness report"
+    ),
     "cli": (
         ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/diagnosis studies/bench"
+        "studies/paper studies/diagnosis studies/bench live"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": "case case/io harness harness/workers studies/checks cli __init__",

@@ -19,6 +19,7 @@ COMMANDS = (
     "explain",
     "assemblies",
     "trace",
+    "serve",
     "doctor",
     "history",
     "report",

@@ -111,6 +111,7 @@ class NativeSolver:
         varied: Sequence[str],
         points: Sequence[str] = (),
         forces: Collection[str] = (),
+        bodies: Sequence[str] = (),
     ) -> PreparedDesigns:
         """Return the mechanism made ready for many designs, as one program.
 
@@ -122,11 +123,12 @@ class NativeSolver:
             points: names of the points whose motion is wanted.
             forces: names of joints, drivers and force elements whose forces are wanted; they take
                 order 2.
+            bodies: names of the bodies whose poses are wanted.
 
         Raises:
             SolveError: as `prepare`.
         """
-        request = self._request(path, points, (), varied)
+        request = self._request(path, points, bodies, varied)
         if not forces:
             return PreparedDesigns(Route(compile_model(mechanism, request), path))
         from .design_forces import DesignForces, compile_with_forces  # most studies are without

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..mechanism.motions import Path
 from ..program import ITERATIONS
 from ..trajectory import QUANTITIES, Array
@@ -71,6 +73,11 @@ class PreparedDesigns:
         """
         rows, orders = self.route.model.rows, self.route.model.orders
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
+
+    def pose(self, found: Variants, body: str) -> Array:
+        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        rows = self.route.model.rows
+        return np.concatenate([found.kept[rows[f"{each} {body}"]] for each in "rp"])
 
     def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
         """Return the forces of solved designs; None where none are wanted.
