@@ -1,4 +1,4 @@
-"""The live page: a design that answers while it is edited.
+"""The live page: a design answers while the user edits it.
 
     protocol    the messages between page and server, as JSON
     table       a table of hardpoints, whose numbers are inputs of one program

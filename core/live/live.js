@@ -18,7 +18,7 @@ const DIRECTIONS = {
   let edited = false;
   let parts = null;
   let asked = 0;
-  window.kincheckLive = state;
+  window.kincheckLive = state; // for scripts and tests
 
   const say = (text) => (one("#state").textContent = text);
   function trouble(text, where = "#trouble") {
@@ -44,6 +44,8 @@ const DIRECTIONS = {
     changed: (message) => trouble(message.message, "#changed"),
     lost: () => say("connection lost; start kincheck serve again: your numbers stay here"),
   });
+
+  state.isDue = () => link.isDue("solve") || link.isDue("move");
 
   function open(message) {
     opening = message;
@@ -88,6 +90,8 @@ const DIRECTIONS = {
       parts.table.chosen(k);
     };
     parts.design = design;
+    state.rows = () => design.rows();
+    state.spots = (plane) => parts.planes.spots(plane);
     parts.planes = planes(one("#planes"), points, view, design, choose);
     parts.table = pointTable(one("#points"), points, unit, design, { choose, refuse: trouble });
     one("#points caption").textContent =

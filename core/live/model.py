@@ -24,14 +24,14 @@ from .table import FRAMES, TOL, as_values, live_axis, live_outputs, sweep_axis
 WAY = 33
 """Samples on the way from the design to a pose; longer steps are divided by the solver."""
 REACH = 129
-"""Samples on the way to the end of a slider, one of which is the last that is reached."""
+"""Samples on the way to the end of a slider, which tell its reach."""
 
 
 class LiveModel:
     """A mechanism with drivers, opened.
 
     Args:
-        file: where it is from.
+        file: the file of the case.
         case: the mechanism, its sweep and its outputs.
     """
 
@@ -98,8 +98,8 @@ class LiveModel:
         )
 
     def pose(self, number: int, values: Mapping[str, float], *, measured: bool) -> Pose:
-        """Return the pose at values of the drivers, straight from the design; where the way ends
-        before, the last pose on it.
+        """Return the pose at values of the drivers, straight from the design, or the last pose
+        before a lock-up.
 
         Args:
             measured: whether the distance from a singular pose is wanted, which takes longer.
@@ -150,7 +150,7 @@ class LiveModel:
         return Way({name: Ramp(changes.get(name, 0.0)) for name in names}, times, design)
 
     def _distance(self, changes: Mapping[str, float], share: float) -> float:
-        """Return the smallest singular value of the rows at a place of a way, over that at its
+        """Return the smallest singular value of the rows at a place of a way, over the one at its
         beginning.
         """
         way = self._way(changes, np.array([0.0, share]))
@@ -182,7 +182,7 @@ class LiveModel:
 
     def _driver(self, name: str) -> LiveDriver:
         """Return a driver with a slider of a turn, or of a length of the mechanism, to both sides,
-        or of its own sweep if that is wider.
+        or of its own wider sweep.
         """
         mechanism, sweep = self.case.mechanism, self.case.sweep
         design, turns = mechanism.design_value(name), mechanism.driver(name).turns

@@ -11,7 +11,8 @@ const PLANE_VIEWS = [
 // The views of a table's points in a box.
 //   metres: from a position in the file to global metres, and `file` back;
 //   design: the numbers; choose: called with the point that is taken.
-// Returns `change` (the drawing), `ghost` (another drawing behind it) and `draw`.
+// Returns `change` (the drawing), `ghost` (another drawing behind it), `draw`, `choose` (a point) and
+// `spots` (the places of all points in a view [px]).
 function planes(box, points, { metres, file, step }, design, choose) {
   const state = { drawing: null, motion: null, bounds: null, ghost: null, chosen: -1 };
   const views = PLANE_VIEWS.map(([plane, name]) => planeView(plane, name));
@@ -112,7 +113,8 @@ function planes(box, points, { metres, file, step }, design, choose) {
     canvas.addEventListener("pointerup", release);
     canvas.addEventListener("pointercancel", release);
     new ResizeObserver(draw).observe(canvas);
-    return { figure, draw };
+    const spots = () => design.rows().map((row) => camera().seen(metres(row)).slice(0, 2));
+    return { figure, draw, spots };
   }
 
   const draw = () => views.forEach((view) => view.draw());
@@ -124,6 +126,7 @@ function planes(box, points, { metres, file, step }, design, choose) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   return {
     draw,
+    spots: (view) => views[view].spots(),
     change(drawing) {
       state.drawing = drawing;
       state.motion = motionOf(drawing);

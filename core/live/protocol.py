@@ -1,4 +1,4 @@
-"""Messages of the live page as JSON: what a page asks, and what the server answers.
+"""Messages of the live page as JSON: questions of a page, and answers of the server.
 
 Lengths of points are in the unit and along the axes of the file; everything else is SI.
 """
@@ -75,7 +75,7 @@ class Check(_Message, frozen=True):
 
 
 class Save(_Message, frozen=True):
-    """Write a table with these points to a new file beside that of the user."""
+    """Write a table with these points to a new file beside the user's own."""
 
     points: Rows
     name: Name
@@ -86,7 +86,7 @@ Asked: TypeAlias = Solve | Rank | Move | Reach | Check | Save
 
 class LivePoint(msgspec.Struct, frozen=True):
     """A row of the table: its name, numbers as in the file, and roles in the template; none for a
-    row that the template does not use.
+    row without use in the template.
     """
 
     name: str
@@ -110,7 +110,7 @@ class LiveOutput(msgspec.Struct, frozen=True):
 
 
 class LiveDriver(msgspec.Struct, frozen=True):
-    """A driver that a page may move, with the ends of its slider [m or rad]."""
+    """A driver for the page to move, with the ends of its slider [m or rad]."""
 
     name: str
     unit: str
@@ -159,7 +159,7 @@ class Answer(_Message, frozen=True):
     """The motion over the sweep.
 
     Attributes:
-        outputs: values by output; null where there is none.
+        outputs: values by output; null without a value.
         solved: whether each sample was reached.
         drawing: the scene, as in reports; its frames are the samples in `frames`.
         message: why samples are missing; empty if none are.
@@ -181,7 +181,7 @@ class Pose(_Message, frozen=True):
         drivers: values reached, by driver [m or rad].
         share: of the way from the design.
         bodies: origin and Euler parameters, seven numbers, by body.
-        distance: smallest singular value of the rows over that at design: 0 is a singular pose;
+        distance: smallest singular value of the rows over the one at design: 0 is a singular pose;
             null if it was not asked for.
         message: why the way ends before; empty if it does not.
     """
@@ -196,8 +196,8 @@ class Pose(_Message, frozen=True):
 
 
 class Reached(_Message, frozen=True):
-    """The values up to which a mechanism moves if only this driver does [m or rad], and what ends
-    its way on either side; empty where the slider ends before.
+    """The values up to which a mechanism moves if only this driver does [m or rad], and the
+    reason on either side; empty if the slider ends before.
     """
 
     driver: str
@@ -207,11 +207,11 @@ class Reached(_Message, frozen=True):
 
 
 class Refused(_Message, frozen=True):
-    """A design that cannot be solved.
+    """A design without a solution.
 
     Attributes:
-        message: what the file with these numbers would get.
-        point: the row of the table that it is about; empty if unknown.
+        message: the message to a file with these numbers.
+        point: the row of the table at fault; empty if unknown.
     """
 
     message: str
@@ -239,7 +239,7 @@ class Verdict(_Message, frozen=True):
 
     Attributes:
         worst: largest deviation over its tolerance; null if nothing was compared.
-        output: the output that has it.
+        output: the output with this deviation.
     """
 
     engine: str
@@ -257,7 +257,7 @@ class Saved(_Message, frozen=True):
 
 
 class Invalid(_Message, frozen=True):
-    """A message that cannot be answered, and why."""
+    """A message without an answer, and the reason."""
 
     message: str
 

@@ -19,7 +19,7 @@ NAME = re.compile(r"[^\W_][\w .+-]{0,80}\.csv")
 
 
 def free_name(file: Path) -> str:
-    """Return a name beside a file that no file has."""
+    """Return a free name beside a file."""
     names = (f"{file.stem}_{k}.csv" for k in range(2, 1000))
     return next((name for name in names if not (file.parent / name).exists()), "")
 
@@ -105,7 +105,7 @@ def _edited(
 
 
 def _written(table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]) -> str:
-    """Return a new table as CSV, with what the readers of it ask for."""
+    """Return a new table as CSV, with unit, axes and template."""
     known = {
         "template": table.template or supplied.template,
         "units": unit_of(table, supplied.units).name,
@@ -121,5 +121,5 @@ def _written(table: HardpointTable, supplied: Supplied, points: Sequence[Sequenc
 
 
 def _plain(number: float) -> str:
-    """Return the shortest text that is read as the number."""
+    """Return the shortest exact text of a number."""
     return str(int(number)) if number == int(number) and abs(number) < 1e15 else repr(number)

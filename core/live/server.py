@@ -51,7 +51,7 @@ from .table import LiveTable
 
 HOST = "127.0.0.1"
 LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", re.IGNORECASE)
-"""Hosts that are this machine; any port, for tunnels such as ssh -L."""
+"""Names of this machine; any port, for tunnels such as ssh -L."""
 MOST_PAGES = 16
 LIVE_SCRIPTS = ("link.js", "table.js", "planes.js", "figures.js", "sliders.js", "live.js")
 HEADERS = {
@@ -67,7 +67,7 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 GRACE = 2.0
-"""Time in which a page that is loaded again comes back [s]."""
+"""Time for a page to load again [s]."""
 
 Live: TypeAlias = LiveTable | LiveModel
 Judge: TypeAlias = Callable[[Case, Sequence[str], Callable[[Record], None]], None]
@@ -79,7 +79,7 @@ class LiveServer:
 
     Args:
         open_file: reads the file; again when it has changed and a page is loaded.
-        engines: names of the engines that may check.
+        engines: names of the engines for checks.
         judge: solves by these engines.
         port: of this machine; 0 for a free one.
         once: whether to end when no page is open any more.
@@ -205,7 +205,7 @@ class LiveServer:
 
 class Conversation:
     """The messages of one page. Of each kind only the newest waits; checks have their own thread,
-    so that edits do not wait for engines.
+    and edits do not wait for engines.
     """
 
     def __init__(self, server: LiveServer, socket: Any) -> None:
@@ -329,7 +329,7 @@ class Conversation:
 
 
 def _verdict(number: int, record: Record, *, last: bool) -> Verdict:
-    """Return what a page shows of a record."""
+    """Return the summary of a record."""
     found = judged([record])
     most = worst(found) if found else None
     return Verdict(

@@ -1,4 +1,4 @@
-"""A table of hardpoints that answers edits at once: one program, whose inputs are its numbers."""
+"""A table of hardpoints as the input of one program: edits have answers at once."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ from .protocol import (
 from .saving import free_name, save_table
 
 TOL = 1e-12
-"""Largest accepted residual, relative to the mechanism's size: that of `kincheck run`."""
+"""Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
 FRAMES = 41
-"""Most samples that are drawn: as many as a hand can tell apart on the slider."""
+"""Most drawn samples: as many as a hand can tell apart on the slider."""
 MOVED = 2e-5
 """Half of the difference for derivatives [m]: its square times a third derivative is far below the
 three digits shown, and rounding of 1e-15 m over it too."""
@@ -59,7 +59,7 @@ class LiveTable:
 
     Args:
         file: the table.
-        supplied: facts that it lacks.
+        supplied: facts missing in it.
 
     Raises:
         KincheckError: the file is no table of a suspension.
@@ -147,7 +147,7 @@ class LiveTable:
         )
 
     def refusal(self, number: int, error: KincheckError) -> Refused:
-        """Return a message of the reader, with the row of the table that it names."""
+        """Return a message of the reader, with the row of the table in its text."""
         text = str(error).removeprefix(f"{self.file}: ")
         named = (each for each in self.names if re.search(rf"\b{re.escape(each)}\b", text))
         return Refused(id=number, message=text, point=next(named, ""))
@@ -198,7 +198,7 @@ class LiveTable:
         return save_table(self.table, self.supplied, points, name).name
 
     def _prepare(self, case: Case) -> tuple[list[str], PreparedDesigns]:
-        """Return what the program is made for, and the program, compiled."""
+        """Return the key of a program, and the program, compiled."""
         bodies = [body.name for body in case.mechanism.moving]
         designs = NativeSolver().prepare_designs(
             case.mechanism,
@@ -309,7 +309,7 @@ def key_samples(case: Case) -> list[int]:
 
 
 def as_values(values: Array) -> Values:
-    """Return numbers as JSON has them: null for what is unknown."""
+    """Return numbers for JSON: null for unknown ones."""
     return [
         each if known else None
         for each, known in zip(values.tolist(), np.isfinite(values).tolist(), strict=True)
@@ -317,7 +317,7 @@ def as_values(values: Array) -> Values:
 
 
 def _computed(case: Case) -> list[Quantity]:
-    """Return the outputs of motion that one solution gives; see `HELD_BUT` for the others."""
+    """Return the outputs of motion from one solution; see `HELD_BUT` for the others."""
     return [each for each in case.outputs if not each.forces and HELD_BUT not in each.facts]
 
 
@@ -329,7 +329,7 @@ def _numbers(case: Case) -> Array:
 
 
 def _structure(case: Case) -> list[str]:
-    """Return what a program depends on beside its numbers."""
+    """Return the key of a program: all but the numbers."""
     joints = [f"{each.name} {each.type} {each.bodies}" for each in case.mechanism.joints]
     points = [f"{each.name} {each.body}" for each in case.mechanism.points]
     return [*joints, *points, *places(case.mechanism), *(each.name for each in case.outputs)]

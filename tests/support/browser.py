@@ -65,7 +65,9 @@ class Browser:
             for line in self.process.stderr
             if (found := re.search(r"listening on ws://([^/]+)/", line))
         )
-        Thread(target=self.process.stderr.read, daemon=True).start()  # a full pipe would stop it
+        # a full pipe would stop it
+        self.reader = Thread(target=self.process.stderr.read, daemon=True)
+        self.reader.start()
         pages: list[dict[str, str]] = []
         while not pages:
             with urlopen(f"http://{host}/json") as listed:
@@ -142,7 +144,7 @@ class Browser:
         """Return the middle of an element, scrolled into view [px]."""
         x, y = self.run(
             f"const it = document.querySelector({json.dumps(selector)});"
-            "it.scrollIntoView({ block: 'center' });"
+            "it.scrollIntoView({ block: 'center', behavior: 'instant' });"
             "const { left, top, width, height } = it.getBoundingClientRect();"
             "return [left + width / 2, top + height / 2];"
         )
@@ -185,3 +187,6 @@ class Browser:
         self("Browser.close")
         self.link.__exit__(None, None, None)
         self.process.wait(20)
+        self.reader.join()
+        assert self.process.stderr is not None
+        self.process.stderr.close()
