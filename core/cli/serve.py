@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import KincheckError
 from . import import_options
 from .option_types import whole
 from .registry import Registry, Status
@@ -16,6 +17,7 @@ from .run_options import TOL
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.record import Record
+    from ..live.server import Live
 
 
 def add(commands: Any) -> None:
@@ -43,6 +45,12 @@ def add(commands: Any) -> None:
     serving.add_argument(
         "--once", action="store_true", help="end when the page is closed, with status 0"
     )
+    serving.add_argument(
+        "--measure",
+        type=whole(1),
+        metavar="N",
+        help="serve nothing: make N edits of a table, print how long each step takes, and end",
+    )
     import_options.add_options(serving)
 
 
@@ -57,7 +65,7 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
     """
     from ..case.models.files import is_table
     from ..live.model import LiveModel
-    from ..live.server import Live, LiveServer
+    from ..live.server import LiveServer
     from ..live.table import LiveTable
 
     file, supplied = Path(options.file), import_options.supplied(options)
@@ -68,6 +76,8 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
             return LiveTable(file, supplied)
         return LiveModel(file, registry.find_case(options.file, supplied))
 
+    if options.measure is not None:
+        return _measured(opened(), options.measure)
     server = LiveServer(
         file, opened, registry.engines, judge_by(registry), port=options.port, once=options.once
     )
@@ -78,6 +88,39 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
         server.ended.wait()
     finally:
         server.close()
+    return Status.WITHIN
+
+
+def _measured(live: Live, count: int) -> int:
+    """Print the times of edits: of each step and of a whole answer as JSON, and the processor's
+    share of it, free of other programs.
+    """
+    import statistics
+    from time import perf_counter, process_time
+
+    from ..live.protocol import Answer, encode
+    from ..live.table import LiveTable
+
+    if not isinstance(live, LiveTable):
+        raise KincheckError(f"--measure: {live.file} is no table of hardpoints; give one")
+    points, steps = live.positions, dict[str, list[float]]()
+    size = max(abs(x) for row in points for x in row)
+    for k in range(count):
+        moved = [(x, y + 1e-3 * size * (k % 11 - 5) / 5, z) for x, y, z in points]
+        begin, worked = perf_counter(), process_time()
+        found = live.answer(k, moved)
+        sent = encode(found)
+        if not isinstance(found, Answer):
+            raise KincheckError(f"--measure: edit {k}: {found.message}")
+        whole = {"answer": perf_counter() - begin, "processor": process_time() - worked}
+        steps.setdefault("bytes", []).append(float(len(sent)))
+        for name, each in (found.milliseconds | {k: 1e3 * v for k, v in whole.items()}).items():
+            steps.setdefault(name, []).append(each)
+    size_sent = statistics.median(steps.pop("bytes"))
+    samples = len(live.case.sweep.values)
+    print(f"{live.file.name}: {count} edits, {samples} samples, {size_sent:.0f} bytes each")
+    for name, each in steps.items():
+        print(f"  {name:<9} median {statistics.median(each):8.2f} ms, most {max(each):8.2f} ms")
     return Status.WITHIN
 
 

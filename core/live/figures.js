@@ -62,17 +62,19 @@ function figures(box, outputs, axis, state) {
   };
 }
 
-// The key numbers: outputs at the ends of the travel and at design, their gradients, and limits.
-//   samples: the three samples; changed: called when a limit changes.
+// The key numbers: outputs at some poses, such as the ends of the travel and design, with their
+// gradients, and limits.
+//   columns: of each pose its word, and the value of an output there; changed: called when a limit
+//   changes.
 // Returns `show`.
-function keyNumbers(table, outputs, samples, state, changed) {
-  const main = outputs.filter(({ group }) => group === "outputs");
+function keyNumbers(table, outputs, columns, state, changed) {
+  const first = outputs.some(({ group }) => group === "outputs") ? "outputs" : "coordinates";
+  const main = outputs.filter(({ group }) => group === first);
   const named = new Map(outputs.map((output) => [output.name, output]));
   const slope = ({ name }) => named.get(`${name}.per_travel`);
-  const words = state.upwards ? ["rebound", "design", "jounce"] : ["first", "design", "last"];
   const cell = (kind, text, className = "") =>
     Object.assign(document.createElement(kind), { textContent: text, className });
-  const heads = ["output, and per travel", ...words, "low", "high"];
+  const heads = ["output", ...columns.map(({ word }) => word), "low", "high"];
   const headRow = document.createElement("tr");
   headRow.append(
     ...heads.map((text, k) =>
@@ -84,7 +86,7 @@ function keyNumbers(table, outputs, samples, state, changed) {
     const row = document.createElement("tr");
     const head = Object.assign(cell("th", output.label), { scope: "row" });
     if (output.shown_unit) head.append(smallText(output.shown_unit));
-    const cells = Array.from({ length: 3 }, () => cell("td", "", "number"));
+    const cells = columns.map(() => cell("td", "", "number"));
     const ends = ["low", "high"].map((end, k) => {
       const input = Object.assign(document.createElement("input"), { autocomplete: "off" });
       input.setAttribute("aria-label", `${end} limit of ${output.label} [${output.shown_unit}]`);
@@ -109,17 +111,15 @@ function keyNumbers(table, outputs, samples, state, changed) {
   function show() {
     for (const { output, cells } of rows) {
       const [low, high] = state.limits.get(output.name) || [];
-      const values = state.answer.outputs[output.name] || [];
       const rate = slope(output);
-      const rates = (rate && state.answer.outputs[rate.name]) || [];
-      samples.forEach((sample, k) => {
-        const value = values[sample];
+      columns.forEach(({ valueOf }, k) => {
+        const value = valueOf(output.name);
         const known = typeof value === "number";
         const scaled = known ? value * output.scale : NaN;
         cells[k].textContent = known ? shown(scaled, ".4g") : "–";
         cells[k].dataset.value = known ? String(value) : "";
         cells[k].classList.toggle("over", scaled < low || scaled > high);
-        const each = rates[sample];
+        const each = rate && valueOf(rate.name);
         const gradient = typeof each === "number" ? shown(each * rate.scale, ".4g") : "";
         if (gradient) cells[k].append(smallText(`${gradient} ${rate.shown_unit}`));
       });

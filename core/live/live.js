@@ -133,6 +133,7 @@ const DIRECTIONS = {
       state.asked = performance.now();
       link.ask("move", { type: "move", drivers, measured: rests });
     });
+    state.asked = performance.now();
     link.ask("solve", { type: "solve", points: [] });
     reached(null);
   }
@@ -183,8 +184,6 @@ const DIRECTIONS = {
   function start(message) {
     parts.first = false;
     const { outputs, axis } = opening;
-    const sizes = axis.values.map(Math.abs);
-    const samples = [0, sizes.indexOf(Math.min(...sizes)), sizes.length - 1];
     one("#scene [data-layer=forces]").closest("label").hidden = !message.drawing.arrows.length;
     parts.scene = mechanism(one("#scene"), message.drawing);
     const slider = one("#scene input[type=range]");
@@ -196,10 +195,26 @@ const DIRECTIONS = {
     }
     parts.figures = figures(one("#figures"), outputs, axis, state);
     const drawAgain = () => parts.figures.draw();
-    parts.numbers = keyNumbers(one("#numbers"), outputs, samples, state, drawAgain);
+    parts.numbers = keyNumbers(one("#numbers"), outputs, columns(), state, drawAgain);
     parts.figures.group(one("#group").value);
     one("#group").onchange = () => parts.figures.group(one("#group").value);
     document.documentElement.dataset.ready = "";
+  }
+
+  // The words of the key samples.
+  function words() {
+    return state.upwards ? ["rebound", "design", "jounce"] : ["first", "design", "last"];
+  }
+
+  // The poses of the key numbers: the key samples, or the pose of the sliders.
+  function columns() {
+    const sizes = opening.axis.values.map(Math.abs);
+    const design = sizes.indexOf(Math.min(...sizes));
+    const at = (sample) => (name) => (state.answer.outputs[name] || [])[sample];
+    const ofPose = (name) => (state.pose ? state.pose.outputs[name] : at(design)(name));
+    if (!parts.planes) return [{ word: "pose", valueOf: ofPose }];
+    const samples = [0, design, sizes.length - 1];
+    return words().map((word, k) => ({ word, valueOf: at(samples[k]) }));
   }
 
   // The time from an edit to its picture.
@@ -220,13 +235,14 @@ const DIRECTIONS = {
   }
   function ranked(message) {
     const output = opening.outputs.find(({ name }) => name === message.output);
-    const words = state.upwards ? ["rebound", "design", "jounce"] : ["first", "design", "last"];
     const unit = { name: opening.unit, metres: METRES[opening.unit] };
-    showRanking(one("#ranking"), { ...message, output: output.label }, output, unit, words);
+    showRanking(one("#ranking"), { ...message, output: output.label }, output, unit, words());
   }
 
   function posed(message) {
+    if (!parts.scene) return; // the sweep is still being solved
     const { drawing } = state.answer;
+    state.pose = message;
     const bodies = drawing.bodies.map((body) => {
       const pose = message.bodies[body.name];
       return pose ? { ...body, r: [pose.slice(0, 3)], p: [pose.slice(3)] } : body;
@@ -236,6 +252,7 @@ const DIRECTIONS = {
     const steps = [whole ? "pose of the sliders" : `the way ends at ${far}`];
     parts.scene.change({ ...drawing, bodies, steps, start: 0, paths: [], arrows: [] });
     parts.sliders.show(message);
+    parts.numbers.show();
     trouble(message.message);
     say(whole ? "all loops closed" : `not reached: ${far}`);
     measure(message.milliseconds);

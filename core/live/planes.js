@@ -11,8 +11,8 @@ const PLANE_VIEWS = [
 // The views of a table's points in a box.
 //   metres: from a position in the file to global metres, and `file` back;
 //   design: the numbers; choose: called with the point that is taken.
-// Returns `change` (the drawing), `ghost` (another drawing behind it), `draw`, `choose` (a point) and
-// `spots` (the places of all points in a view [px]).
+// Returns `change` (the drawing), `ghost` (another drawing behind it), `draw`, `choose` (a point)
+// and `spots` (the places of all points in a view [px]).
 function planes(box, points, { metres, file, step }, design, choose) {
   const state = { drawing: null, motion: null, bounds: null, ghost: null, chosen: -1 };
   const views = PLANE_VIEWS.map(([plane, name]) => planeView(plane, name));

@@ -131,8 +131,10 @@ class LiveServer:
         Thread(target=self.listener.serve_forever, daemon=True).start()
 
     def close(self) -> None:
-        """Stop listening."""
-        self.listener.shutdown()
+        """Stop listening. Open pages have a moment to close."""
+        ending = Thread(target=self.listener.shutdown, daemon=True)
+        ending.start()
+        ending.join(GRACE)
 
     def changed(self) -> bool:
         """Return whether the file has other content than when it was read."""

@@ -76,6 +76,11 @@ class LiveTable:
         self.axis = sweep_axis(self.case)
         self._structure, self._designs = self._prepare(self.case)
 
+    @property
+    def positions(self) -> Rows:
+        """The points as in the file."""
+        return [each.position for each in self.table.points.values()]
+
     def opening(self, engines: Sequence[str]) -> Opening:
         """Return the table as it is."""
         roles = {each.name: each.roles for each in self.case.hardpoints}
@@ -243,7 +248,13 @@ class LiveTable:
         with np.errstate(all="ignore"):
             return {
                 each.name: np.broadcast_to(
-                    counted(case.mechanism, case.sweep.path, each, at, design).x,
+                    counted(
+                        case.mechanism,
+                        case.sweep.path,
+                        each,
+                        {name: at[name] for name in each.points},
+                        design,
+                    ).x,
                     found.solved.shape,
                 )
                 for each in _computed(case)
