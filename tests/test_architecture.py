@@ -24,6 +24,7 @@ LAYERS = (
     ("history",),
     ("report",),
     ("studies",),
+    ("live",),
     ("cli",),
     ("__init__",),
     ("kincheck",),
@@ -80,7 +81,10 @@ IMPORTS = {
     "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
     "case/models/trees": ". joints mechanism kinematics case case/io",
     "case/models/adams": ". joints mechanism kinematics case case/io",
-    "case/models": ". joints mechanism case case/io case/models/adams case/models/hardpoints case/models/trees",
+    "case/models": (
+        ". joints mechanism case case/io case/models/adams case/models/hardpoints "
+        "case/models/trees"
+    ),
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
@@ -111,12 +115,17 @@ IMPORTS = {
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
     ),
+    "live": (
+        ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "
+        "harness report"
+    ),
     "cli": (
         ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/same studies/diagnosis studies/bench studies/compliance"
+        "studies/paper studies/same studies/diagnosis studies/bench studies/compliance "
+        "live"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (

@@ -21,6 +21,7 @@ COMMANDS = (
     "same",
     "trace",
     "kc",
+    "serve",
     "doctor",
     "history",
     "report",

@@ -121,6 +121,22 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
 
 
+def read_hardpoints(file: Path, supplied: Supplied = NOTHING) -> HardpointTable:
+    """Read the table of hardpoints of a file.
+
+    Raises:
+        CaseError: the file is unreadable, or no table of hardpoints.
+    """
+    if not is_table(file, supplied):
+        raise fault(file, "", "is no table of hardpoints; give a table, such as car.csv")
+    return _hardpoints(file, kind_of(file, supplied), supplied)
+
+
+def is_table(file: Path, supplied: Supplied = NOTHING) -> bool:
+    """Return whether a file is a table of hardpoints."""
+    return kind_of(file, supplied) in (CHRONO, ADAMS, ASSETTO, TABLE, WORKBOOK, TREE)
+
+
 def read_tree(file: Path) -> Tree:
     """Return the links of a model in XML: MJCF, URDF or SDF, whatever the file is called.
 
