@@ -82,8 +82,7 @@ IMPORTS = {
     "case/models/trees": ". joints mechanism kinematics case case/io",
     "case/models/adams": ". joints mechanism kinematics case case/io",
     "case/models": (
-        ". joints mechanism case case/io case/models/adams case/models/hardpoints "
-        "case/models/trees"
+        ". joints mechanism case case/io case/models/adams case/models/hardpoints case/models/trees"
     ),
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",

@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
-from ..harness.provenance import THREADS
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
@@ -67,6 +66,8 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 the same motion, whether something is lost or not, 1 it differs, 2 not judged or
     not read.
     """
+    from ..harness.provenance import THREADS
+
     for name in THREADS:  # many small matrices: threads would wait for each other
         os.environ.setdefault(name, "1")
     from ..case.io.atomic_files import require_writable

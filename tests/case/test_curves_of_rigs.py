@@ -10,6 +10,7 @@ import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
@@ -209,3 +210,11 @@ def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
     judged_by, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
     (toe,) = [output for output in judged_by.outputs if output.name == "toe"]
     assert toe.atol == pytest.approx(math.radians(0.02), rel=1e-14)
+
+
+def test_first_rows_with_gaps_are_samples(tmp_path):
+    """A lone number below the head is a sample without the other columns, and never a title."""
+    file = tmp_path / "rig.csv"
+    file.write_text("Travel [mm],toe [deg]\n-50,\n-40,\n0,0.1\n50,0.2\n")
+    samples = samples_of(read_table(file, None, "--sheet"), [0, 1], gaps=True)
+    assert samples.numbers[:, 0].tolist() == [-50.0, -40.0, 0.0, 50.0]

@@ -164,7 +164,9 @@ def layout_of(table: Table) -> Layout:
     all_numbers: int | None = None
     for where, cells in islice(table.rows(), MOST_ABOVE):
         first.append((where, trimmed(cells)))
-        if _numbers(cells) == _filled(cells) > 1:
+        headed = any(_filled(row) > 1 and not _numbers(row) for _, row in first[:-1])
+        # below a head, a lone number is a sample with gaps
+        if _numbers(cells) == _filled(cells) > (0 if headed else 1):
             all_numbers = len(first) - 1
             break
     most_numbers = (k for k, (_, cells) in enumerate(first) if 2 * _numbers(cells) > _filled(cells))
