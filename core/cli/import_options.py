@@ -65,7 +65,15 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--names",
         type=Path,
         metavar="FILE",
-        help='names of the points in the file: TOML, with a line ROLE = "NAME" for each',
+        help=(
+            'names of the points in the file: TOML, with a line ROLE = "NAME" for each; a new FILE'
+            " is written"
+        ),
+    )
+    points.add_argument(
+        "--ask-names",
+        action="store_true",
+        help="refuse names that are only like those of the template, with a guess for each",
     )
     points.add_argument(
         "--wheel-radius",

@@ -17,10 +17,11 @@ class Supplied:
         travel: wheel travel of a suspension, up and down: "METRES", "METRES:SAMPLES" or
             "START:STOP:SAMPLES".
         rack: simultaneous travel of the rack to the left: "METRES" or "START:STOP".
+        ask_names: whether to refuse names of hardpoints that are guessed.
         side: side of the wheel of hardpoints, "left" or "right"; by default from the points.
         corner: corner of a car of which hardpoints are read: "FL", "rear right", ...
         sheet: sheet of a workbook with several tables.
-        names: file of the user's own names of hardpoints, by role of the template.
+        names: file of the user's own names of hardpoints, by role of the template; written if new.
         wheel_radius: loaded radius of the wheel of hardpoints [m].
         wheelbase: wheelbase of the vehicle of hardpoints [m].
         axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
@@ -51,6 +52,7 @@ class Supplied:
     cg_height: str | None = None
     brake_share: str | None = None
     drive_share: str | None = None
+    ask_names: bool = False
     side: str | None = None
     corner: str | None = None
     sheet: str | None = None

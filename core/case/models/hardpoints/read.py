@@ -6,7 +6,9 @@ rack move.
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +33,7 @@ from .templates import (
     TEMPLATES,
     WHEEL_CENTER,
     WHEEL_CONTACT,
+    Role,
     Template,
     agree,
     compact,
@@ -45,6 +48,23 @@ ACROSS = 0.25
 # missing names.
 MOST_POINTS = 10_000
 LARGEST_NAMES = 100_000
+# Names as alike as this are taken for misspelt or abridged ones.
+LIKE = 0.75
+_OPPOSITES = (("upper", "lower"), ("front", "rear"), ("inner", "outer"), ("center", "contact"))
+_SPELLINGS: Mapping[str, str] = {
+    other: word
+    for word, others in (
+        ("upper", "upper upp up top u uca uwb"),
+        ("lower", "lower low lwr bottom bot l lca lwb"),
+        ("front", "front frnt fore fwd f"),
+        ("rear", "rear aft back r"),
+        ("inner", "inner inboard in inn chassis body rack i"),
+        ("outer", "outer outboard out outr upright knuckle hub o"),
+        ("center", "center centre cent ctr cntr"),
+        ("contact", "contact cont patch ground road"),
+    )
+    for other in others.split()
+}
 
 
 def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
@@ -67,14 +87,14 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     template = _template(table, supplied.template)
     unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     table = _of_corner(table, supplied.corner)
-    named = _filled(table, template, supplied.names)
+    named, told = _filled(table, template, supplied)
     points = placed(table, unit, axes)
     at = {role: points[name] for role, name in named.items()}
     size = max(math.dist(a, b) for a in at.values() for b in at.values())
     if improbable := SUSPENSIONS.improbable(size, unit):
         problem = f"the points span {improbable} They are in another unit"
         raise fault(file, "", f"{problem}; correct --units, or the unit in the file")
-    side, told = _side(table, named[WHEEL_CENTER], axes, supplied)
+    side, of_side = _side(table, named[WHEEL_CENTER], axes, supplied)
     if side is Side.RIGHT:  # a template describes the left side
         axes = [(k, -sign if k == 1 else sign) for k, sign in axes]
         at = {role: (x, -y, z) for role, (x, y, z) in at.items()}
@@ -103,7 +123,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = replace(case, length_unit=unit.name, assembly=tuple(told))
+    case = replace(case, length_unit=unit.name, assembly=(*told, *of_side))
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
@@ -206,12 +226,14 @@ def _template(table: HardpointTable, said: str | None) -> Template:
     return written
 
 
-def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict[str, str]:
-    """Return the name of the point for each role of the template.
-
-    Args:
-        own: file of the user's own names.
+def _filled(
+    table: HardpointTable, template: Template, supplied: Supplied
+) -> tuple[dict[str, str], list[str]]:
+    """Return the name of the point for each role of the template, and notes on the names. A file of
+    names that does not exist yet is written.
     """
+    own = supplied.names
+    new = own is not None and not own.exists()
     by_compact_name: dict[str, list[str]] = {}
     by_side_name: dict[str, list[str]] = {}
     sides = [side for _, side in map(side_of, table.points)]
@@ -222,7 +244,7 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         if side == wheel:
             by_side_name.setdefault(compact(plain), []).append(name)
     filled: dict[str, str] = {}
-    if own is not None:
+    if own is not None and not new:
         filled |= _read_own_names(
             own, [role.name for role in (*template.roles, *template.optional)], table.points
         )
@@ -242,25 +264,71 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         if found:
             filled[role.name] = found[0]
     missing = [role for role in template.roles if role.name not in filled]
-    if not missing:
-        return filled
     unused = {compact(name): name for name in table.points if name not in filled.values()}
+    near = {role.name: _nearest(role, unused) for role in missing}
+    told: list[str] = []
+    distinct = len({*near.values()}) == len(near)
+    sure = distinct and all(_fits(role, name) for role, name in near.items())
+    if missing and sure and not supplied.ask_names:
+        filled |= near
+        listed = ", ".join(f"{role} is {visible(name)!r}" for role, name in near.items())
+        told.append(f"names guessed: {listed}; --names FILE states them, --ask-names refuses")
+        missing = []
+    if own is not None and new:
+        _write_names(own, template, filled)
+        told.append(f"{own}: written, with the names of the points by role")
+    if not missing:
+        return filled, told
     lines: list[str] = []
     for role in missing:
-        close = [near for each in role.names if (near := similar(each, unused, 0.75))]
-        advice = ""
-        if close:
-            name = unused[close[0]]
-            where = table.points[name].where
-            advice = f" (is it {name!r}{'' if where == name else f', {where}'}?)"
-        lines.append(f"{role.name}, {role.meaning}{advice}")
+        name = near[role.name]
+        where = table.points[name].where if name else ""
+        place = "" if where in (name, "") else f", {where}"
+        lines.append(f"{role.name}, {role.meaning}" + f" (is it {name!r}{place}?)" * bool(name))
     problem = f"template {template.name}: missing {'; '.join(lines)}"
+    advice = "say with --names FILE which point is which; a new FILE is written to be filled in"
+    if new:
+        advice = f"fill in {own}, which is written"
     raise fault(
         table.file,
         "",
-        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or say with"
-        " --names FILE which point is which",
+        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or {advice}",
     )
+
+
+def _nearest(role: Role, unused: Mapping[str, str]) -> str:
+    """Return the name of the point most like a name of a role; empty without one."""
+    close = [found for each in role.names if (found := similar(each, unused, LIKE))]
+    return unused[close[0]] if close else ""
+
+
+def _fits(role: str, name: str) -> bool:
+    """Return whether a point's name says nothing else than a role: not lower for upper."""
+    words, others = _words(role), _words(name)
+    return bool(name) and all(
+        not (words & kind and others & kind) or words & kind == others & kind
+        for kind in map(frozenset, _OPPOSITES)
+    )
+
+
+def _words(name: str) -> set[str]:
+    """Return those of the opposite words that a name has."""
+    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)
+    return {word for part in parts if (word := _SPELLINGS.get(part.lower()))}
+
+
+def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> None:
+    """Write a file of names, with a comment for each role without a point."""
+    lines = [
+        f"{role.name} = {json.dumps(filled[role.name], ensure_ascii=False)}"
+        if role.name in filled
+        else f'# {role.name} = ""  # {role.meaning}'
+        for role in (*template.roles, *template.optional)
+    ]
+    try:
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise fault(file, "--names", f"cannot be written ({error}); choose another file") from None
 
 
 def _listed(names: Sequence[str]) -> str:
