@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import Field, dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Self
 
@@ -63,11 +63,6 @@ class Measure(TypedQuantity):
     @abstractmethod
     def points(self) -> tuple[str, ...]:
         """Names of the points it reads."""
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        own = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the mechanism has all its names."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, fields, replace
 from functools import reduce
 from operator import add
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, cast
 
 from ..algebra import Vec3
 from ..jet import Jet
@@ -139,6 +139,13 @@ class TypedQuantity(PoseQuantity, ABC):
     def sense(self) -> str:
         """Meaning of a positive value, in words."""
         return f"positive: {self.positive}"
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Properties for readers of results."""
+        names = [each.name for each in fields(cast("Any", self))]
+        own = {name: getattr(self, name) for name in names if name not in ("vehicle", "other")}
+        return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
     @abstractmethod
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:

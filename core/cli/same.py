@@ -10,13 +10,13 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
-from ..harness.provenance import THREADS
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..case.models.undriven import Undriven
     from ..studies.same import Comparison
 
+THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 STATUS = {"same": Status.WITHIN, "differs": Status.DEVIATES, "not judged": Status.FAILED}
 """Exit status by verdict."""
 CONVERTERS = ("mujoco",)

@@ -235,7 +235,7 @@ class Path:
         """Return value, velocity and acceleration of the drivers at times t, shape (3, names,
         *t.shape).
         """
-        found = np.zeros((3, len(names), *t.shape))
+        found = np.zeros((3, len(names), *t.shape), np.result_type(t, np.float64))
         for k, name in enumerate(names):
             if name in self.motions:
                 found[:, k] = self.motions[name].at(t)

@@ -22,24 +22,10 @@ from kincheck.core.harness.execution import Answer, Pair, attempt
 from ..oracles.distances import Carrier as DistanceCarrier
 from ..oracles.distances import turn
 from ..oracles.rods import Carrier
+from ..support.rods_of_templates import RODS as ALL_RODS
 
 WHEELBASE = 1.55
-LINKS = ("upper_front", "upper_rear", "lower_front", "lower_rear", "tierod")
-RODS = {
-    "double_wishbone": (
-        ("lca_front", "lca_outer"),
-        ("lca_rear", "lca_outer"),
-        ("uca_front", "uca_outer"),
-        ("uca_rear", "uca_outer"),
-        ("tierod_inner", "tierod_outer"),
-    ),
-    "five_link": tuple((f"{link}_inner", f"{link}_outer") for link in LINKS),
-    "mcpherson": (
-        ("lca_front", "lca_outer"),
-        ("lca_rear", "lca_outer"),
-        ("tierod_inner", "tierod_outer"),
-    ),
-}
+RODS = {name: ALL_RODS[name] for name in ("double_wishbone", "five_link", "mcpherson")}
 CLOSE = 1e-12
 
 

@@ -16,7 +16,7 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
-from .test_published_suspensions import solved
+from ..support.rods_of_templates import solved
 
 # Two minutes of arc: the repeatability of a rig, made up; its noise is an eighth of that.
 ATOL = 2.0 / 60.0

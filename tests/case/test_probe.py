@@ -12,7 +12,7 @@ from kincheck.core.case.joint_probe import AXIS, PAIRS, POINT, TURN, probe, prob
 from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Coupler, Joint
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.dense_equations import System
+from kincheck.core.kinematics.compiled.dense_equations import system_of
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_poses import solve_closely
@@ -36,7 +36,7 @@ def smallest_singular_value(case):
     """Of the rows at all samples; an engine's record holds an estimate."""
     route = Route(compile_model(case.mechanism, Request((case.sweep.driver,), ())), case.sweep.path)
     every = range(len(route.path.times))
-    found, system = march(route, 1e-12, visit=every), System(route.model)
+    found, system = march(route, 1e-12, visit=every), system_of(route.model)
     lanes = np.array([found.visited[k] for k in every]).T
     return solve_closely(system, system.state(lanes), route.sampled(route.path.times)).sigma.min()
 

@@ -5,6 +5,7 @@ Sources are in tests/data/README.md.
 """
 
 import csv
+import math
 from pathlib import Path
 
 import kincheck.cases
@@ -192,8 +193,8 @@ def test_by_the_command_line(tmp_path, explorer):
     options = ["--travel=-0.04:0.12:3", "--rack", "0.04", "--wheel-radius", str(RADIUS)]
     file, out = str(DATA / "wishbone_explorer.csv"), tmp_path / "curves.csv"
     assert main(["run", file, "--engine", "native", "--csv", str(out), *options]) == 2
-    rows = [row for row in csv.DictReader(out.read_text().splitlines()) if row["output"] == "toe"]
-    toe = [float(row["position"]) for row in rows]
+    rows = csv.DictReader(out.read_text().splitlines())
+    toe = [math.radians(float(row["toe [deg]"])) for row in rows]
     assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)
 
 

@@ -12,7 +12,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.rows import MOST_LINES
-from kincheck.core.case.models.trees.element import MOST_ELEMENTS, parse_xml
+from kincheck.core.case.models.trees.element import DEEPEST, MOST_ELEMENTS, parse_xml
 from kincheck.core.case.models.trees.tree import MOST_TIES
 from kincheck.core.errors import CaseError
 
@@ -158,6 +158,19 @@ def test_closures_are_read_up_to_a_number(name: str, tmp_path: Path):
     file.write_text(TIES[name].format(TIE[name] * (MOST_TIES + 1)))
     with pytest.raises(CaseError, match=rf"line {MOST_TIES + 3}: .*found more than"):
         load(file, Supplied(drive=("j:0:1",)))
+
+
+def test_long_chain_of_fixed_links_is_read(tmp_path: Path):
+    base = LINKS.replace('"b"', '"l-1"')
+    chain = "".join(
+        f'<link name="l{k}"/><joint name="f{k}" type="fixed"><parent link="l{k - 1}"/>'
+        f'<child link="l{k}"/></joint>'
+        for k in range(2 * DEEPEST)
+    )
+    file = tmp_path / "chain.urdf"
+    file.write_text(f"{base}{chain}</robot>")
+    case = load(file, Supplied(drive=("j:0:1",)))
+    assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
 
 
 def test_springs_without_a_length_are_left_out(tmp_path: Path):

@@ -70,6 +70,9 @@ BESIDE_FAULTS = {
     "no joint": ({"kind": "distance", "value": 1.0}, "is open by -1"),
     "no point": ({"i": None}, "found no two links"),
     "unknown kind": ({"kind": "weld"}, "weld"),
+    "huge": ({"value": 1e101}, "value: found 1e.101"),
+    "no curve": ({"kind": "polynomial", "driven": "B", "driving": "A"}, "found no coefficients"),
+    "high curve": ({"kind": "polynomial", "coefficients": [0.0] * 6}, "length <= 5"),
 }
 
 

@@ -1,12 +1,23 @@
-"""The built-in cases: names, truths, and references that belong to their case files."""
+"""The built-in cases: their closed forms against the constraints solved and differentiated by
+mpmath, and published values.
+"""
 
+from collections.abc import Callable, Sequence
+from functools import cache
+
+import mpmath as mp
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core.case.case import Output, Truth
+from kincheck.cases import four_bar, jet, rssr, spatial_slider_crank
+from kincheck.core.case.case import Case, Output, Truth
 from kincheck.core.errors import CaseError
+from kincheck.core.joints import Distance
 
-CLOSED_FORMS = ["four_bar", "rssr", "spatial_slider_crank"]
+from ..support.exact_cases import ROUND_OFF
+
+CLOSED_FORMS = {"four_bar": four_bar, "rssr": rssr, "spatial_slider_crank": spatial_slider_crank}
+ANGLES = [0.3, 1.9, 3.5, 5.6]
 IN_HOUSE = {"mcpherson_strut", "mcpherson_steered", "mcpherson_suspension"}
 
 
@@ -73,3 +84,153 @@ def test_a_full_turn_comes_back(name: str):
         series = case.reference[name]
         assert series.velocity[-1] == pytest.approx(series.velocity[0], abs=1e-12)  # of 10 m/s
         assert np.ptp(series.position) > 0.02  # every output moves
+
+
+# The same mechanisms once more, from the geometry in their case files: constraints solved by mpmath
+# to 40 digits.
+
+Points = dict[str, Sequence[mp.mpf]]
+
+
+def vec(values: Sequence[float]) -> mp.matrix:
+    return mp.matrix([mp.mpf(value) for value in values])
+
+
+def cross(a: mp.matrix, b: mp.matrix) -> mp.matrix:
+    return mp.matrix(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def dot(a: mp.matrix, b: mp.matrix) -> mp.mpf:
+    return (a.T * b)[0]
+
+
+def turned(v: mp.matrix, axis: mp.matrix, angle: mp.mpf) -> mp.matrix:
+    """Rodrigues' rotation formula."""
+    n = axis / mp.norm(axis)
+    return mp.cos(angle) * v + mp.sin(angle) * cross(n, v) + (1 - mp.cos(angle)) * dot(n, v) * n
+
+
+def where(case: Case, joint: str) -> mp.matrix:
+    return vec(case.mechanism.joint(joint).point)
+
+
+def at(case: Case, point: str) -> mp.matrix:
+    return vec(case.mechanism.point(point).position)
+
+
+def solve_four_bar(case: Case, angle: mp.mpf, near: Points) -> Points:
+    """Coupler pin: its distances from the crank pin and from the rocker's pivot, and its plane."""
+    A, B, C, D = (
+        where(case, joint) for joint in ("crank_pivot", "crank_pin", "coupler_pin", "rocker_pivot")
+    )
+    axis = vec(case.mechanism.joint("crank_pivot").axis)
+    pin = A + turned(B - A, axis, angle)
+
+    def closure(*x: mp.mpf) -> list[mp.mpf]:
+        X = mp.matrix(x)
+        lengths = [dot(X - pin, X - pin) - dot(C - B, C - B), dot(X - D, X - D) - dot(C - D, C - D)]
+        return [*lengths, dot(axis, X - D)]
+
+    X = mp.matrix(mp.findroot(closure, near["coupler_pin"]))
+    # the coupler's frame, along the coupler and across it in the plane
+    frame, moved = [[side, cross(axis, side)] for side in (C - B, X - pin)]
+    arm = at(case, "coupler_tip") - B
+    tip = pin
+    for before, now in zip(frame, moved, strict=True):
+        tip += dot(arm, before) / dot(before, before) * now
+    return {"coupler_pin": list(X), "coupler_tip": list(tip)}
+
+
+def solve_rssr(case: Case, angle: mp.mpf, near: Points) -> Points:
+    """Rocker's angle: the rod keeps its length."""
+    rod = case.mechanism.joint("rod")
+    assert isinstance(rod, Distance)
+    pin = turned(vec(rod.points[0]), vec([0, 0, 1]), angle)
+    O = where(case, "rocker_pivot")  # noqa: E741
+
+    def moved(turn: mp.mpf, point: str) -> mp.matrix:
+        return O + turned(at(case, point) - O, vec([1, 0, 0]), turn)
+
+    def length(turn: mp.mpf) -> mp.mpf:
+        arm = moved(turn, "rocker_pin") - pin
+        return dot(arm, arm) - mp.mpf(rod.rod_length) ** 2
+
+    design = at(case, "rocker_pin") - O
+    guess = mp.atan2(near["rocker_pin"][2] - O[2], near["rocker_pin"][1] - O[1]) - mp.atan2(
+        design[2], design[1]
+    )
+    turn = mp.findroot(length, guess)
+    return {
+        "crank_pin": list(pin),
+        **{point: list(moved(turn, point)) for point in ("rocker_pin", "rocker_tip")},
+    }
+
+
+def solve_spatial_slider_crank(case: Case, angle: mp.mpf, near: Points) -> Points:
+    """Slider: the conrod keeps its length; side point: distances from both ends, and the axes of
+    the universal joint.
+    """
+    A, B, S = (where(case, joint) for joint in ("crank_pivot", "crank_pin", "gudgeon"))
+    cross_axes = case.mechanism.joint("gudgeon").axes
+    pin, X = A + turned(B - A, vec([1, 0, 0]), angle), vec([1, 0, 0])
+
+    def length(x: mp.mpf) -> mp.mpf:
+        return dot(pin - x * X, pin - x * X) - dot(B - S, B - S)
+
+    slider = mp.findroot(length, near["slider"][0]) * X
+
+    def universal(*a: mp.mpf) -> list[mp.mpf]:
+        """The axis on the conrod: of constant length and angle to the conrod, perpendicular to the
+        axis on the slider.
+        """
+        axis, design = mp.matrix(a), vec(cross_axes[0])
+        same = [dot(axis, axis) - dot(design, design), dot(axis, pin - slider) - dot(design, B - S)]
+        return [*same, dot(axis, vec(cross_axes[1]))]
+
+    axis = mp.matrix(mp.findroot(universal, (0, -2 * pin[2], 2 * pin[1])))
+    frame, moved = [
+        [u, a, cross(u, a)] for u, a in ((B - S, vec(cross_axes[0])), (pin - slider, axis))
+    ]
+    arm, side = at(case, "conrod_side") - S, slider
+    for before, now in zip(frame, moved, strict=True):
+        side += dot(arm, before) / dot(before, before) * now
+    return {
+        "slider": list(slider),
+        "conrod_centre": list((slider + pin) / 2),
+        "conrod_side": list(side),
+    }
+
+
+SOLVERS: dict[str, Callable[[Case, mp.mpf, Points], Points]] = {
+    "four_bar": solve_four_bar,
+    "rssr": solve_rssr,
+    "spatial_slider_crank": solve_spatial_slider_crank,
+}
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_closed_forms_solve_the_constraints(name: str, angle: float):
+    case, rate = cases.load(name), 1.7
+    motion = CLOSED_FORMS[name].motion(jet.steady(np.array([angle]), rate))
+    near = {point: [mp.mpf(each.x[0]) for each in xyz] for point, xyz in motion.items()}
+
+    @cache
+    def solved(t: mp.mpf, prec: int) -> Points:
+        """All coordinates at a time, solved once with a precision: higher derivatives take more."""
+        return SOLVERS[name](case, angle + rate * t, near)
+
+    with mp.workdps(40):
+        for point, xyz in motion.items():
+            for k, closed in enumerate(xyz):
+
+                def coordinate(t: mp.mpf, point: str = point, k: int = k) -> mp.mpf:
+                    return solved(t, mp.mp.prec)[point][k]
+
+                for order, found in enumerate((closed.x, closed.v, closed.a)):
+                    expected = float(mp.diff(coordinate, 0, order))
+                    assert found[0] == pytest.approx(
+                        expected, abs=ROUND_OFF * 10 ** (order / 2), rel=ROUND_OFF
+                    ), (point, k, order)

@@ -64,21 +64,21 @@ def test_quiet_and_verbose(kincheck_main, capsys):
 
 
 @pytest.mark.parametrize(
-    ("argv", "said"),
+    ("line", "said"),
     [
-        (["runn"], "kincheck: error: there is no command 'runn'; did you mean 'run'?"),
-        (["--engine", "native", "run"], "it belongs to kincheck run"),
-        (["bench", "--rounds", "3"], "'--rounds'; it belongs to kincheck bench engines"),
-        ("sweep --sample 1e3 --vari f".split(), "kincheck sweep: error: "),
-        (["run", "--mode", "projecton"], "projection, simulate; did you mean 'projection'?\n"),
-        (["run", "--mode", "dream"], "'dream' is none of projection, simulate\n"),
-        (["sweep", "--varry", "f"], "no option '--varry'; did you mean '--vary'?"),
-        (["explain", "rssr", "bennett"], "kincheck explain: error: too many arguments: bennett"),
-        ("export rssr --at nan".split(), "'nan' is not a number"),
+        ("runn", "kincheck: error: there is no command 'runn'; did you mean 'run'?"),
+        ("--engine native run", "it belongs to kincheck run"),
+        ("bench --rounds 3", "'--rounds'; it belongs to kincheck bench engines"),
+        ("sweep --sample 1e3 --vari f", "kincheck sweep: error: "),
+        ("run --mode projecton", "projection, simulate; did you mean 'projection'?\n"),
+        ("run --mode dream", "'dream' is none of projection, simulate\n"),
+        ("sweep --varry f", "no option '--varry'; did you mean '--vary'?"),
+        ("explain rssr bennett", "kincheck explain: error: too many arguments: bennett"),
+        ("export rssr --at nan", "'nan' is not a number"),
     ],
 )
-def test_mistakes_name_the_command_and_the_remedy(argv, said, capsys):
-    assert main.main(argv) == 2
+def test_mistakes_name_the_command_and_the_remedy(line, said, capsys):
+    assert main.main(line.split()) == 2
     found = capsys.readouterr().err
     assert said in found
     assert len(found.splitlines()) == 2

@@ -1,4 +1,4 @@
-"""Options that would be ignored, destroy each other's files or be no limits are refused, before
+"""Options that are wrong, would be ignored, or destroy each other's files are refused, before
 anything is computed.
 """
 
@@ -6,12 +6,16 @@ import pytest
 from kincheck.core.case.io.atomic_files import unwritable
 from kincheck.core.cli.main import main
 
-VARY = (
-    'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n[hardpoints.ball]\nat = "ball"\nsigma ='
-    " 1.0\n"
-)
+VARY = """
+schema = "kincheck-vary/1"
+mode = "monte_carlo"
+units.length = "mm"
+[hardpoints.ball]
+at = "ball"
+sigma = 1.0
+"""
 
-WITHOUT_EFFECT = [
+REFUSED = [
     ("assemblies rssr --number 2",
      "--number: found without --export, which it belongs to;"),
     ("assemblies rssr --out x.xml --number 1", "--number, --out: found without --export"),
@@ -33,6 +37,33 @@ WITHOUT_EFFECT = [
      "argument --memory: '1e300' is too large, expected 1e+09 at most; give less"),
     ("run rssr --timeout 2e9",
      "argument --timeout: '2e9' is too large, expected 1e+09 at most; give less"),
+    ("stress --family unit", "there is no family 'unit'; did you mean 'units'?"),
+    ("stress --engine nativ", "there is no engine 'nativ'"),
+    ("stress --samples 0", "'0' is not a whole number of 1 or more"),
+    ("stress --replay nowhere.toml", "no such file"),
+    ("stress --tol -1", "is not a positive number"),
+    *((f"sweep mcpherson_strut --vary vary.toml {options}", said) for options, said in (
+        ("--samples 0", "'0' is not a whole number of 1 or more"),
+        ("", "monte_carlo draws as many variants as it is told; give --samples"),
+        ("--samples 5 --check mujocco", "there is no engine 'mujocco'; did you mean 'mujoco'?"),
+        ("--samples 5 --check native:2",
+         "--check native:2: found the share '2', expected a fraction"),
+        ("--samples 5 --output toe",
+         "there is no output 'toe'; known: half_track_change, wheelbase_change"),
+        ("--samples 5 --replay 3",
+         "--replay: seed and index identify a variant; leave out --samples"),
+        ("--replay 3 --store x.parquet", "in this process and stores nothing"),
+        ("--samples 5 --jobs 2 --scheduler tcp://127.0.0.1:1",
+         "the cluster decides the number of threads"),
+        ("--samples 5 --store no/such/folder.parquet",
+         "cannot be written; give a file in a folder that exists"),
+        ("--samples 5 --limit half_track_change:1",
+         "--limit: found 'half_track_change:1', expected OUTPUT:"),
+        ("--samples 5 --limit toe:0:1", "--limit toe:0:1: there is no output 'toe'"),
+        ("--samples 5 --limit half_track_change:a:b", "expected OUTPUT:LOW:HIGH"),
+        ("--sampling latin --replay 1",
+         "a Latin hypercube depends on the number of variants; give --samples"),
+    )),
 ]  # fmt: skip
 ONE_FILE = [
     ("run rssr --json a --junit a", "--junit", "--json"),
@@ -65,8 +96,8 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(("line", "said"), WITHOUT_EFFECT)
-def test_options_without_effect_are_refused(line, said, here, capsys):
+@pytest.mark.parametrize(("line", "said"), REFUSED)
+def test_invalid_command_lines_are_refused(line, said, here, capsys):
     assert main(line.split()) == 2
     out, err = capsys.readouterr()
     assert (out, said in err) == ("", True), err

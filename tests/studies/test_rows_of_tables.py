@@ -22,7 +22,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 from kincheck.core.studies.variation.varied_places import Geometry
 
 from ..support.rods_of_templates import solved
-from .test_vary import HEAD, moved, vary
+from .test_vary import moved, vary, vary_file
 
 CAR = {"cg_height": "0.5", "wheelbase": "2.6", "brake_share": "0.6", "position": "front"}
 CORNER = Supplied(travel="0.04:3", **CAR)
@@ -63,8 +63,7 @@ def study_of(folder, case):
     """A study in which all that varies by itself varies."""
     names = [each.name for each in Geometry(case).variables if each.moves]
     points = {name: {"at": name, "sigma": 1.0} for name in names}
-    path = folder / "vary.json"
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": points}))
+    path = vary_file(folder, points)
     return Ready.of(Study(case, read_variation(path, case), 1, 0))
 
 

@@ -1,6 +1,5 @@
 """Distributions, samplings and correlations of drawn variants, held against scipy's."""
 
-import json
 from importlib import import_module
 
 import numpy as np
@@ -11,7 +10,7 @@ from kincheck.core.studies.variation.variation import DRAWN, Law
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank
-from .test_vary import HEAD
+from .test_vary import vary_file
 
 TIP = {
     "normal": {"at": "tip", "sigma": [0.0, 2.0, 0.0]},
@@ -44,10 +43,7 @@ def of_scipy(stats, law):
 
 
 def variation(tmp_path, tables=None, **hardpoints):
-    path = tmp_path / "vary.json"
-    whole = {**HEAD, "mode": "monte_carlo", "hardpoints": hardpoints, **(tables or {})}
-    path.write_text(json.dumps(whole))
-    return read_variation(path, crank())
+    return read_variation(vary_file(tmp_path, hardpoints, **(tables or {})), crank())
 
 
 @pytest.mark.parametrize("law", TIP)

@@ -131,21 +131,6 @@ def test_samples_without_a_verdict_are_counted_apart():
     assert headline([found, wrong]) == "1 of 15 samples silently wrong, 3 not judged, 4 unsupported"
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--family", "unit"], "there is no family 'unit'; did you mean 'units'?"),
-        (["--engine", "nativ"], "there is no engine 'nativ'"),
-        (["--samples", "0"], "'0' is not a whole number of 1 or more"),
-        (["--replay", "nowhere.toml"], "no such file"),
-        (["--tol", "-1"], "is not a positive number"),
-    ],
-)
-def test_stress_refuses_invalid_options(options, said, capsys):
-    assert main.main(["stress", *options]) == 2
-    assert said in capsys.readouterr().err
-
-
 def test_families_are_listed_with_their_sizes(capsys):
     assert main.main(["stress", "--list"]) == 0
     out = capsys.readouterr().out

@@ -16,7 +16,7 @@ from kincheck.core.cli.main import main
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},
@@ -26,9 +26,7 @@ POINTS = {
 
 @pytest.fixture
 def file(tmp_path):
-    path = tmp_path / "hardpoints.json"
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
-    return path
+    return vary_file(tmp_path, POINTS)
 
 
 def read(path: Path):
@@ -127,9 +125,7 @@ def test_json_goes_to_standard_output_alone(file, capsys):
 
 
 def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
-    path = tmp_path / "rod.json"
-    rod = {"at": "joints.rod.length", "half_width": 3500.0}
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": {"rod": rod}}))
+    path = vary_file(tmp_path, {"rod": {"at": "joints.rod.length", "half_width": 3500.0}})
     assert main(f"sweep rssr --vary {path} --samples 30 --out {tmp_path / 'out'}".split()) == 1
     told = capsys.readouterr().out
     assert re.search(r"30 variants of rssr, \d+ without a solution somewhere", told)
@@ -137,43 +133,6 @@ def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
         r"unsolved: variant \d+, \d+ samples: cannot be followed beyond crank = ", told
     )
     assert "Variants without a solution" in (tmp_path / "out" / "sweep.html").read_text()
-
-
-WRONG = [
-    (["--samples", "0"], "'0' is not a whole number of 1 or more"),
-    ([], "monte_carlo draws as many variants as it is told; give --samples"),
-    (
-        "--samples 5 --check mujocco".split(),
-        "there is no engine 'mujocco'; did you mean 'mujoco'?",
-    ),
-    (
-        "--samples 5 --check native:2".split(),
-        "--check native:2: found the share '2', expected a fraction",
-    ),
-    (
-        "--samples 5 --output toe".split(),
-        "there is no output 'toe'; known: half_track_change, wheelbase_change",
-    ),
-    (
-        "--samples 5 --replay 3".split(),
-        "--replay: seed and index identify a variant; leave out --samples",
-    ),
-    ("--replay 3 --store x.parquet".split(), "in this process and stores nothing"),
-    (
-        "--samples 5 --jobs 2 --scheduler tcp://127.0.0.1:1".split(),
-        "the cluster decides the number of threads",
-    ),
-    (
-        "--samples 5 --store no/such/folder.parquet".split(),
-        "cannot be written; give a file in a folder that exists",
-    ),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), WRONG)
-def test_sweep_refuses_invalid_options(file, capsys, options, message):
-    assert main(["sweep", "mcpherson_strut", "--vary", str(file), *options]) == 2
-    assert message in capsys.readouterr().err
 
 
 def test_without_pyarrow_there_is_a_message(file, tmp_path, capsys, monkeypatch):
@@ -207,3 +166,22 @@ def test_sweep_files_survive_closed_output(file, tmp_path, monkeypatch):
         os.dup2(kept, 1)
         os.close(kept)
     assert wanted.read_bytes() == (out / "sweep.json").read_bytes()
+
+
+def test_stored_hardpoint_named_like_output(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    stored = tmp_path / "all.parquet"
+    for name in ("rocker_tip_y", "variant"):
+        file = vary_file(tmp_path, {name: {"at": "joints.rod.length", "half_width": 1.0}})
+        assert main(f"sweep rssr --vary {file} --samples 20 --store {stored}".split()) == 0
+        table = parquet.read_table(stored)
+        assert table.column_names[:2] == ["variant", f"{name}.offset"]
+        assert table.column_names.count("rocker_tip_y") == 1
+        offsets, values = (
+            table[f"{name}.offset"].to_numpy(),
+            np.array(table["rocker_tip_y"].to_pylist()),
+        )
+        assert 0.0 < np.abs(offsets).max() <= 1e-3
+        assert values.shape == (20, 181)
+        units = json.loads(table.schema.metadata[b"kincheck"])["units"]
+        assert (units[f"{name}.offset"], units["rocker_tip_y"]) == ("m", "m")

@@ -1,7 +1,5 @@
 """Studies of forces: against runs of single variants, by both ways; masses and loads vary."""
 
-import json
-
 import numpy as np
 import pytest
 from kincheck import adapters
@@ -16,7 +14,7 @@ from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 COUNT = 4
 SLIDER_CRANK = {
@@ -117,12 +115,8 @@ def test_force_study_is_linear_in_mass(tmp_path):
 
 
 def test_force_study_prints_file_units(tmp_path, capsys):
-    path = tmp_path / "vary.json"
     hardpoints = {"mass": {"at": "bodies.slider.mass", "half_width": 0.1}}
-    limits = {"crank_torque": {"high": 1e9}}
-    path.write_text(
-        json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": hardpoints, "limits": limits})
-    )
+    path = vary_file(tmp_path, hardpoints, limits={"crank_torque": {"high": 1e9}})
     case = load("planar_slider_crank")
     (limit,) = read_variation(path, case).limits
     assert limit.high == pytest.approx(1e6)  # N mm in the file

@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from importlib import import_module
 
+import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
@@ -12,11 +13,12 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.studies.tolerance.conformance import sparkline
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.tolerance.tables import limit_notes, remarks
 from kincheck.core.studies.variation.study_choices import Sampling
 from kincheck.core.studies.variation.variation import Limit
 
 from ..support.fakes import crank
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 
@@ -89,6 +91,24 @@ def test_the_page_has_limits_histograms_and_legends(found):
     assert "--sampling sobol --replay" in text
 
 
+@pytest.mark.parametrize(
+    ("changes", "said", "told"),
+    [
+        ({}, "a Sobol sequence is balanced", False),
+        ({"asked": 4097}, "4097 is none, so the means converge more slowly: 8192 would be", True),
+        ({"asked": 4097, "sampling": "random"}, "Sobol", False),
+        ({"unsolved": 10}, "in all", False),
+        ({"unsolved": 11}, "unsolved: 11 in all, the first 0 in the results", True),
+        ({}, "assumes independent variants; for sobol sampling it is usually too wide", True),
+        ({"sampling": "random"}, "assumes independent variants", False),
+    ],
+)
+def test_remarks_of_a_study(found, changes, said, told):
+    results = msgspec.structs.replace(found, **changes)
+    lines = [*remarks(results), *limit_notes(results)]
+    assert any(said in line for line in lines) is told, lines
+
+
 def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):
     case = crank()
     limits = (Limit("y", high=0.4995),)
@@ -115,15 +135,8 @@ def test_limits_of_a_rate_take_its_order(tmp_path):
 
 @pytest.fixture
 def file(tmp_path):
-    tables = {
-        **HEAD,
-        "mode": "monte_carlo",
-        "hardpoints": {"ball": {"at": "ball", "sigma": 1.0}},
-        "limits": {"half_track_change": {"low": -12.0, "high": 1.0}},
-    }
-    path = tmp_path / "vary.json"
-    path.write_text(json.dumps(tables))
-    return path
+    limits = {"half_track_change": {"low": -12.0, "high": 1.0}}
+    return vary_file(tmp_path, {"ball": {"at": "ball", "sigma": 1.0}}, limits=limits)
 
 
 def test_limits_use_units_of_the_file(file, tmp_path, capsys):
@@ -148,21 +161,3 @@ def test_limits_use_units_of_the_file(file, tmp_path, capsys):
     told = capsys.readouterr().out
     assert "Specification limits" in told
     assert "95 % interval" in told
-
-
-WRONG = [
-    (["--limit", "half_track_change:1"], "--limit: found 'half_track_change:1', expected OUTPUT:"),
-    (["--limit", "toe:0:1"], "--limit toe:0:1: there is no output 'toe'"),
-    (["--limit", "half_track_change:a:b"], "expected OUTPUT:LOW:HIGH"),
-    (
-        "--sampling latin --replay 1".split(),
-        "a Latin hypercube depends on the number of variants; give --samples",
-    ),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), WRONG)
-def test_wrong_options_are_status_2_and_a_message(file, capsys, options, message):
-    samples = [] if "--replay" in options else ["--samples", "5"]
-    assert main(["sweep", "mcpherson_strut", "--vary", str(file), *samples, *options]) == 2
-    assert message in capsys.readouterr().err

@@ -15,7 +15,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..report.page import Page
 from ..support.printed import assert_printed, assert_row, blocks, cells_of
-from .test_vary import HEAD
+from .test_vary import vary_file
 
 VARIED = {
     "ball": {"at": "ball", "sigma": 2.0},
@@ -34,11 +34,7 @@ def shown(tmp_path_factory):
 
 
 def variation(folder, mode):
-    file = folder / "vary.json"
-    file.write_text(
-        json.dumps({**HEAD, "mode": mode, "hardpoints": VARIED, "limits": LIMITS}), "utf-8"
-    )
-    return read_variation(file, load("mcpherson_strut"))
+    return read_variation(vary_file(folder, VARIED, mode, limits=LIMITS), load("mcpherson_strut"))
 
 
 def study(folder, mode, **options):

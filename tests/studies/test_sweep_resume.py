@@ -13,7 +13,7 @@ from kincheck.core.studies.tolerance.sweep import sweep_designs
 
 from ..support.fakes import crank
 from .test_sweep_study import TIP
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 POINTS = {"ball": {"at": "ball", "sigma": 1.0}}
 VARIANTS, CHUNK = 256, 64
@@ -22,8 +22,7 @@ CHECK = ("--check", "native:0.01")
 
 @pytest.fixture(scope="module")
 def arguments(tmp_path_factory):
-    file = tmp_path_factory.mktemp("study") / "hardpoints.json"
-    file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
+    file = vary_file(tmp_path_factory.mktemp("study"), POINTS)
     return f"sweep mcpherson_strut --vary {file} --samples {VARIANTS} --seed 3 --jobs 1".split()
 
 

@@ -16,13 +16,16 @@ from ..support.fakes import crank
 HEAD = {"schema": "kincheck-vary/1", "units": {"length": "mm", "angle": "deg"}}
 
 
+def vary_file(folder, hardpoints, mode="monte_carlo", **tables):
+    """A file of these hardpoints, in millimetres and degrees."""
+    path = folder / "vary.json"
+    path.write_text(json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, **tables}))
+    return path
+
+
 def vary(tmp_path, case, mode="monte_carlo", lines=None, **hardpoints):
     """The variation that a file of these hardpoints gives."""
-    path = tmp_path / "vary.json"
-    path.write_text(
-        json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, "lines": lines or {}})
-    )
-    return read_variation(path, case)
+    return read_variation(vary_file(tmp_path, hardpoints, mode, lines=lines or {}), case)
 
 
 def moved(variation, **offsets):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -86,14 +86,6 @@ class SuspensionOutput(TypedQuantity):
     def signs(self) -> str:
         """Convention of signs and axes, in words."""
         return self.vehicle.signs
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """Properties for readers of results."""
-        own = {
-            each: value for each, value in asdict(self).items() if each not in ("vehicle", "other")
-        }
-        return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
 
 @dataclass(frozen=True)

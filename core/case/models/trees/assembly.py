@@ -203,7 +203,7 @@ class Start:
     Attributes:
         given: moves whose values the user gave; they stay if the closures let them.
         text: its source, for notes and messages.
-        closes: whether it is meant to close, so that it is refused far from that.
+        closes: whether it is meant to close; it is then refused far from closed.
     """
 
     pose: Pose
@@ -387,7 +387,7 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
     """Return a model in its start, closed.
 
     Args:
-        closure: tolerance of the closures [m]; that of the file's digits unless given.
+        closure: tolerance of the closures [m]; by the file's digits unless given.
         driven: driven and held moves; they stay if the closures let them.
 
     Raises:

@@ -19,18 +19,20 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from ....algebra import Vec3, X, Y, Z, cross, vec
 from ....errors import CaseError, remedy
 from ....joints.base import triad
-from ...io.document import LARGEST, fault, parse, parse_yaml, read_text, shown, unknown_name
+from ....joints.polynomial import HIGHEST
+from ....mechanism.mechanism import Vector
+from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name
 from .element import Element
-from .graph import Graph, Joint, Loop
+from .graph import Freedom, Graph, Joint, Loop
 from .place import Place, unit_vector
-from .tree import Closure, Coupling, Move
+from .tree import Closure, Coupling, Kind, Move
 
 CONSTRAINTS = ".constraints.json"
 YAML = (".yaml", ".yml")
@@ -41,22 +43,19 @@ OPEN = 1e-9
 _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
 _TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
 
-Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
-Numbers: TypeAlias = tuple[Number, Number, Number]
-
 
 class End(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A point of a link, in its axes [m]."""
 
     link: str
-    point: Numbers
+    point: Vector
 
 
 class Along(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A direction of a link, in its axes [-]."""
 
     link: str
-    direction: Numbers
+    direction: Vector
 
 
 class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -68,11 +67,11 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     j: End | None = None
     x: Along | None = None
     y: Along | None = None
-    value: Number = 0.0
-    weights: dict[str, Number] = {}
+    value: float = 0.0
+    weights: dict[str, float] = {}
     driven: str = ""
     driving: str = ""
-    coefficients: list[Number] = []
+    coefficients: Annotated[list[float], msgspec.Meta(max_length=HIGHEST + 1)] = []
 
 
 class ConstraintsFile(msgspec.Struct, frozen=True):
@@ -210,8 +209,9 @@ def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
         places = graph.places[first], graph.places[second]
         title = f"{names[0]} = {names[1]}"
         element = Element(file, "", {}, 1, words=f"closed_loop: {title}")
-        moves = [Move(title, "ball", places[0].at, X, element)] if kind.lower() == "3d" else []
-        graph.loops.append(Loop(Joint(title, (first, second), moves, element), places))
+        freedoms: list[Freedom] = [("", "ball", X)] if kind.lower() == "3d" else []
+        joint = Joint.of(title, (first, second), places[0].at, freedoms, element)
+        graph.loops.append(Loop(joint, places))
     coordinates = {move.name for joint in graph.joints for move in joint.moves}
     graph.tree.actuated |= coordinates & {*pairs.name_mot}
 
@@ -229,11 +229,15 @@ def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:
             continue
         name = each.joint if each.joint not in names else f"{each.joint}.{k}"
         names.add(name)
-        driven, driving = each.weights, dict[str, float]()
-        if each.kind == "polynomial":
-            driven, driving = {each.driven: 1.0}, {each.driving: 1.0}
-        coefficients, element = each.coefficients or (0.0,), _element(file, each.joint)
-        graph.couplings.append(Coupling(name, driven, driving, coefficients, element))
+        element = _element(file, each.joint)
+        if each.kind == "linear":
+            coupling = Coupling(name, each.weights, {}, (0.0,), element)
+        elif each.coefficients:
+            pair = {each.driven: 1.0}, {each.driving: 1.0}
+            coupling = Coupling(name, *pair, each.coefficients, element)
+        else:
+            raise element.fault("found no coefficients, expected some; export the case anew")
+        graph.couplings.append(coupling)
 
 
 def _element(file: Path, joint: str) -> Element:
@@ -262,16 +266,12 @@ class _Group:
         if self.distance:
             self._add_distance()
             return
-        moves = [*self._slides(), *self._turns()]
-        names = [self.name] if len(moves) == 1 else [f"{self.name}.{k}" for k in range(1, 7)]
-        named = [
-            Move(name, move.kind, move.point, move.axis, self.element)
-            for move, name in zip(moves, names, strict=False)
+        found = [*self._slides(), *self._turns()]
+        freedoms: list[Freedom] = [
+            (f".{k}" * (len(found) > 1), *each) for k, each in enumerate(found, 1)
         ]
-        self._loop(named)
-
-    def _loop(self, moves: Sequence[Move]) -> None:
-        self.graph.loops.append(Loop(Joint(self.name, self.links, moves, self.element)))
+        joint = Joint.of(self.name, self.links, self._pivot(), freedoms, self.element)
+        self.graph.loops.append(Loop(joint))
 
     def _fault(self, problem: str) -> CaseError:
         return self.element.fault(f"{problem}; export the case anew")
@@ -305,14 +305,11 @@ class _Group:
                 f"is open by {residual:.3g} in the zero pose, expected a condition that holds there"
             )
 
-    def _move(self, kind: Literal["hinge", "slide", "ball"], axis: Vec3 = X) -> Move:
-        """Return a move about or along an axis through the point of the second link."""
+    def _pivot(self) -> Vec3:
+        """Return the point of the second link about which it turns, global."""
         for each in (*self.coincident, *self.offset):
-            pivot = self._point(each.j)
-            break
-        else:
-            pivot = self.graph.places[self.links[1]].at
-        return Move("", kind, pivot, axis, self.element)
+            return self._point(each.j)
+        return self.graph.places[self.links[1]].at
 
     def _add_distance(self) -> None:
         """Add a rod; with an offset across a hinge on its first link."""
@@ -329,9 +326,10 @@ class _Group:
             return
         (across,) = self.offset
         hinge = Move(self.name, "hinge", p, self._axis(across.x), self.element)
-        self._loop([hinge, Move(f"{self.name}.ball", "ball", q, X, self.element)])
+        moves = hinge, Move(f"{self.name}.ball", "ball", q, X, self.element)
+        self.graph.loops.append(Loop(Joint(self.name, self.links, moves, self.element)))
 
-    def _slides(self) -> list[Move]:
+    def _slides(self) -> list[tuple[Kind, Vec3]]:
         """Return the slides left by offsets; none with a common point."""
         for each in self.coincident:
             apart = self._point(each.j) - self._point(each.i)
@@ -352,9 +350,9 @@ class _Group:
                 free = [unit_vector([*cross(x, y)])]
             case _:
                 raise self._fault(f"found {len(held)} offsets, expected two at most")
-        return [self._move("slide", axis) for axis in free]
+        return [("slide", axis) for axis in free]
 
-    def _turns(self) -> list[Move]:
+    def _turns(self) -> list[tuple[Kind, Vec3]]:
         """Return the turns left by pairs of directions."""
         pairs: list[tuple[Vec3, Vec3]] = []
         for each in self.directions:
@@ -363,11 +361,11 @@ class _Group:
             pairs.append((x, y))
         match pairs:
             case []:
-                return [self._move("ball")]
+                return [("ball", X)]
             case [(x, y)]:
-                return [self._move("hinge", each) for each in (x, y)]
+                return [("hinge", x), ("hinge", y)]
             case [(_, y), (_, z)] if abs(y @ z) > 1.0 - OPEN:
-                return [self._move("hinge", y)]
+                return [("hinge", y)]
             case [_, _, _]:
                 return []
             case _:

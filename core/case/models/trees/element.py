@@ -1,4 +1,4 @@
-"""Elements of an XML file that somebody wrote: attributes, texts and lines, no entities, no
+"""Elements of an XML file of any origin: attributes, texts and lines, no entities, no
 document types, a bounded depth.
 
 A mistyped attribute or element would silently fall back to its default, so unknown ones are
@@ -39,7 +39,7 @@ class Element:
     Attributes:
         line: its first one.
         texts: parts of the text in it.
-        words: its place in messages, if that is not its line.
+        words: its place in messages, if it is not its line.
     """
 
     file: Path
@@ -108,7 +108,7 @@ class Element:
         """Refuse unknown attributes, but for declarations of prefixes.
 
         Args:
-            closed: refuse all of them, and not only those that are almost known ones.
+            closed: refuse all of them, and not only misspelt known ones.
         """
         for name in self.attributes:
             if name in known or name.startswith("xmlns:"):

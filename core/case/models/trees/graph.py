@@ -10,16 +10,21 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
-from ....algebra import X
+from ....algebra import Vec3, X
 from ....mechanism.mechanism import GROUND
 from ...io.document import SMALLEST
 from .element import Element, significant_digits
 from .place import ORIGIN, Place
-from .tree import WORLD, Closure, Coupling, Mass, Move, Strut, Tree
+from .tree import WORLD, Closure, Coupling, Kind, Mass, Move, Strut, Tree
 
 FIXED = (WORLD, GROUND)
 """Names of a fixed link at the origin, which is the world."""
+
+
+Freedom: TypeAlias = tuple[str, Kind, Vec3]
+"""End of a move's name, after its joint, its kind and its axis."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,14 @@ class Joint:
     moves: Sequence[Move]
     element: Element
     is_free: bool = False
+
+    @staticmethod
+    def of(
+        name: str, links: tuple[str, str], at: Vec3, freedoms: Sequence[Freedom], element: Element
+    ) -> Joint:
+        """Return a joint whose moves go through one point."""
+        moves = [Move(f"{name}{end}", kind, at, axis, element) for end, kind, axis in freedoms]
+        return Joint(name, links, moves, element)
 
     @property
     def reversed(self) -> Joint:
@@ -61,7 +74,7 @@ class Graph:
     """Links and joints of a file, global in its zero pose; a reader fills it.
 
     Attributes:
-        tree: takes what is no link, joint or tie; links, joints and ties when they are hung.
+        tree: takes all but links, joints and ties; links, joints and ties when they are hung.
         places: of the links.
         elements: of the links, for messages.
         fixed: links of the world.
@@ -158,8 +171,8 @@ class _Hanging:
     """The tree of a graph during its making.
 
     Attributes:
-        inside: what hangs on each link, in order.
-        closures: what closes the loops, between links of the graph or copies.
+        inside: parts that hang on each link, in order.
+        closures: joints that close the loops, between links of the graph or copies.
     """
 
     def __init__(self, graph: Graph) -> None:

@@ -59,7 +59,7 @@ OTHERS = {
     "launch": "starts programs of ROS; give the URDF that it names",
     "model": "describes a package of Gazebo; give the SDF beside it",
 }
-"""Other documents in XML, and what to do, by their root."""
+"""Other documents in XML, and the remedy, by their root."""
 _EQUALITIES = ("connect", "weld", "joint", "tendon")
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
 
@@ -68,8 +68,8 @@ def read_mjcf(file: Path, root: Element) -> Tree:
     """Return the tree of a model, in its pose qpos0.
 
     Raises:
-        CaseError: an element that is not known or makes bodies, a name given twice, a joint, place
-            or equality that makes no sense.
+        CaseError: an unknown element or one of new bodies, a name given twice, a joint, place
+            or equality without a sense.
     """
     _require_model(root)
     root = expanded(file, root)
@@ -471,12 +471,12 @@ def _coefficients(element: Element) -> tuple[float, ...]:
 
 
 WATER = 1000.0
-"""Density of geoms unless given, that of water [kg/m^3]."""
+"""Density of geoms unless given, as water has [kg/m^3]."""
 SHAPES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 """Geoms with a volume, and how many sizes they have."""
 MASSLESS = ("plane", "hfield")
 STAND_INS = "kincheck.stand_ins"
-"""Name of the custom text of a model that kincheck wrote without masses."""
+"""Name of the custom text of a model written by kincheck without masses."""
 
 
 def mass_of(
@@ -488,7 +488,7 @@ def mass_of(
     """Return the mass of a body in its frame; None without one.
 
     Args:
-        parts: what is in it, with the places and the default classes of the frames it is given in.
+        parts: its content, with the places and the default classes of the frames it is given in.
 
     Raises:
         CaseError: a number or shape makes no sense, or a mesh has the mass.

@@ -66,7 +66,7 @@ _OPEN = {
     "flag": words("gravity equality spring damper passive"),
     **dict.fromkeys(("spatial", "fixed", "default tendon"), _TENDON),
 }
-"""Attributes that are read of elements with many others, and more in other releases of MuJoCo."""
+"""Attributes read of elements with many others, and more in other releases of MuJoCo."""
 _ALL = KNOWN | _OPEN
 
 _READ = words("compiler option default worldbody tendon equality")
@@ -74,20 +74,20 @@ _NOT_READ = words(
     "size statistic visual extension asset deformable contact actuator sensor custom keyframe"
 )
 ROOT = (*_READ, *_NOT_READ)
-"""What <mujoco> can hold: sections that are read, and those that are not."""
+"""Sections of <mujoco>: read ones, and others."""
 
 IN_BODY = words("body frame joint freejoint site inertial geom camera light plugin")
-"""What a body can hold, besides elements that make bodies."""
+"""Elements of a body, besides those of new bodies."""
 
 MAKE_BODIES = {
     "composite": "it makes bodies",
     "flexcomp": "it makes bodies",
     "attach": "it takes bodies from another model",
 }
-"""Elements that stand for others and are not read; MuJoCo itself can write the model out."""
+"""Elements in place of others, not read; MuJoCo itself can write the model out."""
 
 EXPANDED = ("include", "replicate")
-"""Elements that stand for others and are read; see `expand`."""
+"""Elements in place of others, read; see `expand`."""
 
 WRITE_OUT = (
     'let MuJoCo write the model out and give that file: python -c "import mujoco;'
@@ -99,8 +99,8 @@ DYNAMIC = {
     "armature": "armature",
     "frictionloss": "friction",
 }
-"""Attributes of joints that move nothing where motion is given; they are counted for the list of
-what is left out.
+"""Attributes of joints without effect on a given motion; they are counted for the list of parts
+left out.
 """
 
 

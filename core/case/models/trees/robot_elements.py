@@ -1,4 +1,4 @@
-"""Elements that URDF and SDF have alike: masses, springs, Drake's own, and those that are not read.
+"""Elements that URDF and SDF have alike: masses, springs, Drake's own, and unread ones.
 
 Motion needs neither masses nor springs: what makes no sense of them is counted and left out. Three
 ball constraints of two links hold them together as a whole; `kincheck export --to sdf` closes its
@@ -23,9 +23,9 @@ from ....algebra import ZERO, Vec3, X, cross, vec
 from ....errors import CaseError
 from ...io.document import decimal, shown, usable
 from .element import Element, Names, words
-from .graph import Graph, Joint, Loop
+from .graph import Freedom, Graph, Joint, Loop
 from .place import Place, turn_of_axes, unit_vector
-from .tree import Coupling, Mass, Move, Spring, Strut
+from .tree import Coupling, Mass, Spring, Strut
 
 BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
 # Of the distance of two points, what lies on the line through both.
@@ -37,7 +37,7 @@ FRICTION = ("friction", "drake:rotor_inertia", "drake:gear_ratio")
 LAW = ("damping", "spring_stiffness", "spring_reference")
 """Those that have one."""
 STRUT_LAW = ("stiffness", "damping", "free_length")
-"""What Drake's element between two points has of its own."""
+"""Own keys of Drake's element between two points."""
 
 # What is seen, touched or measured joins nothing.
 _APART = words(
@@ -100,19 +100,16 @@ def add_spring(graph: Graph, move: str, values: Mapping[str, str]) -> None:
         graph.tree.count("dynamics of joints")
 
 
-def screw(graph: Graph, name: str, lead: float, place: Place, axis: Vec3, element: Element):
-    """Return the moves of a screw, and couple them.
+def screw(graph: Graph, name: str, lead: float, axis: Vec3, element: Element) -> list[Freedom]:
+    """Return the freedoms of a screw, and couple them.
 
     Args:
         lead: advance in a turn [m].
     """
-    shift, turn = f"{name}.translation", f"{name}.rotation"
-    weights = {shift: 1.0, turn: -lead / (2.0 * math.pi)}
+    shift, turn = ".translation", ".rotation"
+    weights = {f"{name}{shift}": 1.0, f"{name}{turn}": -lead / (2.0 * math.pi)}
     graph.couplings.append(Coupling(f"{name}.thread", weights, {}, (0.0,), element))
-    return (
-        Move(shift, "slide", place.at, axis, element),
-        Move(turn, "hinge", place.at, axis, element),
-    )
+    return [(shift, "slide", axis), (turn, "hinge", axis)]
 
 
 def mimic(move: str, leader: str, offset: float, factor: float, element: Element) -> Coupling:
@@ -138,7 +135,12 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf]]) -> None:
                 graph.tree.count(STRUT)
     names = Names()
 
-    def add(element: Element, links: tuple[str, str], ends: Sequence[Place], kind: str) -> None:
+    def add(
+        element: Element,
+        links: tuple[str, str],
+        ends: Sequence[Place],
+        freedoms: Sequence[Freedom] = (),
+    ) -> None:
         name = _name(element, links)
         if "name" in element.attributes:
             names.add(name)
@@ -147,21 +149,20 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf]]) -> None:
         first, second = (
             graph.places[link].then(end) for link, end in zip(links, ends, strict=True)
         )
-        moves = [Move(name, "ball", first.at, X, element)] if kind == "point" else []
-        graph.loops.append(Loop(Joint(name, links, moves, element), (first, second)))
+        joint = Joint.of(name, links, first.at, freedoms, element)
+        graph.loops.append(Loop(joint, (first, second)))
 
     for links, ties in found.items():
         if links[0] == links[1]:
             raise ties[0][0].fault(
                 f"ties {links[0]!r} to itself, expected two links; correct one of the bodies"
             )
-        frames = [_frame(points) for points in zip(*(points for _, *points in ties), strict=True)]
-        first, second = frames
+        first, second = map(_frame, zip(*(points for _, *points in ties), strict=True))
         if first is not None and second is not None:
-            add(ties[0][0], links, (first, second), "frame")
+            add(ties[0][0], links, (first, second))
             continue
         for element, *points in ties:
-            add(element, links, [*map(Place, points)], "point")
+            add(element, links, [*map(Place, points)], [("", "ball", X)])
 
 
 def _strut(graph: Graph, element: Element, link_of: LinkOf) -> Strut:
@@ -216,9 +217,9 @@ class Unread:
 
     Attributes:
         links: links by their names, and by those of frames on them.
-        joints: joints by what they are called.
-        followers: joints that follow another one, and this one.
-        advice: what to write in place of a joint that is not read.
+        joints: joints by name.
+        followers: joints with the one they follow.
+        advice: the remedy for a joint of an unknown type.
     """
 
     links: Mapping[str, str]
@@ -238,7 +239,7 @@ class Unread:
         """Refuse an element that names two links, or couples joints.
 
         Args:
-            around: the link or joint that the element around it names.
+            around: the link or joint named by the element around it.
 
         Raises:
             CaseError: it does.

@@ -17,7 +17,7 @@ from ....algebra import Vec3, X, quat, vec
 from ....errors import CaseError, remedy
 from ...io.document import shown
 from .element import DEEPEST, Element, words
-from .graph import Graph, Joint
+from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
@@ -34,7 +34,7 @@ from .robot_elements import (
     mimic,
     screw,
 )
-from .tree import WORLD, Coupling, Kind, Mass, Move, Tree
+from .tree import WORLD, Coupling, Mass, Move, Tree
 
 MODEL = "__model__"
 SCOPE = "::"
@@ -421,8 +421,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         if {*ends} <= graph.fixed:
             graph.tree.count("joints of what stands still")
         else:
-            moves = _Joint(graph, frames, full, version).moves()
-            joints.append(Joint(frames.short(full), (ends[0], ends[1]), moves, element))
+            joints.append(_Joint(graph, frames, full, version).read((ends[0], ends[1])))
     return joints
 
 
@@ -436,9 +435,10 @@ class _Joint:
         self.place = frames.place(self.element, full)
         self.kind = self.element.choice("type", TYPES, "")
 
-    def moves(self) -> Sequence[Move]:
-        """Return its moves; add their mimics, couplings and springs."""
-        moves = self._moves()
+    def read(self, links: tuple[str, str]) -> Joint:
+        """Return the joint between two links; add mimics, couplings and springs."""
+        joint = Joint.of(self.name, links, self.place.at, self._freedoms(), self.element)
+        moves = joint.moves
         mimics: list[Coupling] = []
         for tag, move in zip(("axis", "axis2"), moves, strict=False):
             for axis in self.element.only(tag):
@@ -448,24 +448,19 @@ class _Joint:
         if (element := self.element.child(MIMIC)) is not None:
             mimics.append(self._drake_mimic(moves, element))
         self.graph.couplings += mimics
-        return moves
+        return joint
 
-    def _moves(self) -> Sequence[Move]:
-        name, element, place = self.name, self.element, self.place
-
-        def move(kind: Kind, tag: str = "axis", suffix: str = "") -> Move:
-            axis = X if kind == "ball" else self._axis(tag)
-            return Move(f"{name}{suffix}", kind, place.at, axis, element)
-
+    def _freedoms(self) -> list[Freedom]:
+        element = self.element
         match self.kind:
             case "revolute" | "continuous":
-                return [move("hinge")]
+                return [("", "hinge", self._axis("axis"))]
             case "prismatic":
-                return [move("slide")]
+                return [("", "slide", self._axis("axis"))]
             case "universal" | "revolute2":
-                return [move("hinge", "axis", ".1"), move("hinge", "axis2", ".2")]
+                return [(".1", "hinge", self._axis("axis")), (".2", "hinge", self._axis("axis2"))]
             case "ball":
-                return [move("ball")]
+                return [("", "ball", X)]
             case "screw":
                 if (pitch := element.child("screw_thread_pitch")) is None:
                     raise element.fault(
@@ -474,7 +469,7 @@ class _Joint:
                         " simulators"
                     )
                 (lead,) = pitch.text_numbers(1)
-                return screw(self.graph, name, lead, place, self._axis("axis"), element)
+                return screw(self.graph, self.name, lead, self._axis("axis"), element)
             case _:
                 return []
 

@@ -1,4 +1,4 @@
-"""The tree of links of a model: what the readers of MJCF, URDF and SDF make of a file, and all that
+"""The tree of links of a model: the content of a MJCF, URDF or SDF file, and all that
 its case is made of.
 
 A link without a move of its own is part of the link around it. A link with several moves hangs on a
@@ -29,7 +29,7 @@ WORLD = "world"
 # many as these. The rows of ties are solved together, in some seconds.
 MOST_LINKS, MOST_MOVING, MOST_TIES = 2_000, 150, 6_000
 STAND_IN = 1e-6
-"""Mass and moments of what kincheck itself writes for a body without a mass [kg, kg m^2]."""
+"""Mass and moments written by kincheck for a body without a mass [kg, kg m^2]."""
 # Of the stand-in's moments, turned into the axes of a body [kg m^2].
 _ROUND_OFF = 1e-9 * STAND_IN
 
@@ -95,7 +95,7 @@ class Closure:
     Attributes:
         holds: "point", their origins coincide; "frame", their axes too; "distance", their origins
             have a constant distance.
-        length: that distance [m].
+        length: the distance [m].
     """
 
     name: str
@@ -143,7 +143,7 @@ class Coupling:
 
 Tie: TypeAlias = Closure | Coupling
 Keyframe: TypeAlias = tuple[Element, Sequence[str] | None]
-"""Coordinates of all moves in order, as written in the file, and where; None for the zero pose."""
+"""Coordinates of all moves in order, as written, and their place; None for the zero pose."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Strut:
     """A spring and damper between points of two links, global in the pose of the tree [m].
 
     Attributes:
-        described: what it is counted as if it is left out.
+        described: its name in the list of parts left out.
     """
 
     name: str
@@ -208,7 +208,7 @@ class Tree:
     Attributes:
         described: the model and its file, for the source of the case.
         zero: its zero pose, in words.
-        closes: whether that is meant to close.
+        closes: whether it is meant to close.
         digits: significant digits of the numbers of the file.
         gravity: [m/s^2].
         places: of all links of the file, global.
@@ -221,10 +221,10 @@ class Tree:
         masses: of moving links with a mass, in the frame of each; several of links that move as
             one.
         unweighed: moving links whose masses cannot be read.
-        springs: by move; others are of no move that the tree has.
+        springs: by move; others are of no move of the tree.
         actuated: moves with a motor.
         keyframes: by name.
-        left_out: how many there are of what has no meaning for kinematics, by what it is called.
+        left_out: numbers of parts without a meaning for kinematics, by name.
         dialect: root element of its file.
         degrees, limited: of MJCF, limits are in degrees, and ranges are limits unless said.
     """
@@ -274,18 +274,8 @@ class Tree:
         """
         if name in self.places:
             raise element.repeated_name(name, "the bodies")
-        for most, count, what in (
-            (MOST_LINKS, len(self.places), "bodies; take out what does not move"),
-            (
-                MOST_MOVING,
-                len(self.moving) + len(moves),
-                "joints; take out those that are not looked at",
-            ),
-        ):
-            if count > most:
-                raise element.fault(
-                    f"found more than the {most} that are read, expected fewer {what}"
-                )
+        _require_few(element, MOST_LINKS, len(self.places), "bodies; take out what does not move")
+        _require_few(element, MOST_MOVING, len(self.moving) + len(moves), f"joints; {_TAKE_OUT}")
         carrier = self.carriers[outer]
         if name == GROUND and (moves or carrier != GROUND):
             raise element.fault(
@@ -347,11 +337,7 @@ class Tree:
         Raises:
             CaseError: it ties a link to itself, or there are too many.
         """
-        if len(self.ties) >= MOST_TIES:
-            raise tie.element.fault(
-                f"found more than the {MOST_TIES} equalities that are read, expected fewer; take"
-                " out those that are not looked at"
-            )
+        _require_few(tie.element, MOST_TIES, len(self.ties) + 1, f"equalities; {_TAKE_OUT}")
         if isinstance(tie, Closure) and tie.links[0] == tie.links[1]:
             if tie.links[0] == GROUND:
                 self.count("equalities of what stands still")
@@ -371,11 +357,7 @@ class Tree:
         if not (strut.spring.stiffness or strut.spring.damping):
             self.count(strut.described)
             return
-        if len(self.struts) >= MOST_TIES:
-            raise strut.element.fault(
-                f"found more than the {MOST_TIES} springs that are read, expected fewer; take out"
-                " those that are not looked at"
-            )
+        _require_few(strut.element, MOST_TIES, len(self.struts) + 1, f"springs; {_TAKE_OUT}")
         self.struts.append(strut)
 
     def axial(self, element: Element, key: str, name: str | None) -> str:
@@ -391,6 +373,15 @@ class Tree:
                 f"{key}: {name!r} is a ball joint, expected a hinge or a slide; couple one of those"
             )
         return name
+
+
+_TAKE_OUT = "take out those that are not looked at"
+
+
+def _require_few(element: Element, most: int, count: int, what: str) -> None:
+    """Refuse more than can be read in some seconds."""
+    if count > most:
+        raise element.fault(f"found more than the {most} that are read, expected fewer {what}")
 
 
 def _require_within(element: Element, point: Vec3) -> None:

@@ -20,7 +20,7 @@ from ....joints.base import triad
 from ...io.document import shown
 from .beside import read_beside
 from .element import Element, words
-from .graph import Graph, Joint, Loop
+from .graph import Freedom, Graph, Joint, Loop
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
@@ -37,7 +37,7 @@ from .robot_elements import (
     screw,
 )
 from .sdf import Frames, joints_of
-from .tree import MOST_LINKS, WORLD, Kind, Mass, Move, Tree
+from .tree import WORLD, Kind, Mass, Move, Tree
 
 GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
 JOINTS = ("joint", DRAKE_JOINT)
@@ -136,11 +136,6 @@ class _Robot:
             name = element.required("name")
             if name in graph.elements:
                 raise element.repeated_name(name, "the links")
-            if len(graph.elements) >= MOST_LINKS:
-                raise element.fault(
-                    f"found more than the {MOST_LINKS} links that are read, expected fewer; take"
-                    " out those that are not looked at"
-                )
             graph.elements[name] = element
             element.require_known(("name", "type"), "URDF", closed=False)
             element.require_children(IN_LINK)
@@ -228,40 +223,37 @@ class _Robot:
         types = DRAKE_TYPES if element.tag == DRAKE_JOINT else TYPES
         kind = self.beside.types.get(name) or element.choice("type", types, "")
 
-        def move(suffix: str, kind: Kind, axis: Vec3 = X) -> Move:
-            return Move(f"{name}{suffix}", kind, place.at, axis, element)
+        def axis() -> Vec3:
+            return _axis(element, "axis", place)
 
-        moves: Sequence[Move]
+        freedoms: list[Freedom]
         match kind:
             case "revolute" | "continuous":
-                moves = [move("", "hinge", _axis(element, "axis", place))]
+                freedoms = [("", "hinge", axis())]
             case "prismatic":
-                moves = [move("", "slide", _axis(element, "axis", place))]
+                freedoms = [("", "slide", axis())]
             case "spherical" | "ball":
-                moves = [move("", "ball")]
+                freedoms = [("", "ball", X)]
             case "floating" if links[0] in graph.fixed:
                 return Joint(name, links, (), element, is_free=True)
             case "floating":
-                slides = (
-                    move(f".{each}", "slide", place.direction(a)) for each, a in _AXES.items()
-                )
-                moves = [*slides, move("", "ball")]
+                freedoms = [(f".{each}", "slide", place.direction(a)) for each, a in _AXES.items()]
+                freedoms.append(("", "ball", X))
             case "planar":
-                f, g, h = triad((*_axis(element, "axis", place),))
-                slides = move(".slide1", "slide", f), move(".slide2", "slide", g)
-                moves = [*slides, move(".rotation", "hinge", h)]
+                f, g, h = triad((*axis(),))
+                freedoms = [(".slide1", "slide", f), (".slide2", "slide", g)]
+                freedoms.append((".rotation", "hinge", h))
             case "fixed":
-                moves = []
+                freedoms = []
             case "screw":
-                (lead,) = element.value(PITCH, 1)
-                moves = screw(graph, name, lead, place, _axis(element, "axis", place), element)
+                freedoms = screw(graph, name, element.value(PITCH, 1)[0], axis(), element)
             case "universal":  # of Drake: about x of the parent, then y of the child
-                axes = place.direction(X), place.direction(Y)
-                moves = [move(f".{k}", "hinge", axis) for k, axis in enumerate(axes, 1)]
+                axes = enumerate((X, Y), 1)
+                freedoms = [(f".{k}", "hinge", place.direction(a)) for k, a in axes]
             case _:  # of a file beside: a universal joint, by the letters of its axes
-                axes = {each: place.direction(_AXES[each.lower()]) for each in kind}
-                moves = [move(f"_{each}", "hinge", axis) for each, axis in axes.items()]
-        return Joint(name, links, moves, element)
+                letters = {each: _AXES[each.lower()] for each in kind}
+                freedoms = [(f"_{k}", "hinge", place.direction(a)) for k, a in letters.items()]
+        return Joint.of(name, links, place.at, freedoms, element)
 
     def _constraint(self, element: Element, default: str) -> Loop:
         """Return the joint of a <constraint>."""
@@ -286,16 +278,14 @@ class _Robot:
         axes = [_axis(element, "parent_axis", first)] if kinds and not ball else [X]
         if kind == "universal":
             axes.append(_axis(element, "child_axis", second))
-        titles = [f"{name}.{each}{k}" for k, each in enumerate(kinds, 1)]
-        titles = [name] if len(kinds) == 1 else titles
-        moves = tuple(
-            Move(title, each, first.at, axes[min(k, len(axes) - 1)], element)
-            for k, (each, title) in enumerate(zip(kinds, titles, strict=True))
-        )
-        joint = Joint(name, (links[0], links[1]), moves, element)
+        freedoms: list[Freedom] = [
+            (f".{each}{k + 1}" * (len(kinds) > 1), each, axes[min(k, len(axes) - 1)])
+            for k, each in enumerate(kinds)
+        ]
+        joint = Joint.of(name, (links[0], links[1]), first.at, freedoms, element)
         if ball:
             return Loop(joint, (Place(first.at, IDENTITY), Place(second.at, IDENTITY)))
-        return Loop(joint, (_fitted(first, second, moves), second))
+        return Loop(joint, (_fitted(first, second, joint.moves), second))
 
     def _gazebo(self) -> Frames:
         """Add the joints of SDF in <gazebo>, which close loops; return all frames.
