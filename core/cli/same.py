@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..case.models.undriven import Undriven
     from ..studies.same import Comparison
 
+THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 STATUS = {"same": Status.WITHIN, "differs": Status.DEVIATES, "not judged": Status.FAILED}
 """Exit status by verdict."""
 CONVERTERS = ("mujoco",)

@@ -38,8 +38,9 @@ from ...io.document import SMALLEST, explained, fault, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
-from .driving import Driving, choose_held, read_driving, read_start
+from .driving import Driving, Freedom, choose_held, read_driving, read_start
 from .element import Names
+from .limits import motor_ranges
 from .place import Place, coordinates
 from .tree import Closure, Coupling, Mass, Move, Spring, Tree, together
 
@@ -92,6 +93,15 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     model = assemble(start, supplied.closure, driving.moves)
     spins = find_spins(model.tree, driving.fixed)
     axes = {name: spin.axis for name, spin in spins.items()}
+    if not (driving.moves or driving.fixed or supplied.hold_rest):
+        own = read_driving(tree, replace(supplied, drive=motor_ranges(tree)))
+        if own.driven and len(own.driven) == Freedom(model, axes).dof:
+            driving = own
+            note = (
+                f"nothing is said of what drives it: {', '.join(own.driven)} move through their"
+                " limits, as the file has motors there; other motions by --drive"
+            )
+            model = replace(model, notes=(*model.notes, note))
     return model, choose_held(model, driving, axes, hold_rest=supplied.hold_rest), spins
 
 

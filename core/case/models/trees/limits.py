@@ -67,6 +67,16 @@ def limit_of(tree: Tree, move: Move) -> Limit:
     return _limit(lower, upper, *(x if x is None or x >= 0.0 else None for x in (effort, velocity)))
 
 
+def motor_ranges(tree: Tree) -> tuple[str, ...]:
+    """Return the ranges of all joints with a motor, as --drive takes them; none without limits."""
+    limits = {
+        name: limit_of(tree, move) for name, move in tree.joints.items() if name in tree.actuated
+    }
+    if not all(each.is_bounded and each.lower < each.upper for each in limits.values()):
+        return ()
+    return tuple(f"{name}:{each.lower!r}:{each.upper!r}" for name, each in limits.items())
+
+
 def _limit(lower: float | None, upper: float | None, *sizes: float | None) -> Limit:
     effort, velocity = (math.inf if x is None else x for x in sizes)
     return Limit(
