@@ -110,7 +110,10 @@ IMPORTS = {
         "studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
-    "kincheck": "case case/io harness harness/workers studies/checks cli __init__",
+    "kincheck": (
+        "case case/io harness harness/workers report studies/checks studies/diagnosis "
+        "studies/tolerance studies/variation cli primitives __init__"
+    ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 
