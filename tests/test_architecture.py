@@ -128,7 +128,8 @@ IMPORTS = {
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (
-        "case case/io harness harness/workers studies/checks studies/compliance cli __init__"
+        "case case/io harness harness/workers report studies/checks studies/compliance "
+        "studies/diagnosis studies/tolerance studies/variation cli primitives __init__"
     ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""

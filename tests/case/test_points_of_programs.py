@@ -4,7 +4,7 @@ refused by what they are.
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError
@@ -95,9 +95,20 @@ def test_assetto_corsa_suspension_is_read(tmp_path, options):
     assert "BASEY=-0.12" in case.source
 
 
+def test_expressions_of_a_script_are_listed(tmp_path):
+    file = tmp_path / "car.py"
+    file.write_text(
+        FORMS["dict.py"].replace("\n}", ",\n 'wheel_contact': np.array([0, 1, 2]) / 3,\n}", 1)
+    )
+    file.write_text(file.read_text().replace(",,", ","))
+    assert "wheel_contact" in load(file, SAID).source.split(LEFT_OUT)[1]
+
+
 BARS = "[BAR]\nposbody=body negbody=fl_spindle pos=(0.3,0.1,-1.7) neg=(0.5,0.1,-1.6)\n"
 REFUSED = {
     "rFactor": ("car.pm", BARS, ["rFactor", "left,up,rearward"]),
+    "rFactor by content": ("car.txt", BARS, ["rFactor", "left,up,rearward"]),
+    "no suspension": ("car.ini", "[GRAPHICS]\nx=1\n", ["suspensions.ini"]),
     "two axles": ("car.ini", ASSETTO + "WBCAR_STEER=0,0,0\n", ["FRONT, REAR", "--sheet FRONT"]),
     "no track": ("car.ini", ASSETTO.replace("TRACK", "TRAK"), ["FRONT", "no TRACK"]),
     "a torn point": ("car.ini", ASSETTO.replace("WBTYRE_TOP=", "WBTYRE_TOP=1,"), ["three numbers"]),

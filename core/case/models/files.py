@@ -176,6 +176,8 @@ def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     if kind == WORKBOOK:
         return read_spreadsheet(file, supplied)
     text = _text(file, of_spreadsheet=kind in (TABLE, ADAMS))
+    if kind == TABLE and "[BAR]" in text:
+        raise fault(file, "", f"found a text with [BAR], which {UNREAD['.pm']}")
     if kind == TREE and file.suffix.lower() == ".py":
         return read_python(file, text, supplied)
     if kind in (TREE, TABLE, ASSETTO):
@@ -212,8 +214,11 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         return ADAMS
     if text.lstrip().startswith("<"):
         return MODEL
-    if suffix == ".ini" and is_assetto(text):
-        return ASSETTO
+    if suffix == ".ini":
+        if is_assetto(text):
+            return ASSETTO
+        problem = "found an .ini file without points such as WBCAR_TOP_FRONT or STRUT_CAR"
+        raise fault(file, "", f"{problem}; give the suspensions.ini of Assetto Corsa")
     return TABLE if supplied.template or suffix == ".txt" else CASE
 
 

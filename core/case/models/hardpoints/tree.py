@@ -123,7 +123,7 @@ def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointT
 
 def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
     """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
-    evaluated; what is no number, text, list or dictionary of these is left out.
+    evaluated; what is no number, text, list or dictionary of these is left out and listed.
 
     Raises:
         CaseError: not Python, no points, or points of several suspensions.
@@ -135,10 +135,10 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
             targets = each.targets if isinstance(each, ast.Assign) else []
             if isinstance(each, ast.AnnAssign):
                 targets = [each.target]
-            value = _literal(getattr(each, "value", None))
-            if not targets or value is None:
+            if not targets:
                 left_out.append(f"line {each.lineno}")
                 continue
+            value = _literal(source) if (source := getattr(each, "value", None)) else ""
             for target in targets:
                 path = _KEY.sub(r".\1", ast.unparse(target)).split(".")
                 where = f"line {each.lineno} "
@@ -150,40 +150,36 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
     return _table(file, "Python", leaves, supplied, left_out)
 
 
-def _literal(node: ast.AST | None) -> Any:
-    """Return the value of an expression of literals; None for another one. A call with one list, or
-    with three numbers, is a point: `np.array([1, 2, 3])`, `Vector(1, 2, 3)`.
+def _literal(node: ast.AST) -> Any:
+    """Return the value of an expression of literals, and the text of another one. A call with one
+    list, or with three numbers, is a point: `np.array([1, 2, 3])`, `Vector(1, 2, 3)`.
     """
     match node:
-        case ast.Constant(value=bool() | None):
-            return None
         case ast.Constant(value=int() | float() | str()):
             return node.value
         case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
             return -number
         case ast.List(elts=items) | ast.Tuple(elts=items):
-            values = [_literal(item) for item in items]
-            return None if None in values else values
+            return [_literal(item) for item in items]
         case ast.Dict():
-            pairs = zip(node.keys, node.values, strict=True)
-            return _named_values((_literal(key), _literal(value)) for key, value in pairs)
+            keys = ["**" if key is None else str(_literal(key)) for key in node.keys]
+            return _named_values(zip(keys, map(_literal, node.values), strict=True))
         case ast.Call(func=ast.Name(id="dict"), args=[]):
-            return _named_values((each.arg, _literal(each.value)) for each in node.keywords)
+            return _named_values((str(each.arg), _literal(each.value)) for each in node.keywords)
         case ast.Call(args=[ast.List() | ast.Tuple() as only], keywords=[]):
             return _literal(only)
         case ast.Call(args=[_, _, _] as items, keywords=[]):
-            return _literal(ast.List(items))
+            return [_literal(item) for item in items]
         case _:
-            return None
+            return ast.unparse(node)
 
 
-def _named_values(pairs: Iterable[tuple[Any, Any]]) -> dict[str, Any]:
+def _named_values(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
-        if isinstance(key, str | int | float) and value is not None:
-            if str(key) in found:
-                raise ValueError(f"the key {key!r} stands twice")
-            found[str(key)] = value
+        if key in found:
+            raise ValueError(f"the key {key!r} stands twice")
+        found[key] = value
     return found
 
 
@@ -477,7 +473,7 @@ def _of_one_suspension(
             file,
             "",
             f"found points in {', '.join(map(shown, sections))}, expected those of one suspension;"
-            " choose a section by --sheet NAME",
+            " choose a section by --sheet NAME, or --corner FL",
         )
     names = {
         keys: ".".join(
