@@ -55,7 +55,9 @@ class Multipliers:
     largest: Array
 
     @staticmethod
-    def of(rows: Array, demand: Array, drivers: Sequence[int], left_out: int) -> Multipliers:
+    def of(
+        rows: Array, demand: Array, drivers: Sequence[int], left_out: int, freedoms: int = 0
+    ) -> Multipliers:
         """Return the shortest multipliers with J^T values = demand, and what is free beside them.
 
         Args:
@@ -65,10 +67,12 @@ class Multipliers:
             drivers: indices of the drivers' rows.
             left_out: number of rows at the end that are redundant but for digits. They carry
                 nothing, but what others carry may as well be theirs.
+            freedoms: number of degrees of freedom that no row holds, in a free motion.
         """
         n, count, unknowns = rows.shape
         solved = rows[:, : count - left_out]
-        rank = min(unknowns, count - left_out) - len(drivers)
+        held = min(unknowns - freedoms, count - left_out)
+        rank = held - len(drivers)
         u, sizes, vh = np.linalg.svd(solved, full_matrices=False)
         inverse = 1.0 / np.where(sizes > SINGULAR * sizes[:, :1], sizes, np.inf)
         values = np.zeros((n, count))
@@ -82,7 +86,8 @@ class Multipliers:
         free = np.zeros((n, count, len(joints) - rank))
         free[:, joints] = u[:, :, rank:]
         regular = of_joints[:, rank - 1] if rank else np.ones(n)
-        return Multipliers(values, free, of_joints[:, rank], regular, sizes[:, -1], sizes[:, 0])
+        least = sizes[:, held - 1]
+        return Multipliers(values, free, of_joints[:, rank], regular, least, sizes[:, 0])
 
     @property
     def singular(self) -> NDArray[np.bool_]:

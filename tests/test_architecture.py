@@ -73,7 +73,7 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/statics kinematics/diagnosis"
+        "kinematics/statics kinematics/diagnosis program/llvm"
     ),
     "case": ". primitives joints mechanism kinematics",
     "case/suspension": ". mechanism case",
@@ -128,8 +128,9 @@ IMPORTS = {
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (
-        "case case/io harness harness/workers report studies/checks studies/compliance "
-        "studies/diagnosis studies/tolerance studies/variation cli primitives __init__"
+        "case case/io harness harness/workers report studies studies/checks "
+        "studies/compliance studies/diagnosis studies/tolerance studies/variation cli "
+        "primitives __init__"
     ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""

@@ -135,6 +135,21 @@ class Sweep:
         return {self.driver: self.values, **further}
 
 
+@dataclass(frozen=True)
+class Free:
+    """The start and the samples of a free motion, without drivers.
+
+    Attributes:
+        duration: of the motion from the design position [s].
+        samples: number of samples, both ends included.
+        rates: at the start by driver or joint [m/s or rad/s]; see `kinematics.free_motion`.
+    """
+
+    duration: float
+    samples: int
+    rates: Mapping[str, float] = field(default_factory=dict[str, float])
+
+
 @dataclass(frozen=True, eq=False)
 class Series:
     """One output over the samples: value [unit], and time derivatives if known, each of shape (n,).
@@ -210,6 +225,7 @@ class Case:
         rig: of compliance studies, if the case has one.
         wheels: each `Vehicle` of [suspension], whether outputs read it or not.
         unforced: drivers without a force, which only follow a recording.
+        free: its free motion; None for the default.
     """
 
     name: str
@@ -228,6 +244,7 @@ class Case:
     rig: Rig | None = None
     wheels: tuple[Any, ...] = ()
     unforced: tuple[str, ...] = ()
+    free: Free | None = None
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

@@ -22,6 +22,7 @@ COMMANDS = (
     "trace",
     "kc",
     "serve",
+    "free",
     "doctor",
     "history",
     "report",

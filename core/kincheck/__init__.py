@@ -18,12 +18,31 @@ from typing import TYPE_CHECKING, Any
 from kincheck import core
 
 if TYPE_CHECKING:
-    from kincheck.by_name import check_engine, compliance, explain, load, report, run, sweep
+    from kincheck.by_name import (
+        check_engine,
+        compliance,
+        explain,
+        free,
+        load,
+        report,
+        run,
+        sweep,
+    )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
     from kincheck.core import primitives
 
-_BY_NAME = ("check_engine", "compliance", "explain", "load", "report", "run", "sweep")
-__all__ = ["check_engine", "compliance", "explain", "load", "primitives", "report", "run", "sweep"]
+_BY_NAME = ("check_engine", "compliance", "explain", "free", "load", "report", "run", "sweep")
+__all__ = [
+    "check_engine",
+    "compliance",
+    "explain",
+    "free",
+    "load",
+    "primitives",
+    "report",
+    "run",
+    "sweep",
+]
 __all__ += core.__all__
 
 

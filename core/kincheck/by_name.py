@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 from kincheck.core import KincheckError
-from kincheck.core.case.case import Case
+from kincheck.core.case.case import Case, Free
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.case.io.reference import PROVED
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
@@ -26,6 +26,7 @@ from kincheck.core.studies.checks.findings import Report
 from kincheck.core.studies.compliance import study
 from kincheck.core.studies.compliance.study import ComplianceResults
 from kincheck.core.studies.diagnosis import Diagnosis, diagnose
+from kincheck.core.studies.free import FreeResult, free_of
 from kincheck.core.studies.tolerance.results import SweepResults
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
@@ -184,6 +185,39 @@ def report(results: Results, file: str | Path) -> None:
         OSError: the file cannot be written.
     """
     write_report(results, Path(file))
+
+
+def free(
+    case: str | Path | Case,
+    *,
+    duration: float | None = None,
+    samples: int | None = None,
+    rates: Mapping[str, float] | None = None,
+) -> FreeResult:
+    """Integrate the motion of a case without its drivers, as the command `kincheck free` does.
+
+    Args:
+        case: a case, its name, or path; masses, loads and the rates at the start move it.
+        duration: of the motion [s]; by default that of the case's [free].
+        samples: number of samples, both ends included; by default that of [free].
+        rates: at the start by driver or joint [m/s or rad/s]; by default those of [free].
+
+    Raises:
+        KincheckError: duration or samples are missing, or the mechanism has no free motion.
+    """
+    found = case if isinstance(case, Case) else load(case)
+    own = found.free
+    if (duration is None or samples is None) and own is None:
+        raise KincheckError(
+            f"case {found.name!r} says no duration of its free motion; give duration and samples"
+        )
+    given = own or Free(1.0, 2)
+    asked = Free(
+        given.duration if duration is None else duration,
+        given.samples if samples is None else samples,
+        given.rates if rates is None else rates,
+    )
+    return free_of(replace(found, free=asked))
 
 
 def check_engine(engine: str | Engine) -> Report:

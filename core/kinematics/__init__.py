@@ -8,10 +8,11 @@ Solve:
     solve_designs      many designs over a sweep, each with its own geometry
     StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
+    free_motion        the motion without drivers, by masses and loads
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
-    FreeMotion         poses reached without drivers, and bodies placed to fit others
+    FreePoses          poses reached without drivers, and bodies placed to fit others
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
     count_turns        an angle known up to whole turns, from sample to sample
@@ -84,7 +85,8 @@ if TYPE_CHECKING:
     from .formulation.cartesian import COLUMNS, Cartesian
     from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
-    from .free_motion import FreeMotion, Poses, Walked
+    from .free_dynamics import FreeMotion, free_motion
+    from .free_poses import FreePoses, Poses, Walked
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
     from .replay import Residuals, Worst, count_turns, judged_part, replayed, residuals
@@ -116,7 +118,8 @@ _NAMES = {
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
-    "free_motion": "FreeMotion Poses Walked",
+    "free_dynamics": "FreeMotion free_motion",
+    "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
     "replay": "Residuals Worst count_turns judged_part replayed residuals",

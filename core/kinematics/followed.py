@@ -72,7 +72,7 @@ class Followed(Protocol):
 def near_design(mechanism: Mechanism, path: Path) -> bool:
     """Return whether the drivers go from the design to all samples in short steps."""
     times = path.times[np.isfinite(path.times)]
-    if not len(times):
+    if not len(times) or not path.motions:  # a free motion is known at all its steps
         return True
     start = start_of(mechanism, path)
     # turns are read from samples as if the design were at time zero

@@ -16,13 +16,13 @@ from typing import Any
 
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import held, require_finite, triple
-from ..joints.base import Joint, Kind, unit
+from ..joints.base import AxialJoint, Joint, Kind, unit
 from ..joints.coupler import Coupler
 from ..joints.gap import gap
 from ..trajectory import MARKER
 from .body import Body, Vector
 from .loads import Bushing, ForceElement, TorsionSpringDamper
-from .motions import Driver, JointDriver, PointCoordinate
+from .motions import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -407,6 +407,23 @@ class Mechanism:
     def moving(self) -> tuple[Body, ...]:
         """The bodies not fixed, in order."""
         return tuple(body for body in self.bodies if not body.fixed)
+
+
+def coordinates(mechanism: Mechanism) -> dict[str, Driver]:
+    """Return the drivers by name; and of every joint the drivers of its coordinates, as
+    JOINT.rotation or JOINT.translation, and as JOINT where it has one.
+    """
+    found: dict[str, Driver] = {}
+    for joint in mechanism.joints:
+        if not isinstance(joint, AxialJoint):
+            continue
+        for freedom in joint.freedoms:
+            kind = JointAngle if freedom == JointAngle.freedom else JointDisplacement
+            name = f"{joint.name}.{freedom}"
+            found[name] = kind(name, joint.name)
+        if len(joint.freedoms) == 1:
+            found[joint.name] = found[f"{joint.name}.{joint.freedoms[0]}"]
+    return found | {each.name: each for each in mechanism.drivers}
 
 
 def _unique(what: str, names: Sequence[str]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any, cast
 
 from ...errors import CaseError, MechanismError, unknown
 from ..case import Case, Truth, size
@@ -15,7 +16,9 @@ from ..units import ANGLES, LENGTHS, FileUnits
 from .compliance import read_resting, read_rig
 from .document import LONGEST_TEXT, Section, explained, read_tables, shown, toml_table
 from .mechanism_sections import (
+    free_lines,
     mechanism_lines,
+    read_free,
     read_mechanism,
     read_sweep,
     sweep_lines,
@@ -46,7 +49,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     """
     file = Path(path)
     advice = "a case holds hardpoints; samples belong into a reference file"
-    root = Section(file, "", read_tables(file, LARGEST_FILE, advice, SCHEMA))
+    root = Section(file, "", _with_free(read_tables(file, LARGEST_FILE, advice, SCHEMA)))
     keys = root.typed(CaseKeys)
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
@@ -60,11 +63,13 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     columns = None
     if keys.reference is not None:
         columns = root.at("reference").typed(ReferenceKeys)
+    free = read_free(root, mechanism, units)
     sweep, driver, own_grid = read_sweep(root, mechanism, units, columns)
     case = Case(
         *(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()),
         length_unit=units.length.name,
         angle_unit=units.angle.name,
+        free=free,
     )
     if keys.equilibrium is not None:
         from .resting import at_rest  # it takes the solver, and few cases need it
@@ -91,6 +96,16 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     convention = str(root.at("suspension").at("convention").value or "")
     case = replace(case, truth=keys.truth)
     return read_reference(file, columns, driver, units, case, convention, own_grid=own_grid)
+
+
+def _with_free(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a file; beside [free], those of a driven motion may be left out."""
+    free = tables.get("free")
+    if not isinstance(free, dict):
+        return tables
+    free = cast("dict[str, Any]", free)
+    sweep = {"start": 0.0, "stop": free.get("duration"), "steps": free.get("samples")}
+    return {"drivers": {}, "sweep": sweep, **tables}
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
@@ -159,6 +174,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         lines += toml_table({"gravity": case.mechanism.gravity})
     lines += mechanism_lines(case)
     lines += sweep_lines(case, values, own_grid=bool(reference))
+    lines += free_lines(case)
     lines += _closure_lines(case)
     if case.rig is not None:
         given = {f.name: getattr(case.rig, f.name) for f in fields(case.rig)}

@@ -15,7 +15,7 @@ from ...errors import CaseError, with_article
 from ...joints import Coupler, Joint, Polynomial
 from ...mechanism.body import ACCELERATION, INERTIA, checked_inertia
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper, TorsionSpringDamper
-from ...mechanism.mechanism import Body, Mechanism, Point
+from ...mechanism.mechanism import Body, Mechanism, Point, coordinates
 from ...mechanism.motions import (
     ROUNDED_TIME,
     Absolute,
@@ -28,7 +28,7 @@ from ...mechanism.motions import (
     Table,
 )
 from ...trajectory import Array
-from ..case import MARKER, SLOW, TIME, Case, Sweep
+from ..case import MARKER, SLOW, TIME, Case, Free, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
 from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
@@ -36,6 +36,7 @@ from .schema import (
     MOST_SAMPLES,
     BodyKeys,
     CaseKeys,
+    FreeKeys,
     PointKeys,
     ReferenceKeys,
     SweepKeys,
@@ -71,7 +72,7 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
         point = section.typed(PointKeys)
         points.append(Point(name, point.body, units.place(point.position)))
     joints, couplers = _joints(root, units)
-    drivers = _drivers(root.at("drivers"), units)
+    drivers = _drivers(root.at("drivers"), units, free=root.at("free").value is not None)
     forces = [
         _built(section, section.class_of("force", ELEMENTS), units, name)
         for name, section in root.at("forces").each()
@@ -188,9 +189,9 @@ def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]
     return [part for part in parts if isinstance(part, Joint)], couplers
 
 
-def _drivers(section: Section, units: FileUnits) -> list[Driver]:
+def _drivers(section: Section, units: FileUnits, *, free: bool) -> list[Driver]:
     """Return the drivers. `read_sweep` reads their motions, since they depend on the sweep."""
-    if not section.value:
+    if not section.value and not free:
         raise section.fault("found no driver, expected at least one that moves; add [drivers.NAME]")
     if TIME in section.table:
         raise section.at(TIME).fault(
@@ -240,7 +241,7 @@ def read_sweep(
         for name, each in drivers.items()
         if (motion := each.at("motion")).value is not None
     }
-    _require_moved(section, sweep, drivers, moved)
+    _require_moved(section, sweep, drivers, moved, free=root.at("free").value is not None)
     motions = {name: _motion(mechanism, name, each, units) for name, each in moved.items()}
     convert, design = SECOND, 0.0
     if sweep.driver != TIME:
@@ -304,10 +305,12 @@ def _require_moved(
     sweep: SweepKeys,
     drivers: Mapping[str, Section],
     moved: Mapping[str, Section],
+    *,
+    free: bool,
 ) -> None:
     """Refuse a sweep in contradiction to itself or the motions."""
     if sweep.driver == TIME:
-        if not moved:
+        if not moved and not free:
             found = f"found {shown(TIME)}" if "driver" in section.table else "missing"
             raise section.at("driver").fault(
                 f"{found}, and no driver has a motion, expected something that moves; name the"
@@ -356,6 +359,30 @@ def _require_defined(section: Section, motion: Motion, times: Array) -> None:
 def _unit(driver: Driver, units: FileUnits) -> Unit:
     """Return the unit of a driver's values in the file."""
     return units.angle if driver.turns else units.length
+
+
+def read_free(root: Section, mechanism: Mechanism, units: FileUnits) -> Free | None:
+    """Read the free motion; None without one."""
+    section = root.at("free")
+    if section.value is None:
+        return None
+    keys, rates = section.typed(FreeKeys), dict[str, float]()
+    known = coordinates(mechanism)
+    for name, rate in keys.rates.items():
+        if name not in known:
+            expected = "a driver or a joint with a rotation or translation"
+            raise section.at("rates").unknown(name, known, expected)
+        rates[name] = _unit(known[name], units)(rate)
+    return Free(keys.duration, keys.samples, rates)
+
+
+def free_lines(case: Case) -> list[str]:
+    """Return the lines of [free]."""
+    if case.free is None:
+        return []
+    rates = toml_table(case.free.rates, "free", "rates") if case.free.rates else []
+    grid = {"duration": case.free.duration, "samples": case.free.samples}
+    return [*toml_table(grid, "free"), *rates]
 
 
 def mechanism_lines(case: Case) -> Iterator[str]:

@@ -61,6 +61,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          without such a start, all drivers go straight from the design to their
                          values at time zero if it is in the sweep, else at the first sample, and
                          the result says so
+    [free]               duration [s], samples, both ends included: the motion without drivers, for
+                         `kincheck free`; (rates) = {DRIVER or JOINT = number}: at the start, units
+                         per second; with [free], [drivers] and [sweep] may be left out
     [closure]            (tolerance) [length]: points and axes have few digits; rows redundant
                          within the tolerance are left out, with a note; strict without it;
                          --closure of the command line overrides it
@@ -258,6 +261,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     forces: Table = {}
     compliance: Table | None = None
     equilibrium: Table | None = None
+    free: Table | None = None
 
 
 class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -295,6 +299,19 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
         | None
     ) = None
     rate: Number | None = None
+
+
+class FreeKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[free]; rates in the units of the drivers, per second."""
+
+    duration: Annotated[float, Meta(gt=0.0, description="a number of seconds greater than zero")]
+    samples: Annotated[
+        int,
+        Meta(ge=2, le=MOST_SAMPLES, description=f"a whole number of samples, 2 to {MOST_SAMPLES}"),
+    ]
+    rates: Annotated[
+        dict[str, float], Meta(description="a table of numbers by driver or joint")
+    ] = {}
 
 
 class ClosureKeys(msgspec.Struct, forbid_unknown_fields=True):

@@ -152,8 +152,9 @@ class ForceRows:
     Rows left out within digits come last: they carry nothing, and count in the self-stress.
     """
 
-    def __init__(self, lanes: MotionLanes) -> None:
+    def __init__(self, lanes: MotionLanes, freedoms: int = 0) -> None:
         self.lanes, mechanism, frame = lanes, lanes.mechanism, lanes.frame
+        self._freedoms = freedoms
         numbers = drive_numbers(mechanism.drivers, lanes.drive, frame.unit)
         drives = {
             driver.name: Drive(*numbers[5 * k : 5 * k + 5])
@@ -205,7 +206,7 @@ class ForceRows:
             return Multipliers(values, np.empty((*values.shape, 0)), np.zeros(n), one, one, one)
         last = len(self.formulation.owners)
         drivers = range(last - len(self.lanes.mechanism.drivers), last)
-        return Multipliers.of(rows, demand, drivers, rows.shape[1] - last)
+        return Multipliers.of(rows, demand, drivers, rows.shape[1] - last, self._freedoms)
 
     def wrench(self, joint: Joint, multipliers: Array) -> tuple[Array, Array]:
         """Return force [J / unit of the frames] and moment [N m] of a joint, shape (n, 3) each.
@@ -280,6 +281,7 @@ def forces_of(
     motion: Trajectory,
     names: Collection[str] | None = None,
     follow: Follow | None = None,
+    freedoms: int = 0,
 ) -> Forces:
     """Return the forces of a solved motion.
 
@@ -289,6 +291,7 @@ def forces_of(
         motion: motion of all moving bodies, with accelerations.
         names: names of joints, drivers and force elements; by default all.
         follow: counts the turns of joints with torsional springs; by default their rates do.
+        freedoms: number of degrees of freedom that no driver holds, in a free motion.
 
     Raises:
         SolveError: a name is unknown, or the motion lacks a body.
@@ -296,7 +299,7 @@ def forces_of(
     wanted = wanted_forces(mechanism, names)
     solved = motion.solved
     lanes = MotionLanes(mechanism, path, motion, follow)
-    lines = ForceRows(lanes)
+    lines = ForceRows(lanes, freedoms)
     solution = lines.solve()
     efforts = {each.name: lines.effort(each, solution) for each in mechanism.drivers}
     elements = {name: each.amount + np.zeros(lanes.n) for name, each in lanes.applied.items()}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...case.models.undriven import Coordinate, Undriven
 from ...joints.base import Joint, unit
-from ...kinematics import FreeMotion, Poses, Residuals, residuals
+from ...kinematics import FreePoses, Poses, Residuals, residuals
 from ...mechanism.body import Body
 from ...mechanism.mechanism import GROUND
 from ...trajectory import Array
@@ -175,13 +175,13 @@ def measurable(file: Undriven, name: str) -> bool:
     )
 
 
-def left_in(b: Undriven, free: FreeMotion, poses: Poses) -> Residuals:
+def left_in(b: Undriven, free: FreePoses, poses: Poses) -> Residuals:
     """Return residuals of poses in the rows of a file; links without poses are fitted."""
     return residuals(b.mechanism, free.placed(poses))
 
 
 def placement(
-    a: Undriven, b: Undriven, match: Match, poses: Poses, free: FreeMotion, enough: float
+    a: Undriven, b: Undriven, match: Match, poses: Poses, free: FreePoses, enough: float
 ) -> Placement:
     """Return the placement in which most joints of the second file hold.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...case.models.undriven import Undriven
 from ...errors import shortened
-from ...kinematics import FreeMotion, Poses, Residuals, Walked
+from ...kinematics import FreePoses, Poses, Residuals, Walked
 from ...trajectory import Array
 from .links import Match, match_links
 from .lost import lost_items
@@ -134,7 +134,7 @@ class _Pair:
 
     def __init__(self, a: Undriven, b: Undriven, match: Match) -> None:
         self.files, self.match = (a, b), match
-        self.motions = FreeMotion(a.mechanism), FreeMotion(b.mechanism)
+        self.motions = FreePoses(a.mechanism), FreePoses(b.mechanism)
         self.sizes = [each.size for each in self.motions]
         # an angle is off by twice a component of a quaternion
         self.allowed = max(self.sizes) * sum(

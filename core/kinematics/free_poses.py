@@ -58,7 +58,7 @@ class Walked:
         return len(next(iter(self.poses.values()))) - 1
 
 
-class FreeMotion:
+class FreePoses:
     """The native rows of a mechanism without its drivers and loads.
 
     Attributes:

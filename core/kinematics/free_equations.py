@@ -1,0 +1,419 @@
+"""The equations of a free mechanism in numbers, and its start.
+
+The equations are those of index 1 on the traced rows, [M J^T; J 0] [a; -lambda] = [Q - h; gamma].
+A QR factorisation with pivots of J^T gives, at every evaluation, the independent rows and a basis Z
+of the motions they leave; a = a_p + Z b, with Z^T M Z b = Z^T (Q - h - M a_p). Redundant rows and
+bodies without mass need no special case.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..algebra import ZERO, quat, vec
+from ..errors import SolveError, unknown
+from ..mechanism.mechanism import Mechanism, coordinates
+from ..mechanism.motions import Driver
+from ..primitives.base import GROUND_TWIST, Drive, Pose, Twist
+from ..program import Plan, Tape, program
+from ..program.llvm.compiler import available
+from ..program.llvm.executor import bind
+from ..program.llvm.jit import LlvmCode
+from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
+from .compiled.request import Layout
+from .compiled.traced_forces import angles
+from .forces.equations import BodyStates, ForceEquations, Wrench, arm_of_center, at_work, inertial
+from .formulation.cartesian import COLUMNS, Cartesian
+from .formulation.constraints import constraints, frames
+from .formulation.formulation import (
+    GROUND_ACCELERATION,
+    Acceleration,
+    motion_of_frame,
+    motion_of_point,
+)
+from .formulation.state_vectors import jacobian
+
+# Singular values below this part of the largest are zero, as for `structure.redundancy`.
+RANK = 1e-9
+# At a change point the smallest singular value vanishes. Accelerations have round-off over its
+# square, so a motion that passes this near to one cannot be told from one through it.
+VANISHING = 1e-5
+# Directions with less than this part of the largest inertia have none, but for round-off.
+MASSLESS = 1e-13
+
+
+class FreeEquations:
+    """The equations of a free mechanism in numbers.
+
+    A state y holds displacements and Euler parameters of all bodies, joint coordinates, the rates
+    of the unknowns, and the work of all loads.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = replace(mechanism, drivers=())
+        if not any(body.mass for body in mechanism.moving):
+            raise SolveError(
+                f"mechanism {mechanism.name!r}: no moving body has mass, and without mass loads"
+                " determine no motion; give bodies mass, center_of_mass and inertia"
+            )
+        self.frame = frames(mechanism)
+        found = constraints(self.mechanism, self.frame, {}, named=angles(mechanism))
+        self.formulation = Cartesian(found, self.frame.moving)
+        self.unknowns, self.bodies = self.formulation.unknowns, len(self.formulation.bodies)
+        self.design = np.concatenate([*self.formulation.design.values()])
+        self.evaluations = 0
+        self._linear: Any = importlib.import_module("scipy.linalg")
+        self._trace()
+        at_start = self.evaluate(np.concatenate([self.design, np.zeros(self.unknowns + 1)]))
+        sizes = np.linalg.svd(at_start.rows, compute_uv=False) if self.count else np.zeros(0)
+        self.rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+        if self.rank == self.unknowns:
+            raise SolveError(
+                f"mechanism {mechanism.name!r}: no freedom is left without its drivers, so that"
+                " nothing moves; free a joint"
+            )
+        inertia = np.diag(at_start.mass)
+        # unknowns of the size of their inertia: light bodies beside heavy ones keep their digits
+        self.scale = 1.0 / np.sqrt(np.where(inertia > 0.0, inertia, inertia.max()))
+
+    def _trace(self) -> None:
+        tape, layout, formulation = Tape(), Layout(), self.formulation
+        state = {
+            name: [tape.input(k) for k in layout.vector(name, len(values))]
+            for name, values in formulation.design.items()
+        }
+        v = [tape.input(k) for k in layout.vector("v", self.unknowns)]
+        inputs = len(layout.slots)
+        at = formulation.configuration(state)
+        still = dict.fromkeys(formulation.bodies, GROUND_ACCELERATION)
+        states = BodyStates(self.frame, at.poses, formulation.twists(at, v), still)
+        applied = at_work(self.mechanism, states, lambda joint: at.state[f"x {joint}.rotation"][0])
+        equations = ForceEquations(
+            self.mechanism, formulation, at, states, applied, Cartesian((), ())
+        )
+        gravity, power = vec(self.mechanism.gravity), list[Any]()
+        mass = dict[tuple[int, int], Any]()
+        for body in self.mechanism.moving:
+            if body.mass == 0.0:
+                continue
+            arm, first = arm_of_center(body, states), formulation.columns[body.name]
+            velocity = self.frame.unit * states.twists[body.name].of(arm)
+            power.append(body.mass * (velocity @ gravity))
+            for k in range(COLUMNS):
+                unit = [float(k == other) for other in range(COLUMNS)]
+                moved = BodyStates(
+                    self.frame,
+                    at.poses,
+                    {body.name: GROUND_TWIST},
+                    {body.name: Acceleration(vec(unit[:3]), vec(unit[3:]))},
+                )
+                for row, value in enumerate(self._column(inertial(body, moved, ZERO))):
+                    mass[first + row, first + k] = value
+        power += [-(each.stored + each.lost) for each in applied.values()]
+        rows = formulation.rows(at)
+        self.count = len(rows)
+        entries = {(i, k): x for i, row in enumerate(rows) for k, x in row.items()}
+        wanted = {
+            "rows": [*entries.values()],
+            "mass": [*mass.values()],
+            "phi": formulation.phi(at),
+            "gamma": formulation.gamma(at, v),
+            "demand": equations.demand,
+            "power": [sum(power, 0.0)],
+        }
+        outputs = {
+            slot: value
+            for name, values in wanted.items()
+            for slot, value in zip(layout.vector(name, len(values)), values, strict=True)
+        }
+        plan = Plan({"free": program("free", tape, outputs)}, layout.slots)
+        self._executor = bind(plan, 1, LlvmCode(plan) if available() else None)
+        self._inputs, self._outputs = range(inputs), [*outputs]
+        ends = np.cumsum([len(values) for values in wanted.values()])
+        self._parts = dict(zip(wanted, zip([0, *ends], ends, strict=False), strict=True))
+        self._at_rows = tuple(np.array([*entries], np.intp).reshape(-1, 2).T)
+        self._at_mass = tuple(np.array([*mass], np.intp).reshape(-1, 2).T)
+
+    def _column(self, wrench: Wrench) -> list[Any]:
+        return [*(self.frame.unit * wrench.force), *wrench.torque]
+
+    def evaluate(self, y: Array) -> Evaluated:
+        """Return the equations at a state."""
+        self.evaluations += 1
+        executor = self._executor
+        executor.put(self._inputs, y[:-1, None])
+        executor.run("free")
+        values = executor.get(self._outputs)[:, 0]
+        part = {name: values[slice(*ends)] for name, ends in self._parts.items()}
+        rows, mass = np.zeros((self.count, self.unknowns)), np.zeros((self.unknowns,) * 2)
+        rows[self._at_rows], mass[self._at_mass] = part["rows"], part["mass"]
+        power = float(part["power"][0])
+        return Evaluated(rows, mass, part["phi"], part["gamma"], part["demand"], power)
+
+    def rate(self, _: float, y: Array) -> Array:
+        """Return the rate of a state."""
+        at = self.evaluate(y)
+        return self.moved(y, y[len(self.design) : -1], self.accelerations(at), at.power)
+
+    def moved(self, y: Array, v: Array, a: Array, power: float) -> Array:
+        """Return the rate of a state by the rates of the unknowns and their accelerations."""
+        n = self.bodies
+        e = y[3 * n : 7 * n].reshape(n, 4)
+        velocity, w = v[: 6 * n].reshape(n, 2, 3).transpose(1, 0, 2)
+        turning = np.empty((n, 4))
+        (e0, e1, e2, e3), (wx, wy, wz) = e.T, 0.5 * w.T
+        turning[:, 0] = -(wx * e1 + wy * e2 + wz * e3)
+        turning[:, 1] = e0 * wx + wy * e3 - wz * e2
+        turning[:, 2] = e0 * wy + wz * e1 - wx * e3
+        turning[:, 3] = e0 * wz + wx * e2 - wy * e1
+        return np.concatenate([velocity.ravel(), turning.ravel(), v[6 * n :], a, [power]])
+
+    def accelerations(self, at: Evaluated) -> Array:
+        """Return the accelerations of the unknowns.
+
+        Raises:
+            SolveError: a load acts on a freedom without inertia.
+        """
+        particular, free = self.split(at.rows, at.gamma)
+        left = -at.demand - at.mass @ particular
+        sizes, ways = np.linalg.eigh(free.T @ at.mass @ free)
+        acting = ways.T @ (free.T @ left)
+        light = sizes <= MASSLESS * sizes[-1]
+        if light.any():
+            scaled = self.scale * (np.abs(at.demand) + np.abs(at.mass) @ np.abs(particular))
+            if (np.abs(acting[light]) > RANK * np.linalg.norm(scaled)).any():
+                name = self._lightest(free @ ways[:, 0])
+                raise SolveError(
+                    f"mechanism {self.mechanism.name!r}: a load acts on a motion of body {name!r}"
+                    " that has no inertia, so that its acceleration is infinite; give the body"
+                    " mass and inertia"
+                )
+        motion = np.where(light, 0.0, acting / np.where(light, 1.0, sizes))
+        return particular + free @ (ways @ motion)
+
+    def _lightest(self, way: Array) -> str:
+        """Return the body that moves most."""
+        sizes = np.linalg.norm(way[: 6 * self.bodies].reshape(-1, 6), axis=1)
+        return self.formulation.bodies[int(sizes.argmax())]
+
+    def split(self, rows: Array, right: Array) -> tuple[Array, Array]:
+        """Return a solution x of rows x = right, and a basis of all others beside it, shape
+        (unknowns,) and (unknowns, freedoms).
+        """
+        if not self.count:
+            return np.zeros(self.unknowns), np.diag(self.scale)
+        q, r, order = self._linear.qr((rows * self.scale).T, pivoting=True, check_finite=False)
+        chosen, upper = order[: self.rank], r[: self.rank, : self.rank]
+        x = self._linear.solve_triangular(upper, right[chosen], trans="T", check_finite=False)
+        return self.scale * (q[:, : self.rank] @ x), self.scale[:, None] * q[:, self.rank :]
+
+    def start(self, v: Array) -> Array:
+        """Return the state at the design position, closed, at rates of the unknowns.
+
+        Raises:
+            SolveError: the start is open.
+        """
+        y = np.concatenate([self.design, v, [0.0]])
+        closed = y + self.projection(y)
+        if self.gap(closed) > RANK:
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: the design position is open by"
+                f" {self.frame.unit * self.gap(closed):.2g} m; close it by kincheck run --closure,"
+                " or correct the points"
+            )
+        return closed
+
+    def projection(self, y: Array) -> Array:
+        """Return the change of a state that projects its pose and then its velocities onto the
+        rows.
+        """
+        n, position, v = self.bodies, slice(len(self.design)), slice(len(self.design), -1)
+        total = np.zeros_like(y)
+        for _ in range(2):
+            e = (y + total)[3 * n : 7 * n].reshape(n, 4)
+            excess = 0.5 * (1.0 - (e * e).sum(axis=1, keepdims=True))  # of a length of nearly one
+            total[3 * n : 7 * n] += (excess * e).ravel()
+            at = self.evaluate(y + total)
+            step, _ = self.split(at.rows, -at.phi)
+            total[position] += self.moved(y + total, step, step, 0.0)[position]
+        rows = self.evaluate(y + total).rows
+        total[v] = -self.split(rows, rows @ y[v])[0]
+        return total
+
+    def gap(self, y: Array) -> float:
+        """Return the largest residual of all rows."""
+        return float(np.abs(self.evaluate(y).phi).max(initial=0.0))
+
+    def regular(self, y: Array) -> float:
+        """Return the smallest singular value of the independent rows, by the largest."""
+        if not self.rank:
+            return 1.0
+        sizes = np.linalg.svd(self.evaluate(y).rows, compute_uv=False)
+        if sizes[self.rank : self.rank + 1].max(initial=0.0) > VANISHING * sizes[0]:
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: its design position is a change point, where"
+                " rows are redundant that are not so beside it; give the design in another pose,"
+                " some degrees on"
+            )
+        return float(sizes[self.rank - 1] / sizes[0])
+
+    def energy(self, y: Array) -> float:
+        """Return the kinetic energy less the work of the loads since the start [J]."""
+        v = y[len(self.design) : -1]
+        return float(0.5 * v @ self.evaluate(y).mass @ v - y[-1])
+
+    def decay(self, y: Array) -> float:
+        """Return the fastest decay of a deviation from a state [1/s]."""
+        steps = np.sqrt(np.finfo(np.float64).eps) * np.maximum(np.abs(y), 1.0)
+        at = self.rate(0.0, y)
+        columns = [
+            (self.rate(0.0, y + way) - at) / step
+            for way, step in zip(np.diag(steps).copy(), steps, strict=True)
+        ]
+        return float(-np.linalg.eigvals(np.array(columns, np.float64).T).real.min())
+
+    def _states(self, states: Array) -> dict[str, tuple[Pose, Twist]]:
+        n, lanes = self.bodies, states.T
+        v = lanes[len(self.design) :]
+        return {
+            name: (
+                Pose.of(
+                    vec([*lanes[3 * k : 3 * k + 3]]),
+                    quat(lanes[3 * n + 4 * k : 3 * n + 4 * k + 4]),
+                ),
+                Twist(vec([*v[6 * k : 6 * k + 3]]), vec([*v[6 * k + 3 : 6 * k + 6]])),
+            )
+            for k, name in enumerate(self.formulation.bodies)
+        }
+
+    def trajectory(self, states: Array) -> Trajectory:
+        """Return the motion of points and bodies over states, shape (m, numbers)."""
+        every = self._states(states)
+        a = np.array([self.accelerations(self.evaluate(y)) for y in states]).T
+        count = len(states)
+
+        def table(values: Sequence[Any]) -> Array:
+            return np.stack([x + np.zeros(count) for x in values], axis=1)
+
+        def carried(body: str) -> tuple[Pose, Twist, Acceleration]:
+            pose, twist = every[body]
+            k = self.formulation.columns[body]
+            return pose, twist, Acceleration(vec([*a[k : k + 3]]), vec([*a[k + 3 : k + 6]]))
+
+        def moving(body: str, position: Sequence[float]) -> list[Array]:
+            if body not in every:
+                return [np.tile(x, (count, 1)) for x in (position, np.zeros(3), np.zeros(3))]
+            arm, unit = self.frame.arm(body, position), self.frame.unit
+            return [table([*each]) for each in motion_of_point(position, arm, unit, *carried(body))]
+
+        points = {
+            point.name: PointMotion(*moving(point.body, point.position))
+            for point in self.mechanism.points
+        }
+        bodies = dict[str, BodyMotion]()
+        for body in self.mechanism.moving:
+            r, v, r_tt = moving(body.name, body.origin)
+            p, w, w_t = motion_of_frame(quat(body.euler_parameters), *carried(body.name))
+            bodies[body.name] = BodyMotion(
+                r, table([*p]), np.hstack([v, table([*w])]), np.hstack([r_tt, table([*w_t])])
+            )
+        solved = np.ones(count, np.bool_)
+        return Trajectory(points, solved, np.zeros(count, np.int64), 0.0, bodies=bodies)
+
+    def differences(self, one: Array, other: Array) -> tuple[float, float]:
+        """Return the largest difference of a point of two series of states [m], and that of Euler
+        parameters, doubled [rad].
+        """
+        mechanism, found = self.mechanism, [0.0]
+        every = [self._states(states) for states in (one, other)]
+        places = [(point.body, point.position) for point in mechanism.points]
+        for joint in mechanism.joints:
+            places += [(body, at) for body in joint.bodies for at in joint.points_on(body)]
+        for body, position in places:
+            if body not in every[0]:
+                continue
+            arm = self.frame.arm(body, position)
+            a, b = (each[body][0].u + each[body][0].swing(arm) for each in every)
+            d = b - a
+            found.append(self.frame.unit * float(np.sqrt(d @ d).max()))
+        n = self.bodies
+        turned = np.abs(other[:, 3 * n : 7 * n] - one[:, 3 * n : 7 * n]).max(initial=0.0)
+        return max(found), 2.0 * float(turned)
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluated:
+    """The equations at one state.
+
+    Attributes:
+        rows: J, shape (rows, unknowns).
+        mass: M [J], shape (unknowns, unknowns).
+        phi, gamma: residuals, and right-hand sides of the accelerations, shape (rows,).
+        demand: h - Q [J], shape (unknowns,).
+        power: of all loads [W].
+    """
+
+    rows: Array
+    mass: Array
+    phi: Array
+    gamma: Array
+    demand: Array
+    power: float
+
+
+def start_velocities(
+    mechanism: Mechanism, equations: FreeEquations, rates: Mapping[str, float]
+) -> Array:
+    """Return the rates of the unknowns at the start.
+
+    Raises:
+        SolveError: a name is unknown, or rates contradict each other or the joints.
+    """
+    if not rates:
+        return np.zeros(equations.unknowns)
+    known = coordinates(mechanism)
+    for name in rates:
+        if name not in known:
+            what = unknown("driver or joint with a rotation or translation", name, known)
+            raise SolveError(f"rates of mechanism {mechanism.name!r}: {what}")
+    named = [known[name] for name in rates]
+    held = [each for each in (*mechanism.drivers, *known.values()) if each not in named]
+    still = np.concatenate([equations.design, np.zeros(equations.unknowns + 1)])
+    rows, right = equations.evaluate(still).rows, np.zeros(equations.count)
+    for driver, rate in zip(named, rates.values(), strict=True):
+        row, value = _driven_row(mechanism, equations, driver, rate)
+        rows, right = np.vstack([rows, row]), np.append(right, value)
+    v = np.linalg.lstsq(rows, right, rcond=RANK)[0]
+    if np.abs(rows @ v - right).max() > RANK * np.abs(right).max():
+        raise SolveError(
+            f"mechanism {mechanism.name!r}: the rates {dict(rates)} contradict each other or the"
+            " joints at the start; leave some out"
+        )
+    rank = np.linalg.matrix_rank(rows, tol=RANK * np.linalg.norm(rows, 2))
+    for driver in held:
+        row, _ = _driven_row(mechanism, equations, driver, 0.0)
+        more = np.vstack([rows, row])
+        size = np.linalg.matrix_rank(more, tol=RANK * np.linalg.norm(more, 2))
+        if size > rank:
+            rows, right, rank = more, np.append(right, 0.0), size
+    # the least kinetic energy: what an impulse at the named coordinates gives
+    scaled = np.linalg.lstsq(rows * equations.scale, right, rcond=RANK)[0]
+    return equations.scale * scaled
+
+
+def _driven_row(
+    mechanism: Mechanism, equations: FreeEquations, driver: Driver, rate: float
+) -> tuple[Array, float]:
+    """Return the row of a driver at the design position, and its right-hand side at a rate."""
+    frame = equations.frame
+    drive = Drive(0.0, rate if driver.turns else rate / frame.unit, 0.0, 1.0, 0.0)
+    driven = replace(mechanism, drivers=(driver,))
+    found = constraints(driven, frame, {driver.name: drive}, named=angles(mechanism))
+    formulation = Cartesian(found, frame.moving)
+    right = formulation.nu(formulation.configuration(formulation.design))
+    return jacobian(formulation)[-1], float(right[-1])
