@@ -157,7 +157,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         CaseError: no case file can express the case: nothing drives it, samples on no even grid,
             outputs of several axles, or names and texts beyond their limits.
     """
-    if not case.mechanism.drivers:
+    if not case.mechanism.drivers and case.free is None:
         raise CaseError(f"case {case.name!r}: nothing drives it; drive a joint or a point")
     values = values_in_file(case)
     reference = reference_lines(case, values)
