@@ -95,6 +95,7 @@ def slider(mass=2.0, **load):
     )
 
 
+@pytest.mark.nightly
 def test_stiff_damper_takes_the_implicit_method():
     k, c, mass, ahead = 40.0, 4000.0, 2.0, -0.1
     found = free_motion(
