@@ -30,7 +30,7 @@ from .free_equations import VANISHING, FreeEquations, start_velocities
 # The error of a step: of what the step adds, and of the largest number. The first is the smallest
 # that scipy takes; the second is near round-off, because errors of many steps add up.
 RTOL, ATOL, LEAST = 2.3e-14, 1e-15, 1e-3
-# Radau solves its stages by iteration, which ends at round-off: its steps are controlled above that.
+# Radau iterates its stages down to round-off: its steps are controlled above that.
 LOOSER = 100.0
 # A minimum between steps is looked for where the value at a step is below this part of the largest.
 NEAR = 0.1
