@@ -51,3 +51,12 @@ WRITERS = ("mjcf", "exudyn", "urdf", "sdf", "osim")
 def writer(name: str) -> Any:
     """Return the function that writes a mechanism in a named format, without a simulator."""
     return importlib.import_module(f".writers.{name}", __name__).write
+
+
+CONVERTERS = {"mujoco": "mujoco.saved"}
+"""Simulators with converters: name on the command line -> module with `saved`."""
+
+
+def converter(name: str) -> Any:
+    """Return the function from a model's file to the text saved by a simulator."""
+    return importlib.import_module(f".{CONVERTERS[name]}", __name__).saved

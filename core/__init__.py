@@ -41,8 +41,10 @@ if TYPE_CHECKING:
         Curve,
         Designs,
         Event,
+        Residuals,
         assemble,
         find_assemblies,
+        residuals,
         solve,
         solve_designs,
         trace,
@@ -92,6 +94,7 @@ __all__ = [
     "RackPinion",
     "Ramp",
     "Record",
+    "Residuals",
     "Results",
     "Revolute",
     "RevoluteSpherical",
@@ -110,6 +113,7 @@ __all__ = [
     "check_joint",
     "clear_caches",
     "find_assemblies",
+    "residuals",
     "solve",
     "solve_designs",
     "trace",
@@ -129,8 +133,8 @@ _NAMES = {
     "case.case": "Case",
     "case.io.reader_options": "Supplied",
     "kinematics": (
-        "Assembled Assemblies Assembly Curve Designs Event "
-        "assemble find_assemblies solve solve_designs trace"
+        "Assembled Assemblies Assembly Curve Designs Event Residuals "
+        "assemble find_assemblies residuals solve solve_designs trace"
     ),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",

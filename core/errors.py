@@ -75,6 +75,10 @@ class SolveError(KincheckError, RuntimeError):
         self.kind = kind
 
 
+class UnsupportedError(KincheckError):
+    """An engine refuses a case while it solves; the message gives the reason."""
+
+
 class UnknownNameError(KincheckError, KeyError):
     """There is nothing of a name that is looked up; the message suggests another one."""
 

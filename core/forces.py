@@ -148,13 +148,30 @@ class Reaction:
         """Return the component of force or moment along a unit direction, shape (n,).
 
         It is NaN at samples with this component undetermined by redundant rows.
+
+        Args:
+            direction: shape (3,), or (n, 3) for one at each sample.
         """
         part = slice(3, 6) if moment else slice(0, 3)
         d = np.asarray(direction, dtype=np.float64)
-        loose: Array = np.einsum("i,nik->nk", d, self.free[:, part])
-        values: Array = (self.moment if moment else self.force) @ d
+        if d.ndim == 1:
+            loose: Array = np.einsum("i,nik->nk", d, self.free[:, part])
+            values: Array = (self.moment if moment else self.force) @ d
+        else:
+            loose = np.einsum("ni,nik->nk", d, self.free[:, part])
+            values = np.einsum("ni,ni->n", self.moment if moment else self.force, d)
         # not by a power, which is not defined for a ball around zero
         return np.where((loose * loose).sum(axis=1) <= self.known**2, values, np.nan)
+
+    def about(self, arm: Array) -> Reaction:
+        """Return the same wrench with its moment about another point.
+
+        Args:
+            arm: from that point to the joint's [m], shape (n, 3).
+        """
+        moved = self.free.copy()
+        moved[:, 3:] += np.cross(arm[:, None], self.free[:, :3].swapaxes(1, 2)).swapaxes(1, 2)
+        return Reaction(self.force, self.moment + np.cross(arm, self.force), moved, self.known)
 
     def determined(self) -> tuple[int, int, int]:
         """Return how many directions of force, of moment and of the wrench are determined.

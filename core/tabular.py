@@ -38,6 +38,10 @@ class Tabular:
 
         return to_html(f"{type(self).__name__}: {self.summary()}", self.dataset())
 
+    def to_html(self) -> str:
+        """Return the table and the curves as HTML, as a notebook shows them."""
+        return self._repr_html_()
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, ready for JSON: the content of a file as in the file, any other result
         as `xarray.Dataset.to_dict` has it. Missing numbers are null.

@@ -49,7 +49,10 @@ def FIGURES() -> dict[str, str | bytes]:  # noqa: N802
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         car = _files("start/suspension.md")
         return {
-            "figures/report.png": (ROOT / ".github" / "report.png").read_bytes(),
+            **{
+                f"figures/{name}.png": (ROOT / ".github" / f"{name}.png").read_bytes()
+                for name in ("report", "live")
+            },
             "figures/strut-errors.svg": strut_errors(),
             "figures/car-scene.svg": scene(car, "car", frames=(0, 16, 32)),
             "figures/car-curves.svg": car_curves(car),

@@ -20,9 +20,11 @@ LAYERS = (
     ("kinematics",),
     ("case",),
     ("harness",),
+    ("recorded",),
     ("history",),
     ("report",),
     ("studies",),
+    ("live",),
     ("cli",),
     ("__init__",),
     ("kincheck",),
@@ -38,11 +40,15 @@ IMPORTS = {
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
-    "kinematics/forces": ". primitives joints mechanism kinematics/formulation",
+    "kinematics/forces": ". primitives program joints mechanism kinematics/formulation",
     "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm joints mechanism kinematics/formulation "
         "kinematics/forces kinematics/structure"
+    ),
+    "kinematics/statics": (
+        ". primitives program program/llvm joints mechanism kinematics/formulation "
+        "kinematics/forces kinematics/structure kinematics/compiled"
     ),
     "kinematics/assembly": (
         ". primitives joints mechanism kinematics/formulation "
@@ -67,23 +73,27 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/diagnosis program/llvm"
+        "kinematics/statics kinematics/diagnosis program/llvm"
     ),
-    "case": ". joints mechanism kinematics",
+    "case": ". primitives joints mechanism kinematics",
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics case case/suspension",
     "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
     "case/models/trees": ". joints mechanism kinematics case case/io",
-    "case/models": ". case case/io case/models/hardpoints case/models/trees",
+    "case/models/adams": ". joints mechanism kinematics case case/io",
+    "case/models": (
+        ". joints mechanism case case/io case/models/adams case/models/hardpoints case/models/trees"
+    ),
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
+    "recorded": (". primitives joints mechanism kinematics case case/io case/models/trees harness"),
     "history": ". case case/io harness",
     "report": ". joints mechanism case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/truth": ". program mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/truth",
-    "studies": ". program joints kinematics case case/io harness",
+    "studies": ". program joints mechanism kinematics case case/io harness",
     "studies/checks": (
         ". primitives program joints mechanism kinematics case case/io "
         "harness harness/workers report"
@@ -98,19 +108,30 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
+    "studies/compliance": (". mechanism kinematics case case/suspension report"),
+    "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
     ),
+    "live": (
+        ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "
+        "harness report"
+    ),
     "cli": (
         ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
-        "report studies/variation studies/stress/families studies "
+        "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/diagnosis studies/bench"
+        "studies/paper studies/same studies/diagnosis studies/bench studies/compliance "
+        "live"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
-    "kincheck": "case case/io harness harness/workers studies studies/checks cli __init__",
+    "kincheck": (
+        "case case/io harness harness/workers report studies studies/checks "
+        "studies/compliance studies/diagnosis studies/tolerance studies/variation cli "
+        "primitives __init__"
+    ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

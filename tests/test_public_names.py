@@ -1,6 +1,7 @@
 """The names of `import kincheck`, and when they are loaded."""
 
 import ast
+import math
 import subprocess
 import sys
 
@@ -8,6 +9,7 @@ import kincheck
 import kincheck.adapters
 import kincheck.core
 import pytest
+from kincheck.core.case.models.hardpoints.templates import sample_tables
 
 from .support.sources import ROOT
 
@@ -30,6 +32,15 @@ def test_import_loads_names_only():
     assert found == ["", "kincheck kincheck.core kincheck.core.version", "True False"]
 
 
+BY_NAME = (
+    *("check_engine", "compliance", "explain", "free", "load"),
+    *("primitives", "report", "run", "sweep"),
+)
+VARY = """schema = "kincheck-vary/1"
+mode = "monte_carlo"
+units = { length = "mm", angle = "deg" }
+hardpoints.lca_front = { at = "lca_front", sigma = 1.0 }
+"""
 HELP = """
 import contextlib, io, sys
 from kincheck.core.cli.main import main
@@ -53,8 +64,7 @@ def test_every_name_is_there(name):
 
 
 def test_core_has_all_but_the_functions_by_name():
-    by_name = {"check_engine", "free", "load", "run"}
-    assert set(kincheck.__all__) - set(kincheck.core.__all__) == by_name
+    assert set(kincheck.__all__) - set(kincheck.core.__all__) == {*BY_NAME}
     assert kincheck.Mechanism is kincheck.core.Mechanism
 
 
@@ -76,6 +86,41 @@ def test_run_in_one_line():
     results = kincheck.run("rssr", engines=["native"])
     assert [(each.case, each.outcome) for each in results.records] == [("rssr", "pass")]
     assert "rssr" in results.scenes
+
+
+def test_run_takes_a_measured_curve(tmp_path):
+    """That of the case itself, rounded."""
+    table, curve = tmp_path / "car.csv", tmp_path / "rig.csv"
+    table.write_text(sample_tables(["mcpherson"])[0])
+    case = kincheck.load(table, kincheck.Supplied(travel="0.05:11"))
+    (record,) = kincheck.run(case, "native").records
+    toe = record.outputs["toe"].position
+    rows = zip(case.sweep.values, toe, strict=True)
+    lines = [f"{1e3 * x:.0f},{math.degrees(y):.3f}" for x, y in rows]
+    curve.write_text("\n".join(["travel [mm],toe [deg]", *lines]) + "\n")
+    results = kincheck.run(case, "native", reference=curve)
+    assert results.records[0].outcome == "pass"
+    with pytest.raises(kincheck.KincheckError, match="found 2 cases"):
+        kincheck.run([case, "rssr"], "native", reference=curve)
+    kincheck.report(results, tmp_path / "report.html")
+    assert "toe" in (tmp_path / "report.html").read_text()
+
+
+def test_sweep_and_primitives_are_there(tmp_path):
+    table, vary = tmp_path / "car.csv", tmp_path / "vary.toml"
+    table.write_text(sample_tables(["mcpherson"])[0])
+    vary.write_text(VARY)
+    case = kincheck.load(table, kincheck.Supplied(travel="0.05:3"))
+    results = kincheck.sweep(case, vary, samples=20)
+    assert results.samples == 20
+    assert "toe" in results.to_html()
+    assert kincheck.primitives.Dot10
+
+
+def test_explain_is_that_of_the_command():
+    found = kincheck.explain("rssr", samples=3)
+    assert len(found.samples) == 3
+    assert not found.findings
 
 
 def test_run_takes_cases_files_and_engines_of_its_own():

@@ -25,12 +25,19 @@ from ...core.errors import SolveError
 from ...core.harness.engine import Floor
 from ...core.joints import Joint
 from ...core.joints.base import unit
-from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
+from ...core.mechanism.loads import (
+    Axes,
+    Bushing,
+    Force,
+    SpringDamper,
+    Torque,
+    TorsionSpringDamper,
+)
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
 from ..shared.exudyn_joints import JOINTS
-from ..shared.force_solution import Dynamics, left_out_of, reacting
+from ..shared.force_solution import Dynamics, Element, curve_force, left_out_of, places, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
 from .rows import NO_ROTATION, Rows, turned
 
@@ -39,7 +46,7 @@ COMPUTED_BY = {
     "reactions of joints": "rows of ComputeNewtonJacobian",
     "force elements": (
         "ObjectConnectorSpringDamper, LoadForceVector, LoadTorqueVector; torques of torsional"
-        " springs are set by the adapter"
+        " springs are set by the adapter; bushings and curves are the adapter's, by Exudyn's bodies"
     ),
 }
 
@@ -65,6 +72,7 @@ class Loads:
         self.springs: dict[str, int] = {}
         self.twisters: list[Twister] = []
         self.amounts: dict[str, float] = {}
+        self.framed: list[Bushing | SpringDamper] = []
         for body in self.mechanism.moving:
             marker = self.items.MarkerBodyMass(bodyNumber=rows.bodies[body.name][0])
             self.mbs.AddLoad(
@@ -77,7 +85,9 @@ class Loads:
 
     def _add(self, each: Any) -> None:
         rows, items = self.rows, self.items
-        if isinstance(each, SpringDamper):
+        if isinstance(each, Bushing) or (isinstance(each, SpringDamper) and each.curve):
+            self.framed.append(each)
+        elif isinstance(each, SpringDamper):
             ends = [rows.marker(*end) for end in zip(each.bodies, each.points, strict=True)]
             spring = items.ObjectConnectorSpringDamper(
                 markerNumbers=ends,
@@ -138,6 +148,8 @@ class Loads:
         solver.ComputeODE2RHS(self.mbs)
         demand = np.zeros(len(v))
         demand[:n] = mass @ a[:n] - np.array(solver.GetSystemResidual())[:n]
+        for each in self.framed:
+            amounts[each.name] = self._by_frames(each, v, demand)
         for name, number in self.springs.items():
             force = self.mbs.GetObjectOutput(number, self.kinds.ForceLocal)
             amounts[name] = float(np.atleast_1d(force)[0])
@@ -152,11 +164,22 @@ class Loads:
         }
         return Dynamics(demand, reactions, amounts, every[len(J) :])
 
+    def _by_frames(self, each: Bushing | SpringDamper, v: Array, demand: Array) -> float:
+        """Take the wrenches of an element out of the demand; return its amount."""
+        frames = [self._frame(len(v), *end) for end in places(each, self.mechanism)]
+        for frame in frames:
+            frame.velocity = frame.jacobian @ v
+        amount, wrenches = Element(each, frames, np.zeros(3), lambda: 0.0).at_work()
+        for frame, wrench in zip(frames, wrenches, strict=True):
+            demand -= frame.jacobian.T @ wrench
+        return amount
+
     def _twist(self, each: Twister, model: Any, v: Array) -> float:
         """Set the torques of a torsional spring-damper; return the torque on the second body."""
         given, place = each.given, model.coordinates + each.value - len(self.mechanism.drivers)
         joint: Any = self.mechanism.joint(given.joint)
-        elastic = given.stiffness * (float(model.x[place]) - given.free_angle)
+        deflection = float(model.x[place]) - given.free_angle
+        elastic = given.stiffness * deflection + curve_force(given.curve, deflection)
         amount = -(elastic + given.damping * float(v[place]))
         A = np.array(self.mbs.GetMarkerOutput(each.marker, self.kinds.RotationMatrix))
         axis = A.reshape(3, 3) @ np.array([*unit(joint.axis)])

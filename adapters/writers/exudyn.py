@@ -25,6 +25,7 @@ from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import (
     Axes,
+    Bushing,
     Force,
     ForceElement,
     SpringDamper,
@@ -47,6 +48,13 @@ def inertial(body: Body) -> tuple[float, list[float], list[float]]:
     xx, yy, zz, xy, xz, yz = text.six(text.inertia_at_origin(body))
     center = np.subtract(text.center_of(body), body.origin)
     return text.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
+
+
+def known(element: ForceElement) -> bool:
+    """Return whether a script has the element: Exudyn's own bushing has a law of other angles, and
+    its springs have no curve.
+    """
+    return not isinstance(element, Bushing) and not getattr(element, "curve", None)
 
 
 def load_options(element: ForceElement) -> dict[str, Any]:
@@ -234,7 +242,9 @@ class _Script:
                 self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
-        for force in self.mechanism.forces:
+        if strange := [str(f) for f in self.mechanism.forces if not known(f)]:
+            self.lines.append(f"# Left out: {', '.join(strange)}")
+        for force in filter(known, self.mechanism.forces):
             self.load(force)
         for point in self.mechanism.points:
             self.lines.append(

@@ -187,6 +187,8 @@ class _Model:
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether MJCF has the force element."""
+        if getattr(force, "curve", None):
+            return False
         if isinstance(force, SpringDamper):
             tendon = self.add_tendon(force.name, force.bodies, force.points)
             tendon.set("springlength", numbers([force.free_length]))

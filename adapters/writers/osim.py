@@ -177,6 +177,8 @@ class _Model:
 
     def add_spring(self, forces: ET.Element, force: ForceElement) -> bool:
         """Add a spring-damper; return whether OpenSim has it."""
+        if getattr(force, "curve", None):
+            return False
         if isinstance(force, SpringDamper):
             element = ET.SubElement(forces, SPRINGS[0], name=_name(force.name))
             for k, (link, at) in enumerate(zip(force.bodies, force.points, strict=True), 1):

@@ -167,7 +167,11 @@ class _Model:
                 add_text(element, name, numbers(self.local(link, point)))
 
     def add_spring(self, force: ForceElement) -> bool:
-        """Add a spring-damper; return whether Drake has it."""
+        """Add a spring-damper; return whether Drake has it. Its bushing has another law: forces
+        along half-way axes, at half-way points.
+        """
+        if getattr(force, "curve", None):
+            return False
         if isinstance(force, SpringDamper):
             assert (
                 force.free_length is not None

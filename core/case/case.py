@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import CaseError, unknown
 from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.motions import Absolute, Motion, Path, Ramp
+from ..mechanism.motions import Absolute, Motion, Path, Ramp, Slowed
 from ..trajectory import Array
+from .compliance import Rig
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
@@ -35,6 +37,9 @@ class Hardpoint:
     roles: tuple[str, ...]
     moves: Mapping[str, Array]
 
+
+SLOW = 2.0**60
+"""Seconds of a path at rest for each second of its motions."""
 
 TIME = "time"
 """Name of the driver in a sweep of time."""
@@ -74,6 +79,7 @@ class Sweep:
         driver: name of the swept driver, or "time" if drivers only follow their motions.
         values: driver values in the order start..stop [m or rad], or times [s], shape (n,).
         rate: driver units per second, constant; velocities and accelerations are per second at it.
+            Zero is rest at every sample: forces are static, and times are those of rate one.
         design: driver value at the design position [m or rad]; zero unless its values are absolute.
         motions: motions of the other drivers, from their design values. Time is zero at the design
             value of the swept driver, which moves at the rate.
@@ -91,17 +97,30 @@ class Sweep:
         return self.values - self.design
 
     @property
+    def static(self) -> bool:
+        """Whether the mechanism is at rest at every sample."""
+        return self.rate == 0.0
+
+    @property
+    def pace(self) -> float:
+        """Rate of the path: so slow for rest, that no inertia and no damper shows in a double."""
+        return self.rate or 1.0 / SLOW
+
+    @property
     def path(self) -> Path:
         """Motions of all moving drivers over time, and the times of the samples."""
+        motions: Mapping[str, Motion] = self.motions
+        if self.static:
+            motions = {name: Slowed(motion, SLOW) for name, motion in motions.items()}
         design = {
             name: motion.design
             for name, motion in self.motions.items()
             if isinstance(motion, Absolute)
         }
         if self.driver == TIME:
-            return Path(self.motions, self.values, design)
-        moved = {self.driver: Ramp(self.rate), **self.motions}
-        return Path(moved, self.change / self.rate, {self.driver: self.design, **design})
+            return Path(motions, self.values * (SLOW if self.static else 1.0), design)
+        moved = {self.driver: Ramp(self.pace), **motions}
+        return Path(moved, self.change / self.pace, {self.driver: self.design, **design})
 
     @property
     def moved(self) -> dict[str, Array]:
@@ -110,8 +129,8 @@ class Sweep:
         """
         path = self.path
         further = {
-            name: path.design.get(name, 0.0) + motion.at(path.times)[0]
-            for name, motion in self.motions.items()
+            name: path.design.get(name, 0.0) + path.motions[name].at(path.times)[0]
+            for name in self.motions
         }
         return {self.driver: self.values, **further}
 
@@ -203,6 +222,9 @@ class Case:
         assembly: notes on how the start was closed, and on rows left out.
         closure: of rows left out; None if all rows hold.
         hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
+        rig: of compliance studies, if the case has one.
+        wheels: each `Vehicle` of [suspension], whether outputs read it or not.
+        unforced: drivers without a force, which only follow a recording.
         free: its free motion; None for the default.
     """
 
@@ -219,6 +241,9 @@ class Case:
     assembly: tuple[str, ...] = ()
     closure: Closure | None = None
     hardpoints: tuple[Hardpoint, ...] = ()
+    rig: Rig | None = None
+    wheels: tuple[Any, ...] = ()
+    unforced: tuple[str, ...] = ()
     free: Free | None = None
 
     def __repr__(self) -> str:
@@ -298,7 +323,7 @@ def pace(case: Case) -> float:
     _, rates, seconds = path.drive(list(path.motions), path.times)
     extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
-    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
+    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max(initial=0.0))
 
 
 def without_forces(case: Case) -> Case:

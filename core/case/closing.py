@@ -90,7 +90,9 @@ def held_case(case: Case, drivers: Sequence[str]) -> Case:
     """Return the case on a path through the same poses, on which these drivers alone move at each
     sample.
     """
-    path = case.sweep.path
+    # only ratios of rates count, and those of a path at rest are the same
+    sweep = replace(case.sweep, rate=1.0) if case.sweep.static else case.sweep
+    path = sweep.path
     times: Array = np.unique([0.0, *path.times]) if path.covers(0.0) else np.unique(path.times)
     shortest = float(np.diff(times).min(initial=1.0))
     rate = STEP * size(case) / shortest

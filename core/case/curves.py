@@ -83,7 +83,11 @@ class Printed:
 
 def even(values: Array) -> bool:
     """Return whether the values are an even grid, which somebody chose and nobody rounded."""
-    steps = np.diff(values)
+    return even_steps(np.diff(values))
+
+
+def even_steps(steps: Array) -> bool:
+    """Return whether steps are those of an even grid."""
     return len(steps) < 2 or float(np.ptp(steps)) <= _EVEN * float(np.abs(steps).max())
 
 

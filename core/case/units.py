@@ -10,6 +10,7 @@ from typing import Any, TypeAlias, cast
 
 from ..joints import Kind
 from ..mechanism.body import Dimension, dimension_of
+from ..mechanism.curves import dimensions_of, scaled
 from ..mechanism.motions import Measure
 
 Convert: TypeAlias = Callable[[float], float]
@@ -118,6 +119,11 @@ class FileUnits:
             return None
         if dimension := dimension_of(each):
             return self.power(dimension, value)
+        if (pair := dimensions_of(each)) is not None:
+            try:
+                return scaled(value, [self.power(dimension, 1.0) for dimension in pair])
+            except (TypeError, ValueError):  # a row of another length, or rows and numbers mixed
+                return value  # the element's own check names it
         if each.metadata.get("kind") in (Kind.POSITION, Kind.POSITIONS, Kind.LENGTH):
             return self.place(value)
         measure = each.metadata.get("measure")

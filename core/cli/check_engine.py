@@ -37,8 +37,14 @@ def add(commands: Any) -> None:
     checking.set_defaults(do=_check_engine)
     checking.add_argument(
         "engine",
+        nargs="?",
         metavar="MODULE:CLASS",
         help="the class, in a module of this folder or an installed one; or an engine's name",
+    )
+    checking.add_argument(
+        "--engine-command",
+        metavar="COMMAND",
+        help='a program as an engine, "prog {case} {samples} {out}"; see run',
     )
     add_verbosity(checking, quiet="print only the failed checks and the count")
 
@@ -47,7 +53,14 @@ def _check_engine(options: argparse.Namespace, registry: Registry) -> int:
     """Check an engine: every joint type, several topologies, its rates against differences, its
     refusals, and repeated answers. Each pair is solved in a worker process.
     """
-    report = examined(options.engine, registry)
+    if (options.engine is None) == (options.engine_command is None):
+        raise KincheckError("found no engine, or two, expected MODULE:CLASS or --engine-command")
+    engine: str | Engine = options.engine
+    if options.engine is None:
+        from ..recorded.program import ProgramEngine
+
+        engine = ProgramEngine(options.engine_command)
+    report = examined(engine, registry)
     report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES
 

@@ -57,17 +57,30 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points.add_argument(
+        "--side",
+        metavar="SIDE",
+        help="side of the wheel, left or right; without it, the side follows from the points",
+    )
+    points.add_argument(
         "--names",
         type=Path,
         metavar="FILE",
-        help='names of the points in the file: TOML, with a line ROLE = "NAME" for each',
+        help=(
+            'names of the points in the file: TOML, with a line ROLE = "NAME" for each; a new FILE'
+            " is written"
+        ),
+    )
+    points.add_argument(
+        "--ask-names",
+        action="store_true",
+        help="refuse names that are only like those of the template, with a guess for each",
     )
     points.add_argument(
         "--wheel-radius",
         metavar="M",
         help=(
-            "radius of the loaded wheel [m], if no point is its contact: for roll centre, scrub"
-            " radius and trail"
+            "radius of the loaded wheel, such as 300mm, if no point is its contact: for roll"
+            " centre, scrub radius and trail"
         ),
     )
     points.add_argument(
@@ -85,16 +98,16 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--travel",
         metavar="M[:SAMPLES]",
         help=(
-            "travel of the wheel, up and down [m], default 0.05:41; or START:STOP:SAMPLES, positive"
-            " up: --travel=-0.04:0.12:33"
+            "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
+            " up: --travel=-40:120mm:33; in metres without a unit"
         ),
     )
     points.add_argument(
         "--rack",
         metavar="M",
         help=(
-            "travel of the rack while the wheel goes up [m], positive to the left: -M to M, or"
-            " START:STOP"
+            "travel of the rack while the wheel goes up, such as 20mm, positive to the left: -M to"
+            " M, or START:STOP; in metres without a unit"
         ),
     )
     points.add_argument(
@@ -114,19 +127,28 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--drive-share", metavar="X", help="share of the driving force at this axle, 0 to 1"
     )
     points.add_argument(
+        "--corner",
+        metavar="NAME",
+        help="wheel of a table of the whole car: FL, FR, RL, RR, or in words",
+    )
+    points.add_argument(
         "--sheet",
         metavar="NAME",
         help="sheet of a workbook with several tables, or section of a tree, such as front",
     )
     model = command.add_argument_group(
-        "models", "Models (MJCF, URDF, SDF). They do not state drivers."
+        "models",
+        "Models (MJCF, URDF, SDF), which do not state drivers, and datasets of Adams (.adm).",
     )
     model.add_argument(
         "--drive",
         action="append",
         default=[],
         metavar="JOINT:START:STOP[:SAMPLES]",
-        help="a joint that moves [rad or m, as qpos]; several move together",
+        help=(
+            "a joint that moves, as qpos, in rad or m without a unit: knee:-30:30deg:61; several"
+            " move together"
+        ),
     )
     model.add_argument(
         "--hold",
@@ -142,23 +164,31 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help="hold as many joints as needed: free bodies, joints with an actuator, others",
     )
     model.add_argument(
+        "--without",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="statements of a dataset of Adams to leave out, as BUSHING or BUSHING/3",
+    )
+    model.add_argument(
         "--start",
         nargs="+",
         action="extend",
         default=[],
         metavar="WHERE",
         help=(
-            "keyframe:NAME, or JOINT=VALUE [rad or m, as qpos], instead of qpos0; the start is"
-            " assembled to close, and a note says by how far joints moved"
+            "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
+            " the start is assembled to close, and a note says by how far joints moved"
         ),
     )
 
 
 def return_cases(options: argparse.Namespace) -> None:
-    """Move files from --hold and --start back to the cases: these options take several names, and
-    in `run --hold knee hip model.xml` also the file.
+    """Move files from --hold, --start and --without back to the cases: these options take several
+    names, and in `run --hold knee hip model.xml` also the file.
     """
-    for given in (options.hold, options.start):
+    for given in (options.hold, options.start, options.without):
         files = [name for name in given if os.path.isfile(name)]
         options.case += files
         given[:] = [name for name in given if name not in files]
@@ -166,8 +196,13 @@ def return_cases(options: argparse.Namespace) -> None:
 
 def supplied(options: argparse.Namespace) -> Supplied:
     """Return the facts supplied by options."""
-    given: dict[str, Any] = {each.name: getattr(options, each.name) for each in fields(Supplied)}
-    given |= {name: (*given[name],) for name in ("drive", "hold", "start")}
+    given: dict[str, Any] = {
+        each.name: getattr(options, each.name)
+        for each in fields(Supplied)
+        if each.name != "recorded"
+    }
+    given |= {name: (*given[name],) for name in ("drive", "hold", "start", "without")}
+    given["recorded"] = bool(getattr(options, "recorded", ()))
     return Supplied(**given)
 
 

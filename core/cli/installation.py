@@ -32,6 +32,7 @@ PURPOSES = {
     "proofs": "proved references",
     "parquet": "history as Parquet",
     "xlsx": "tables of spreadsheets",
+    "fmu": "functional mock-up units",
     "distributed": "runs on many machines",
     "yaml": "loops of URDF files",
     "pandas": "results as tables",

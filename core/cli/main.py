@@ -142,6 +142,8 @@ def registry() -> Registry:
         *writers,
         cases.summary,
         tuple(adapters.SIMULATIONS),
+        tuple(adapters.CONVERTERS),
+        adapters.converter,
     )
 
 

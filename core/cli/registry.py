@@ -48,6 +48,8 @@ class Registry:
         summary: returns kind of reference and source of a built-in case by its name, without
             loading it.
         simulations: names of the engines in simulate mode.
+        converters: names of the simulators that save models.
+        converter: returns the function of such a name, from a file to the text of another.
     """
 
     engines: Sequence[str]
@@ -58,6 +60,8 @@ class Registry:
     writer: Callable[[str], Writer]
     summary: Callable[[str], tuple[str, str]]
     simulations: Sequence[str] = ()
+    converters: Sequence[str] = ()
+    converter: Callable[[str], Callable[[Path], str]] | None = None
 
     def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
         """Return the case of a name or in a file.
@@ -70,7 +74,7 @@ class Registry:
             KincheckError: there is no such case, a pattern matches several, its file is invalid,
                 or its drivers do not match its degrees of freedom.
         """
-        from ..case.models.files import SUFFIXES, load
+        from ..case.models.files import DATASETS, SUFFIXES, load
         from ..kinematics import require_driven
 
         matching, known = self.matching(name), self.cases()
@@ -93,7 +97,8 @@ class Registry:
             raise KincheckError(
                 unknown("case", name, known) + "; a case file ends in .toml or .json"
             )
-        if not driven:
+        # a dataset says itself which freedoms are left to a recording
+        if not driven or (supplied.recorded and Path(name).suffix.lower() in DATASETS):
             return case
         try:
             require_driven(case.mechanism)

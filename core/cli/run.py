@@ -17,7 +17,7 @@ from ..case.io.escape import visible
 from ..errors import KincheckError, SolveError
 from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, progress, uncompared
-from . import execution_options, history_options, import_options
+from . import execution_options, history_options, import_options, recorded_options
 from .engine_loading import WHERE
 from .registry import Registry, Status
 from .run_options import HISTORY, add_options, curve_options
@@ -117,6 +117,8 @@ def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
         return print_summary
     if options.verbose:
         return print_outputs
+    if options.reactions:
+        return partial(print_table, reactions=True)
     return print_matrix if options.joints else print_table
 
 
@@ -141,9 +143,27 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         named, unread, list(probes()) if options.joints else [], import_options.supplied(options)
     )
     import_options.tell_left_out(cases)
+    if options.static:
+        from ..studies.reactions import without_motion
+
+        cases = [without_motion(each) for each in cases]
+    if options.reactions:
+        from ..studies.reactions import with_reactions
+
+        cases = [with_reactions(each, options.tol) for each in cases]
     unused: list[str] = []
+    recorded: list[Engine] = []
+    if options.recorded and len(cases) != 1:
+        problems.append(
+            f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
+        )
+    elif options.recorded:
+        try:
+            cases[0], recorded = recorded_options.recorded_engines(options, cases[0])
+        except KincheckError as error:
+            problems += str(error).splitlines()
     curve = curve_options(options)
-    if not options.reference and curve != type(curve)():
+    if not (options.reference or options.recorded or options.fmu) and curve != type(curve)():
         problems.append("options for measured curves need a curve: give --reference FILE")
     if options.reference and not problems:
         try:
@@ -152,6 +172,18 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
+    if recorded and recorded_options.undriven(cases[0]):
+        engines, baseline = [], None
+    try:
+        engines += [*recorded_options.foreign_engines(options, cases), *recorded]
+    except KincheckError as error:
+        problems += str(error).splitlines()
+    keys = [(engine.name, engine.mode) for engine in engines]
+    problems += [
+        f"engine {name}: found twice; rename one"
+        for name, mode in keys
+        if keys.count((name, mode)) > 1
+    ][:1]
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does

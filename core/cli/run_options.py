@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from . import execution_options, import_options
+from . import execution_options, import_options, recorded_options
 from .option_types import positive
 from .verbosity import add_verbosity
 
@@ -124,7 +124,21 @@ def add_options(run: argparse.ArgumentParser) -> None:
     )
     import_options.add_options(run)
     _add_curve_options(run)
+    recorded_options.add_options(run)
     execution_options.add_options(run, positive)
+    run.add_argument(
+        "--static",
+        action="store_true",
+        help="efforts and reactions at rest, at every sample; [sweep] rate = 0 of all cases",
+    )
+    run.add_argument(
+        "--reactions",
+        action="store_true",
+        help=(
+            "every determined reaction of joints, effort of drivers and force of elements as"
+            " outputs, first in table and page; what is not determined is a note"
+        ),
+    )
     run.add_argument(
         "--history",
         type=Path,
@@ -170,7 +184,10 @@ def _add_curve_options(run: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OUTPUT=NUMBER UNIT",
-        help='uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"',
+        help=(
+            'uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"; without'
+            " a unit in that of the column"
+        ),
     )
     curve.add_argument(
         "--citation",

@@ -36,11 +36,18 @@ def _regression() -> dict[str, Any]:
     return msgspec.json.schema(Regressions)
 
 
+def _live() -> dict[str, Any]:
+    from ..live.protocol import live_schema
+
+    return live_schema()
+
+
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "case": _case,
     "variation": _variation,
     "results": _results,
     "regression": _regression,
+    "live": _live,
 }
 
 

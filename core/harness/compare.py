@@ -24,7 +24,7 @@ of its rate is this atol times the pace.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -47,22 +47,26 @@ NO_VALUE = "has no value at"
 
 
 def output_series(
-    case: Case, output: Quantity, trajectory: Trajectory, held: Trajectory | None = None
+    case: Case,
+    output: Quantity,
+    trajectory: Trajectory,
+    held: Mapping[tuple[str, ...], Trajectory] | None = None,
 ) -> Series:
     """Return an output over the samples of a trajectory.
 
     Args:
-        held: the same poses, with velocities caused by some drivers while the others are at rest;
-            outputs defined as such derivatives have no value without it.
+        held: the same poses, with velocities caused by some drivers while the others are at rest,
+            by these drivers; outputs defined as such derivatives have no value without it.
 
     Values are NaN at unsolved samples. A quantity is None if the engine does not give it.
     """
+    alone = tuple(output.facts.get(HELD_BUT, ()))
+    moved = (held or {}).get(alone) if alone else trajectory
+    if moved is None:
+        return Series(np.full(len(trajectory.solved), np.nan), possible=False)
     if isinstance(output, ForceMeasure):
-        return _force_series(output, trajectory)
-    if HELD_BUT in output.facts:
-        if held is None:
-            return Series(np.full(len(trajectory.solved), np.nan), possible=False)
-        trajectory = held
+        return _force_series(output, trajectory, moved)
+    trajectory = moved
     at = {name: _moving(trajectory.points[name]) for name in output.points}
     # NaN marks unknown values, and spreads to all results that depend on them
     with np.errstate(all="ignore"):
@@ -78,6 +82,8 @@ def output_series(
     )
     # the value of a derivative output needs the rate given by the engine
     known = given - (ORDERS - output.orders)
+    if case.sweep.static:  # rates of the path are no result
+        return Series(position, possible=known > 0)
     return Series(
         position,
         *(rate if order < known else None for order, rate in enumerate(rates, 1)),
@@ -85,12 +91,14 @@ def output_series(
     )
 
 
-def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
+def _force_series(output: ForceMeasure, trajectory: Trajectory, moved: Trajectory) -> Series:
     """Return a force over the samples, NaN if it is missing or undetermined."""
     given = trajectory.forces
     # a simulator may replace a joint by an equivalent, which gives no reaction of the joint
     if given is None or not given.has(output.forces):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
+    if output.placed:
+        output = output.located({name: _moving(moved.points[name]) for name in output.points})
     values = np.where(trajectory.solved, output.values(given), np.nan)
     return Series(values, reason=output.undetermined(given))
 
@@ -169,8 +177,8 @@ def deviations(
             if getattr(series, quantity) is not None
         ]
         compared[quantity], word = None, motion_word(quantity, output.unit)
-        if order and force:
-            continue  # forces have no rates
+        if order and (force or case.sweep.static):
+            continue  # forces have no rates, and a mechanism at rest has none
         if order >= output.orders:
             reasons.append(f"{word}: needs a higher derivative than engines give")
         elif values is None:
@@ -184,6 +192,9 @@ def deviations(
             )
         else:
             name, reference, uncertainty = known[0]
+            own = found.uncertainty.get(quantity)
+            if own is not None:
+                uncertainty = own if uncertainty is None else own + uncertainty
             shown = labels.against(name)
             compared[quantity] = off = deviation(
                 values, reference, output.atol * rate_scale**order, output.rtol, name, uncertainty
@@ -196,7 +207,7 @@ def deviations(
                 losses += lost
             elif not (order or found.possible):
                 inputs = "forces" if force else "velocities, on which it depends"
-                reasons.append(f"{word}: the engine gives no {inputs}")
+                reasons.append(found.reason or f"{word}: the engine gives no {inputs}")
             elif off is None:
                 none = f"{word}: no sample is known to both the engine and {shown}"
                 reasons.append(found.reason or none)

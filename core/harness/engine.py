@@ -11,6 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 from ..case.case import Case
 from ..trajectory import Trajectory
 
+RECORDED = "recorded"
+"""Mode of engines that solve nothing: their results come from a file."""
+
 
 class Engine(Protocol):
     """A solver of cases.
@@ -18,14 +21,16 @@ class Engine(Protocol):
     Attributes:
         name: name on the command line.
         mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or
-            "simulate" (its own solver or time stepping). Modes are separate products and never
-            share a ranking. Name and mode together identify an engine: the recommended simulate
-            mode has the simulator's name, and each variant has another name.
+            "simulate" (its own solver or time stepping), or "recorded" (results of a file). Modes
+            are separate products and never share a ranking. Name and mode together identify an
+            engine: the recommended simulate mode has the simulator's name, and each variant has
+            another name.
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
         settings: the settings in the report that a reader needs to repeat the run.
 
-    Two attributes are optional, and False by default. `in_process`: the engine loads no foreign
-    code. `bounds_error`: the engine itself bounds the error of each pose.
+    Three attributes are optional, and False by default. `in_process`: the engine loads no foreign
+    code. `bounds_error`: the engine itself bounds the error of each pose. `untimed`: its time means
+    nothing, and it solves each case once.
     """
 
     @property
@@ -72,6 +77,11 @@ def may_run_here(engine: Engine) -> bool:
     engines run in separate processes.
     """
     return bool(getattr(engine, "in_process", False))
+
+
+def untimed(engine: Engine) -> bool:
+    """Return whether the time of an engine means nothing, by its attribute `untimed`."""
+    return bool(getattr(engine, "untimed", False))
 
 
 def bounds_error(engine: Engine) -> bool:

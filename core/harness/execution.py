@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import Case, Series
-from ..errors import KincheckError
+from ..errors import KincheckError, UnsupportedError
 from ..failures import FailureKind
 from ..forces import Forces
 from ..trajectory import Array, Trajectory
 from .compare import output_series
 from .engine import Engine
-from .held_trajectory import held_trajectory
+from .held_trajectory import held_trajectories
 from .provenance import plain, readable
 from .record import Outcome, Seconds
+from .reported import Reported
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 from .trajectory_check import check, faults
@@ -72,6 +73,8 @@ class Answer:
         power: missing to the balance at each sample [W], NaN if unknown or no power flows; None
             without forces.
         faults: what the answer gets wrong by itself, in sentences.
+        reported: whether the outputs are reported and not solved, so that values may be missing.
+        judged: whether the engine judged its answer by itself.
     """
 
     outputs: Mapping[str, Series]
@@ -83,16 +86,35 @@ class Answer:
     failures: Sequence[FailureKind] = ()
     power: Array | None = None
     faults: Sequence[str] = ()
+    reported: bool = False
+    judged: bool = False
 
     @staticmethod
-    def of(pair: Pair, found: Trajectory, held: Trajectory | None = None, why: str = "") -> Answer:
+    def of(
+        pair: Pair,
+        found: Trajectory,
+        held: Mapping[tuple[str, ...], Trajectory] | None = None,
+        why: str = "",
+    ) -> Answer:
         """Return the answer that a checked trajectory gives to a pair.
 
         Args:
-            held, why: from `held_trajectory`.
+            held, why: from `held_trajectories`.
         """
         case, solved = pair.case, np.asarray(found.solved, dtype=np.bool_)
         rigid = pair.engine.mode == "projection"
+        if isinstance(found, Reported):
+            return Answer(
+                outputs=found.outputs,
+                solved=int(solved.sum()),
+                iterations=0,
+                residual=found.residual,
+                message=bounded(found.message),
+                details=plain(found.facts),
+                faults=found.faults,
+                reported=True,
+                judged=found.judged,
+            )
         return Answer(
             outputs={each.name: output_series(case, each, found, held) for each in case.outputs},
             solved=int(solved.sum()),
@@ -127,6 +149,8 @@ class Failure:
     @staticmethod
     def of(error: BaseException) -> Failure:
         """Return the failure that an error of the engine stands for."""
+        if isinstance(error, UnsupportedError):
+            return Failure(Outcome.UNSUPPORTED, bounded(error))
         kind = error.kind if isinstance(error, KincheckError) else None
         return Failure(Outcome.ERROR, error_text(error), kind=kind)
 
@@ -232,7 +256,7 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         check(case, engine.name, found)
         return found
 
-    held, why = held_trajectory(case, engine.mode, trajectory, solve_anew)
+    held, why = held_trajectories(case, engine.mode, trajectory, solve_anew)
     return Answer.of(pair, trajectory, held, why)
 
 

@@ -18,22 +18,30 @@ from ..trajectory import Trajectory
 SAME_POSE = 1e-6
 
 
-def held_trajectory(
+def held_trajectories(
     case: Case, mode: str, found: Trajectory, solve: Callable[[Case], Trajectory]
-) -> tuple[Trajectory | None, str]:
+) -> tuple[dict[tuple[str, ...], Trajectory], str]:
     """Return the poses of a trajectory with velocities caused by some drivers while the others are
-    at rest, and the reason for missing samples.
+    at rest, by these drivers, and the reasons for missing samples.
 
-    The trajectory is None if no output needs it, or if the engine steps through time: its
-    velocities then belong to its own path.
+    There is none if no output needs it, or if the engine steps through time: its velocities then
+    belong to its own path.
 
     Args:
         mode: mode of the engine.
         solve: solves another case with the engine.
     """
-    by = next((output.facts[HELD_BUT] for output in case.outputs if HELD_BUT in output.facts), None)
-    if by is None or mode != "projection":
-        return None, ""
+    wanted = [tuple(o.facts[HELD_BUT]) for o in case.outputs if HELD_BUT in o.facts]
+    held, reasons = dict[tuple[str, ...], Trajectory](), list[str]()
+    for by in dict.fromkeys(wanted) if mode == "projection" else ():
+        held[by], why = _held(case, by, found, solve)
+        reasons += [why] if why else []
+    return held, "; ".join(reasons)
+
+
+def _held(
+    case: Case, by: tuple[str, ...], found: Trajectory, solve: Callable[[Case], Trajectory]
+) -> tuple[Trajectory, str]:
     held = solve(held_case(case, by))
     off = [
         np.abs(held.points[name].position - found.points[name].position).max(axis=1)

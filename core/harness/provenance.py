@@ -17,7 +17,7 @@ import numpy as np
 
 from ..case.case import TIME, Case, Series, Truth
 from ..case.notes import notes
-from ..mechanism.motions import Absolute, Motion
+from ..mechanism.motions import Absolute, Motion, Slowed
 from ..version import VERSION
 from .compare import as_numbers
 from .evidence import IDENTICAL
@@ -233,8 +233,8 @@ def _driver(case: Case, name: str) -> dict[str, Any]:
 def _motion(motion: Motion) -> dict[str, Any]:
     return (
         _motion(motion.motion)
-        if isinstance(motion, Absolute)
-        else {"type": motion.type, **asdict(motion)}
+        if isinstance(motion, Absolute | Slowed)
+        else {"type": getattr(motion, "type", "recorded"), **asdict(motion)}
     )
 
 

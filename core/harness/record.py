@@ -54,6 +54,10 @@ class Outcome(StrEnum):
         return "not judged" if self is Outcome.UNJUDGED else self.value
 
 
+ROWS = "rows"
+"""Key of a record's details: what a recording leaves of the rows of its mechanism, by quantity."""
+
+
 class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
     """One output over the samples, in SI. A sample or series without a value is null; `reason`
     explains it.
@@ -222,8 +226,11 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def compared(self) -> bool:
-        """Return whether any output was compared with a standard."""
-        return any(deviations.items() for deviations in self.errors.values())
+        """Return whether any output was compared with a standard, or a recording with the rows of
+        its mechanism.
+        """
+        outputs = any(deviations.items() for deviations in self.errors.values())
+        return outputs or ROWS in self.details
 
 
 class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):

@@ -14,7 +14,7 @@ import msgspec
 from ..case.case import Case, Truth
 from ..errors import CaseError
 from .compare import as_numbers
-from .engine import Engine
+from .engine import Engine, untimed
 from .evidence import Evidence, evidence
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, here
 from .provenance import results, truth_of
@@ -23,7 +23,7 @@ from .standard import STANDARD, Standard, has_everything, standard_of
 from .verdict import Verdict, judged, promised
 
 NULL_REASONS = {
-    "residual_max": "no sample was solved",
+    "residual_max": "no sample was solved, or the engine has none",
     "rank": "the engine does not report it",
     "dof": "the engine does not report it",
     "iterations": "no sample was solved",
@@ -99,7 +99,7 @@ def run(
         case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases
     }
     pairs = [
-        Pair(case, engine, tol)
+        Pair(case, engine, tol, timed=not untimed(engine))
         for case, engine in _to_solve(cases, ordered, baseline, records, judging)
     ]
 
@@ -254,7 +254,7 @@ def _answered(
     if solved == samples and answer.message:  # on forces; else the verdict has it
         messages.append(answer.message)
     numbers = {
-        "residual_max": answer.residual if solved else None,
+        "residual_max": answer.residual if solved and answer.residual == answer.residual else None,
         "rank": details.pop("rank", None),
         "dof": details.pop("dof", None),
         "iterations": answer.iterations if solved else None,

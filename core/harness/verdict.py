@@ -61,7 +61,9 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     solved, samples = answer.solved, len(case.sweep.values)
     complete = solved == samples
     errors = {
-        output.name: _deviations(case, output, answer, native, complete=complete)
+        output.name: _deviations(
+            case, output, answer, native, complete=complete and not answer.reported
+        )
         for output in case.outputs
     }
     reach: list[str] = []
@@ -83,7 +85,7 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     if messages:
         faults = [*reach, *others]
         return Verdict(Outcome.FAIL, messages, errors, perf_counter() - begin, faults)
-    compared = any(each.items() for each in errors.values())
+    compared = answer.judged or any(each.items() for each in errors.values())
     outcome = Outcome.PASS if compared else Outcome.UNJUDGED
     messages = _not_judged(case, errors)
     if outcome is Outcome.PASS and messages:
@@ -195,7 +197,8 @@ def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for output in case.outputs:
         each = errors[output.name]
-        if len(each.items()) < output.orders or NO_VALUE in (each.reason or ""):
+        orders = 1 if case.sweep.static else output.orders
+        if len(each.items()) < orders or NO_VALUE in (each.reason or ""):
             reasons.setdefault(each.reason or "", []).append(output.name)
     return [
         reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}"

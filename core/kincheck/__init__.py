@@ -18,11 +18,31 @@ from typing import TYPE_CHECKING, Any
 from kincheck import core
 
 if TYPE_CHECKING:
-    from kincheck.by_name import check_engine, free, load, run
+    from kincheck.by_name import (
+        check_engine,
+        compliance,
+        explain,
+        free,
+        load,
+        report,
+        run,
+        sweep,
+    )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
+    from kincheck.core import primitives
 
-_BY_NAME = ("check_engine", "free", "load", "run")
-__all__ = ["check_engine", "free", "load", "run"]
+_BY_NAME = ("check_engine", "compliance", "explain", "free", "load", "report", "run", "sweep")
+__all__ = [
+    "check_engine",
+    "compliance",
+    "explain",
+    "free",
+    "load",
+    "primitives",
+    "report",
+    "run",
+    "sweep",
+]
 __all__ += core.__all__
 
 
@@ -32,8 +52,12 @@ if not TYPE_CHECKING:  # otherwise type checkers would accept any name
         """Import a public name on first use."""
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        module = import_module("kincheck.by_name") if name in _BY_NAME else core
-        found = globals()[name] = getattr(module, name)
+        if name == "primitives":
+            found = import_module("kincheck.core.primitives")
+        else:
+            module = import_module("kincheck.by_name") if name in _BY_NAME else core
+            found = getattr(module, name)
+        globals()[name] = found
         return found
 
 

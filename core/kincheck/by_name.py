@@ -8,6 +8,9 @@ from typing import TypeVar, cast
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case, Free
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
+from kincheck.core.case.io.reference import PROVED
+from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.case.io.reference_file import judged_by
 from kincheck.core.cli.check_engine import examined
 from kincheck.core.cli.engine_loading import made
 from kincheck.core.cli.main import registry
@@ -15,10 +18,18 @@ from kincheck.core.cli.run_options import TOL
 from kincheck.core.harness import run as running
 from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
+from kincheck.core.harness.resource_limits import default_jobs
 from kincheck.core.harness.scene import with_scenes
 from kincheck.core.harness.workers.pool import solver_for
+from kincheck.core.report.report import write_report
 from kincheck.core.studies.checks.findings import Report
+from kincheck.core.studies.compliance import study
+from kincheck.core.studies.compliance.study import ComplianceResults
+from kincheck.core.studies.diagnosis import Diagnosis, diagnose
 from kincheck.core.studies.free import FreeResult, free_of
+from kincheck.core.studies.tolerance.results import SweepResults
+from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.variation.variation_file import read_variation
 
 _One = TypeVar("_One")
 
@@ -43,6 +54,7 @@ def run(
     mode: str | None = None,
     tol: float = TOL,
     jobs: int | None = None,
+    reference: str | Path | None = None,
 ) -> Results:
     """Solve cases with engines and judge the results, as the command `kincheck run` does.
 
@@ -55,6 +67,8 @@ def run(
         tol: largest accepted constraint residual, relative to the mechanism's size.
         jobs: number of worker processes; 0 solves in this process. By default half the processors,
             and 0 if every engine may run in this process.
+        reference: measured curve, or proved reference, of the only case; how a curve was read is
+            among the notes.
 
     Raises:
         KincheckError: a case cannot be read, there is no engine of a name, or a member of the
@@ -63,6 +77,8 @@ def run(
     known, problems = registry(), list[str]()
     named = known.cases() if cases is None else _several(cases)
     found = [each if isinstance(each, Case) else known.find_case(str(each)) for each in named]
+    if reference is not None:
+        found = _judged_by(found, Path(reference))
     every = known.simulations if mode == "simulate" else known.engines
     team = list[Engine]()
     for each in every if engines is None else _several(engines):
@@ -76,6 +92,99 @@ def run(
     solver, _ = solver_for(team, jobs)
     results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
     return with_scenes(results, found)
+
+
+def compliance(
+    case: str | Path | Case,
+    travel: Sequence[float] | None = None,
+    loads: Mapping[str, float | Sequence[float]] | None = None,
+    axle: str = "heave",
+) -> ComplianceResults:
+    """Return the kinematics and compliance of a suspension, as the command `kincheck kc` does.
+
+    Args:
+        case: name, path or case.
+        travel: of the wheel from design [m], by default 60 mm up and down; of the steering if
+            `axle` is "steer".
+        loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
+            applied at design; one number acts over all travel.
+        axle: motion of both wheels: "heave", "roll" or "steer".
+
+    Raises:
+        KincheckError: the case lacks facts, or a sample has no equilibrium; the message gives the
+            last load with one.
+    """
+    found = study.compliance(case if isinstance(case, Case) else load(case), travel, loads, axle)
+    if found.failures:
+        raise KincheckError("\n".join(found.failures))
+    return found
+
+
+def _judged_by(cases: Sequence[Case], file: Path) -> list[Case]:
+    if file.suffix.lower() == PROVED:
+        return judged_by(cases, [file])
+    if len(cases) != 1:
+        problem = f"{file}: found {len(cases)} cases, expected the one of a measured curve"
+        raise KincheckError(f"{problem}; run them one by one")
+    case, notes = with_curve(cases[0], file, CurveOptions())
+    return [replace(case, assembly=(*case.assembly, *notes))]
+
+
+def explain(
+    case: str | Path | Case, supplied: Supplied = NOTHING, *, samples: int = 41, tol: float = TOL
+) -> Diagnosis:
+    """Diagnose a case as the command `kincheck explain` does: degrees of freedom, redundant rows,
+    conditioning, and sensitivities of outputs [SI].
+
+    Args:
+        case: a case, its name, or path to its file.
+        supplied: facts missing in a file of another tool.
+        samples: number of samples of the sweep to examine.
+        tol: largest residual that engines may leave [m or -].
+
+    Raises:
+        KincheckError: there is no such case, or its file is invalid.
+    """
+    found = case if isinstance(case, Case) else load(case, supplied)
+    return diagnose(found, samples=samples, tol=tol)
+
+
+def sweep(
+    case: str | Path | Case,
+    variation: str | Path,
+    supplied: Supplied = NOTHING,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    order: int = 0,
+) -> SweepResults:
+    """Solve variants of a case as the command `kincheck sweep` does.
+
+    Args:
+        case: a case, its name, or path to its file.
+        variation: file of what varies.
+        supplied: facts missing in a file of another tool.
+        samples: number of variants to draw; None if the file lists them.
+        seed: of the draws.
+        order: highest time derivative of the outputs to reduce: 0, 1 or 2.
+
+    Raises:
+        KincheckError: a file is invalid, or the number of samples is missing or superfluous.
+    """
+    found = case if isinstance(case, Case) else load(case, supplied)
+    varied = read_variation(Path(variation), found)
+    return sweep_designs(
+        found, varied, samples=samples, seed=seed, order=order, tol=TOL, jobs=default_jobs()
+    )
+
+
+def report(results: Results, file: str | Path) -> None:
+    """Write results as the report of `kincheck run --out`: one HTML file, worst first.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    write_report(results, Path(file))
 
 
 def free(

@@ -6,13 +6,18 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
+    StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
     free_motion        the motion without drivers, by masses and loads
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
+    FreePoses          poses reached without drivers, and bodies placed to fit others
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
+    count_turns        an angle known up to whole turns, from sample to sample
+    residuals          what poses from elsewhere leave of the rows, and what their digits allow
+    needed_forces      the forces that a motion from elsewhere needs, and what nothing holds
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -36,6 +41,7 @@ The folders:
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
     blocks           large mechanisms as lists of blocks: components, or one sparse system
+    statics          equilibria with springs, bushings and loads, and their compliance
     forces           the equations of forces, and the forces of a solved motion
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
@@ -56,14 +62,15 @@ if TYPE_CHECKING:
     from .design_batch import Designs, Variants, solve_designs
     from .design_forces import ForcesOfDesigns
     from .diagnosis.conditioning import Conditioning, Gradient, PoseConditioning, conditioning
-    from .diagnosis.instantaneous_screws import Screw, describe_screws
     from .diagnosis.rank import (
         Blocked,
         ComponentCount,
         Dependency,
         NamedRow,
         Ranks,
+        Screw,
         Violation,
+        describe_screws,
         freeing,
     )
     from .followed import DOUBTFUL, agreement, in_doubt, near_design
@@ -79,8 +86,13 @@ if TYPE_CHECKING:
     from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
     from .free_dynamics import FreeMotion, free_motion
+    from .free_poses import FreePoses, Poses, Walked
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
+    from .replay import Residuals, Worst, count_turns, judged_part, replayed, residuals
+    from .replayed_forces import Needed, needed_forces
+    from .statics.equations import LoadPoint
+    from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
     from .verified.exact import Exact, Reading, as_decimal, as_double
@@ -97,8 +109,9 @@ _NAMES = {
     "design_batch": "Designs Variants solve_designs",
     "design_forces": "ForcesOfDesigns",
     "diagnosis.conditioning": "Conditioning Gradient PoseConditioning conditioning",
-    "diagnosis.instantaneous_screws": "Screw describe_screws",
-    "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation freeing",
+    "diagnosis.rank": (
+        "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws freeing"
+    ),
     "followed": "DOUBTFUL agreement in_doubt near_design",
     "forces.reactions": "forces_of motion_defects with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
@@ -106,8 +119,13 @@ _NAMES = {
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
     "free_dynamics": "FreeMotion free_motion",
+    "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
+    "replay": "Residuals Worst count_turns judged_part replayed residuals",
+    "replayed_forces": "Needed needed_forces",
+    "statics.equations": "LoadPoint",
+    "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
@@ -101,6 +103,7 @@ class NativeSolver:
         varied: Sequence[str],
         points: Sequence[str] = (),
         forces: Collection[str] = (),
+        bodies: Sequence[str] = (),
     ) -> PreparedDesigns:
         """Return the mechanism made ready for many designs, as one program.
 
@@ -112,11 +115,12 @@ class NativeSolver:
             points: names of the points whose motion is wanted.
             forces: names of joints, drivers and force elements whose forces are wanted; they take
                 order 2.
+            bodies: names of the bodies whose poses are wanted.
 
         Raises:
             SolveError: as `prepare`.
         """
-        request = self._request(path, points, (), varied)
+        request = self._request(path, points, bodies, varied)
         if not forces:
             return PreparedDesigns(Route(compile_model(mechanism, request), path))
         from .design_forces import DesignForces, compile_with_forces  # most studies are without
@@ -295,6 +299,11 @@ class PreparedDesigns:
         """
         rows, orders = self.route.model.rows, self.route.model.orders
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
+
+    def pose(self, found: Variants, body: str) -> Array:
+        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        rows = self.route.model.rows
+        return np.concatenate([found.kept[rows[f"{each} {body}"]] for each in "rp"])
 
     def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
         """Return the forces of solved designs; None where none are wanted.

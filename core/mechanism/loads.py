@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Self, cast
 
 from ..errors import MechanismError, Phrase
-from ..input_checks import finite, held, plain, require_finite, triple
-from ..joints.base import Joint, Kind, position, positions
+from ..input_checks import finite, held, plain, require_direction, require_finite, triple
+from ..joints.base import Joint, Kind, position, positions, unit
 from .body import (
     ANGLE,
     DAMPING,
@@ -27,6 +27,11 @@ from .body import (
     dimension_of,
     quantity,
 )
+from .curves import checked_curve, curve, dimensions_of, scaled
+
+# Axes of a file have some digits; more than this apart from a right angle is no slip of digits.
+PERPENDICULAR = 1e-3
+ROUND_OFF = 4e-16
 
 
 class Axes(StrEnum):
@@ -73,16 +78,28 @@ class ForceElement:
         changes: dict[str, Any] = {}
         for each in fields(self):
             value: Any = getattr(self, each.name)
+            if value is None:
+                continue
             if (dimension := dimension_of(each)) is not None:
                 numbers = cast("tuple[float, ...]", value if isinstance(value, tuple) else (value,))
                 new = tuple(dimension.in_kg_and_s(x, unit) for x in numbers)
                 changes[each.name] = new if isinstance(value, tuple) else new[0]
+            elif (pair := dimensions_of(each)) is not None:
+                factors = [each_of.in_kg_and_s(1.0, unit) for each_of in pair]
+                changes[each.name] = scaled(value, factors)
             elif (kind := each.metadata.get("kind")) is not None:
                 changes[each.name] = tuple(map(place, value)) if kind.pair else place(value)
         return replace(self, **changes)
 
     def _key(self, what: str) -> str:
         return f"forces.{self.name}.{what}"
+
+    def _curve(self) -> None:
+        """Make the curve, if any, a checked one."""
+        table = getattr(self, "curve", None)
+        if table is not None:
+            found = checked_curve(f"{self}: curve", self._key("curve"), table)
+            object.__setattr__(self, "curve", found)
 
     def _numbers(self) -> None:
         """Make the quantities finite numbers, of zero or more unless they are angles."""
@@ -108,7 +125,8 @@ class ForceElement:
 class SpringDamper(ForceElement):
     """A spring and a damper between a point of each of two bodies, tension positive.
 
-    The tension is stiffness (length - free_length) + damping times the rate of the length.
+    The tension is stiffness (length - free_length) + damping times the rate of the length. A curve
+    adds its force at the deflection length - free_length.
 
     Attributes:
         i, j: first and second body.
@@ -116,15 +134,17 @@ class SpringDamper(ForceElement):
         stiffness: [N/m], zero or more.
         damping: [N s/m], zero or more.
         free_length: [m], zero or more; the length at design unless given.
+        curve: tension over deflection [m, N]; none by default.
     """
 
     type: ClassVar[str] = "spring_damper"
     i: str
     j: str
     points: tuple[tuple[float, float, float], tuple[float, float, float]] = positions()
-    stiffness: float = quantity(STIFFNESS)
+    stiffness: float = quantity(STIFFNESS, default=0.0)
     damping: float = quantity(DAMPING, default=0.0)
     free_length: float | None = quantity(LENGTH, default=None)
+    curve: tuple[tuple[float, float], ...] | None = curve(LENGTH, FORCE)
 
     def __post_init__(self) -> None:
         who = f"{self}: points"
@@ -151,6 +171,7 @@ class SpringDamper(ForceElement):
         if self.free_length is None:
             object.__setattr__(self, "free_length", length)
         self._numbers()
+        self._curve()
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -163,23 +184,27 @@ class TorsionSpringDamper(ForceElement):
     """A torsional spring and damper about the axis of a joint that turns.
 
     The torque on the joint's second body, about the axis by the right hand, is
-    -(stiffness (angle - free_angle) + damping times the angle's rate).
+    -(stiffness (angle - free_angle) + damping times the angle's rate). A curve adds its torque at
+    the deflection angle - free_angle.
 
     Attributes:
         joint: name; its angle is zero at design.
         stiffness: [N m/rad], zero or more.
         damping: [N m s/rad], zero or more.
         free_angle: [rad].
+        curve: torque over deflection [rad, N m]; none by default.
     """
 
     type: ClassVar[str] = "torsion_spring_damper"
     joint: str
-    stiffness: float = quantity(TURNING_STIFFNESS)
+    stiffness: float = quantity(TURNING_STIFFNESS, default=0.0)
     damping: float = quantity(TURNING_DAMPING, default=0.0)
     free_angle: float = quantity(ANGLE, default=0.0)
+    curve: tuple[tuple[float, float], ...] | None = curve(ANGLE, TORQUE)
 
     def __post_init__(self) -> None:
         self._numbers()
+        self._curve()
 
     def check(self, joint: Joint) -> None:
         """Raise MechanismError unless the joint turns about an axis."""
@@ -244,7 +269,162 @@ class Torque(ForceElement):
         return (self.body,)
 
 
+class Law(StrEnum):
+    """The law of a bushing's torque: the gradient of an energy in three angles.
+
+    To first order both are equal. `EULER_PARAMETERS`: twice the vector part of the relative Euler
+    parameters. `CARDAN`: the angles of turns about x, then y, then z of the turned axes, as of
+    OpenSim's BushingForce.
+    """
+
+    EULER_PARAMETERS = "euler_parameters"
+    CARDAN = "cardan"
+
+
+@dataclass(frozen=True)
+class Bushing(ForceElement):
+    """A block of rubber between two bodies: springs and dampers along and about three axes.
+
+    The axes are fixed in the first body, which carries the element. A displacement is that of the
+    second body's point from the first body's, along these axes. The force acts at the second body's
+    point, on the first body in the sense of the displacement.
+
+    Attributes:
+        i, j: first and second body.
+        point: of both bodies, global at design [m].
+        axes: first and second axis, global at design, perpendicular; the third follows by the right
+            hand. Global axes unless given.
+        stiffness: along the axes [N/m], zero or more; one number serves all.
+        turning_stiffness: about the axes [N m/rad].
+        damping: along the axes [N s/m].
+        turning_damping: about the axes [N m s/rad].
+        preload: force along the axes at design on the first body [N].
+        curve: force over displacement [m, N], for all axes, or one for each; an axis with an empty
+            one has none. It adds to the stiffness.
+        law: law of the torque.
+        joint: the joint in the bushing's place in rigid studies; empty without one.
+    """
+
+    type: ClassVar[str] = "bushing"
+    i: str
+    j: str
+    point: tuple[float, float, float] = position()
+    axes: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+    )
+    stiffness: tuple[float, float, float] = quantity(STIFFNESS, default=(0.0, 0.0, 0.0))
+    turning_stiffness: tuple[float, float, float] = quantity(
+        TURNING_STIFFNESS, default=(0.0, 0.0, 0.0)
+    )
+    damping: tuple[float, float, float] = quantity(DAMPING, default=(0.0, 0.0, 0.0))
+    turning_damping: tuple[float, float, float] = quantity(TURNING_DAMPING, default=(0.0, 0.0, 0.0))
+    preload: tuple[float, float, float] = quantity(FORCE, default=(0.0, 0.0, 0.0))
+    curve: tuple[tuple[tuple[float, float], ...], ...] | None = curve(LENGTH, FORCE)
+    law: Law = Law.EULER_PARAMETERS
+    joint: str = field(default="", metadata={"hidden": True})
+
+    def __post_init__(self) -> None:
+        if self.i == self.j:
+            raise MechanismError(
+                f"{self}: both sides are on {self.i!r}; a bushing needs two different bodies",
+                self._key("bodies"),
+            )
+        self._vector("point", Kind.POSITION.value)
+        self._axes()
+        for each in fields(self):
+            if dimension_of(each) is not None:
+                self._three(each.name, str(dimension_of(each)))
+        self._curves()
+        try:
+            object.__setattr__(self, "law", Law(self.law))
+        except ValueError:
+            raise MechanismError(
+                f"{self}: law is {self.law!r}, expected one of {', '.join(Law)}", self._key("law")
+            ) from None
+        if not any((*self.stiffness, *self.turning_stiffness, *self.damping, *self.preload)) and (
+            self.curve is None and not any(self.turning_damping)
+        ):
+            raise MechanismError(
+                f"{self}: it has no stiffness; give stiffness, turning_stiffness or a curve",
+                self._key("stiffness"),
+            )
+
+    def _key(self, what: str) -> str:
+        if not self.joint:
+            return super()._key(what)
+        own = self.name.removeprefix(f"{self.joint}.")
+        return f"joints.{self.joint}.bushings.{own}.{what}"
+
+    def _axes(self) -> None:
+        who = f"{self}: axes"
+        expected = "two directions [[x, y, z], [x, y, z]] at right angles"
+        pair = [triple(who, each, expected) for each in held(who, self.axes, 2, expected)]
+        for each in pair:
+            require_finite(who, each, expected)
+            require_direction(who, each)
+        given = [math.hypot(*each) for each in pair]
+        first, second = (unit(each) for each in pair)
+        off = first @ second
+        if max(abs(off), *(abs(each - 1.0) for each in given)) <= ROUND_OFF:
+            object.__setattr__(self, "axes", tuple(pair))
+            return
+        if abs(off) > PERPENDICULAR:
+            raise MechanismError(
+                f"{who} are {math.degrees(math.acos(off)):.6g} degrees apart, expected 90; give"
+                " perpendicular ones",
+                self._key("axes"),
+            )
+        # what the digits of the file leave of the first axis is taken out of the second
+        second = unit([*(second - off * first)])
+        object.__setattr__(self, "axes", (tuple(first), tuple(second)))
+
+    def _three(self, what: str, unit_of: str) -> None:
+        given = plain(getattr(self, what))
+        values = (given,) * 3 if finite(given) else given
+        values = held(f"{self}: {what}", values, 3, f"a number of {unit_of}, or three")
+        for value in values:
+            if not finite(value) or (value < 0.0 and what != "preload"):
+                more = "" if what == "preload" else ", zero or more (a falling force needs a curve)"
+                raise MechanismError(
+                    f"{self}: {what} is {value!r}, expected a number of {unit_of}{more}",
+                    self._key(what),
+                )
+        object.__setattr__(self, what, tuple(map(float, values)))
+
+    def _curves(self) -> None:
+        if self.curve is None:
+            return
+        who, key = f"{self}: curve", self._key("curve")
+        given = held(who, self.curve, None, "a table, or one for each axis")
+        one = all(
+            len(row) == 2 and all(map(finite, row)) for row in given if hasattr(row, "__len__")
+        )
+        tables = (given,) * 3 if one and any(len(row) for row in given) else given
+        tables = held(who, tables, 3, "a table [[displacement, force], ...], or one for each axis")
+        found = tuple(checked_curve(who, key, each) if len(each) else () for each in tables)
+        object.__setattr__(self, "curve", found)
+
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """Names of the bodies that it acts on."""
+        return self.i, self.j
+
+    @property
+    def triad(
+        self,
+    ) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
+        """The three axes, global unit vectors at design [-]."""
+        (a, b, c), (d, e, f) = self.axes
+        return (*self.axes, (b * f - c * e, c * d - a * f, a * e - b * d))
+
+    @property
+    def turns_only(self) -> bool:
+        """Whether it gives no force, and so its amount is a torque."""
+        return not any((*self.stiffness, *self.damping, *self.preload, self.curve))
+
+
 ELEMENTS: dict[str, type[ForceElement]] = {
-    each.type: each for each in (SpringDamper, TorsionSpringDamper, Force, Torque)
+    each.type: each for each in (SpringDamper, TorsionSpringDamper, Bushing, Force, Torque)
 }
 """Force elements by their type in case files."""

@@ -21,7 +21,7 @@ from ..joints.coupler import Coupler
 from ..joints.gap import gap
 from ..trajectory import MARKER
 from .body import Body, Vector
-from .loads import ForceElement, TorsionSpringDamper
+from .loads import Bushing, ForceElement, TorsionSpringDamper
 from .motions import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 
 GROUND = "ground"
@@ -71,6 +71,7 @@ KINDS: Mapping[str, type] = {
     "drivers": Driver,
     "couplers": Coupler,
     "forces": ForceElement,
+    "bushings": Bushing,
 }
 """Members of a mechanism, and the class of each."""
 
@@ -86,6 +87,7 @@ class Mechanism:
         forces: force elements.
         reduced: joints with fewer rows in `joints` than given. A motion needs no more, but loads
             are shared with the rows left out.
+        bushings: of joints; see `released`.
 
     Raises:
         MechanismError: a name is used twice or does not exist, or a joint between fixed bodies does
@@ -102,6 +104,7 @@ class Mechanism:
     gravity: Vector = (0.0, 0.0, 0.0)
     forces: Sequence[ForceElement] = field(default=())
     reduced: Sequence[Reduced] = field(default=())
+    bushings: Sequence[Bushing] = field(default=())
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reduced", tuple(self.reduced))
@@ -200,6 +203,47 @@ class Mechanism:
             key = f"{key}.{'body' if len(force.bodies) == 1 else 'bodies'}"
             for name in force.bodies:
                 _known(str(force), "body", name, bodies, key)
+
+        for bushing in self.bushings:
+            key = f"joints.{bushing.joint}.bushings"
+            _known(str(bushing), "joint", bushing.joint, self._named["joints"], key)
+            for name in bushing.bodies:
+                _known(str(bushing), "body", name, bodies, key)
+
+    def released(self) -> Mechanism:
+        """Return the mechanism with the bushings of joints as force elements in their place.
+
+        Raises:
+            MechanismError: a coupler or a torsional spring needs such a joint.
+        """
+        soft = {bushing.joint for bushing in self.bushings}
+        needed = {joint: str(each) for each in self.couplers for joint in each.joints}
+        needed |= {
+            each.joint: str(each) for each in self.forces if isinstance(each, TorsionSpringDamper)
+        }
+        for name in soft & set(needed):
+            raise MechanismError(
+                f"{needed[name]} needs joint {name!r}, which gives way to its bushings; put it on"
+                " another joint, or remove the bushings",
+                f"joints.{name}.bushings",
+            )
+        return replace(
+            self,
+            joints=[
+                each
+                for each in (*self.joints, *self.grounded)
+                if self.given_name(each.name) not in soft
+            ],
+            grounded=(),
+            drivers=[
+                each
+                for each in self.drivers
+                if not isinstance(each, JointDriver) or each.joint not in soft
+            ],
+            reduced=[each for each in self.reduced if each.joint.name not in soft],
+            forces=(*self.forces, *(replace(each, joint="") for each in self.bushings)),
+            bushings=(),
+        )
 
     def _leave_out_grounded(self) -> None:
         """Separate the joints between fixed bodies from all others."""

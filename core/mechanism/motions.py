@@ -21,6 +21,7 @@ from ..errors import MechanismError
 from ..input_checks import finite, held, require_direction, require_finite, triple
 from ..joints.base import Joint, Kind
 from ..trajectory import Array
+from .formula import jet_of
 
 ROUNDED_TIME = 1e-12
 """Relative rounding by which a time may lie outside a motion's span."""
@@ -34,6 +35,7 @@ class Measure(Enum):
     ANGLE = "an angle"
     FREQUENCY = "Hz"
     TIME = "s"
+    TEXT = "text"
 
 
 def measured(measure: Measure, **options: Any) -> Any:
@@ -140,6 +142,33 @@ class Table(Motion):
 
 
 @dataclass(frozen=True)
+class Formula(Motion):
+    """value = offset + scale * formula, which is over TIME in units of `second`, as Adams has it.
+
+    SIN, COS, SQRT, STEP, POLY and SHF are known; 30D is an angle in degrees.
+    """
+
+    type = "formula"
+    formula: str = measured(Measure.TEXT)
+    scale: float = measured(Measure.DRIVER, default=1.0)
+    offset: float = measured(Measure.DRIVER, default=0.0)
+    second: float = measured(Measure.TIME, default=1.0)
+
+    def __post_init__(self) -> None:
+        _finite("formula", scale=self.scale, offset=self.offset, second=self.second)
+        if not self.second > 0.0:
+            raise MechanismError(f"formula motion: second is {self.second!r}; give a positive time")
+        try:
+            jet_of(self.formula, np.zeros(1))
+        except MechanismError as error:
+            raise MechanismError(f"formula motion: {error}; in {self.formula!r}") from None
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        found, rate = jet_of(self.formula, t / self.second), self.scale / self.second
+        return self.offset + self.scale * found.x, rate * found.v, rate / self.second * found.a
+
+
+@dataclass(frozen=True)
 class Absolute(Motion):
     """A motion of a driver's absolute value, converted to values from design as in all other
     motions.
@@ -155,6 +184,23 @@ class Absolute(Motion):
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         value, velocity, acceleration = self.motion.at(t)
         return value - self.design, velocity, acceleration
+
+
+@dataclass(frozen=True)
+class Slowed(Motion):
+    """A motion over times that are longer by a factor; a power of two keeps all digits."""
+
+    motion: Motion
+    factor: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        first, last = sorted(self.factor * end for end in self.motion.span)
+        return first, last
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        value, velocity, acceleration = self.motion.at(t / self.factor)
+        return value, velocity / self.factor, acceleration / self.factor**2
 
 
 def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:

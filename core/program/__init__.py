@@ -19,8 +19,8 @@ Executors:
 
 From a plan to machine code:
 
-- `llvm.programs`, `llvm.ir_writer`: schedule a program, assign registers, and write LLVM text; the
-  interpreter of tables.
+- `llvm.programs`: schedule a program, assign registers, and write LLVM text; the interpreter of
+  tables.
 - `llvm.loops`: loops over lanes as LLVM text, the same for all plans. `llvm.plan` lays out a plan
   in memory for them.
 - `llvm.compiler`: compile the text, link the object file, and load it.

@@ -259,27 +259,6 @@ class NumpyExecutor:
         self.settle(start, self.plan.alone)
         return self.block[self.plan.slots[MARGIN]] > 0.0
 
-    def fold(self, table: Array, totals: Array) -> None:
-        """Reduce numbers into totals, column by column, in the first group of lanes.
-
-        Per column: set `Plan.kept` to the totals; read groups of numbers into `Plan.taken`, as many
-        at a time as it has slots, and run the programs in `after`; at the end write `Plan.kept` to
-        the totals.
-
-        Args:
-            table: shape (columns, room), contiguous; room is a multiple of the numbers read at a
-                time.
-            totals: shape (kept, columns, group), contiguous.
-        """
-        plan, block = self.plan, self.block
-        for column, row in enumerate(table):
-            block[list(plan.kept)] = totals[:, column]
-            for some in row.reshape(-1, len(plan.taken), self.group):
-                block[list(plan.taken)] = some
-                for name in plan.after:
-                    self.run(name)
-            totals[:, column] = block[list(plan.kept)]
-
     def groups(self, lanes: int) -> int:
         """Return the number of vector groups that hold so many lanes."""
         return 1

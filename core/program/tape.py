@@ -11,12 +11,13 @@ operands there: folding would round them to doubles, and balls have to prove bou
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, TypeAlias, cast
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
-from ..algebra import Scalar
+from ..algebra import Scalar, root
 from ..trajectory import Array
 
 if TYPE_CHECKING:
@@ -279,7 +280,7 @@ Gradient: TypeAlias = dict[int, Scalar]
 """Derivatives by position of the input; zero derivatives are left out."""
 
 
-def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
+def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
     """Return the derivatives of an operation by its operands a and b; y is its value."""
     match op:
         case "+":
@@ -298,6 +299,10 @@ def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ..
             return (cos(a),)
         case "cos":
             return (-sin(a),)
+        case "min" | "max" if smooth:
+            sign = 1.0 if op == "max" else -1.0
+            first = where_larger(a - b + 1.0, a - b - 1.0, 0.5 + 0.5 * sign, 0.5 - 0.5 * sign)
+            return first, 1.0 - first
         case _:
             raise TypeError(
                 f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
@@ -305,8 +310,14 @@ def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ..
             )
 
 
-def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> list[Gradient]:
+def jacobian(
+    tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced], *, smooth: bool = False
+) -> list[Gradient]:
     """Return the derivatives of each value by the inputs, without zeros.
+
+    Args:
+        smooth: "min" and "max" are parts of smooth functions, such as the pieces of a curve; at the
+            kink itself, where they need a derivative of one side, it is that of the second operand.
 
     Raises:
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",
@@ -317,7 +328,9 @@ def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> 
     for number, node in enumerate(tuple(tape.nodes)):
         read = operands(node)
         if any(gradients.get(k) for k in read):
-            weights = _weights(node[0], tape.scalars[number], *(tape.scalars[k] for k in read))
+            weights = _weights(
+                smooth, node[0], tape.scalars[number], *(tape.scalars[k] for k in read)
+            )
             gradients[number] = _sum(
                 zip(weights, (gradients.get(k, {}) for k in read), strict=True)
             )
@@ -333,3 +346,45 @@ def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
         for k, value in gradient.items():
             total[k] = total.get(k, 0.0) + weight * value
     return {k: value for k, value in total.items() if isinstance(value, Traced) or value != 0.0}
+
+
+def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, float]) -> list[Scalar]:
+    """Return scalars with numbers in place of some inputs, by slot: all operations fold again."""
+    new: dict[int, Scalar] = {}
+    waiting = [each.number for each in values if isinstance(each, Traced)]
+    live = set[int]()
+    while waiting:
+        if (number := waiting.pop()) not in live:
+            live.add(number)
+            waiting += operands(tape.nodes[number])
+    for number in sorted(live):
+        op, *rest = tape.nodes[number]
+        if op == "input":
+            new[number] = known.get(int(rest[0]), tape.scalars[number])
+        elif op == "const":
+            new[number] = float(rest[0])
+        elif op == "where":
+            _, *sizes = tape.nodes[int(rest[0])]
+            new[number] = where_larger(*(new[int(k)] for k in (*sizes, *rest[1:])))
+        elif op != "larger":  # which "where" reads itself
+            new[number] = _AGAIN[str(op)](*(new[int(k)] for k in rest))
+    return [new[each.number] if isinstance(each, Traced) else each for each in values]
+
+
+def _over(a: Scalar, b: Scalar) -> Scalar:
+    return a / b
+
+
+_AGAIN: Mapping[str, Any] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": _over,
+    "neg": operator.neg,
+    "sqrt": root,
+    "sin": sin,
+    "cos": cos,
+    "abs": absolute,
+    "min": minimum,
+    "max": maximum,
+}

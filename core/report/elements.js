@@ -70,3 +70,12 @@ function standalone(box) {
   });
   return copy.outerHTML;
 }
+
+// Hand a text to the user as a file.
+function save(text, type, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type }));
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}

@@ -82,10 +82,11 @@ function edges(trace, axis) {
 }
 
 // The width of the longest text [px].
+const ruler = document.createElement("canvas").getContext("2d");
+
 function longest(texts, font) {
-  const pen = document.createElement("canvas").getContext("2d");
-  pen.font = `12px ${font}`;
-  return texts.reduce((most, text) => Math.max(most, pen.measureText(text).width), 0);
+  ruler.font = `12px ${font}`;
+  return texts.reduce((most, text) => Math.max(most, ruler.measureText(text).width), 0);
 }
 
 function grid({ left, right, top, bottom, width, height, x, y, sides, slanted }) {

@@ -4,15 +4,15 @@
 const FRAME_MS = 66; // sixty-one samples in four seconds
 
 // Draw a mechanism into a box, and connect its buttons, slider and keys.
-// Returns a function that draws it again.
+// Returns `draw`, which draws it again, and `change`, which shows another drawing in the same view.
 function mechanism(box, drawing) {
-  const motion = motionOf(drawing);
+  let motion = motionOf(drawing);
   const bounds = boundsOf(motion);
   const views = viewsOf(bounds);
   const canvas = box.querySelector("canvas");
   const slider = box.querySelector("input[type=range]");
   const sample = box.querySelector("output");
-  const last = motion.frames - 1;
+  const last = () => motion.frames - 1;
   const [azimuth, elevation] = views[firstView(bounds)];
   const camera = { frame: drawing.start, azimuth, elevation, zoom: 1 };
 
@@ -20,7 +20,7 @@ function mechanism(box, drawing) {
   const limited = (value, low, high) => Math.min(Math.max(value, low), high);
 
   function show(frame) {
-    camera.frame = limited(frame, 0, last);
+    camera.frame = limited(frame, 0, last());
     sample.textContent = drawing.steps[camera.frame] || "design position";
     if (slider) {
       slider.value = camera.frame;
@@ -41,7 +41,15 @@ function mechanism(box, drawing) {
     draw();
   }
 
-  const { toggle, pause } = player(box, () => camera.frame, show, last, isClosed(motion));
+  function change(next) {
+    drawing = next;
+    motion = motionOf(next);
+    if (slider) slider.max = last();
+    show(camera.frame);
+  }
+
+  const closed = () => isClosed(motion);
+  const { toggle, pause } = player(box, () => camera.frame, show, last, closed);
   const step = (by) => {
     pause();
     show(camera.frame + by);
@@ -81,7 +89,7 @@ function mechanism(box, drawing) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   explainArrows(box, motion);
   show(camera.frame);
-  return draw;
+  return { draw, change };
 }
 
 // The player of the samples, which can pause; none without a button.
@@ -91,8 +99,8 @@ function player(box, current, show, last, closed) {
   let by = 1;
 
   function next() {
-    if (closed) return show((current() + 1) % (last + 1));
-    if (current() + by < 0 || current() + by > last) by = -by;
+    if (closed()) return show((current() + 1) % (last() + 1));
+    if (current() + by < 0 || current() + by > last()) by = -by;
     show(current() + by);
   }
   function say(text, pressed) {

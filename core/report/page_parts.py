@@ -19,7 +19,7 @@ from ..unit_text import value_text, with_unit
 from .figures import Figure
 
 _HERE = Path(__file__).parent
-SCRIPTS = (
+SCENE_SCRIPTS = (
     "elements.js",
     "axes.js",
     "frame.js",
@@ -31,10 +31,11 @@ SCRIPTS = (
     "canvas.js",
     "scene.js",
     "mechanism.js",
-    "overview.js",
-    "report.js",
 )
-"""Scripts of a page with figures, in loading order: each depends only on earlier ones."""
+"""Scripts of figures and scenes, in loading order: each depends only on earlier ones."""
+
+SCRIPTS = (*SCENE_SCRIPTS, "overview.js", "report.js")
+"""Scripts of a report."""
 
 LONG = 300
 """Characters of a message that the page shows at once; the rest is folded."""
@@ -88,14 +89,14 @@ def figure_parts(
     data = {"drivers": drivers or {}, "figures": figures, "scenes": scenes or {}}
     return {
         "css": style_sheet(),
-        "script": "\n".join(_script(name) for name in SCRIPTS),
+        "script": "\n".join(script_of(name) for name in SCRIPTS),
         "data": packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
     }
 
 
-def _script(name: str) -> str:
+def script_of(name: str, folder: Path = _HERE) -> str:
     """Return a script of the pages without indentation and comment lines."""
-    lines = [line.strip() for line in (_HERE / name).read_text("utf-8").splitlines()]
+    lines = [line.strip() for line in (folder / name).read_text("utf-8").splitlines()]
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 

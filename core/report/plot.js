@@ -7,8 +7,8 @@ let clips = 0;
 
 // Draw a figure into a box, and draw it again when the size of the box changes.
 //   data: the traces, with their values in place of "driver".
-// Returns `reset` (the zoom), `show` (a series, or hide it) and `fit` (the figure to a width and
-// height for paper, or to the box without them).
+// Returns `reset` (the zoom), `show` (a series, or hide it), `fit` (the figure to a width and
+// height for paper, or to the box without them) and `change` (to other traces and lines across).
 function plot(box, { data, layout }) {
   const clip = `clip-${clips++}`;
   const hidden = new Set();
@@ -102,6 +102,11 @@ function plot(box, { data, layout }) {
       if (!data.some((trace) => trace.meta === series)) return;
       if (on) hidden.delete(series);
       else hidden.add(series);
+      draw();
+    },
+    change(traces, across) {
+      data = traces;
+      layout.shapes = across;
       draw();
     },
     fit(...given) {

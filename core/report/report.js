@@ -16,14 +16,6 @@ async function unpacked(id) {
   return new Response(stream).text();
 }
 
-function save(text, type, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type }));
-  link.download = name;
-  link.click();
-  URL.revokeObjectURL(link.href);
-}
-
 function onClick(selector, act) {
   for (const button of document.querySelectorAll(selector)) {
     button.addEventListener("click", () => act(button));
@@ -101,7 +93,7 @@ function onClick(selector, act) {
   window.addEventListener("beforeprint", () => {
     document.documentElement.dataset.paper = "";
     for (const rest of document.querySelectorAll(".problems details")) rest.open = true;
-    canvases.forEach((redraw) => redraw());
+    canvases.forEach(({ draw }) => draw());
     for (const box of plots.filter((each) => !isFolded(each) && !each.closest("[hidden]"))) {
       draw(box);
       if (drawn.has(box)) drawn.get(box).fit(...PAPER);
@@ -109,7 +101,7 @@ function onClick(selector, act) {
   });
   window.addEventListener("afterprint", () => {
     delete document.documentElement.dataset.paper;
-    canvases.forEach((redraw) => redraw());
+    canvases.forEach(({ draw }) => draw());
     drawn.forEach((figure) => figure.fit());
   });
   document.documentElement.dataset.ready = "";

@@ -16,8 +16,9 @@ const BESIDE = [
   [0, 18],
 ];
 
-// Draw a mechanism into its box at a sample, seen from a direction.
-function paint(box, drawing, motion, bounds, { frame, azimuth, elevation, zoom }) {
+// Draw a mechanism into its box at a sample, seen from a direction, with the layers that its boxes
+// to tick ask for, or else the given ones.
+function paint(box, drawing, motion, bounds, { frame, azimuth, elevation, zoom, layers = [] }) {
   const canvas = box.querySelector("canvas");
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (!width) return;
@@ -26,7 +27,8 @@ function paint(box, drawing, motion, bounds, { frame, azimuth, elevation, zoom }
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   const isFixed = (b) => drawing.bodies[b].fixed;
   const own = (b) => colour(isFixed(b) ? "soft" : `s${motion.moving.indexOf(b) % 6}`);
-  const isOn = (layer) => (box.querySelector(`[data-layer=${layer}]`) || {}).checked;
+  const ticked = (layer) => (box.querySelector(`[data-layer=${layer}]`) || {}).checked;
+  const isOn = (layer) => layers.includes(layer) || ticked(layer);
 
   const camera = cameraOf(azimuth, elevation, zoom, bounds, width, height);
   const spots = motion.places[frame].map(camera.seen);

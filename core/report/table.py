@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import groupby
 from typing import Any, TextIO
 
@@ -26,30 +26,34 @@ COLOURS = {
     Outcome.UNAVAILABLE: "yellow",
 }
 LENGTH = "m"
-HEADS = (
-    "engine",
-    "outcome",
-    *(f">error\n{motion_unit(LENGTH, quantity)}" for quantity in QUANTITIES),
-    ">us/step",
-)
+FORCES = ("N", "N m")
 
 
-def print_table(results: Results, file: TextIO) -> None:
+def _heads(reactions: bool) -> tuple[str, ...]:
+    units = [motion_unit(LENGTH, quantity) for quantity in QUANTITIES]
+    errors = [f">error\n{unit}" for unit in (*(FORCES if reactions else ()), *units)]
+    return "engine", "outcome", *errors, ">us/step"
+
+
+def print_table(results: Results, file: TextIO, *, reactions: bool = False) -> None:
     """Print the sign conventions, a line per record, every message, and outcome counts.
 
     If the console is too narrow for a line per record, the records stand below their case.
+
+    Args:
+        reactions: forces and moments have columns of their own, the first ones.
     """
     console = terminal.console(file)
     print_signs(results.run, console)
     several = len({record.mode for record in results.records}) > 1
-    rows = [(record, _cells(record, several)) for record in results.records]
-    table = terminal.columns("case", *HEADS, "truth")
+    rows = [(record, _cells(record, several, reactions)) for record in results.records]
+    table = terminal.columns("case", *_heads(reactions), "truth")
     for record, cells in rows:
         table.add_row(Text(visible(record.case)), *cells, Text(visible(truth(record))))
     if rows and table.natural_width(console, console.options) <= console.width:
         console.print(table)
     elif rows:
-        _print_by_case(rows, console)
+        _print_by_case(rows, console, _heads(reactions))
     print_travel(results, console)
     print_messages(results, console)
 
@@ -128,22 +132,31 @@ def _of_tolerance(error: Deviation | None) -> Text:
     return Text(text, style="" if error.within else "bold red")
 
 
-def _cells(record: Record, several: bool) -> tuple[Text, ...]:
-    """Return the cells of `HEADS` as text, with the engine's mode if there are several."""
+def _cells(record: Record, several: bool, reactions: bool) -> tuple[Text, ...]:
+    """Return the cells of the table as text, with the engine's mode if there are several."""
     engine = f"{record.engine} · {record.mode}" if several else record.engine
     outcome = Text(record.outcome.shown, style=COLOURS.get(record.outcome, "bold red"))
-    errors = (_error(record, quantity) for quantity in QUANTITIES)
+    errors = [
+        _shown(worst(record, "position", of=lambda its, unit=unit: its == unit), f"[{unit}]")
+        for unit in (FORCES if reactions else ())
+    ]
+    errors += [
+        _shown(worst(record, quantity, of=lambda its: not reactions or its not in FORCES))
+        for quantity in QUANTITIES
+    ]
     return Text(visible(engine)), outcome, *errors, Text(_time(record.us_per_step))
 
 
-def _print_by_case(rows: Sequence[tuple[Record, tuple[Text, ...]]], console: Console) -> None:
+def _print_by_case(
+    rows: Sequence[tuple[Record, tuple[Text, ...]]], console: Console, heads: Sequence[str]
+) -> None:
     """Print the records of each case below its name and standard."""
     standards = {
         case: _standard([record for record, _ in group])
         for case, group in groupby(rows, lambda row: row[0].case)
     }
     titled = [(record.case, standards[record.case], cells) for record, cells in rows]
-    _print_below_titles(titled, HEADS, console)
+    _print_below_titles(titled, heads, console)
 
 
 def _print_below_titles(
@@ -217,19 +230,24 @@ def truth(record: Record) -> str:
     return against(record.truth) + (f" ({said})" if said else "")
 
 
-def _error(record: Record, quantity: str) -> Text:
-    found = worst(record, quantity)
+def _shown(found: tuple[Deviation, str] | None, own: str = "") -> Text:
     if found is None:
         return Text("–")
     error, unit = found
     return Text(
-        visible(f"{error.max_abs:.1e} {unit}".rstrip()), style="" if error.within else "bold red"
+        visible(f"{error.max_abs:.1e} {unit.removeprefix(own)}".rstrip()),
+        style="" if error.within else "bold red",
     )
 
 
-def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
+def worst(
+    record: Record, quantity: str, of: Callable[[str], bool] = lambda unit: True
+) -> tuple[Deviation, str] | None:
     """Return the largest error of a quantity over the outputs, and its output's unit, empty for the
     metre of the heads.
+
+    Args:
+        of: tells the units of the outputs.
 
     Errors out of tolerance come first, then lengths, because errors in different units cannot be
     compared. Return None if nothing was compared.
@@ -237,6 +255,8 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
     found: list[tuple[Deviation, str]] = []
     for output, errors in record.errors.items():
         unit = record.outputs[output].unit if output in record.outputs else LENGTH
+        if not of(unit):
+            continue
         found += [
             (each, "" if unit == LENGTH else f"[{unit}]")
             for name, each in errors.items()

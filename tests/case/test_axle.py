@@ -248,7 +248,7 @@ def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
     ("supplied", "fragments"),
     [
         ({"axle": "pitch"}, ["--axle", "'pitch'", "heave"]),
-        ({"axle": "steer", "wheelbase": "two"}, ["--wheelbase", "'two'", "metres"]),
+        ({"axle": "steer", "wheelbase": "two"}, ["--wheelbase", "'two'", "a length"]),
         ({"axle": "steer", "wheelbase": "-2"}, ["--wheelbase", "-2 m"]),
     ],
 )
@@ -370,7 +370,7 @@ def test_without_data_of_the_vehicle_there_are_no_anti_values(tmp_path):
 
 STEERING_FAULTS = {
     "position": ({"position": "frnt"}, ["--position", "'frnt'", "'front'"]),
-    "height": ({"cg_height": "half"}, ["--cg-height", "'half'", "metres"]),
+    "height": ({"cg_height": "half"}, ["--cg-height", "'half'", "a length"]),
     "negative height": ({"cg_height": "-0.5"}, ["--cg-height", "-0.5 m"]),
     "percent": ({"brake_share": "60"}, ["--brake-share", "'60'", "0 to 1"]),
     "no share": ({"drive_share": "all"}, ["--drive-share", "'all'", "0 to 1"]),

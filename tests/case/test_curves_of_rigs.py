@@ -2,6 +2,7 @@
 grid, judged as the reference of a case file is.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
@@ -165,9 +167,9 @@ FAULTS = {
     "no such output": ({}, {"columns": ["toe=tow"]}, ["--map: found 'tow'", "'toe'"]),
     "no equals": ({}, {"columns": ["toe"]}, ["--map: found 'toe'", "COLUMN=OUTPUT"]),
     "stated unit contradicts": ({}, {"columns": ["toe=toe [rad]"]}, ["in 'deg' and 'rad'"]),
-    "accuracy without a unit": ({}, {"accuracy": ["toe=0.1"]}, ["--accuracy", "toe=0.02 deg"]),
+    "accuracy of two outputs": ({}, {"accuracy": ["0.1"]}, ["--accuracy", "with a column"]),
     "accuracy of nothing": ({}, {"accuracy": ["caster=1 deg"]}, ["'caster'", "with a column"]),
-    "a gap": ({"form": "{},,{}"}, {}, ["line 2", "''", "finite number"]),
+    "a gap": ({"form": "{},,{}"}, {}, ["'toe [deg]'", "0 numbers", "expected 4"]),
 }
 
 
@@ -199,3 +201,20 @@ def test_the_command_line(tmp_path, car, capsys):
     assert "give --reference FILE" in capsys.readouterr().err
     assert main([*command, "mcpherson_strut", "--reference", str(file)]) == 2
     assert "one by one" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("accuracy", ["0.02", "toe=0.02", "toe=0.02deg", "toe=0.02 deg"])
+def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
+    case, rows = car
+    file = rig(tmp_path, rows, "Travel [mm],toe [deg]", "{0},{1}")
+    judged_by, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
+    (toe,) = [output for output in judged_by.outputs if output.name == "toe"]
+    assert toe.atol == pytest.approx(math.radians(0.02), rel=1e-14)
+
+
+def test_first_rows_with_gaps_are_samples(tmp_path):
+    """A lone number below the head is a sample without the other columns, and never a title."""
+    file = tmp_path / "rig.csv"
+    file.write_text("Travel [mm],toe [deg]\n-50,\n-40,\n0,0.1\n50,0.2\n")
+    samples = samples_of(read_table(file, None, "--sheet"), [0, 1], gaps=True)
+    assert samples.numbers[:, 0].tolist() == [-50.0, -40.0, 0.0, 50.0]

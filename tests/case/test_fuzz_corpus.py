@@ -10,9 +10,21 @@ from pathlib import Path
 
 import pytest
 
-from ..fuzz import casefile, fuzzing, hardpoints, keeping, mjcf, reference, results, sdf, urdf
+from ..fuzz import (
+    adams,
+    casefile,
+    fuzzing,
+    hardpoints,
+    keeping,
+    mjcf,
+    reference,
+    results,
+    sdf,
+    urdf,
+)
 
 READERS = {
+    "adams": adams,
     "casefile": casefile,
     "hardpoints": hardpoints,
     "mjcf": mjcf,

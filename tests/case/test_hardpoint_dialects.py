@@ -176,11 +176,8 @@ def test_what_is_no_point_is_listed(tmp_path):
     assert listed.split(", ") == [*RIGHT]
 
 
-def test_the_right_side_is_read_as_the_left(tmp_path, plain):
-    """Mirrored by its axes, as the message says."""
+def test_right_points_are_read_as_left_ones_by_axes(tmp_path, plain):
     text = table(points={name: (x, -y, z) for name, (x, y, z) in POINTS.items()})
-    with pytest.raises(CaseError, match="those of the right side are read as left ones if --axes"):
-        read(tmp_path, text)
     said = Supplied("double_wishbone", "mm", "rearward,left,up")
     assert read(tmp_path, text, said).mechanism == plain
 
@@ -491,3 +488,55 @@ def test_a_folder(tmp_path, capsys):
     (tmp_path / "car.csv").mkdir()
     assert main(["explain", str(tmp_path / "car.csv")]) == 2
     assert "car.csv: a folder, not a regular file; give the path" in capsys.readouterr().err
+
+
+MISSPELT = {"uca_front": "UCA_Frnt", "lca_outer": "LCA outr", "wheel_center": "WheelCentr"}
+
+
+def test_likely_names_are_taken_with_a_note(tmp_path, plain):
+    text = table(points={MISSPELT.get(name, name): at for name, at in POINTS.items()})
+    case = read(tmp_path, text)
+    assert case.mechanism == plain
+    (note,) = case.assembly
+    assert all(f"{role} is {name!r}" in note for role, name in MISSPELT.items())
+    with pytest.raises(CaseError, match=r"missing uca_front.*is it 'UCA_Frnt'"):
+        read(tmp_path, text, Supplied(*("double_wishbone", "mm", "adams"), ask_names=True))
+
+
+@pytest.mark.parametrize(
+    ("role", "name"),
+    [
+        ("uca_front", "lca_front2"),
+        ("uca_rear", "uca_front_2"),
+        ("tierod_outer", "tierod_inner_2"),
+        ("wheel_center", "wheel_cont"),
+        ("wheel_center", "hub"),
+    ],
+)
+def test_names_of_another_point_are_not_taken(tmp_path, role, name):
+    with pytest.raises(CaseError, match=f"missing {role}"):
+        read(
+            tmp_path,
+            table(points={name if each == role else each: POINTS[each] for each in POINTS}),
+        )
+
+
+def test_one_name_is_not_taken_twice(tmp_path):
+    points = {each: at for each, at in POINTS.items() if each not in ("uca_front", "lca_front")}
+    with pytest.raises(CaseError, match="missing uca_front"):
+        read(tmp_path, table(points={**points, "xca_front": POINTS["uca_front"]}))
+
+
+def test_a_new_file_of_names_is_written(tmp_path, plain):
+    text = table(points={MISSPELT.get(name, name): at for name, at in POINTS.items()})
+    names = tmp_path / "names.toml"
+    said = Supplied(*("double_wishbone", "mm", "adams"), names=names)
+    assert read(tmp_path, text, said).mechanism == plain
+    assert 'uca_front = "UCA_Frnt"' in names.read_text()
+    again = read(tmp_path, text, said)
+    assert again.mechanism == plain
+    assert not again.assembly
+    names.unlink()
+    with pytest.raises(CaseError, match=r"fill in .*names\.toml"):
+        read(tmp_path, table(points={OWN[name]: at for name, at in POINTS.items()}), said)
+    assert '# uca_front = ""' in names.read_text()

@@ -75,7 +75,7 @@ def test_without_a_radius_nothing_is_at_the_road():
 @pytest.mark.parametrize(
     ("supplied", "extra", "fragments"),
     [
-        ({"wheel_radius": "30 cm"}, "", ["--wheel-radius", "'30 cm'", "metres"]),
+        ({"wheel_radius": "30 deg"}, "", ["--wheel-radius", "'30 deg'", "a length"]),
         ({"wheel_radius": "300"}, "", ["--wheel-radius", "300 m", "0.02 to 3 m"]),
         ({"wheel_radius": "0.3"}, "wheel_contact,0,612,0\n", ["--wheel-radius", "wheel_contact"]),
         ({}, "wheel_contact,0,612,220\n", ["wheel_contact", "0.008 m"]),
@@ -121,3 +121,19 @@ def test_the_template_of_a_table(tmp_path):
     with pytest.raises(CaseError, match="expected mcpherson"):
         load(file, Supplied("five_link"))
     assert load(file, Supplied("mcpherson")).mechanism == load(file).mechanism
+
+
+@pytest.mark.parametrize(
+    ("travel", "ends"),
+    {
+        "50mm": (-0.05, 0.05),
+        "5 cm:7": (-0.05, 0.05),
+        "-80:80mm:33": (-0.08, 0.08),
+        "-80mm:0.12m:33": (-0.08, 0.12),
+        "-0.04:0.12:33": (-0.04, 0.12),
+        "2inch": (-0.0508, 0.0508),
+    }.items(),
+)
+def test_travel_takes_a_unit(tmp_path, travel, ends):
+    case = sample(tmp_path, "double_wishbone", travel)
+    assert (case.sweep.values[0], case.sweep.values[-1]) == pytest.approx(ends, rel=1e-15)

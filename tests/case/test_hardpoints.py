@@ -1,6 +1,7 @@
 """Cases of tables of hardpoints, and what is wrong with a table."""
 
 import csv
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -311,7 +312,7 @@ def test_chrono(tmp_path, kind):
     file = edited(tmp_path, STRUT, edit)
     if kind == "cut":
         file.write_text(file.read_text()[:600])
-    complains(file, Supplied(), *fragments)
+    complains(file, Supplied(ask_names=True), *fragments)
 
 
 ADAMS_FAULTS = {
@@ -343,7 +344,7 @@ ADAMS_FAULTS = {
 @pytest.mark.parametrize("kind", ADAMS_FAULTS)
 def test_adams(tmp_path, kind):
     edit, fragments = ADAMS_FAULTS[kind]
-    complains(edited(tmp_path, ADAMS, edit), Supplied(WISHBONE), *fragments)
+    complains(edited(tmp_path, ADAMS, edit), Supplied(WISHBONE, ask_names=True), *fragments)
 
 
 def test_adams_cut_short(tmp_path):
@@ -398,23 +399,23 @@ TABLE_FAULTS = {
         Supplied(WISHBONE, "mm", "rearward,right,down"),
         ["uca_outer", "lca_outer", "expected it above"],
     ),
-    "travel": ((), Supplied(WISHBONE, "mm", "adams", "5cm"), ["--travel", "'5cm'", "METRES"]),
+    "travel": ((), Supplied(WISHBONE, "mm", "adams", "5deg"), ["--travel", "'5deg'", "a length"]),
     "separated travel": (
         (),
         Supplied(WISHBONE, "mm", "adams", "0.0_5"),
-        ["--travel", "'0.0_5'", "METRES"],
+        ["--travel", "'0.0_5'", "a length"],
     ),
     "many samples": (
         (),
         Supplied(WISHBONE, "mm", "adams", "0.05:1000000000"),
-        ["METRES:SAMPLES, 2 to 1000000 of them"],
+        ["LENGTH:SAMPLES, 2 to 1000000 of them"],
     ),
     "one sample": (
         (),
         Supplied(WISHBONE, "mm", "adams", "0.05:1"),
-        ["METRES:SAMPLES, 2 to 1000000 of them"],
+        ["LENGTH:SAMPLES, 2 to 1000000 of them"],
     ),
-    "no travel": ((), Supplied(WISHBONE, "mm", "adams", "0"), ["--travel", "'0'", "METRES"]),
+    "no travel": ((), Supplied(WISHBONE, "mm", "adams", "0"), ["--travel", "'0'", "a length"]),
     "drive": (
         (),
         Supplied(WISHBONE, "mm", "adams", drive=("a:0:1",)),
@@ -445,7 +446,7 @@ TABLE_FAULTS = {
     ),
     "misspelt": (
         ("lca_rear", "lca_raer"),
-        WHOLE,
+        replace(WHOLE, ask_names=True),
         ["lca_rear, the lower arm's rear pivot", "is it 'lca_raer', line 4?"],
     ),
     "no head": (("name,x,y,z\n", "1,2,3,4,5\n"), WHOLE, ["line 1", "expected the head name,x,y,z"]),

@@ -1,7 +1,11 @@
 """How an MJCF model is said to be driven: what is wrong with it is one message."""
 
+import math
+from dataclasses import replace
+
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
 
 from ..support.mjcf_complaints import COUPLING, DRIVEN, GRIPPER, SPRINGS, complains, edited
 
@@ -28,7 +32,7 @@ DRIVES = {
     "misspelt": (Supplied(drive=("right_drive_joint:0:1",)), ["--drive", "'right_driver_joint'"]),
     "no range": (
         Supplied(drive=("right_driver_joint",)),
-        ["--drive", "JOINT:START:STOP", "[rad, m]", "right_driver_joint:START:STOP"],
+        ["--drive", "JOINT:START:STOP", "rad or m", "right_driver_joint:START:STOP"],
     ),
     "no end": (
         Supplied(drive=("right_driver_joint:0",)),
@@ -48,6 +52,18 @@ DRIVES = {
     ),
     "no samples": (
         Supplied(drive=("right_driver_joint:0:1:0",)),
+        ["--drive", "correct the numbers"],
+    ),
+    "degrees without a unit": (
+        Supplied(drive=("right_driver_joint:0:360:9",)),
+        [
+            "would turn 57.3 times",
+            "right_driver_joint:0:360deg:9 for degrees",
+            "right_driver_joint:0:360rad:9",
+        ],
+    ),
+    "another quantity": (
+        Supplied(drive=("right_driver_joint:0:40mm",)),
         ["--drive", "correct the numbers"],
     ),
     "nowhere": (Supplied(drive=("right_driver_joint:1:1",)), ["--drive", "correct the numbers"]),
@@ -91,3 +107,9 @@ def test_a_joint_that_the_file_locks_is_not_driven(tmp_path, supplied, found):
 def test_driving(kind):
     supplied, fragments = DRIVES[kind]
     complains(GRIPPER, supplied, *fragments)
+
+
+@pytest.mark.parametrize("drive", ["0:20deg:5", "0:0.3490658503988659rad:5"])
+def test_drive_takes_a_unit(drive):
+    case = load(GRIPPER, replace(DRIVEN, drive=(f"right_driver_joint:{drive}",)))
+    assert case.sweep.values[-1] - case.sweep.values[0] == pytest.approx(math.radians(20.0))

@@ -48,7 +48,7 @@ ALL_KINDS = """<mujoco><compiler angle="degree" eulerseq="zyx"/><worldbody>
 def test_a_start_is_mujocos_pose(tmp_path, said):
     file = written(tmp_path, ALL_KINDS)
     tree = read_tree(file)
-    there = read_start(tree, said).pose.settled()
+    there = read_start(tree, said).pose.as_tree()
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     data.qpos[:] = model.key("bent").qpos

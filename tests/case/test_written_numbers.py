@@ -144,12 +144,6 @@ wheel_center,0.2,WHEEL,0
     ("upper", "wheel", "axes", "words"),
     [
         (
-            "0.2",
-            "-0.7512",
-            "forward,left,up",
-            "wheel_center: found y = -0.7512 UNIT, not left of the middle",
-        ),
-        (
             "-0.2345",
             "0.75",
             "forward,left,up",

@@ -90,7 +90,7 @@ def of_cells(data: bytes) -> Case:
     rows = [(f"row {k}", [*map(cell_of, line.split("\t"))]) for k, line in enumerate(lines, 1)] or [
         ("row 1", [""])
     ]
-    table = read_rows(Table(FOLDER / "car.xlsx", sheet=rows), "Excel", {})
+    table = read_rows(Table(FOLDER / "car.xlsx", sheet=rows), "Excel", {}, Supplied())
     return case_of_hardpoints(table, Supplied("double_wishbone", None, None))
 
 

@@ -13,7 +13,8 @@ from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.ring import ring, tip
 
-from ..support.block_structures import LEAN, solve_as, torus
+from ..support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
+from ..support.mechanisms import four_bar, slider_crank
 from .test_chain import chain
 from .test_sparse_choice import inside
 
@@ -23,6 +24,46 @@ METHODS = Method.ONE_PROGRAM, Method.BY_COMPONENTS, Method.SPARSE
 def in_every_way(mechanism, turn, points, driver="turn"):
     path = Path({driver: Ramp(1.0)}, np.asarray(turn))
     return [solve_as(method, mechanism, path, points) for method in METHODS]
+
+
+IN_BLOCKS = pytest.mark.parametrize("method", METHODS[1:])
+
+
+# several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
+@IN_BLOCKS
+@pytest.mark.parametrize(
+    "name",
+    [
+        "mcpherson_strut",
+        "mcpherson_steered",
+        "four_bar",
+        "andrews_squeezer",
+        "delta_robot",
+        "bricard",
+        "double_cardan",
+        "rssr",
+    ],
+)
+def test_blocks_give_what_one_program_gives(name, method):
+    case = cases.load(name)
+    assert_alike(*with_one_program(method, case.mechanism, case.sweep.path, case.points))
+
+
+@IN_BLOCKS
+@pytest.mark.parametrize(
+    "times",
+    [
+        np.linspace(2.0, 3.0, 5),
+        np.linspace(-0.2, 0.9, 70)[::-1],
+        np.zeros(1),
+        np.array([0.5, 0.5, -0.5]),
+    ],
+)
+def test_any_samples_in_blocks(times, method):
+    for mechanism in (slider_crank(1.01), four_bar()):
+        points = tuple(point.name for point in mechanism.points)
+        path = Path({"turn": Ramp(2.0)}, times)
+        assert_alike(*with_one_program(method, mechanism, path, points))
 
 
 @pytest.mark.parametrize(

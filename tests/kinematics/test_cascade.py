@@ -4,72 +4,32 @@ and programs are shared.
 
 import numpy as np
 import pytest
-from kincheck import cases
 from kincheck.core import Body, Point, solve
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.blocks.component_lanes import LANES, Cascade, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import WORST
-from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
-from kincheck.core.kinematics.compiled.routes import Route, start_of
-from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.kinematics.compiled.routes import start_of
 from kincheck.core.kinematics.continuation.walk import HALVINGS, part_of_step
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
 
-from ..support.block_structures import solve_components
-from ..support.mechanisms import four_bar, slider_crank
+from ..support.block_structures import assert_alike, solve_components, with_one_program
 from .test_chain import LEAN, chain
 
 
-def both(mechanism, path, points, *, compiled=True):
-    bodies = tuple(body.name for body in mechanism.moving)
-    request = Request(tuple(path.motions), points, bodies, compiled=compiled)
-    found = solve_components(mechanism, path, points, bodies, compiled=compiled)
-    return found, follow(Route(compile_model(mechanism, request), path), 1e-12)
-
-
-def assert_alike(found, expected):
-    assert found.solved.all(), found.message
-    assert expected.solved.all()
-    for name, motion in expected.bodies.items():
-        # two orders of elimination: round-off of one times the condition, once more for each
-        # derivative (library: below 100)
-        for label, limit in (("r", 1e-14), ("p", 1e-14), ("v", 1e-13), ("a", 3e-12)):
-            assert (
-                np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
-            )
-    for name, motion in expected.points.items():
-        assert np.abs(found.points[name].acceleration - motion.acceleration).max() <= 3e-12
-    assert [found.details[name] for name in ("rank", "dof")] == [
-        expected.details[name] for name in ("rank", "dof")
-    ]
-
-
-# the redundant, the open loop of several, several drivers, a sweep that does not start at the
-# design
-@pytest.mark.parametrize(
-    "name", ["andrews_squeezer", "mcpherson_steered", "four_bar", "rssr", "delta_robot", "bricard"]
-)
-def test_components_give_what_one_program_gives(name):
-    case = cases.load(name)
-    assert_alike(*both(case.mechanism, case.sweep.path, case.points))
+def compared(mechanism, path, points):
+    assert_alike(*with_one_program(Method.BY_COMPONENTS, mechanism, path, points))
 
 
 def test_numpy_runs_components_too():
     path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
-    assert_alike(*both(chain(3), path, ("end",), compiled=False))
-
-
-@pytest.mark.parametrize(
-    "times",
-    [np.linspace(2.0, 3.0, 5), np.linspace(-0.2, 0.9, 70)[::-1], np.zeros(1)],
-    ids=["far", "back", "one"],
-)
-def test_any_samples(times):
-    for mechanism, driver in ((slider_crank(), "turn"), (four_bar(), "turn")):
-        points = tuple(point.name for point in mechanism.points)
-        assert_alike(*both(mechanism, Path({driver: Ramp(2.0)}, times), points))
+    assert_alike(
+        *(
+            solve_components(chain(3), path, ("end",), ("crank3",), compiled=each)
+            for each in (False, True)
+        )
+    )
 
 
 @pytest.mark.parametrize("first", [-7.0, 1000.0])
@@ -80,7 +40,7 @@ def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
         Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5)),
     )
     assert not start_of(chain(3), path).stands
-    assert_alike(*both(mechanism, path, ("end",)))
+    compared(mechanism, path, ("end",))
 
 
 def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():

@@ -11,9 +11,8 @@ from kincheck.core.kinematics.blocks.component_lanes import Cascade
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 
-from ..support.block_structures import solve_components
+from ..support.block_structures import assert_alike, solve_components, with_one_program
 from ..support.mechanisms import mcpherson
-from .test_cascade import assert_alike, both
 from .test_chain import LEAN, chain
 
 
@@ -130,7 +129,8 @@ def test_sweep_without_samples_has_no_numbers():
 def test_a_narrow_gap_is_not_stepped_over(name):
     """The sample is beyond a gap, or a corner, of less than a thousandth of the step."""
     case = load_case(File(__file__).parents[1] / "data" / "stress" / f"{name}.toml")
-    found, expected = both(case.mechanism, case.sweep.path, case.points)
+    path = case.sweep.path
+    found, expected = with_one_program(Method.BY_COMPONENTS, case.mechanism, path, case.points)
     if expected.solved.all():
         assert_alike(found, expected)
     else:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import cases
 from kincheck.core import (
     Body,
     Gear,
@@ -19,11 +18,9 @@ from kincheck.core import (
     Translational,
     solve,
 )
+from kincheck.core.kinematics import Method
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
-from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.routes import Route
-from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.one_design import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
@@ -31,51 +28,26 @@ from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.bench import scaling
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring
 
-from ..support.block_structures import solve_sparse
-from ..support.mechanisms import four_bar, mcpherson, slider_crank
-from .test_cascade import assert_alike
+from ..support.block_structures import (
+    assert_alike,
+    chain_of_hinges,
+    solve_sparse,
+    with_one_program,
+)
+from ..support.mechanisms import four_bar, mcpherson
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-
-
-WAYS = pytest.mark.parametrize("compiled", [False, True], ids=["one by one", "together"])
 
 
 def turning(*values, rate=1.0):
     return Path({"turn": Ramp(rate)}, np.array(values))
 
 
-def both(mechanism, path, points, compiled=False):
-    bodies = tuple(body.name for body in mechanism.moving)
-    model = recent_model(mechanism, Request(tuple(path.motions), points, bodies))
-    expected = follow(Route(model, path), 1e-12)
-    return solve_sparse(mechanism, path, points, bodies, compiled=compiled), expected
+def compared(mechanism, path, points):
+    assert_alike(*with_one_program(Method.SPARSE, mechanism, path, points))
 
 
-# several drivers, redundant rows, all kinds of joints, a sweep that does not start at the design
-@WAYS
-@pytest.mark.parametrize(
-    "name",
-    [
-        "mcpherson_strut",
-        "mcpherson_steered",
-        "four_bar",
-        "andrews_squeezer",
-        "delta_robot",
-        "bricard",
-        "double_cardan",
-    ],
-)
-def test_it_gives_what_one_program_gives(name, compiled):
-    case = cases.load(name)
-    path = case.sweep.path
-    # one by one a sample takes ten times as long as together
-    path = path if compiled else replace(path, times=path.times[::4])
-    assert_alike(*both(case.mechanism, path, case.points, compiled))
-
-
-@WAYS
-def test_couplers_and_their_coordinates(compiled):
+def test_couplers_and_their_coordinates():
     mechanism = Mechanism(
         "gears",
         [
@@ -95,9 +67,8 @@ def test_couplers_and_their_coordinates(compiled):
         [JointAngle("turn", "first")],
         [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
     )
-    found, expected = both(
-        mechanism, turning(*np.linspace(-3.0, 3.0, 25)), ("tooth", "top"), compiled
-    )
+    path = turning(*np.linspace(-3.0, 3.0, 25))
+    found, expected = with_one_program(Method.SPARSE, mechanism, path, ("tooth", "top"))
     assert_alike(found, expected)
     # the pinion makes half the turns, the nut a lead for each
     assert np.ptp(found.points["top"].position[:, 2]) == pytest.approx(
@@ -105,34 +76,9 @@ def test_couplers_and_their_coordinates(compiled):
     )
 
 
-@WAYS
-@pytest.mark.parametrize(
-    "times",
-    [
-        np.linspace(2.0, 3.0, 5),
-        np.linspace(-0.2, 0.9, 30)[::-1],
-        np.zeros(1),
-        np.array([0.5, 0.5, -0.5]),
-    ],
-)
-def test_any_samples(times, compiled):
-    for mechanism in (slider_crank(1.01), four_bar()):
-        assert_alike(
-            *both(
-                mechanism,
-                turning(*times, rate=2.0),
-                tuple(point.name for point in mechanism.points),
-                compiled,
-            )
-        )
-
-
-@WAYS
-def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample(compiled):
+def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample():
     for times in (np.linspace(0.0, 2.0, 15), np.linspace(2.0, 1.0, 4)):
-        assert_alike(
-            *both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",), compiled)
-        )
+        compared(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",))
 
 
 def test_a_motion_that_begins_beyond_the_travel_ends_on_the_way_to_its_first_sample():
@@ -219,28 +165,11 @@ def test_numpy_and_machine_code_agree():
 
 def test_redundant_rows_of_many_loops_are_found_where_they_are():
     loops = 60
-    n, s, c = range(loops), np.sin(0.3), np.cos(0.3)
-    pivots = [
-        Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), Z)
-        for k in range(loops + 1)
-    ]
-    pins = [
-        Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), Z)
-        for k in n
-        for at in (0, 1)
-    ]
-    bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
-    planar = Mechanism(
-        "planar", bodies, [*pivots, *pins], [Point("end", f"crank{loops}", (loops + s, c, 0.0))]
-    )
-    driven = Mechanism(
-        "planar", bodies, planar.joints, planar.points, [JointAngle("turn", "pivot0")]
-    )
-    found = solve_sparse(driven, turning(-0.5, 0.5), ["end"])
+    found = solve_sparse(chain_of_hinges(loops), turning(-0.5, 0.5), ["end"])
     assert found.solved.all(), found.message
     assert len(found.details["dof_account"]["redundant_rows"]) == 3 * loops
     assert found.details["redundant_residual"] <= 1e-15
-    expected = [[loops + np.sin(0.3 - turn), np.cos(0.3 - turn), 0.0] for turn in (-0.5, 0.5)]
+    expected = [[loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0] for turn in (-0.5, 0.5)]
     assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
 
 

@@ -128,4 +128,10 @@ def test_gravity_is_three_finite_numbers():
 
 
 def test_elements_have_the_names_of_case_files():
-    assert sorted(ELEMENTS) == ["force", "spring_damper", "torque", "torsion_spring_damper"]
+    assert sorted(ELEMENTS) == [
+        "bushing",
+        "force",
+        "spring_damper",
+        "torque",
+        "torsion_spring_damper",
+    ]

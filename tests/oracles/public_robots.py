@@ -134,7 +134,7 @@ def _freedoms(file: Path, drive: str) -> tuple[int, str]:
 
 def posed(file: Path, supplied: Supplied) -> tuple[Case, Driving, Assembled]:
     """Return the case of a model, its driven and held joints, and its start."""
-    assembled, driving, _ = trees.posed(read_tree(file), supplied)
+    assembled, driving, _ = trees.model_of(read_tree(file), supplied)
     return load(file, supplied), driving, assembled
 
 

@@ -167,5 +167,5 @@ def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
 
 def test_code_is_known_by_how_it_is_made(monkeypatch):
     before = jit.cache_key(TEXT)
-    monkeypatch.setattr(jit, "_compiling", lambda: "another way")
+    monkeypatch.setattr(jit, "_sources", lambda: "another way")
     assert jit.cache_key(TEXT) != before

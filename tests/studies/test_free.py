@@ -121,7 +121,7 @@ def slider(mass=2.0, **load):
 def test_damped_block_follows_its_closed_form(k, c, method):
     mass, ahead = 2.0, -0.1
     found = free_motion(
-        slider(mass, stiffness=k, damping=c, free_length=2.0 + ahead), np.linspace(0.0, 5.0, 6)
+        slider(mass, stiffness=k, damping=c, free_length=2.0 + ahead), np.linspace(0.0, 1.0, 6)
     )
     root = cmath.sqrt((c / mass) ** 2 - 4.0 * k / mass)
     slow, fast = -(2.0 * k / mass) / (c / mass + root), -(c / mass + root) / 2.0

@@ -74,7 +74,9 @@ def tables(name):
     yield rows_of(name, wheel=False), replace(CORNER, axle=axle, wheel_radius="0.3")
 
 
+RIGHT = [[name, x, f"-{y}", z] for name, x, y, z in rows_of("mcpherson")]
 CASES = [(name, *each) for name in TEMPLATES for each in tables(name)]
+CASES.append(("mcpherson", RIGHT, CORNER))
 
 
 @pytest.mark.parametrize(("name", "rows", "supplied"), CASES)

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from kincheck.core import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
 from kincheck.core.kinematics import Method, NativeSolver
 
@@ -23,6 +24,49 @@ def solve_sparse(mechanism, path, points=(), bodies=(), **settings):
 def solve_components(mechanism, path, points=(), bodies=(), **settings):
     """Solve a mechanism over a path component by component."""
     return solve_as(Method.BY_COMPONENTS, mechanism, path, points, bodies, **settings)
+
+
+def with_one_program(method, mechanism, path, points=()):
+    """Solve a mechanism over a path by a method and as one program, all bodies included."""
+    bodies = tuple(body.name for body in mechanism.moving)
+    return [
+        solve_as(each, mechanism, path, points, bodies) for each in (method, Method.ONE_PROGRAM)
+    ]
+
+
+def assert_alike(found, expected):
+    """Assert that two motions are one but for round-off."""
+    assert found.solved.all(), found.message
+    assert expected.solved.all()
+    for name, motion in expected.bodies.items():
+        # two orders of elimination: round-off of one times the condition, once more for each
+        # derivative (library: below 100)
+        for label, limit in (("r", 1e-14), ("p", 1e-14), ("v", 1e-13), ("a", 3e-12)):
+            assert (
+                np.abs(getattr(found.bodies[name], label) - getattr(motion, label)).max() <= limit
+            )
+    for name, motion in expected.points.items():
+        assert np.abs(found.points[name].acceleration - motion.acceleration).max() <= 3e-12
+    assert [found.details[name] for name in ("rank", "dof")] == [
+        expected.details[name] for name in ("rank", "dof")
+    ]
+
+
+def chain_of_hinges(loops):
+    """Return a chain of four-bars whose joints are all hinges: three redundant rows a loop."""
+    n, s, c, up = range(loops), math.sin(LEAN), math.cos(LEAN), (0.0, 0.0, 1.0)
+    pivots = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), up)
+        for k in range(loops + 1)
+    ]
+    pins = [
+        Revolute(f"{at}{k}", f"crank{k + at}", f"coupler{k}", (k + at + s, c, 0.0), up)
+        for k in n
+        for at in (0, 1)
+    ]
+    bodies = [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)]
+    points = [Point("end", f"crank{loops}", (loops + s, c, 0.0))]
+    return Mechanism("chain", bodies, [*pivots, *pins], points, [JointAngle("turn", "pivot0")])
 
 
 def torus(rows, columns):

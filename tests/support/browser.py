@@ -1,6 +1,17 @@
 """A browser without a window, and the script by which a test acts on a page."""
 
+import base64
+import json
+import re
 import shutil
+import subprocess
+from pathlib import Path
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any
+from urllib.request import urlopen
+
+from websockets.sync.client import connect
 
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -35,3 +46,147 @@ addEventListener("load", async () => {
   document.body.dataset.told = JSON.stringify(told);
 });
 </script></body>"""  # noqa: E501
+
+
+class Browser:
+    """A headless browser with real mouse and key events, by the Chrome DevTools Protocol
+    (https://chromedevtools.github.io/devtools-protocol/).
+    """
+
+    def __init__(self, folder: Path, size: tuple[int, int] = (1400, 1000), *, dark: bool = False):
+        flags = [each for each in FLAGS if not each.startswith("--window-size")]
+        command = [str(CHROMIUM), *flags, "--remote-debugging-port=0", f"--user-data-dir={folder}"]
+        self.process = subprocess.Popen(
+            [*command, "about:blank"], stderr=subprocess.PIPE, text=True
+        )
+        assert self.process.stderr is not None
+        host = next(
+            found[1]
+            for line in self.process.stderr
+            if (found := re.search(r"listening on ws://([^/]+)/", line))
+        )
+        # a full pipe would stop it
+        self.reader = Thread(target=self.process.stderr.read, daemon=True)
+        self.reader.start()
+        pages: list[dict[str, str]] = []
+        while not pages:
+            with urlopen(f"http://{host}/json") as listed:
+                pages = [page for page in json.load(listed) if page["type"] == "page"]
+        self.link = connect(pages[0]["webSocketDebuggerUrl"], max_size=None)
+        self.socket = self.link.__enter__()
+        self.count, self.events = 0, list[dict[str, Any]]()
+        for domain in ("Page", "Runtime", "Log"):
+            self(f"{domain}.enable")
+        width, height = size
+        self(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self("Emulation.setEmulatedMedia", features=[scheme])
+
+    def __call__(self, method: str, **given: Any) -> dict[str, Any]:
+        """Call a method of the protocol."""
+        self.count += 1
+        self.socket.send(json.dumps({"id": self.count, "method": method, "params": given}))
+        while True:
+            message = json.loads(self.socket.recv(timeout=60))
+            if message.get("id") == self.count:
+                assert "error" not in message, (method, message)
+                return message["result"]
+            self.events.append(message)
+
+    def run(self, script: str) -> Any:
+        """Return what a script returns in the page."""
+        text = f"(async () => {{ {script} }})()"
+        found = self("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found
+        return found["result"].get("value")
+
+    def visit(self, address: str) -> None:
+        """Open a page and wait until it is ready."""
+        self("Page.navigate", url=address)
+        self.until("'ready' in document.documentElement.dataset")
+
+    def until(self, condition: str, seconds: float = 90.0) -> None:
+        """Wait for a condition in the page."""
+        end = monotonic() + seconds
+        while not self.run(f"return Boolean(document.documentElement && ({condition}))"):
+            assert monotonic() < end, condition
+            sleep(0.05)
+
+    def mouse(self, kind: str, x: float, y: float, buttons: int) -> None:
+        """Send one event of the mouse with the left button."""
+        button = "left" if buttons or kind != "mouseMoved" else "none"
+        self(
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            button=button,
+            buttons=buttons,
+            clickCount=1,
+        )
+
+    def drag(self, start: tuple[float, float], by: tuple[float, float], steps: int = 12) -> None:
+        """Press at a place, move, and release."""
+        (x, y), (dx, dy) = start, by
+        self.mouse("mouseMoved", x, y, 0)
+        self.mouse("mousePressed", x, y, 1)
+        for k in range(1, steps + 1):
+            self.mouse("mouseMoved", x + dx * k / steps, y + dy * k / steps, 1)
+        self.mouse("mouseReleased", x + dx, y + dy, 0)
+
+    def middle(self, selector: str) -> tuple[float, float]:
+        """Return the middle of an element, scrolled into view [px]."""
+        x, y = self.run(
+            f"const it = document.querySelector({json.dumps(selector)});"
+            "it.scrollIntoView({ block: 'center', behavior: 'instant' });"
+            "const { left, top, width, height } = it.getBoundingClientRect();"
+            "return [left + width / 2, top + height / 2];"
+        )
+        return x, y
+
+    def click(self, selector: str) -> None:
+        """Click on an element."""
+        self.drag(self.middle(selector), (0.0, 0.0), steps=0)
+
+    def key(self, key: str, *, ctrl: bool = False, shift: bool = False, alt: bool = False) -> None:
+        """Press and release a key."""
+        code = {"ArrowUp": 38, "ArrowDown": 40, "Enter": 13, "Tab": 9}.get(key, ord(key[0].upper()))
+        modifiers = alt + 2 * ctrl + 8 * shift
+        for kind in ("rawKeyDown", "keyUp"):
+            self(
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key=key,
+                windowsVirtualKeyCode=code,
+                modifiers=modifiers,
+            )
+
+    def write(self, text: str) -> None:
+        """Type a text where the focus is, in place of what is selected."""
+        self("Input.insertText", text=text)
+
+    def picture(self, file: Path) -> None:
+        """Write the page as PNG."""
+        data = self("Page.captureScreenshot", format="png", captureBeyondViewport=True)["data"]
+        file.write_bytes(base64.b64decode(data))
+
+    def complaints(self) -> list[str]:
+        """Return what was written to the console or thrown."""
+        self.run("return 0")
+        named = ("Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled")
+        return [json.dumps(each) for each in self.events if each.get("method") in named]
+
+    def close(self) -> None:
+        """End the browser."""
+        self("Browser.close")
+        self.link.__exit__(None, None, None)
+        self.process.wait(20)
+        self.reader.join()
+        assert self.process.stderr is not None
+        self.process.stderr.close()

@@ -223,7 +223,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
             "pipe.csv": "not a regular file",
             ".": "not a regular file",
             "below": "not a regular file",
-            "a.toml": "line 8: found 1 numbers",
+            "a.toml": "line 10: not valid CSV",
             "a" * 300: "cannot be read",
             "a" * 9999: "cannot be read",
             "~/tip.csv": "no such file",

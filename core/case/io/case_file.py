@@ -5,14 +5,15 @@ to TOML, in SI units, with all digits of every number.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, cast
 
-from ...errors import MechanismError, unknown
+from ...errors import CaseError, MechanismError, unknown
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
+from .compliance import read_resting, read_rig
 from .document import LONGEST_TEXT, Section, explained, read_tables, shown, toml_table
 from .mechanism_sections import (
     free_lines,
@@ -70,7 +71,16 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
         angle_unit=units.angle.name,
         free=free,
     )
+    if keys.equilibrium is not None:
+        from .resting import at_rest  # it takes the solver, and few cases need it
+
+        resting = read_resting(root.at("equilibrium"), mechanism)
+        with explained(file, "equilibrium", units.length):
+            case = at_rest(case, resting)
     case = _with_outputs(root, case, units)
+    if keys.compliance is not None:
+        rig = read_rig(root.at("compliance"), case.mechanism, units)
+        case = replace(case, rig=rig)
     with explained(file, "closure", units.length):
         closing = Section(file, "closure", keys.closure).typed(ClosureKeys)
         case = _within_digits(case, closing, closure)
@@ -100,7 +110,7 @@ def _with_free(tables: dict[str, Any]) -> dict[str, Any]:
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
     """Return the case without rows redundant within its tolerance, if it has a tolerance."""
-    case, why = replace(case, assembly=keys.notes), "--closure"
+    case, why = replace(case, assembly=(*keys.notes, *case.assembly)), "--closure"
     if closure is None and keys.tolerance is not None:
         closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"
     known = [joint.name for joint in case.mechanism.joints]
@@ -124,6 +134,8 @@ def _with_outputs(root: Section, case: Case, units: FileUnits) -> Case:
     table = None
     if root.at("suspension").value is not None:
         table = read_suspension(root.at("suspension"), case, units)
+        wheels = tuple(each for each in (table.vehicle, table.other) if each)
+        case = replace(case, wheels=wheels)
     outputs = read_outputs(root, table, case, units)
     if not outputs:
         outputs = with_all_coordinates(case).outputs
@@ -142,9 +154,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         comments: comment lines at the top.
 
     Raises:
-        CaseError: no case file can express the case: samples on no even grid, outputs of several
-            axles, or names and texts beyond their limits.
+        CaseError: no case file can express the case: nothing drives it, samples on no even grid,
+            outputs of several axles, or names and texts beyond their limits.
     """
+    if not case.mechanism.drivers and case.free is None:
+        raise CaseError(f"case {case.name!r}: nothing drives it; drive a joint or a point")
     values = values_in_file(case)
     reference = reference_lines(case, values)
     lines = [f"# {line}" for line in comments]
@@ -162,6 +176,10 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     lines += sweep_lines(case, values, own_grid=bool(reference))
     lines += free_lines(case)
     lines += _closure_lines(case)
+    if case.rig is not None:
+        given = {f.name: getattr(case.rig, f.name) for f in fields(case.rig)}
+        given = {key: value for key, value in given.items() if value is not None}
+        lines += toml_table(given, "compliance")
     lines += suspension_lines(case)
     lines += output_lines(case)
     return "\n".join([*lines, *reference]) + "\n"

@@ -14,11 +14,12 @@ import msgspec
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import dimension_of
-from ...mechanism.loads import ELEMENTS, SpringDamper
+from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
 from ...mechanism.motions import Motion
 from ..measures import Measure, key_of
 from ..quantity import own_keys
 from ..suspension import SuspensionOutput
+from .compliance import RestingKeys, RigKeys
 from .mechanism_sections import DRIVERS
 from .schema import (
     COORDINATE,
@@ -102,7 +103,7 @@ def type_tables() -> dict[str, Rows]:
             (
                 name,
                 f'bodies = ["first", "second"], {_keys(cls)}'
-                if issubclass(cls, SpringDamper)
+                if issubclass(cls, SpringDamper | Bushing)
                 else _keys(cls),
                 _meaning(cls),
             )
@@ -210,6 +211,8 @@ def case_schema() -> dict[str, Any]:
         "free": FreeKeys,
         "suspension": SuspensionKeys,
         "reference": ReferenceKeys,
+        "compliance": RigKeys,
+        "equilibrium": RestingKeys,
     }
     motions = {name: keys_of(cls) for name, cls in Motion.registry.items()}
     found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})

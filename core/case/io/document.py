@@ -132,6 +132,36 @@ def decimal(text: str) -> float:
     return float(text)
 
 
+def measure(text: str, units: Mapping[str, Unit], bare: str) -> tuple[float, str]:
+    """Return a measure of an option in SI and the name of its unit: "0.05", "50mm" or "-30 deg".
+
+    Args:
+        units: those of the quantity, by name.
+        bare: unit of a number without one; its name is returned as an empty text.
+
+    Raises:
+        ValueError: another text, or a unit of another quantity.
+    """
+    number, unit = text.strip(), ""
+    for name in sorted(units, key=len, reverse=True):
+        if number.endswith(name):
+            number, unit = number.removesuffix(name).rstrip(), name
+            break
+    return units[unit or bare](decimal(number)), unit
+
+
+def interval(parts: Sequence[str], units: Mapping[str, Unit], bare: str) -> tuple[list[float], str]:
+    """Return the ends of a range of an option in SI, and their unit; the unit of one end holds for
+    an end without one: "-80:80mm".
+
+    Raises:
+        ValueError: as `measure`.
+    """
+    stated = [unit for part in parts if (unit := measure(part, units, bare)[1])]
+    common = stated[0] if stated else bare
+    return [measure(part, units, common)[0] for part in parts], stated[0] if stated else ""
+
+
 def read_bytes(file: Path, limit: int, why_limit: str) -> bytes:
     """Return the content of a file of at most `limit` bytes.
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from ...errors import CaseError, with_article
 from ...joints import Coupler, Joint, Polynomial
 from ...mechanism.body import ACCELERATION, INERTIA, checked_inertia
-from ...mechanism.loads import ELEMENTS
+from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import Body, Mechanism, Point, coordinates
 from ...mechanism.motions import (
     ROUNDED_TIME,
@@ -27,9 +28,9 @@ from ...mechanism.motions import (
     Table,
 )
 from ...trajectory import Array
-from ..case import MARKER, TIME, Case, Free, Sweep
+from ..case import MARKER, SLOW, TIME, Case, Free, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
-from .document import Section, explained, shown, toml_table
+from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
 from .schema import (
     MOST_SAMPLES,
@@ -39,6 +40,7 @@ from .schema import (
     PointKeys,
     ReferenceKeys,
     SweepKeys,
+    bushing_keys,
     keys_of,
     own_fields,
 )
@@ -46,6 +48,7 @@ from .schema import (
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
 }
+LARGEST_BUSHINGS = 1_000_000
 # Defaults of a body.
 PLAIN = Body("plain")
 _EVEN: Mapping[str, str] = {
@@ -77,8 +80,38 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
     gravity = units.power(ACCELERATION, keys.gravity)
     with explained(root.file, "", units.length):
         return Mechanism(
-            *(keys.name, bodies, joints, points, drivers, couplers), gravity=gravity, forces=forces
+            *(keys.name, bodies, joints, points, drivers, couplers),
+            gravity=gravity,
+            forces=forces,
+            bushings=read_bushings(root, joints, units),
         )
+
+
+def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> list[Bushing]:
+    """Return the bushings of joints, [joints.NAME.bushings.X]; bodies and point are by default the
+    joint's.
+    """
+    found: list[Bushing] = []
+    for joint in joints:
+        table = root.at("joints").at(joint.name)
+        if table.value is None:
+            continue
+        given = table.at("bushings")
+        for own, section in given.each() if given.value is not None else ():
+            keys: Any = section.typed(bushing_keys())
+            numbers = {
+                each.name: units.in_si(each, getattr(keys, each.name))
+                for each in own_fields(Bushing)
+            }
+            places = joint.points_on()
+            if numbers["point"] is None and not places:
+                raise section.at("point").fault("missing, expected a point [x, y, z]; add it")
+            numbers["point"] = numbers["point"] or places[0]
+            i, j = keys.bodies or joint.bodies
+            with explained(section.file, section.key, units.length, section.value):
+                name = f"{joint.name}.{own}"
+                found.append(Bushing(name, i, j, joint=joint.name, **numbers))
+    return found
 
 
 def _body(name: str, section: Section, units: FileUnits) -> Body:
@@ -109,6 +142,14 @@ def _built(
     Args:
         driver: unit of the driver of a motion.
     """
+    if cls.type in Joint.registry:  # bushings are read with the mechanism
+        own = {name: each for name, each in section.table.items() if name != "bushings"}
+        section = Section(section.file, section.key, own)
+    sprung = cls.type in (SpringDamper.type, TorsionSpringDamper.type)
+    if sprung and not {"stiffness", "curve"} & section.table.keys():
+        raise section.at("stiffness").fault(
+            "missing, expected a number; add the key 'stiffness', or a curve"
+        )
     keys: Any = section.typed(keys_of(cls))
     given: dict[str, Any] = {
         each.name: units.in_si(each, getattr(keys, each.name), driver) for each in own_fields(cls)
@@ -116,8 +157,9 @@ def _built(
     if hasattr(keys, "joints"):
         given["joints"] = keys.joints
     given |= zip("ij", getattr(keys, "bodies", ()), strict=False)
+    make: Any = cls  # type checkers would take the classes of the conditions
     with explained(section.file, section.key, units.length, section.value):
-        return cls(*name, **given)
+        return make(*name, **given)
 
 
 def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]]:
@@ -188,6 +230,10 @@ def read_sweep(
         reference.
     """
     section = root.at("sweep")
+    if section.value is None:
+        if root.at("equilibrium").value is None:
+            raise section.fault("missing, expected a table; add the key 'sweep'")
+        return Sweep(TIME, np.ones(1), 0.0), SECOND, False
     sweep = section.typed(SweepKeys)
     drivers = dict(root.at("drivers").each())
     moved = {
@@ -204,8 +250,9 @@ def read_sweep(
     grid = np.array(_samples(section, sweep, convert, reference))
     rate = convert(1.0 if sweep.rate is None else sweep.rate)
     found = Sweep(sweep.driver, grid, rate, design, motions)
+    times = found.path.times / (SLOW if found.static else 1.0)
     for name, motion in motions.items():
-        _require_defined(moved[name], motion, found.path.times)
+        _require_defined(moved[name], motion, times)
     return found, convert, sweep.at is not None
 
 
@@ -269,10 +316,11 @@ def _require_moved(
                 f"{found}, and no driver has a motion, expected something that moves; name the"
                 " driver to sweep, or add [drivers.NAME.motion]"
             )
-        if sweep.rate is not None:
+        if sweep.rate:
             raise section.at("rate").fault(
                 f"found {section.at('rate').value!r} in a sweep of time, expected none, for the"
-                " motions have rates of their own; remove it, or name the driver to sweep"
+                " motions have rates of their own, or 0 for rest; remove it, or name the driver to"
+                " sweep"
             )
     elif sweep.driver not in drivers:
         raise section.at("driver").unknown(sweep.driver, [*drivers, TIME], "a driver")
@@ -280,11 +328,6 @@ def _require_moved(
         raise moved[sweep.driver].fault(
             "found a motion of the swept driver, expected the sweep alone to move it; remove it, or"
             f' sweep time: driver = "{TIME}", start and stop in seconds'
-        )
-    if sweep.rate == 0.0:
-        raise section.at("rate").fault(
-            "found 0, expected driver units per second; give 1 to differentiate by the driver's"
-            " value"
         )
 
 
@@ -358,6 +401,12 @@ def mechanism_lines(case: Case) -> Iterator[str]:
             {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         )
         yield from toml_table(_own(joint, **between), "joints", joint.name)
+        for each in mechanism.bushings:
+            if each.joint == joint.name:
+                own = {key: x for key, x in _own(each).items() if key != "type"}
+                name = each.name.removeprefix(f"{joint.name}.")
+                table = {"bodies": each.bodies, **own}
+                yield from toml_table(table, "joints", joint.name, "bushings", name)
     for point in mechanism.points:
         if not point.name.startswith(MARKER):  # the reader of the file creates markers anew
             place = {"body": point.body, "position": point.position}
@@ -413,7 +462,7 @@ def sweep_lines(case: Case, values: Array, *, own_grid: bool) -> list[str]:
         CaseError: the samples are on no even grid.
     """
     sweep, start, stop = case.sweep, float(values[0]), float(values[-1])
-    rate = {} if sweep.driver == TIME else {"rate": sweep.rate}
+    rate = {} if sweep.driver == TIME and not sweep.static else {"rate": sweep.rate}
     # round-off of start + k * step, once in the file's units and once here
     rounding = 4.0 * np.spacing(np.abs([*sweep.values, *values]).max())
     if (np.abs(np.linspace(start, stop, len(values)) - values) <= rounding).all():
@@ -426,3 +475,25 @@ def sweep_lines(case: Case, values: Array, *, own_grid: bool) -> list[str]:
             " give an even one"
         )
     return toml_table({"driver": sweep.driver, **grid, **rate}, "sweep")
+
+
+def with_bushings(case: Case, file: Path) -> Case:
+    """Return a case with the bushings in a file of tables [joints.NAME.bushings.X], in SI units,
+    beside its own: tables of hardpoints have none.
+
+    Raises:
+        CaseError: the file cannot be read, or names an unknown joint.
+    """
+    text = read_text(file, LARGEST_BUSHINGS, "it holds the bushings of one suspension")
+    root, joints = Section(file, "", parse(file, text)), case.mechanism.given_joints
+    names = [joint.name for joint in joints]
+    for name, section in root.at("joints").each():
+        if name not in names:
+            raise section.unknown(name, names, "a joint")
+    found = read_bushings(root, joints, FileUnits())
+    if not found:
+        raise root.at("joints").fault(
+            "found no bushing, expected tables [joints.NAME.bushings.X]; add one"
+        )
+    bushings = (*case.mechanism.bushings, *found)
+    return replace(case, mechanism=replace(case.mechanism, bushings=bushings))

@@ -83,7 +83,7 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
         )
     bodies, path = tuple(body.name for body in case.mechanism.moving), case.sweep.path
     solver, begin = NativeSolver(order=0), start_of(case.mechanism, path)
-    first = case.sweep.design + case.sweep.rate * begin.time
+    first = case.sweep.design + case.sweep.pace * begin.time
     for samples in (1,) if stop == first and begin.lead is None else SAMPLES:
         # the end at `stop` is exact, also for a single sample
         values: Array = np.linspace(stop, first, samples)[::-1]

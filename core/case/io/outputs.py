@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import CaseError
-from ...mechanism.loads import Torque, TorsionSpringDamper
+from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
 from ..measures import (
@@ -211,14 +211,27 @@ def _measure(
         output = output.bound(case.mechanism)
     scale = size(case)
     if isinstance(output, ForceMeasure):
-        loads = _largest_load(case.mechanism, scale, pace(case))
+        loads = largest_load(case.mechanism, scale, pace(case))
         scale = loads * scale if output.turns else loads
     _, convert = units.of(output.unit)
     atol, rtol, why = _tolerance(section, keys, convert, scale, output.unit)
     return replace(output, atol=atol, rtol=rtol, why=why)
 
 
-def _largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
+def _largest(each: ForceElement, name: str) -> float:
+    """Return the largest of an element's numbers of a name; zero without it."""
+    return float(np.max(getattr(each, name, 0.0)))
+
+
+def _steepest(each: ForceElement) -> float:
+    """Return the steepest slope between rows of an element's curves."""
+    given: Any = getattr(each, "curve", None) or ()
+    tables = given if isinstance(each, Bushing) else (given,)
+    slopes = [np.abs(np.divide(*np.diff(table, axis=0).T[::-1])).max() for table in tables if table]
+    return float(max(slopes, default=0.0))
+
+
+def largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
     """Return an estimate of the largest force of a mechanism [N], the scale of errors.
 
     It counts the weights, the inertia forces at a pace [1/s], springs stretched by their own
@@ -227,10 +240,10 @@ def _largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
     masses = sum(body.mass for body in mechanism.moving)
     total = masses * (math.hypot(*mechanism.gravity) + size * pace**2)
     for each in mechanism.forces:
-        stiffness = getattr(each, "stiffness", 0.0)
-        damping = getattr(each, "damping", 0.0)
         arm = 1.0 / size if isinstance(each, TorsionSpringDamper) else size
-        total += (stiffness + damping * pace) * arm
+        total += (_largest(each, "stiffness") + _largest(each, "damping") * pace) * arm
+        turning = _largest(each, "turning_stiffness") + _largest(each, "turning_damping") * pace
+        total += turning / size + _largest(each, "preload") + _steepest(each) * arm
         vector = getattr(each, "vector", (0.0,))
         total += float(np.linalg.norm(vector)) / (size if isinstance(each, Torque) else 1.0)
     return total

@@ -17,8 +17,11 @@ class Supplied:
         travel: wheel travel of a suspension, up and down: "METRES", "METRES:SAMPLES" or
             "START:STOP:SAMPLES".
         rack: simultaneous travel of the rack to the left: "METRES" or "START:STOP".
+        ask_names: whether to refuse names of hardpoints that are guessed.
+        side: side of the wheel of hardpoints, "left" or "right"; by default from the points.
+        corner: corner of a car of which hardpoints are read: "FL", "rear right", ...
         sheet: sheet of a workbook with several tables.
-        names: file of the user's own names of hardpoints, by role of the template.
+        names: file of the user's own names of hardpoints, by role of the template; written if new.
         wheel_radius: loaded radius of the wheel of hardpoints [m].
         wheelbase: wheelbase of the vehicle of hardpoints [m].
         axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
@@ -30,6 +33,9 @@ class Supplied:
         hold: joints or free bodies of a model to hold in place.
         hold_rest: whether to hold further joints of a model as needed.
         start: start of a model: "keyframe:NAME", "JOINT=VALUE" [rad, m].
+        without: statements of a dataset of Adams to leave out, although they force the motion: KIND
+            or KIND/id.
+        recorded: whether a recording is there, whose motion a dataset without its own follows.
         closure: tolerance of rows redundant but for the digits of a file [m].
     """
 
@@ -46,24 +52,30 @@ class Supplied:
     cg_height: str | None = None
     brake_share: str | None = None
     drive_share: str | None = None
+    ask_names: bool = False
+    side: str | None = None
+    corner: str | None = None
     sheet: str | None = None
     drive: tuple[str, ...] = ()
     hold: tuple[str, ...] = ()
     hold_rest: bool = False
     start: tuple[str, ...] = ()
     closure: float | None = None
+    without: tuple[str, ...] = ()
+    recorded: bool = False
 
     @property
     def given(self) -> list[str]:
         """Names of the given options, as on the command line."""
         values = (getattr(self, each.name) for each in fields(self))
-        return [name for name, value in zip(_NAMES, values, strict=True) if value]
+        named = zip(_NAMES, values, strict=True)
+        return [name for name, value in named if value and name != "recorded"]
 
 
 _NAMES = tuple(each.name.replace("_", "-") for each in fields(Supplied))
-_SHEET = _NAMES.index("sheet")
-OF_HARDPOINTS, OF_MODELS = _NAMES[:_SHEET], _NAMES[_SHEET + 1 :]
-"""Options of each kind of file; those of hardpoints may have a sheet, too."""
+_CORNER = _NAMES.index("corner")
+OF_HARDPOINTS, OF_SEVERAL = _NAMES[:_CORNER], _NAMES[_CORNER : _CORNER + 2]
+"""Options of all hardpoints, and of files with those of several wheels."""
 NOTHING = Supplied()
 
 LEFT_OUT = "; left out: "

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...trajectory import QUANTITIES, Array
 from ..case import Case, Origin, Quantity, Series, Truth
@@ -327,6 +328,16 @@ class Grid:
         there = int((self._index >= 0).sum())
         return "" if there == samples else f"rows for {there} of {samples} samples"
 
+    def _within_filled(self, k: int, x: Array) -> NDArray[np.bool_]:
+        """Return the samples within the rows with a number in a column, at these driver values."""
+        samples, needed = self._samples, 1 if self._index is not None else FEWEST
+        if len(x) < needed:
+            problem = f"found {len(x)} numbers in column {shown(samples.columns[k])}"
+            expected = "expected some" if needed == 1 else f"expected {needed} to interpolate"
+            raise fault(samples.file, samples.key, f"{problem}, {expected}; add them")
+        slack = max(self._allowed, self._half)
+        return (self._at >= x[0] - slack) & (self._at <= x[-1] + slack)
+
     def column(self, k: int, scale: Convert) -> GridColumn:
         """Return a column at the samples.
 
@@ -336,26 +347,28 @@ class Grid:
         written = self._samples.numbers[:, k]
         printed = self._samples.printed[k]
         y = np.array([scale(value) for value in written.tolist()])
-        half = printed.half(written) * abs(scale(1.0))
+        half = np.where(np.isnan(written), 0.0, printed.half(written)) * abs(scale(1.0))
         if self._full and even(written):  # a file of all digits has them here too
             half = np.zeros_like(half)
         error = np.zeros_like(self._at)
+        filled = self._order[~np.isnan(y[self._order])]
+        x = self._x[~np.isnan(y[self._order])]
+        within = self._within_filled(k, x)
         if self._index is not None:
             there = self._index >= 0
             values = np.where(there, y[self._index], np.nan)
             rounding = np.where(there, half[self._index], 0.0)
         else:
-            ordered = y[self._order]
-            values, error = interpolated(self._x, ordered, self._at)
-            values = np.where(self._within, values, np.nan)
-            above = np.clip(np.searchsorted(self._x, self._at), 1, len(self._x) - 1)
+            values, error = interpolated(x, y[filled], self._at)
+            values = np.where(within, values, np.nan)
+            above = np.clip(np.searchsorted(x, self._at), 1, len(x) - 1)
             around = np.stack([above - 1, above])
-            at_row = (np.abs(self._x[around] - self._at) <= self._allowed).any(axis=0)
-            error = np.where(self._within & ~at_row, error, 0.0)
-            rounding = bounded(self._x, half[self._order], self._at, self._within)
+            at_row = (np.abs(x[around] - self._at) <= self._allowed).any(axis=0)
+            error = np.where(within & ~at_row, error, 0.0)
+            rounding = bounded(x, half[filled], self._at, within)
         shifted = np.zeros_like(self._at)
-        if self._half and len(self._x) > 1:
-            shifted = self._half * slopes(self._x, y[self._order], self._at)
+        if self._half and len(x) > 1:
+            shifted = self._half * slopes(x, y[filled], self._at)
             shifted = np.where(np.isfinite(values), shifted, 0.0)
         parts = {
             f"printed to {printed.significant} digits": rounding,

@@ -17,7 +17,7 @@ import numpy as np
 from ...errors import MOST_NAMED, brief, remedy, shortened
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
-from ..suspension import Convention, PerTravel
+from ..suspension import Convention, PerTravel, SuspensionOutput
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import decimal, fault, shown, unknown_name
 from .reference import compared
@@ -28,8 +28,8 @@ from .reference_samples import (
     Samples,
     column_of,
     driver_unit,
-    head_of,
     known_columns,
+    layout_of,
     read_table,
     require_positions,
     samples_of,
@@ -55,7 +55,10 @@ _ALSO: Mapping[str, Sequence[str]] = {
     "rack_travel": ("rack", "rack_displacement", "rack_stroke", "rack_disp", "steering_rack"),
 }
 _OUTPUTS = {other: name for name, others in _ALSO.items() for other in others}
-_LEFT = re.compile(r"^(?:left|l|fl|rl|lf|lr)_(?=..)|_(?:left|l|fl|rl|lf|lr)$")
+_SIDES = {
+    side: re.compile(rf"^(?:{words})_(?=..)|_(?:{words})$")
+    for side, words in (("left", "left|l|fl|rl|lf"), ("right", "right|r|fr|rr|rf"))
+}
 # A rig may go farther than the sweep. Millimetres taken for metres are 1000 times as far, degrees
 # for radians 57 times.
 FARTHER = 20.0
@@ -92,17 +95,18 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     driver, known = case.sweep.driver, known_columns(case.outputs)
     stated = read_stated(file, options.columns, driver, known)
     table = read_table(file, options.sheet, "--reference-sheet NAME")
-    where, heads = head_of(table)
-    found = match(file, where, heads, driver, known, stated)
+    layout = layout_of(table)
+    where, heads = layout.where, layout.heads
+    found = match(file, where, heads, driver, known, stated, _side(case))
     left_out = [head for k, head in enumerate(heads) if head and k not in found]
     targets = [*found.values()]
-    samples = samples_of(table, [*found])
+    samples, equal = _once(samples_of(table, [*found], gaps=True))
     columns = zip(samples.columns, targets, strict=True)
     samples = replace(
         samples, columns=[f"{text} [{each.unit}]" if each.unit else text for text, each in columns]
     )
     unit, of = _columns(case, samples, targets)
-    outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
+    outputs = _with_accuracy(file, case.outputs, of, options.accuracy)
     compared_outputs: list[Any] = [each for each in outputs if each.name in of and each.signs]
     convention = str(compared_outputs[0].vehicle.convention) if compared_outputs else ""
     signs = _signs(file, samples.signs, options.signs)
@@ -136,7 +140,39 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     )
     case = compared(samples, Columns(unit, driver, of), case, own=options.own_samples)
     assert case.origin is not None
-    return case, _notes(file, case.origin, left_out, bare, convention if assumed else "")
+    rows = [*samples.left_out, *equal]
+    return case, _notes(file, case.origin, left_out, rows, bare, convention if assumed else "")
+
+
+def _side(case: Case) -> str:
+    """Return the side of the wheel of a case; left for an axle or a case without wheels."""
+    sides = {str(each.vehicle.side) for each in case.outputs if isinstance(each, SuspensionOutput)}
+    return "right" if sides == {"right"} else "left"
+
+
+def _once(samples: Samples) -> tuple[Samples, list[str]]:
+    """Return the samples, of equal rows one, such as those before and after an event, and the
+    places of the others.
+
+    Raises:
+        CaseError: a driver value is missing.
+    """
+    before: dict[bytes, str] = {}
+    kept: list[int] = []
+    equal: list[str] = []
+    for k, (place, row) in enumerate(zip(samples.places, samples.numbers, strict=True)):
+        if np.isnan(row[0]):
+            where = f"{place}, column {samples.columns[0]}"
+            raise fault(
+                samples.file, where, "found no driver value, expected one; complete the row"
+            )
+        first = before.setdefault(row.tobytes(), place)
+        if first is place:
+            kept.append(k)
+        else:
+            equal.append(f"{place} (equal to {first})")
+    places = [samples.places[k] for k in kept]
+    return replace(samples, places=places, numbers=samples.numbers[kept]), equal
 
 
 def _columns(
@@ -171,29 +207,35 @@ def _opposite(convert: Convert) -> Convert:
 
 
 def _with_accuracy(
-    file: Path, outputs: Sequence[Quantity], compared: Sequence[str], texts: Sequence[str]
+    file: Path, outputs: Sequence[Quantity], compared: Mapping[str, Column], texts: Sequence[str]
 ) -> tuple[Quantity, ...]:
-    """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT"."""
+    """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT". Without a
+    unit the number is in that of the output's column; without an output it holds for the only one.
+    """
     stated: dict[str, float] = {}
     units = {output.name: output.unit for output in outputs if output.name in compared}
     for text in texts:
-        name, _, right = (part.strip() for part in text.partition("="))
+        name, equals, right = (part.strip() for part in text.partition("="))
+        if not equals and len(compared) == 1:
+            (name,), right = compared, name
         if name not in units:
             raise unknown_name(file, "--accuracy", name, units, "an output with a column")
-        number, _, unit = right.partition(" ")
+        _, number, unit = re.split(r"^([-+.\deE]*)", right, maxsplit=1)
         try:
             size = decimal(number)
         except ValueError:
             size = float("nan")
-        if not 0.0 < size < float("inf") or not (unit.strip() or units[name] == "1"):
+        if not 0.0 < size < float("inf"):
             raise fault(
                 file,
                 "--accuracy",
                 f"found {shown(text)}, expected OUTPUT=NUMBER UNIT; say --accuracy"
                 f' "{name}=0.02 {"deg" if units[name] == "rad" else units[name]}"',
             )
-        measured = required_unit(file, "--accuracy", name, unit.strip() or "-", units[name])
-        stated[name] = measured.convert(size)
+        convert = compared[name].convert
+        if unit := unit.strip():
+            convert = required_unit(file, "--accuracy", name, unit, units[name]).convert
+        stated[name] = abs(convert(size) - convert(0.0))
     why = f"the accuracy of {file.name}, as its user states it"
     found: list[Any] = [*outputs]
     for k, output in enumerate(found):
@@ -234,7 +276,12 @@ def _require_size(samples: Samples, unit: Unit, driven: Array, case: Case) -> No
 
 
 def _notes(
-    file: Path, origin: Origin, left_out: Sequence[str], bare: Sequence[str], assumed: str
+    file: Path,
+    origin: Origin,
+    left_out: Sequence[str],
+    rows: Sequence[str],
+    bare: Sequence[str],
+    assumed: str,
 ) -> list[str]:
     """Return what the user should know of how a curve was read."""
     read = ", ".join(f"{name} [{unit}]" for name, unit in origin.units.items())
@@ -242,6 +289,8 @@ def _notes(
     if left_out:
         listed = shortened([brief(shown(head)) for head in left_out], MOST_NAMED)
         notes.append(f"{file}: left out the columns {listed}")
+    if rows:
+        notes.append(f"{file}: left out the rows {shortened([*rows], MOST_NAMED)}")
     if bare:
         listed = shortened([brief(shown(head)) for head in bare], MOST_NAMED)
         notes.append(f"{file}: without a unit, taken in SI units: {listed}")
@@ -311,8 +360,12 @@ def match(
     driver: str,
     known: Mapping[str, str],
     stated: Mapping[str, Target],
+    side: str = "left",
 ) -> dict[int, Target]:
     """Return what columns hold, by their indices, the driver first. Other columns are left out.
+
+    Args:
+        side: that of the wheel.
 
     Raises:
         CaseError: two columns hold the same, a stated column is missing, or none holds an output.
@@ -341,7 +394,7 @@ def match(
     by_name = {_normal(name): name for name in (*known, driver)}
     matches: dict[str, list[int]] = {}
     for k, name in enumerate(names):
-        wanted = _named(name, by_name)
+        wanted = _named(name, by_name, side)
         if k not in found and wanted and wanted not in taken:
             matches.setdefault(wanted, []).append(k)
     for name, places in matches.items():
@@ -381,14 +434,20 @@ def _bare(head: str, known: Mapping[str, str]) -> str:
     return _bare(name, known) if unit else name
 
 
-def _named(name: str, by_name: Mapping[str, str]) -> str:
+def _named(name: str, by_name: Mapping[str, str], side: str) -> str:
     """Return the driver or column of an output of a name, of a rig's name for it, or of one of
-    these of the left side; empty if there is none.
+    these of a side; empty if there is none.
+
+    Args:
+        side: that of names without one.
     """
     plain = _normal(name)
-    for each in (plain, _LEFT.sub("", plain)):
+    said = next((each for each, words in _SIDES.items() if words.search(plain)), side)
+    bare = _SIDES[said].sub("", plain)
+    for each in (plain, bare):
         also = _normal(_OUTPUTS.get(each, ""))
-        for other in (each, also, f"left_{each}", f"left_{also}"):
+        own = (each, also) if said == side or each != bare else ()
+        for other in (*own, f"{said}_{each}", f"{said}_{also}"):
             if other in by_name:
                 return by_name[other]
     return ""

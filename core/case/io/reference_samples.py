@@ -1,7 +1,8 @@
 """Samples of a reference: from a table beside the case file, or from rows in it; and its columns,
 with units and the outputs that they hold.
 
-A table may have titles above its head and comments, such as `# signs: iso8855`. A head is the name
+A table may have titles above its head, remarks below, and comments, such as `# signs: iso8855`. A
+head is the name
 of an output, or `OUTPUT.velocity` or `OUTPUT.acceleration`, with or without a unit: `toe [deg]`;
 units may also stand in a row below.
 """
@@ -12,7 +13,7 @@ import math
 import re
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -20,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import remedy
+from ...errors import brief, remedy
 from ...trajectory import Array
 from ..case import PER_TRAVEL, Quantity
 from ..curves import Printed
@@ -31,7 +32,7 @@ from .table import (
     DELIMITERS,
     LARGEST_FILE,
     WORKBOOKS,
-    Row,
+    Cell,
     Table,
     find_decimal_sign,
     is_number,
@@ -47,6 +48,8 @@ from .table import (
 
 # A line for each sample of the largest sweep, and as many other lines.
 MOST_LINES = 2_000_000
+# Titles, settings of a rig and heads stand above the first numbers.
+MOST_ABOVE = 1000
 COLUMNS, ROWS = "reference.columns", "reference.rows"
 """Places of a table in a case file."""
 DERIVATIVES = (".velocity", ".acceleration")
@@ -64,6 +67,7 @@ class Samples:
         printed: digits of the numbers, by column.
         table: the table that they are from, with the driver values in its column `first`.
         signs: sign convention named in a comment.
+        left_out: rows without numbers below the head.
     """
 
     file: Path
@@ -75,6 +79,7 @@ class Samples:
     table: Table
     first: int
     signs: str
+    left_out: Sequence[str]
 
     @property
     def key(self) -> str:
@@ -131,51 +136,113 @@ def _delimiter(table: Table) -> str:
     return ","
 
 
-def head_of(table: Table) -> tuple[str, list[str]]:
-    """Return the place of the head of a table, and the texts in it.
+@dataclass(frozen=True)
+class Layout:
+    """The head of a table.
+
+    Attributes:
+        where: place of the head.
+        heads: its texts, with the units of a row of units.
+        rows: texts of the head and of the row of units, which may stand again below.
+        body: index of the first row below, among all rows of the table.
+    """
+
+    where: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    body: int
+
+
+def layout_of(table: Table) -> Layout:
+    """Return the head of a table: the last row of texts above the numbers, or the last but one if
+    units stand below it. If it names columns twice, or none, the row above it names their groups.
 
     Raises:
         CaseError: the table is empty.
     """
-    for where, cells in _below_titles(table):
-        return where, [str(cell).strip() for cell in cells]
-    raise fault(
-        table.file,
-        "",
-        "found no samples, expected a line of column names and rows of numbers; add them",
-    )
+    first: list[tuple[str, Sequence[Cell]]] = []
+    all_numbers: int | None = None
+    for where, cells in islice(table.rows(), MOST_ABOVE):
+        first.append((where, trimmed(cells)))
+        headed = any(_filled(row) > 1 and not _numbers(row) for _, row in first[:-1])
+        # below a head, a lone number is a sample with gaps
+        if _numbers(cells) == _filled(cells) > (0 if headed else 1):
+            all_numbers = len(first) - 1
+            break
+    most_numbers = (k for k, (_, cells) in enumerate(first) if 2 * _numbers(cells) > _filled(cells))
+    several = (k + 1 for k, (_, cells) in enumerate(first) if _filled(cells) > 1)
+    body = all_numbers
+    if body is None:
+        body = next(most_numbers, next(several, min(1, len(first))))
+    above = [row for row in first[:body] if _filled(row[1]) > 1] or first[: max(body, 1)]
+    if not above:
+        raise fault(
+            table.file,
+            "",
+            "found no samples, expected a line of column names and rows of numbers; add them",
+        )
+    texts = [[str(cell).strip() for cell in cells] for _, cells in above]
+    units = texts.pop() if len(texts) > 1 and is_unit_row(texts[-1]) else []
+    where, heads = above[len(texts) - 1][0], texts[-1]
+    named = [*filter(None, heads)]
+    if len(texts) > 1 and (len({*named}) < len(named) or "" in heads):
+        heads = [f"{a} {b}".strip() for a, b in zip(*_grouped(texts[-2], heads), strict=True)]
+    rows = [texts[-1], *[units] * bool(units)]
+    units = [unit.strip("[]() ") for unit in units] + [""] * len(heads)
+    heads = [f"{a} [{b}]" if a and b else a for a, b in zip(heads, units, strict=False)]
+    return Layout(where, heads, rows, max(body, 1))
+
+
+def _grouped(above: Sequence[str], heads: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the names of groups, each over the blank cells behind it, and the heads below."""
+    width = max(len(above), len(heads))
+    groups, below = ([*row, *[""] * (width - len(row))] for row in (above, heads))
+    for k in range(1, width):
+        groups[k] = groups[k] or (groups[k - 1] if below[k] else "")
+    return groups, below
+
+
+def _filled(cells: Sequence[Cell]) -> int:
+    return sum(cell != "" for cell in cells)
+
+
+def _numbers(cells: Sequence[Cell]) -> int:
+    return sum(map(is_number, cells))
 
 
 def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool = False) -> Samples:
     """Return the samples of a table: a head and rows of numbers; a row of units may stand between.
+
+    Rows without a number are remarks, or the head again; those of numbers between them are read.
 
     Args:
         wanted: indices of the columns to read, the driver first; None for all.
         gaps: whether empty cells and "nan" are gaps, and no faults.
 
     Raises:
-        CaseError: a row lacks a number, or has a text in place of one.
+        CaseError: a row lacks a number, or has a text in place of one, or a second head follows.
     """
-    file, (where, names) = table.file, head_of(table)
+    file, layout = table.file, layout_of(table)
+    names = layout.heads
+    every = wanted is None or [*wanted] == [*range(len(names))]
     wanted = range(len(names)) if wanted is None else wanted
-    every = [*wanted] == [*range(len(names))]
-    sign = "." if table.delimiter == "," else _decimal_sign(table, wanted)
-    places, numbers = list[str](), array("d")
+    sign = "." if table.delimiter == "," else _decimal_sign(table, layout, wanted)
+    places, numbers, left_out = list[str](), array("d"), list[str]()
     printed = [Printed() for _ in wanted]
-    for k, (place, cells) in enumerate(_body(table)):
-        if k == 0 and is_unit_row(cells):
-            units = [str(cell).strip("[]() ") for cell in cells] + [""] * len(names)
-            names = [
-                f"{name} [{unit}]" if unit else name
-                for name, unit in zip(names, units, strict=False)
-            ]
+    for place, cells in islice(table.rows(), layout.body, None):
+        cells = trimmed(cells)
+        if not is_number(cells[wanted[0]] if wanted[0] < len(cells) else "") and _is_remark(
+            file, place, cells, layout
+        ):
+            left_out.append(f"{place} ({brief(', '.join(map(str, filter(None, cells))))})")
             continue
         if not every and not any(cells[n] != "" for n in wanted if n < len(cells)):
             continue  # a note
         if gaps:
             cells = [*cells, *[""] * (len(names) - len(cells))]
         width = len(cells)
-        if not (width == len(names) if every else max(wanted) < width <= len(names)):
+        surplus = any(map(is_number, cells[len(names) :])) or (every and width > len(names))
+        if (width < len(names) if every else width <= max(wanted)) or surplus:
             expected = f"{len(names)} ({', '.join(names)})"
             raise fault(
                 file, place, f"found {width} numbers, expected {expected}; complete the row"
@@ -198,42 +265,36 @@ def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool 
     comments = [*table.comments, *(str(cells[0]) for _, cells in table.sheet)]
     signs = next((said[1] for text in comments if (said := _SIGNS.match(text))), "")
     return Samples(
-        *(file, where, [names[n] for n in wanted], places),
+        *(file, layout.where, [names[n] for n in wanted], places),
         np.array(numbers).reshape(len(places), len(wanted)),
-        *(printed, table, wanted[0], signs),
+        *(printed, table, wanted[0], signs, left_out),
     )
 
 
-def _below_titles(table: Table) -> Iterator[Row]:
-    """Yield the rows from the head on, the first row with several cells; all rows without a head.
-    Comments of a sheet are left out.
+def _is_remark(file: Path, place: str, cells: Sequence[Cell], layout: Layout) -> bool:
+    """Return whether a row has no number: a remark, or the head or its units again.
+
+    Raises:
+        CaseError: it is another head, so that another table follows.
     """
-    above: list[Row] = []
-    head = False
-    for where, cells in table.rows():
-        filled = sum(cell != "" for cell in cells)
-        if not table.delimiter and filled < 2 and str(cells[0]).startswith("#"):
-            continue
-        if head:
-            yield where, trimmed(cells)
-        elif filled > 1:
-            head = True
-            yield where, trimmed(cells)
-        else:
-            above.append((where, trimmed(cells)))
-    if not head:
-        yield from above
+    texts = [str(cell).strip() for cell in cells]
+    if _numbers(cells) or any(text.startswith(("=", "#N", "#R", "#V", "#D")) for text in texts):
+        return False
+    if texts in layout.rows or 2 * _filled(cells) <= len(layout.heads) or _filled(cells) == 1:
+        return texts[0].lower().lstrip("+-") != "nan"
+    raise fault(
+        file,
+        place,
+        f"found {shown(', '.join(texts))}, a row without numbers that is not the head"
+        f" {shown(', '.join(layout.rows[0]))}, expected one table; keep one, or take the row out",
+    )
 
 
-def _body(table: Table) -> Iterator[Row]:
-    return islice(_below_titles(table), 1, None)
-
-
-def _decimal_sign(table: Table, wanted: Sequence[int]) -> str:
+def _decimal_sign(table: Table, layout: Layout, wanted: Sequence[int]) -> str:
     texts = [
         (place, cell)
-        for k, (place, cells) in enumerate(_body(table))
-        if k or not is_unit_row(cells)
+        for place, cells in islice(table.rows(), layout.body, None)
+        if _numbers(cells)
         for cell in (cells[n] for n in wanted if n < len(cells))
         if isinstance(cell, str) and cell
     ]

@@ -44,8 +44,12 @@ left out. `kincheck list --joints` prints all types with their keys.
                          amplitude sin(2 pi frequency t + phase)
                          type = "table": times [s], values: the natural cubic spline through them;
                          the times must cover the sweep
+                         type = "formula": formula over TIME, such as "STEP(TIME, 0, 0, 1, 1)",
+                         (scale) = 1 and (offset) = 0, in driver units, (second) = 1 [s], TIME's
+                         unit: offset + scale formula
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
-                         (rate) = 1, in driver units per second
+                         (rate) = 1, in driver units per second; 0: at rest at every sample, for
+                         static efforts and reactions; times are then those of rate 1
                          driver: its samples from start to stop; it has its design value at time
                          zero, and moves at the rate; the sign of the rate gives the direction
                          at = "reference", in place of start, stop and steps: the samples of the
@@ -107,6 +111,14 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (static_toe), (static_camber), (wheel_axis), (wheel_contact), (travel);
                          the rest is as in [suspension];
                          outputs of one wheel may then have (side)
+    [equilibrium]        the case rests with gravity and springs: (held) = [DRIVER, ...], which keep
+                         their values or are swept; the others are free, and their efforts vanish;
+                         [sweep] may be left out
+    [compliance]         of `kincheck kc`: (wheel), the body that carries the wheel; (contact), the
+                         point where it touches the road; (held) = [DRIVER, ...], which keep their
+                         values, others are free, default: all; (loads) = ["longitudinal",
+                         "lateral", "braking", "aligning"]; (tire_stiffness) [N/length], vertical,
+                         for the ride rate
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns); (sheet), the name of one of several in an .xlsx file
                          beside: in its folder or below, also after following links; a foreign case
@@ -136,12 +148,23 @@ Earth). Points and vectors are global, at the design position. Results are alway
                          (inertia) = [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], entries of the matrix about the
                          centre of mass, global axes at design [kg length^2]; the products have the
                          sign of the matrix entry, Ixy = -sum of m x y; default: zero, a point mass
+    [joints.NAME.bushings.X]   keys of a bushing; bodies and point are the joint's unless given; it
+                         stands for its bushings in `run`, and they for it in `kc`
     [forces.NAME]        type = "spring_damper": bodies = [first, second], points = [on first, on
                          second], stiffness [N/length], (damping) = 0 [N s/length],
                          (free_length), default: the length at design; tension is positive
                          type = "torsion_spring_damper": joint with a rotation, stiffness
                          [N length/angle], (damping) = 0 [N length s/angle], (free_angle) = 0: the
                          joint's angle is zero at design
+                         both: (curve) = [[deflection, force or torque], ...], of progressive rates
+                         and bump stops, smooth through the rows and straight beyond; it adds to the
+                         stiffness, which may then be left out
+                         type = "bushing": bodies = [first, second], point, (axes), the first and
+                         second, fixed in the first body, default: global; one number or three, by
+                         the axes: (stiffness) = 0 [N/length], (damping) = 0 [N s/length],
+                         (preload) = 0 [N], on the first body; about them:
+                         (turning_stiffness) = 0 [N length/angle], (turning_damping) = 0;
+                         (curve), one or one for each axis; (law) = "euler_parameters" or "cardan"
                          type = "force": body, point, vector [N], (frame) = "global": its direction
                          is constant; "body": it turns with the body
                          type = "torque": body, vector [N length], (frame) = "global"
@@ -161,7 +184,8 @@ from msgspec import Meta
 
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import ANGLE, SIX_NUMBERS, Inertia, dimension_of
-from ...mechanism.loads import ForceElement, SpringDamper
+from ...mechanism.curves import dimensions_of
+from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper
 from ...mechanism.mechanism import Vector
 from ...mechanism.motions import Driver, Motion
 from ..case import TIME, Truth
@@ -223,7 +247,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     ]
     bodies: Table
     drivers: Table
-    sweep: Table
+    sweep: Table | None = None
     truth: Annotated[Truth, _one_of(Truth)] | None = None
     units: Table = {}
     joints: Table = {}
@@ -235,6 +259,8 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     reference: Table | None = None
     gravity: Numbers3 = (0.0, 0.0, 0.0)
     forces: Table = {}
+    compliance: Table | None = None
+    equilibrium: Table | None = None
     free: Table | None = None
 
 
@@ -426,17 +452,31 @@ _OF_FIELDS: Mapping[Any, Any] = {
     float: Number,
     Vector: Numbers3,
     tuple[float, ...]: Numbers,
+    str | None: Annotated[str | None, Meta(description="a name")],
     Vector | None: Annotated[Vector | None, Meta(description="a direction [x, y, z]")],
     tuple[Vector, Vector]: Annotated[
         tuple[Vector, Vector], Meta(description="two directions [[x, y, z], [x, y, z]]")
     ],
 }
+_PAIRS_OF_SPRING = tuple[tuple[float, float], ...] | None
+_PAIRS = Annotated[
+    tuple[tuple[float, float], ...] | None, Meta(description="a table of pairs of numbers")
+]
+_CURVES = Annotated[
+    tuple[tuple[float | tuple[float, float], ...], ...] | None,
+    Meta(description="a table [[displacement, force], ...], or one for each axis"),
+]
+_ONE_OR_THREE = Annotated[float | Vector, Meta(description="a number, or three along the axes")]
 _FRAME = Annotated[Literal["global", "body"], Meta(description='"global" or "body"')]
 
 
 def own_fields(cls: type[Described]) -> list[Field[Any]]:
     """Return the fields of a class itself, without the fields of its kind; case files give them."""
-    return [each for each in fields(cls) if each.name not in _INHERITED]
+    return [
+        each
+        for each in fields(cls)
+        if each.name not in _INHERITED and not each.metadata.get("hidden")
+    ]
 
 
 @cache
@@ -448,7 +488,7 @@ def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.S
     quantity = issubclass(cls, Measure | SuspensionOutput)
     if issubclass(cls, Coupler):
         keys.append(("joints", Joints))
-    elif issubclass(cls, Joint | SpringDamper):
+    elif issubclass(cls, Joint | SpringDamper | Bushing):
         keys.append(("bodies", Bodies))
     elif issubclass(cls, SuspensionOutput) and not issubclass(cls, AxleOutput):
         keys.append(("side", Sides | None, None))
@@ -465,6 +505,23 @@ def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.S
     )
 
 
+@cache
+def bushing_keys() -> type[msgspec.Struct]:
+    """Return the keys of a joint's bushing: bodies and point are by default the joint's."""
+    hints = get_type_hints(Bushing)
+    place = Annotated[Vector | None, Meta(description="a point [x, y, z]")]
+    keys: list[Any] = [
+        ("bodies", Annotated[Bodies | None, Meta(description="two names of bodies")], None),
+        ("point", place, None),
+    ]
+    keys += [
+        (each.name, _shape(each, hints[each.name]), each.default)
+        for each in own_fields(Bushing)
+        if each.name != "point"
+    ]
+    return msgspec.defstruct("BushingKeys", keys, kw_only=True, forbid_unknown_fields=True)
+
+
 def _shape(each: Field[Any], hint: Any) -> Any:
     """Return the annotation of a field, by its kind, dimension, name or type.
 
@@ -473,11 +530,16 @@ def _shape(each: Field[Any], hint: Any) -> Any:
     """
     if (kind := each.metadata.get("kind")) is not None:
         return Annotated[_SHAPES[kind], Meta(description=kind.value)]
-    if (dimension := dimension_of(each)) and hint != Vector:
+    if dimensions_of(each) is not None:
+        return _PAIRS if hint == _PAIRS_OF_SPRING else _CURVES
+    dimension = dimension_of(each)
+    if dimension and hint == Vector and each.default is not MISSING:
+        return _ONE_OR_THREE
+    if dimension and hint != Vector:
         return Number if dimension is ANGLE else Size
     if hint is None:
         return _OF_JOINTS.get(each.type, Number)
-    if each.name == "frame":
+    if hint is Axes:
         return _FRAME
     for words in (hint, *get_args(hint)):
         if isinstance(words, type) and issubclass(words, StrEnum):

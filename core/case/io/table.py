@@ -87,6 +87,7 @@ _FACTORS: Mapping[str, tuple[float, _Powers]] = {
     "sec": (1.0, _TIME),
     "ms": (1e-3, _TIME),
     "n": (1.0, _FORCE),
+    "newton": (1.0, _FORCE),
     "kn": (1e3, _FORCE),
     "nm": (1.0, (1, 0, 0, 1)),
     "nmm": (1e-3, (1, 0, 0, 1)),
@@ -519,9 +520,7 @@ def required_unit(file: Path, where: str, column: str, unit: str, si: str) -> Un
 
 
 def is_unit_row(cells: Sequence[object]) -> bool:
-    """Return whether cells are units, as in a row below the heads."""
-    texts = [cell for cell in cells if cell != ""]
-    return bool(texts) and all(
-        isinstance(each, str) and each.strip() != "1" and read_unit(each.strip("[]() ")) is not None
-        for each in texts
-    )
+    """Return whether most cells are units, as in a row below the heads."""
+    texts = [str(cell).strip("[]() ") for cell in cells if cell != ""]
+    units = [text for text in texts if text != "1" and read_unit(text) is not None]
+    return bool(texts) and 2 * len(units) > len(texts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,36 +10,46 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, Supplied
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_SEVERAL, Supplied
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
+    from .trees.element import Element
     from .trees.tree import Tree
 
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
-TREES = (".yaml", ".yml")
+TREES = (".yaml", ".yml", ".py")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
-SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS)
+DATASETS = (".adm",)
+SUFFIXES = (
+    *(*CASE_FILES, ".ini", ".pm", *TABLES, *TREES, *WORKBOOKS),
+    *(*ADAMS_FILES, *MODELS, *DATASETS),
+)
 """Suffixes of names that are files, whether they exist or not."""
 
-CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
+CASE, CHRONO, ADAMS, ASSETTO, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "case file",
     "Project Chrono suspension",
     "Adams/Car hardpoints",
+    "Assetto Corsa suspension",
     "hardpoint table",
     "tree of hardpoints",
     "workbook of hardpoints",
     "model",
+    "dataset of Adams Solver",
 )
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
+    ".pm": "is a suspension of rFactor, whose bars have no names of points; write their ends into a"
+    " table, name,x,y,z, with --units m --axes left,up,rearward",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     ".mjb": "is compiled; give the MJCF that it is made of",
     ".osim": "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case",
-    ".adm": "is a model of Adams/View; give its hardpoints (.sub, .csv), or MJCF, URDF or SDF",
+    ".cmd": "is a script of Adams/View; export the dataset of Adams Solver, .adm",
+    ".acf": "holds commands of Adams Solver; give the dataset that it names, .adm",
     **dict.fromkeys(
         (
             ".usd",
@@ -59,11 +70,13 @@ UNREAD = {
     ),
 }
 """Files that people have beside their models, and what to do, by suffix."""
+_OF_CASE = re.compile(r"^\s*(?:schema\s*=|\[+\s*(?:bodies|joints|drivers|sweep)\b)", re.MULTILINE)
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: OF_MODELS,
+    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
+    DATASET: ("drive", "hold", "hold-rest", "without", "closure"),
     **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
-    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE, ASSETTO), (*OF_HARDPOINTS, *OF_SEVERAL)),
 }
 
 
@@ -95,6 +108,10 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "",
             "found a file name with control characters, expected printable ones; rename the file",
         )
+    if kind == DATASET:
+        from .adams.read import read_adams
+
+        return read_adams(file, _text(file, of_spreadsheet=True), supplied)
     if kind == MODEL:
         from .trees.case import case_of
 
@@ -104,15 +121,29 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
 
 
+def read_hardpoints(file: Path, supplied: Supplied = NOTHING) -> HardpointTable:
+    """Read the table of hardpoints of a file.
+
+    Raises:
+        CaseError: the file is unreadable, or no table of hardpoints.
+    """
+    if not is_table(file, supplied):
+        raise fault(file, "", "is no table of hardpoints; give a table, such as car.csv")
+    return _hardpoints(file, kind_of(file, supplied), supplied)
+
+
+def is_table(file: Path, supplied: Supplied = NOTHING) -> bool:
+    """Return whether a file is a table of hardpoints."""
+    return kind_of(file, supplied) in (CHRONO, ADAMS, ASSETTO, TABLE, WORKBOOK, TREE)
+
+
 def read_tree(file: Path) -> Tree:
     """Return the links of a model in XML: MJCF, URDF or SDF, whatever the file is called.
 
     Raises:
         CaseError: it is no such model, or something in it makes no sense.
     """
-    from .trees.element import parse_xml
-
-    root = parse_xml(file, _text(file))
+    root = root_of(file)
     match root.tag:
         case "robot":
             from .trees.urdf import read_urdf as read
@@ -120,20 +151,38 @@ def read_tree(file: Path) -> Tree:
             from .trees.sdf import read_sdf as read
         case _:
             from .trees.mjcf import read_mjcf as read
-    return read(file, root)
+    tree = read(file, root)
+    tree.dialect = root.tag
+    return tree
+
+
+def root_of(file: Path) -> Element:
+    """Return the root element of a model in XML.
+
+    Raises:
+        CaseError: it is no XML.
+    """
+    from .trees.element import parse_xml
+
+    return parse_xml(file, _text(file))
 
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.programs import read_adams, read_chrono
+    from .hardpoints.programs import read_adams, read_assetto, read_chrono
     from .hardpoints.rows import read_plain, read_spreadsheet
-    from .hardpoints.tree import read_tree
+    from .hardpoints.tree import read_python, read_tree
 
     if kind == WORKBOOK:
-        return read_spreadsheet(file, supplied.sheet)
+        return read_spreadsheet(file, supplied)
     text = _text(file, of_spreadsheet=kind in (TABLE, ADAMS))
-    if kind in (TREE, TABLE):
-        return {TREE: read_tree, TABLE: read_plain}[kind](file, text, supplied.sheet)
+    if kind == TABLE and "[BAR]" in text:
+        raise fault(file, "", f"found a text with [BAR], which {UNREAD['.pm']}")
+    if kind == TREE and file.suffix.lower() == ".py":
+        return read_python(file, text, supplied)
+    if kind in (TREE, TABLE, ASSETTO):
+        readers = {TREE: read_tree, TABLE: read_plain, ASSETTO: read_assetto}
+        return readers[kind](file, text, supplied)
     return {CHRONO: read_chrono, ADAMS: read_adams}[kind](file, text)
 
 
@@ -145,7 +194,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     """
     suffix = file.suffix.lower()
     if suffix == ".toml":
-        return CASE
+        return _kind_of_toml(file)
     if suffix == ".json":
         return _kind_of_json(file, supplied)
     for kind, suffixes in (
@@ -154,15 +203,32 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         (WORKBOOK, WORKBOOKS),
         (ADAMS, ADAMS_FILES),
         (MODEL, MODELS),
+        (DATASET, DATASETS),
     ):
         if suffix in suffixes:
             return kind
+    from .hardpoints.programs import is_assetto
+
     text = _text(file, of_spreadsheet=True)
     if "[HARDPOINT]" in text:
         return ADAMS
     if text.lstrip().startswith("<"):
         return MODEL
+    if suffix == ".ini":
+        if is_assetto(text):
+            return ASSETTO
+        problem = "found an .ini file without points such as WBCAR_TOP_FRONT or STRUT_CAR"
+        raise fault(file, "", f"{problem}; give the suspensions.ini of Assetto Corsa")
     return TABLE if supplied.template or suffix == ".txt" else CASE
+
+
+def _kind_of_toml(file: Path) -> str:
+    text = _text(file)
+    if _OF_CASE.search(text):
+        return CASE
+    from .hardpoints.tree import has_points, toml_tree
+
+    return TREE if has_points(toml_tree(file, text)) else CASE
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:

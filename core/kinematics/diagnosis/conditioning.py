@@ -36,7 +36,7 @@ from ..formulation.constraints import Frames
 from ..formulation.formulation import Configuration, position_of
 from ..formulation.parameters import placed, places
 from ..formulation.state_vectors import displaced, jacobian, standing_drives, state_of
-from .instantaneous_screws import Screw, screws
+from .rank import Screw, screws
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
-"""Redundant rows, contradictions and free motions at the design, by name, and
-joints that over-constrain.
+"""Redundant rows, contradictions and free motions at the design, by name, and joints that
+over-constrain; motions in words: how each body moves at given rates of the unknowns, as a turn
+about an axis, a screw or a shift.
 
 The rows are those of the native formulation, joints first, then drivers. Lengths are in mechanism
 sizes, so that rows of lengths and of angles compare. Contradictions are found by exact rows:
@@ -8,6 +9,7 @@ with a residual, simplified rows have another fixed point (formulation section 3
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,15 +17,126 @@ from itertools import repeat
 
 import numpy as np
 
-from ...mechanism.mechanism import Mechanism
+from ...algebra import Vec3, cross, triple
+from ...errors import shortened
+from ...mechanism.mechanism import Mechanism, Vector
+from ...primitives.base import Twist
 from ...trajectory import Array
 from ..compiled.request import CONSISTENT
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Constraint, Style, constraints_left_out, frames
+from ..formulation.constraints import Constraint, Frames, Style, constraints_left_out, frames
+from ..formulation.formulation import Configuration, Formulation
 from ..formulation.state_vectors import jacobian
 from ..structure.degrees_of_freedom import FreedomAccount, account
 from ..structure.redundancy import DIGITS, RANK_TOLERANCE, independent_joint_rows, independent_rows
-from .instantaneous_screws import Screw, free_motions, screws
+
+# Parts of a motion below this share of its largest are left out: round-off of a null vector is far
+# below, what moves is above.
+STILL = 1e-6
+# Components below this [- or m] are printed as zero: they are round-off, of which a reader would
+# see a direction askew.
+ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class Screw:
+    """The motion of a body, relative to the fastest body.
+
+    Attributes:
+        turn: about the axis [rad], 0 for a pure shift.
+        axis: unit vector, global, of the turn, or of the shift without a turn.
+        through: a point of the axis, global [m].
+        shift: along the axis [m].
+    """
+
+    body: str
+    turn: float
+    axis: Vector
+    through: Vector
+    shift: float
+
+    def __str__(self) -> str:
+        along = _numbers(self.axis)
+        if not self.turn:
+            return f"{self.body!r} shifts along {along}"
+        how = "screws" if self.shift else "turns"
+        lead = f", {self.shift / self.turn:.3g} m per rad" if self.shift else ""
+        return f"{self.body!r} {how} about {along} through {_numbers(self.through)}{lead}"
+
+
+def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Array) -> list[Screw]:
+    """Return the motion of each moving body at the rates of the unknowns, shape (unknowns,), the
+    fastest first.
+
+    Rates have either sign: the fastest body's axis points along x, y or z rather than against it.
+    """
+    twists = formulation.twists(at, rates.tolist())
+    speeds = {name: max(_size(twist.v), _size(twist.w)) for name, twist in twists.items()}
+    fastest = max(speeds.values(), default=0.0)
+    moving = sorted(
+        (name for name, speed in speeds.items() if speed > STILL * fastest),
+        key=lambda name: -speeds[name],
+    )
+    if moving:
+        first = twists[moving[0]]
+        leading = max([*(first.w if _size(first.w) > STILL * fastest else first.v)], key=abs)
+        fastest = math.copysign(fastest, leading)
+    return [_screw(name, twists[name], at, frame, fastest) for name in moving]
+
+
+def free_motions(matrix: Array) -> Array:
+    """Return a basis of the null space of a matrix, shape (motions, columns), with the fewest
+    bodies in each motion.
+
+    The orthonormal basis mixes independent motions; reduced to echelon form, each has a column of
+    its own, and a spinning rod spins alone.
+    """
+    values, basis = np.linalg.svd(matrix, full_matrices=True)[1:]
+    rank = int((values > RANK_TOLERANCE * max(1.0, values.max(initial=0.0))).sum())
+    left = basis[rank:].copy()
+    for k in range(len(left)):
+        column = int(np.abs(left[k:]).max(axis=0).argmax())
+        row = k + int(np.abs(left[k:, column]).argmax())
+        left[[k, row]] = left[[row, k]]
+        left[k] /= left[k, column]
+        others = np.arange(len(left)) != k
+        left[others] -= np.outer(left[others, column], left[k])
+    return left
+
+
+def describe_screws(found: Sequence[Screw], most: int = 4) -> str:
+    """The motions of the fastest bodies, in words."""
+    return shortened([*map(str, found)], most)
+
+
+def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: float) -> Screw:
+    v, w = (1.0 / fastest) * twist.v, (1.0 / fastest) * twist.w
+    origin = frame.origins[name] + at.poses[name].u
+    turn = _size(w)
+    if turn <= STILL:
+        size = _size(v)
+        return Screw(
+            name, 0.0, triple((1.0 / size) * v), triple(frame.unit * origin), frame.unit * size
+        )
+    axis = (1.0 / turn) * w
+    foot = origin + (1.0 / (turn * turn)) * cross(w, v)
+    along = axis @ v
+    return Screw(
+        name,
+        turn,
+        triple(axis),
+        triple(frame.unit * foot),
+        frame.unit * along if abs(along) > STILL else 0.0,
+    )
+
+
+def _size(a: Vec3) -> float:
+    return float(np.linalg.norm([*a]))
+
+
+def _numbers(a: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{x if abs(x) > ROUND_OFF else 0.0:.4g}" for x in a) + ")"
+
 
 # What a row owes to another below this is round-off of an orthogonalisation.
 OWED = 1e-9

@@ -19,6 +19,8 @@ from fractions import Fraction
 from typing import Any
 
 from ...algebra import Scalar, Vec3, quat
+from ...errors import SolveError
+from ...mechanism.loads import Law
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Drive
 from ...program import Program, Tape, Traced, program
@@ -151,7 +153,17 @@ def _value(b: Any) -> Any:
 
 
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
-    """Return the mechanism with `Exact` numbers."""
+    """Return the mechanism with `Exact` numbers.
+
+    Raises:
+        SolveError: a force element has a law without an enclosure.
+    """
+    for force in mechanism.forces:
+        if getattr(force, "curve", None) or getattr(force, "law", None) is Law.CARDAN:
+            raise SolveError(
+                f"{force} has a curve or Cardan angles, and proofs know neither; give a stiffness"
+                " and the law 'euler_parameters'"
+            )
 
     def read(value: Any) -> Any:
         if isinstance(value, float):

@@ -99,14 +99,6 @@ class LlvmExecutor:
         )
         self._code.count(self._groups * wanted)
 
-    def fold(self, table: Array, totals: Array) -> None:
-        """See `NumpyExecutor`."""
-        columns, room = table.shape
-        self._code.call("fold", "fold")(
-            self._address, address(table), columns, room, address(totals)
-        )
-        self._code.count(columns * self.groups(room))
-
     def groups(self, lanes: int) -> int:
         """See `NumpyExecutor`."""
         return -(-lanes // self._code.width)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import inspect
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -22,10 +21,9 @@ from .. import disk_cache, plan, straight_line, tape
 from ..plan import Plan
 from ..straight_line import Bytecode, bytecode, packed, unpacked
 from . import compiler
-from .ir_writer import declarations, interpret
-from .loops import fan, fold, follow, parts, run, settle
+from .loops import fan, follow, parts, run, settle
 from .plan import PlanInMemory, rows
-from .programs import function
+from .programs import declarations, function, interpret
 
 
 class Code:
@@ -74,16 +72,10 @@ def find(content: str) -> Code | None:
 
 
 def cache_key(content: str) -> bytes:
-    """Return the cache key: content, processor, compiler, and sources that process its output."""
+    """Return the cache key: content, processor, compiler, and the sources that write its text."""
     return "\n".join(
-        (*compiler.processor(), str(compiler.possible()), _compiling(), content)
+        (*compiler.processor(), str(compiler.possible()), _sources(), content)
     ).encode()
-
-
-@cache
-def _compiling() -> str:
-    """Return the source of the module that compiles and links."""
-    return inspect.getsource(compiler)
 
 
 def _emitted(text: str) -> bytes:
@@ -99,7 +91,6 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
         {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3},
     ),
     "fan": ([*_NEEDED, fan], {"fan": 12}),
-    "fold": ([rows, fold], {"fold": 6}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
 """Modules of loops: their writers, and their functions with the number of arguments."""
@@ -141,7 +132,7 @@ class LlvmCode:
     def __init__(self, plan: Plan, often: float = OFTEN) -> None:
         self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
         # content of the code as a key: writing the text takes longer than loading the code
-        self._content = repr([plan.programs, self.width, _sources()])
+        self._content = repr([plan.programs, self.width])
         code = find(self._content)
         again = code is None and disk_cache.known(self._of_tables)
         self.interpreted, tables = code is None, {} if code else self._tables()
@@ -199,7 +190,7 @@ class LlvmCode:
 
     @property
     def _of_tables(self) -> bytes:
-        return f"tables {len(self.plan.slots)} {self._content}".encode()
+        return f"tables {len(self.plan.slots)} {_sources()} {self._content}".encode()
 
     def _text(self) -> str:
         programs = (function(program, self.width) for program in self.plan.programs.values())
@@ -247,7 +238,7 @@ def _made(name: str, width: int) -> Code:
 
 
 def _content(name: str, width: int) -> str:
-    return repr([name, width, _sources()])
+    return repr([name, width])
 
 
 @cache

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 from ..plan import LINE
 from ..tape import NODES
-from .ir_writer import Lines
 from .plan import TOGETHER, Rows, call, function, over
+from .programs import Lines
 
 
 def settle(width: int) -> str:
@@ -513,38 +513,3 @@ def _kept(width: int) -> str:
     )
     lost = lose.function("lose", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
     return kept + lost + remember.function("remember", "i64 %past")
-
-
-def fold(width: int) -> str:
-    """Return the LLVM function of `fold` of an executor: totals stay in the L1 cache, inputs are
-    read once.
-    """
-    body = f"""%all = mul i64 %columns, {width}
-  %step = mul i64 %plan_taken_count, {width}
-  br label %column
-column:
-  %k = phi i64 [0, %entry], [%next, %end_column]
-  %out_at = mul i64 %k, {width}
-  %out_here = getelementptr double, ptr %out, i64 %out_at
-  {over("take", "kept", "ptr %out_here", "i64 %all")}
-  %column_at = mul i64 %k, %room
-  %table_here = getelementptr double, ptr %table, i64 %column_at
-  br label %some
-some:
-  %at = phi i64 [0, %column], [%next_at, %some]
-  %from = getelementptr double, ptr %table_here, i64 %at
-  {over("take", "taken", "ptr %from", f"i64 {width}")}
-  {over("calls", "after")}
-  %next_at = add i64 %at, %step
-  %more = icmp slt i64 %next_at, %room
-  br i1 %more, label %some, label %end_column
-end_column:
-  {over("keep", "kept", "ptr %out_here", "i64 %all")}
-  %next = add i64 %k, 1
-  %more_columns = icmp slt i64 %next, %columns
-  br i1 %more_columns, label %column, label %end
-end:
-  ret void"""
-    return function(
-        "void @fold(ptr %plan, ptr %lane, ptr %table, i64 %columns, i64 %room, ptr %out)", body
-    )

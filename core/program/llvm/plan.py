@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plan import DONE, ITERATIONS, MARGIN, Plan, shifted
-from .ir_writer import Lines
+from .programs import Lines
 
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 """Slots that loops read and write, by their names in the plan."""

@@ -1,4 +1,9 @@
-"""Programs as LLVM code: functions of a vector of lanes.
+"""LLVM text over a vector of lanes, line by line: programs as functions, and the interpreter of
+their tables (see `straight_line`).
+
+The text calls LLVM instructions only: no library, no runtime. Sine and cosine are reduced and
+summed in place. The W lanes of a vector are contiguous, slot by slot: a program touches one stretch
+of a few kilobytes.
 
 `ordered` puts the operations with the longest chain of dependent operations first. A processor
 begins several operations per cycle, but looks only a few hundred ahead for ready ones. The pivots
@@ -9,13 +14,285 @@ the end (Hu, Parallel sequencing and assembly line problems, Operations Research
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 
-from ..straight_line import Program, lowered
+from ..straight_line import ARITY, FUSED, KINDS, Program, lowered
 from ..tape import LEAVES, Node, operands, place_of
-from .ir_writer import Lines
+
+# The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after
+# reduction.
+SINE_TERMS, COSINE_TERMS = 9, 9
+# pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
+HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
+BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
+EXTREMES = frozenset({"minimum", "maximum"})
+CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
+
+
+class Lines:
+    """Body of a function over vectors of W lanes, line by line in static single assignment."""
+
+    def __init__(self, width: int, prefix: str = "x", lane: str = "%lane") -> None:
+        self.width, self.prefix, self.lines, self._lane = width, prefix, list[str](), lane
+        self.vector = f"<{width} x double>"
+        self._known: dict[str, str] = {}
+
+    def let(self, text: str) -> str:
+        """Return the name of an expression's value, computed once."""
+        if text not in self._known:
+            self._known[text] = self.assign(text)
+        return self._known[text]
+
+    def assign(self, text: str) -> str:
+        """Return the name of an expression's value, computed here even if computed before."""
+        name = f"%{self.prefix}{len(self.lines)}"
+        self.lines.append(f"{name} = {text}")
+        return name
+
+    @property
+    def text(self) -> str:
+        """The lines, indented."""
+        return "\n  ".join(self.lines)
+
+    def sum(self, a: str | int, b: str | int) -> str:
+        """Return the sum of two integers."""
+        return self.let(f"add i64 {a}, {b}")
+
+    def product(self, a: str | int, b: str | int) -> str:
+        """Return the product of two integers."""
+        return self.let(f"mul i64 {a}, {b}")
+
+    def number(self, pointer: str, index: str | int) -> str:
+        """Return the address of a number in an array."""
+        return self.let(f"getelementptr double, ptr {pointer}, i64 {index}")
+
+    def spread(self, x: str) -> str:
+        """Return a vector of W times the same number."""
+        one = self.let(f"insertelement {self.vector} poison, double {x}, i64 0")
+        return self.let(
+            f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32>"
+            " zeroinitializer"
+        )
+
+    def turned(self, x: str) -> str:
+        """Return the lanes in reverse order."""
+        order = ", ".join(f"i32 {k}" for k in reversed(range(self.width)))
+        return self.let(
+            f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>"
+        )
+
+    def slot(self, number: str | int) -> str:
+        """Return the address of a slot."""
+        return self.let(f"getelementptr {self.vector}, ptr {self._lane}, i64 {number}")
+
+    def read(self, number: str | int) -> str:
+        """Return the value of a slot."""
+        return self.let(f"load {self.vector}, ptr {self.slot(number)}, align 8")
+
+    def write(self, number: str | int, value: str) -> None:
+        """Set a slot."""
+        self.lines.append(f"store {self.vector} {value}, ptr {self.slot(number)}, align 8")
+
+    def constant(self, x: float) -> str:
+        """Return a vector of equal numbers, exact to the last bit."""
+        bits = struct.unpack("<Q", struct.pack("<d", x))[0]
+        return "<" + ", ".join([f"double 0x{bits:016X}"] * self.width) + ">"
+
+    def call(self, name: str, *operands: str) -> str:
+        """Call one of LLVM's vector functions."""
+        arguments = ", ".join(f"{self.vector} {x}" for x in operands)
+        # of two zeros either may be the smaller: their order costs three more instructions.
+        # Elsewhere nsz would let LLVM turn the sign of a zero in compiled programs, which would
+        # then differ from interpreted ones.
+        flags = " nsz" if name in EXTREMES else ""
+        return self.let(f"call{flags} {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
+
+    def umax(self, a: str, b: str) -> str:
+        """Return the larger of two numbers without a sign, or NaN: their bits have the same order,
+        NaN last.
+
+        The comparison is of signed integers, although the numbers have no sign: AVX2 compares only
+        those, and takes four instructions for unsigned ones.
+        """
+        words = f"<{self.width} x i64>"
+        x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
+        larger = self.let(f"call {words} @llvm.smax.v{self.width}i64({words} {x}, {words} {y})")
+        return self.let(f"bitcast {words} {larger} to {self.vector}")
+
+    def arithmetic(self, op: str, a: str, b: str) -> str:
+        """Return a op b."""
+        return self.let(f"{BINARY[op]} {self.vector} {a}, {b}")
+
+    def fused(self, op: str, a: str, b: str, c: str) -> str:
+        """Return a product and a sum, rounded once if the processor can."""
+        first = self.let(f"fneg {self.vector} {a}") if op == "fnma" else a
+        last = self.let(f"fneg {self.vector} {c}") if op == "fms" else c
+        return self.call("fmuladd", first, b, last)
+
+    def choose(self, mask: str, p: str, q: str) -> str:
+        """Return p if the mask is true, else q."""
+        return self.let(f"select <{self.width} x i1> {mask}, {self.vector} {p}, {self.vector} {q}")
+
+    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
+        """Return a polynomial by Horner's rule, lowest coefficient first."""
+        total = self.constant(coefficients[-1])
+        for c in reversed(coefficients[:-1]):
+            total = self.fused("fma", total, x, self.constant(c))
+        return total
+
+    def trigonometric(self, x: str, quadrant: float) -> str:
+        """Return sin(x + quadrant * pi/2)."""
+        k = self.call("rint", self.arithmetic("*", x, self.constant(2.0 / math.pi)))
+        y = x
+        for part in HALF_PI:
+            # not fused: the products are exact, and the differences must see them as such
+            y = self.arithmetic("-", y, self.arithmetic("*", k, self.constant(part)))
+        z = self.arithmetic("*", y, y)
+        odd = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(SINE_TERMS)]
+        even = [(-1.0) ** n / math.factorial(2 * n) for n in range(COSINE_TERMS)]
+        sine, cosine = self.arithmetic("*", y, self.polynomial(z, odd)), self.polynomial(z, even)
+        turn = self.arithmetic("+", k, self.constant(quadrant))
+        quarter = self.arithmetic("*", turn, self.constant(0.25))
+        q = self.arithmetic(
+            "-", turn, self.arithmetic("*", self.call("floor", quarter), self.constant(4.0))
+        )
+        half = self.arithmetic("*", q, self.constant(0.5))
+        swapped = self.let(f"fcmp one {self.vector} {self.call('floor', half)}, {half}")
+        negative = self.let(f"fcmp oge {self.vector} {q}, {self.constant(2.0)}")
+        value = self.choose(swapped, cosine, sine)
+        return self.choose(negative, self.let(f"fneg {self.vector} {value}"), value)
+
+    def operation(self, op: str, operands: Sequence[str]) -> str:
+        """Return the value of a traced operation."""
+        if op in BINARY:
+            return self.arithmetic(op, *operands)
+        if op in FUSED:
+            return self.fused(op, *operands)
+        if op == "umax":
+            return self.umax(*operands)
+        if op in CALLS:
+            return self.call(CALLS[op], *operands)
+        if op == "neg":
+            return self.let(f"fneg {self.vector} {operands[0]}")
+        if op == "larger":
+            return self.let(
+                f"fcmp ogt {self.vector} {self.call('fabs', operands[0])},"
+                f" {self.call('fabs', operands[1])}"
+            )
+        if op == "where":
+            return self.choose(*operands)
+        if op == "before":
+            order = ", ".join(f"i32 {k}" for k in (self.width, *range(self.width - 1)))
+            return self.let(
+                f"shufflevector {self.vector} {operands[0]}, {self.vector} {operands[1]},"
+                f" <{self.width} x i32> <{order}>"
+            )
+        return self.trigonometric(operands[0], {"sin": 0.0, "cos": 1.0}[op])
+
+
+def declarations(width: int) -> str:
+    """Return the declarations of LLVM's vector functions that programs use."""
+    vector = f"<{width} x double>"
+    one = "\n".join(
+        f"declare {vector} @llvm.{name}.v{width}f64({vector})"
+        for name in ("sqrt", "fabs", "rint", "floor")
+    )
+    two = "\n".join(
+        f"declare {vector} @llvm.{name}.v{width}f64({vector}, {vector})"
+        for name in ("minimum", "maximum")
+    )
+    words, three = (
+        f"<{width} x i64>",
+        f"declare {vector} @llvm.fmuladd.v{width}f64({vector}, {vector}, {vector})",
+    )
+    return f"{one}\n{two}\n{three}\ndeclare {words} @llvm.smax.v{width}i64({words}, {words})\n"
+
+
+MASK = "larger"
+"""The operation with a boolean result: all bits of a number set, or none."""
+
+
+def interpret(width: int) -> str:
+    """Return the LLVM function of W lanes and a table."""
+    kinds = "\n    ".join(f"i32 {kind}, label %kind{kind}" for kind in KINDS.values())
+    ends = ", ".join(f"[%end, %kind{kind}_run]" for kind in KINDS.values())
+    return f"""define void @interpret(ptr %lane, ptr %table) {{
+entry:
+  br label %next
+next:
+  %at = phi ptr [%table, %entry], {ends}
+  %kind = load i32, ptr %at, align 4
+  %bytes_at = getelementptr i32, ptr %at, i64 1
+  %bytes_short = load i32, ptr %bytes_at, align 4
+  %bytes = zext i32 %bytes_short to i64
+  %rows = getelementptr i32, ptr %at, i64 2
+  %end = getelementptr i8, ptr %rows, i64 %bytes
+  switch i32 %kind, label %done [
+    {kinds}
+  ]
+{"".join(_stretch(op, width) for op in ARITY)}done:
+  ret void
+}}
+"""
+
+
+def _stretch(op: str, width: int) -> str:
+    """Return the loop over the rows of one kind of operation."""
+    name = f"kind{KINDS[op]}"
+    row = _Row(width, f"{name}_")
+    row.result(row.value(op))
+    return f"""{name}:
+  br label %{name}_run
+{name}_run:
+  %{name}_row = phi ptr [%rows, %{name}], [%{name}_next, %{name}_run]
+  {row.text}
+  %{name}_next = getelementptr i32, ptr %{name}_row, i64 {ARITY[op] + 1}
+  %{name}_more = icmp ult ptr %{name}_next, %end
+  br i1 %{name}_more, label %{name}_run, label %next
+"""
+
+
+class _Row(Lines):
+    """Lines of one row of a table."""
+
+    def place(self, k: int) -> str:
+        """Return the address that entry k of the row names."""
+        word = self.let(f"getelementptr i32, ptr %{self.prefix}row, i64 {k}")
+        offset = self.let(f"zext i32 {self.let(f'load i32, ptr {word}, align 4')} to i64")
+        return self.let(f"getelementptr i8, ptr %lane, i64 {offset}")
+
+    def operand(self, k: int, kind: str = "double") -> str:
+        """Return a vector that the row names."""
+        return self.let(f"load <{self.width} x {kind}>, ptr {self.place(k)}, align 8")
+
+    def value(self, op: str) -> str:
+        """Return the result of the row's operation."""
+        if op == "const":
+            number = self.let(f"getelementptr i32, ptr %{self.prefix}row, i64 1")
+            return self.spread(self.let(f"load double, ptr {number}, align 4"))
+        if op == "node":
+            return self.spread(self.let(f"load double, ptr {self.place(1)}, align 8"))
+        if op == "copy":
+            return self.operand(1)
+        if op == "where":
+            mask = self.let(
+                f"icmp slt <{self.width} x i64> {self.operand(1, 'i64')}, zeroinitializer"
+            )
+            return self.choose(mask, self.operand(2), self.operand(3))
+        value = self.operation(op, [self.operand(k) for k in range(1, ARITY[op] + 1)])
+        if op == MASK:
+            words = self.let(f"sext <{self.width} x i1> {value} to <{self.width} x i64>")
+            return self.let(f"bitcast <{self.width} x i64> {words} to {self.vector}")
+        return value
+
+    def result(self, value: str) -> None:
+        """Store the result at its place."""
+        self.lines.append(f"store {self.vector} {value}, ptr {self.place(0)}, align 8")
+
 
 CYCLES = {"/": 24, "sqrt": 32, "larger": 5, "before": 3, "umax": 3, "where": 1, "abs": 1, "neg": 1}
 """Latency [cycles] on vectors of eight on Intel's Golden Cove (uops.info); `OTHERS` for all other

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...program.llvm import compiler
-from ...program.llvm import jit as code_cache
+from ...program.llvm import compiler, jit
 from ...trajectory import Array
 from .rounds import Spread
 
@@ -52,7 +51,7 @@ def prepare() -> Peak:
     """Compile the kernel; raise ImportError without llvmlite."""
     width = compiler.vector_width()
     text = _text(width)
-    code = code_cache.load(text, lambda: text, {"peak": 2})
+    code = jit.load(text, lambda: text, {"peak": 2})
     # x <- 0.5 x + 1 stays near two: no overflow, no subnormal number
     memory = np.repeat([0.5, 1.0, *np.linspace(1.0, 2.0, CHAINS)], width)
     return Peak(width, 2 * CHAINS * width * STEPS, code.calls["peak"], memory, code)

@@ -17,10 +17,11 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ....trajectory import Array
 from ...case import Sweep
-from ...io.document import decimal, fault, shown, unknown_name
+from ...io.document import fault, interval, shown, unknown_name
 from ...io.outputs import AXES
 from ...io.schema import MOST_SAMPLES
 from ...suspension import Side
+from ...units import LENGTHS
 from .templates import TIEROD_INNER, WHEEL_CENTER, Template
 
 # The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
@@ -71,9 +72,9 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
             raise fault(
                 file,
                 "--travel",
-                f"found {shown(travel)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of"
-                f" them, or START:STOP:SAMPLES, up to {FARTHEST:g} m; say --travel 0.05 for 50 mm"
-                " up and down",
+                f"found {shown(travel)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
+                f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES, up to {FARTHEST:g} m, in metres"
+                " unless a unit is given; say --travel 50mm for 50 mm up and down",
             )
         wheel = ends
     ends = None if rack is None else _interval(rack.split(":"))
@@ -81,16 +82,17 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
         raise fault(
             file,
             "--rack",
-            f"found {shown(rack)}, expected METRES or START:STOP, up to {FARTHEST:g} m; say --rack"
-            " 0.04 for 40 mm to the right, then to the left",
+            f"found {shown(rack)}, expected a length such as 40mm, or START:STOP, up to"
+            f" {FARTHEST:g} m, in metres unless a unit is given; say --rack 40mm for 40 mm to the"
+            " right, then to the left",
         )
     return Travels(np.linspace(*wheel, samples), ends)
 
 
 def _interval(parts: Sequence[str]) -> tuple[float, float] | None:
-    """Return the ends of METRES, which goes both ways, or of START:STOP; None for another text."""
+    """Return the ends of LENGTH, which goes both ways, or of START:STOP; None for another text."""
     try:
-        numbers = [decimal(each) for each in parts]
+        numbers, _ = interval(parts, LENGTHS, "m")
     except ValueError:
         return None
     if len(numbers) == 1 and numbers[0] > 0.0:
@@ -114,16 +116,23 @@ class AxleMotion(StrEnum):
 
 
 def mechanism_of(
-    file: Path, said: str | None, template: Template, at: Mapping[str, Vector], travels: Travels
+    file: Path,
+    said: str | None,
+    template: Template,
+    at: Mapping[str, Vector],
+    travels: Travels,
+    side: Side,
 ) -> tuple[Mechanism, Sweep]:
     """Return the mechanism of a template and its motion.
 
-    The left wheel travels up and down, with the rack if it moves. Of an axle the right side mirrors
-    the left, and both wheels travel, or the rack to the left and to the right. The rack carries the
+    The wheel travels up and down, with the rack if it moves. The right side mirrors the left; of an
+    axle, and both wheels travel, or the rack to the left and to the right. The rack carries the
     inner joints of the tie rods, and slides along y. Without tie rods there is no rack.
 
     Args:
         said: motion of both wheels of an axle; None for one wheel.
+        at: positions by role of a left wheel, or of the mirror image of a right one [m].
+        side: of the one wheel.
 
     Raises:
         CaseError: an unknown motion, or the rack moves and there are no tie rods.
@@ -142,7 +151,7 @@ def mechanism_of(
         problem = "found it beside --axle steer, whose --travel is that of the rack"
         raise fault(file, "--rack", f"{problem}, expected one of them; leave it out")
     racked = bool(template.steered) and (said is not None or travels.rack is not None)
-    sides = {"": 1} if said is None else {f"{side}_": side.left for side in Side}
+    sides = {"": side.left} if said is None else {f"{side}_": side.left for side in Side}
     joints: list[Joint] = []
     points: list[Point] = []
     drivers: list[Driver] = []
@@ -158,7 +167,9 @@ def mechanism_of(
         drivers.append(PointCoordinate(prefix + STROKE, prefix + WHEEL_CENTER, AXES["z"]))
     strokes = [driver.name for driver in drivers]
     if racked:
-        joints.append(Translational(SLIDE, GROUND, RACK, at[TIEROD_INNER], AXES["y"]))
+        x, y, z = at[TIEROD_INNER]
+        middle = (x, sides.get("", 1) * y, z)
+        joints.append(Translational(SLIDE, GROUND, RACK, middle, AXES["y"]))
         drivers.append(JointDisplacement(RACK_TRAVEL, SLIDE))
     names = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
     bodies = [Body(name) for name in names]

@@ -17,13 +17,14 @@ from ....dual_numbers import Slope, derivatives
 from ....kinematics import places
 from ....mechanism.mechanism import Mechanism, Vector
 from ...case import Case, Hardpoint, Quantity, size
-from ...io.document import decimal, fault, shown, unknown_name
+from ...io.document import decimal, fault, measure, shown, unknown_name
 from ...io.outputs import default, with_all_coordinates, with_slopes
 from ...io.reader_options import Supplied
 from ...quantity import with_markers
 from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
+from ...units import LENGTHS
 from .axle import STROKE, AxleMotion
 from .table import Axes, HardpointTable
 from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
@@ -40,13 +41,14 @@ def vehicle_of(
     named: Mapping[str, str],
     at: Mapping[str, Vector],
     supplied: Supplied,
+    side: Side,
 ) -> Vehicle:
-    """Return the vehicle around the left wheel; the wheel's radius and axis follow from points if
+    """Return the vehicle around the wheel; the wheel's radius and axis follow from points if
     the table has them.
 
     Args:
         named: names of the points in the file, by role.
-        at: positions by role [m].
+        at: positions by role of a left wheel, or of the mirror image of a right one [m].
 
     Raises:
         CaseError: a length is unusable or contradicts the points, the axis points inboard, or an
@@ -81,7 +83,7 @@ def vehicle_of(
         raise unknown_name(file, "--position", position, [*Axle], "an axle")
     return Vehicle(
         convention=Convention.ISO_8855,
-        side=Side.LEFT,
+        side=side,
         forward=(1.0, 0.0, 0.0),
         up=(0.0, 0.0, 1.0),
         wheel_center=WHEEL_CENTER,
@@ -104,12 +106,12 @@ def _length(file: Path, option: str, text: str | None) -> float | None:
     if text is None:
         return None
     try:
-        found = decimal(text)
+        found, _ = measure(text, LENGTHS, "m")
     except ValueError:
         raise fault(
             file,
             f"--{option}",
-            f"found {shown(text)}, expected metres; say --{option} 0.3",
+            f"found {shown(text)}, expected a length; say --{option} 0.3 or 300mm",
         ) from None
     if not 0.0 < found < float("inf"):
         raise fault(file, f"--{option}", f"found {found:.6g} m, expected a length; correct it")
@@ -162,7 +164,7 @@ def with_suspension_outputs(
     template's watched points.
 
     Args:
-        vehicle: the vehicle around the left wheel.
+        vehicle: the vehicle around the wheel.
         motion: motion of both wheels; None for one wheel.
         steered: whether the rack moves during the wheel's travel.
     """

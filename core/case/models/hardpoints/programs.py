@@ -1,4 +1,4 @@
-"""Hardpoints in files of other programs: Adams/Car and Project Chrono."""
+"""Hardpoints in files of other programs: Adams/Car, Project Chrono and Assetto Corsa."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any, cast
 
 from ....errors import MOST_NAMED, remedy, shortened
 from ...io.document import fault, parse, shown
-from .table import Hardpoint, HardpointTable, number, require_name, twice
+from ...io.reader_options import Supplied
+from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
 BLOCK = "[HARDPOINT]"
 COLUMNS = ("hardpoint_name", "symmetry", "x_value", "y_value", "z_value")
@@ -201,3 +202,61 @@ def _point(file: Path, key: str, value: object) -> tuple[float, float, float]:
         )
     x, y, z = (number(file, key, each) for each in numbers)
     return x, y, z
+
+
+_OF_ASSETTO = re.compile(r"(?:WBCAR|WBTYRE|STRUT)_\w+")
+
+
+def is_assetto(text: str) -> bool:
+    """Return whether a text has points of a suspension of Assetto Corsa."""
+    return re.search(rf"^\s*{_OF_ASSETTO.pattern}\s*=", text, re.MULTILINE) is not None
+
+
+def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
+    """Return the points of an axle of Assetto Corsa (suspensions.ini), of its left wheel unless the
+    corner is a right one.
+
+    Points are in metres from the wheel's centre: x inboard, y up, z forward. The centre is half a
+    TRACK from the middle.
+
+    Raises:
+        CaseError: there are several axles with points, none, no TRACK, or an invalid point.
+    """
+    sections: dict[str, dict[str, tuple[str, str]]] = {}
+    section = ""
+    for k, line in enumerate(text.splitlines(), 1):
+        row = re.split(r";|//", line)[0].strip()
+        key, equals, value = (part.strip() for part in row.partition("="))
+        if head := _SECTION.fullmatch(row):
+            section = head[1].upper()
+        elif equals:
+            keys = sections.setdefault(section, {})
+            if key in keys:
+                raise twice(file, f"line {k}", key, keys[key][0])
+            keys[key] = (f"line {k}", value)
+    axles = [name for name, keys in sections.items() if any(map(_OF_ASSETTO.fullmatch, keys))]
+    corner = None if supplied.corner is None else wanted_corner(file, supplied.corner)
+    wanted = supplied.sheet or (corner[0] if corner else "")
+    chosen = [name for name in axles if wanted.upper() in ("", name)]
+    if len(chosen) != 1:
+        found = f"found points of {', '.join(axles)}"
+        raise fault(file, "", f"{found}, expected those of one axle; choose it by --sheet FRONT")
+    keys = sections[chosen[0]]
+    if "TRACK" not in keys:
+        raise fault(file, chosen[0], "found no TRACK, expected it beside the points; add it")
+    half = 0.5 * number(file, keys["TRACK"][0], keys["TRACK"][1])
+    outward = -1.0 if corner and corner[1] == "right" else 1.0
+    points = {"wheel_center": Hardpoint((0.0, outward * half, 0.0), keys["TRACK"][0])}
+    left_out = [f"[{name}]" for name in sections if name and name != chosen[0]]
+    for key, (where, value) in keys.items():
+        if not _OF_ASSETTO.fullmatch(key):
+            left_out += [f"{key}={value}"] * (key not in ("TRACK", "TYPE"))
+            continue
+        x, y, z = _point(file, f"{where}: {key}", value.split(","))
+        points[key] = Hardpoint((z, outward * (half - x), y), where)
+    return HardpointTable(
+        *(file, "Assetto Corsa", points, "m", "forward,left,up"),
+        *(keys.get("TYPE", ("", None))[1], left_out),
+        side=corner[1] if corner and corner[1] else None,
+        corner=corner,
+    )

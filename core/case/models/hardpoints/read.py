@@ -6,10 +6,14 @@ rack move.
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from ....errors import MOST_NAMED, brief, shortened, similar
 from ....mechanism.mechanism import Mechanism, Vector
@@ -19,17 +23,21 @@ from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...notes import SUSPENSIONS
 from ...quantity import with_markers
+from ...suspension import Side
 from ...units import plain
 from .axle import mechanism_of, read_travels
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
-from .table import HardpointTable, axes_of, placed, unit_of
+from .table import Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
     TEMPLATE_NAMES,
     TEMPLATES,
     WHEEL_CENTER,
     WHEEL_CONTACT,
+    Role,
     Template,
+    agree,
     compact,
+    corner_in,
     side_of,
 )
 
@@ -40,6 +48,23 @@ ACROSS = 0.25
 # missing names.
 MOST_POINTS = 10_000
 LARGEST_NAMES = 100_000
+# Names as alike as this are taken for misspelt or abridged ones.
+LIKE = 0.75
+_OPPOSITES = (("upper", "lower"), ("front", "rear"), ("inner", "outer"), ("center", "contact"))
+_SPELLINGS: Mapping[str, str] = {
+    other: word
+    for word, others in (
+        ("upper", "upper upp up top u uca uwb"),
+        ("lower", "lower low lwr bottom bot l lca lwb"),
+        ("front", "front frnt fore fwd f"),
+        ("rear", "rear aft back r"),
+        ("inner", "inner inboard in inn chassis body rack i"),
+        ("outer", "outer outboard out outr upright knuckle hub o"),
+        ("center", "center centre cent ctr cntr"),
+        ("contact", "contact cont patch ground road"),
+    )
+    for other in others.split()
+}
 
 
 def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
@@ -61,14 +86,19 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         )
     template = _template(table, supplied.template)
     unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
+    table = _of_corner(table, supplied.corner)
+    named, told = _filled(table, template, supplied)
     points = placed(table, unit, axes)
-    named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     size = max(math.dist(a, b) for a in at.values() for b in at.values())
     if improbable := SUSPENSIONS.improbable(size, unit):
         problem = f"the points span {improbable} They are in another unit"
         raise fault(file, "", f"{problem}; correct --units, or the unit in the file")
-    vehicle = vehicle_of(table, template, named, at, supplied)
+    side, of_side = _side(table, named[WHEEL_CENTER], axes, supplied)
+    if side is Side.RIGHT:  # a template describes the left side
+        axes = [(k, -sign if k == 1 else sign) for k, sign in axes]
+        at = {role: (x, -y, z) for role, (x, y, z) in at.items()}
+    vehicle = vehicle_of(table, template, named, at, supplied, side)
     travels = read_travels(file, supplied.travel, supplied.rack)
 
     def written(role: str, k: int) -> str:
@@ -76,24 +106,24 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         number = plain(table.points[named[role]].position[column])
         return f"{'xyz'[column]} = {number} {unit.name}"
 
-    _require_left_and_upright(table, template, named, at, written)
+    _require_one_side_and_upright(table, template, named, at, written)
     far = far_out(at)
 
     def design(at: Mapping[str, Vector]) -> tuple[Mechanism, Sweep]:
-        return mechanism_of(file, supplied.axle, template, with_axis(at, far), travels)
+        return mechanism_of(file, supplied.axle, template, with_axis(at, far), travels, side)
 
     with explained(file, "", unit):
         mechanism, sweep = design(at)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
         f"{table.tool} hardpoints of {file.name} on the template {template.name},"
-        f" {'left side' if supplied.axle is None else 'both sides'}, x forward, y left, z up"
+        f" {f'{side} side' if supplied.axle is None else 'both sides'}, x forward, y left, z up"
     )
     if vehicle.wheel_radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = replace(case, length_unit=unit.name)
+    case = replace(case, length_unit=unit.name, assembly=(*told, *of_side))
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
@@ -101,6 +131,69 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         named, at, axes, lambda at: with_markers(design(at)[0], case.outputs)
     )
     return replace(case, hardpoints=hardpoints)
+
+
+def _side(
+    table: HardpointTable, center: str, axes: Axes, supplied: Supplied
+) -> tuple[Side, list[str]]:
+    """Return the side of the wheel, and a note if it follows from the points alone.
+
+    Args:
+        center: name of the wheel's centre.
+
+    Raises:
+        CaseError: the points lie on another side than file or user state, or in the middle, or
+            their axes are left-handed and the wheel is then a right one.
+    """
+    column, sign = next((column, sign) for column, (k, sign) in enumerate(axes) if k == 1)
+    y = table.points[center].position[column]
+    found = Side.LEFT if sign * y > 0.0 else Side.RIGHT
+    said = {"--side": supplied.side, "side": table.side}
+    for where, text in said.items():
+        if text is not None and text.strip().lower() not in list(Side):
+            raise unknown_name(table.file, where, text, [*Side], "a side")
+    stated = {where: Side(text.strip().lower()) for where, text in said.items() if text}
+    number = f"{'xyz'[column]} = {plain(y)} {unit_of(table, supplied.units).name}"
+    correct = "correct --axes" if table.axes is None else "correct the points"
+    if len({*stated.values()}) > 1:
+        problem = f"found {supplied.side}, but the points of this file are of the {table.side} side"
+        raise fault(table.file, "--side", f"{problem}; leave out --side")
+    for where, side in stated.items():
+        if side is not found or y == 0.0:
+            problem = f"found {number}, not {side} of the middle, but {where} says {side}"
+            raise fault(table.file, center, f"{problem}, expected the same; {correct}, or the side")
+    turned = np.zeros((3, 3))
+    for row, (k, way) in enumerate(axes):
+        turned[row, k] = way
+    if y == 0.0 or (not stated and found is Side.RIGHT and np.linalg.det(turned) < 0.0):
+        problem = f"found {number}, not left of the middle, expected the left side"
+        why = "" if y == 0.0 else " in left-handed axes"
+        raise fault(
+            table.file, center, f"{problem}{why}; {correct}, or say --side right for a right wheel"
+        )
+    if stated or found is Side.LEFT:
+        return found, []
+    note = f"{center} has {number}, right of the middle: read as a right wheel"
+    return found, [f"{note}; --side right, or a line # side: right, states it"]
+
+
+def _of_corner(table: HardpointTable, said: str | None) -> HardpointTable:
+    """Return the table with the points of one corner, if their names tell corners apart."""
+    if said is None or table.corner is not None:
+        return table
+    wanted = wanted_corner(table.file, said)
+    corners = {name: corner_in(name) for name in table.points}
+    if not any(any(found) and agree(found, wanted) for found in corners.values()):
+        raise fault(
+            table.file,
+            "--corner",
+            f"found no point of {said}, expected a column, sheet, section or names that tell"
+            " corners apart; leave out --corner for a table of one wheel",
+        )
+    kept = {name: each for name, each in table.points.items() if agree(corners[name], wanted)}
+    left_out = [*table.left_out, f"{len(table.points) - len(kept)} points of other corners"]
+    side = table.side or wanted[1] or None
+    return replace(table, points=kept, left_out=left_out, side=side, corner=wanted)
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
@@ -133,21 +226,25 @@ def _template(table: HardpointTable, said: str | None) -> Template:
     return written
 
 
-def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict[str, str]:
-    """Return the name of the point for each role of the template.
-
-    Args:
-        own: file of the user's own names.
+def _filled(
+    table: HardpointTable, template: Template, supplied: Supplied
+) -> tuple[dict[str, str], list[str]]:
+    """Return the name of the point for each role of the template, and notes on the names. A file of
+    names that does not exist yet is written.
     """
+    own = supplied.names
+    new = own is not None and not own.exists()
     by_compact_name: dict[str, list[str]] = {}
-    by_left_name: dict[str, list[str]] = {}
+    by_side_name: dict[str, list[str]] = {}
+    sides = [side for _, side in map(side_of, table.points)]
+    wheel = table.side or ("right" if "left" not in sides else "left")
     for name in table.points:
         by_compact_name.setdefault(compact(name), []).append(name)
         plain, side = side_of(name)
-        if side == "left":
-            by_left_name.setdefault(compact(plain), []).append(name)
+        if side == wheel:
+            by_side_name.setdefault(compact(plain), []).append(name)
     filled: dict[str, str] = {}
-    if own is not None:
+    if own is not None and not new:
         filled |= _read_own_names(
             own, [role.name for role in (*template.roles, *template.optional)], table.points
         )
@@ -156,7 +253,7 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
             continue
         names = dict.fromkeys(role.names)
         found = [name for each in names for name in by_compact_name.get(each, ())]
-        found = found or [name for each in names for name in by_left_name.get(each, ())]
+        found = found or [name for each in names for name in by_side_name.get(each, ())]
         if len(found) > 1:
             places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
             raise fault(
@@ -167,25 +264,71 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         if found:
             filled[role.name] = found[0]
     missing = [role for role in template.roles if role.name not in filled]
-    if not missing:
-        return filled
     unused = {compact(name): name for name in table.points if name not in filled.values()}
+    near = {role.name: _nearest(role, unused) for role in missing}
+    told: list[str] = []
+    distinct = len({*near.values()}) == len(near)
+    sure = distinct and all(_fits(role, name) for role, name in near.items())
+    if missing and sure and not supplied.ask_names:
+        filled |= near
+        listed = ", ".join(f"{role} is {visible(name)!r}" for role, name in near.items())
+        told.append(f"names guessed: {listed}; --names FILE states them, --ask-names refuses")
+        missing = []
+    if own is not None and new:
+        _write_names(own, template, filled)
+        told.append(f"{own}: written, with the names of the points by role")
+    if not missing:
+        return filled, told
     lines: list[str] = []
     for role in missing:
-        close = [near for each in role.names if (near := similar(each, unused, 0.75))]
-        advice = ""
-        if close:
-            name = unused[close[0]]
-            where = table.points[name].where
-            advice = f" (is it {name!r}{'' if where == name else f', {where}'}?)"
-        lines.append(f"{role.name}, {role.meaning}{advice}")
+        name = near[role.name]
+        where = table.points[name].where if name else ""
+        place = "" if where in (name, "") else f", {where}"
+        lines.append(f"{role.name}, {role.meaning}" + f" (is it {name!r}{place}?)" * bool(name))
     problem = f"template {template.name}: missing {'; '.join(lines)}"
+    advice = "say with --names FILE which point is which; a new FILE is written to be filled in"
+    if new:
+        advice = f"fill in {own}, which is written"
     raise fault(
         table.file,
         "",
-        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or say with"
-        " --names FILE which point is which",
+        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or {advice}",
     )
+
+
+def _nearest(role: Role, unused: Mapping[str, str]) -> str:
+    """Return the name of the point most like a name of a role; empty without one."""
+    close = [found for each in role.names if (found := similar(each, unused, LIKE))]
+    return unused[close[0]] if close else ""
+
+
+def _fits(role: str, name: str) -> bool:
+    """Return whether a point's name says nothing else than a role: not lower for upper."""
+    words, others = _words(role), _words(name)
+    return bool(name) and all(
+        not (words & kind and others & kind) or words & kind == others & kind
+        for kind in map(frozenset, _OPPOSITES)
+    )
+
+
+def _words(name: str) -> set[str]:
+    """Return those of the opposite words that a name has."""
+    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)
+    return {word for part in parts if (word := _SPELLINGS.get(part.lower()))}
+
+
+def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> None:
+    """Write a file of names, with a comment for each role without a point."""
+    lines = [
+        f"{role.name} = {json.dumps(filled[role.name], ensure_ascii=False)}"
+        if role.name in filled
+        else f'# {role.name} = ""  # {role.meaning}'
+        for role in (*template.roles, *template.optional)
+    ]
+    try:
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise fault(file, "--names", f"cannot be written ({error}); choose another file") from None
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -193,27 +336,19 @@ def _listed(names: Sequence[str]) -> str:
     return shortened([brief(visible(name)) for name in names], MOST_NAMED) or "nothing"
 
 
-def _require_left_and_upright(
+def _require_one_side_and_upright(
     table: HardpointTable,
     template: Template,
     named: Mapping[str, str],
     at: Mapping[str, Vector],
     written: Callable[[str, int], str],
 ) -> None:
-    """Refuse mirrored points and points upside down: the stated axes are wrong.
+    """Refuse points on both sides and points upside down: the stated axes are wrong.
 
     Args:
         written: returns x, y or z (0, 1, 2) of a role as in the file: "y = 750 mm".
     """
     advice = "correct --axes" if table.axes is None else "correct the points"
-    if at[WHEEL_CENTER][1] <= 0.0:
-        raise fault(
-            table.file,
-            named[WHEEL_CENTER],
-            f"found {written(WHEEL_CENTER, 1)}, not left of the middle, expected the left side;"
-            f" {advice}, or give the left points; those of the right side are read as left ones if"
-            " --axes says left for right",
-        )
     across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL_CENTER][1]]
     for role in across[:1]:
         raise fault(

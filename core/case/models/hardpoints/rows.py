@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import TypeAlias
 
-from ....errors import brief
+from ....errors import MOST_NAMED, brief, shortened
 from ...io.document import fault, shown
+from ...io.reader_options import NOTHING, Supplied
 from ...io.table import (
     DELIMITERS,
     Cell,
@@ -41,8 +42,9 @@ from .table import (
     one_unit,
     require_name,
     twice,
+    wanted_corner,
 )
-from .templates import ROLES, compact
+from .templates import ROLES, agree, compact, corner_of
 from .tree import FEWEST, axis_of, fact_of, is_assignments, read_assignments
 
 COMMENTS = ("#", "%", "//")
@@ -57,6 +59,7 @@ _COLUMN = re.compile(
     r"(?:[-_ ]?(?:value|coord|coordinate|pos|position|koordinate))?"
     r"(?:\s*[\[(_/,]\s*([a-z]+)\s*[\])]?|\s+(?:in\s+)?([a-z]+))?"
 )
+_CORNERS = ("corner", "wheel", "wheelposition", "axle", "side", "location")
 _SIGNS = re.compile(rf"[{DELIMITERS}]+")
 
 
@@ -77,6 +80,11 @@ class Head:
     unit: str | None
 
     @property
+    def of_corners(self) -> list[int]:
+        """Indices of the columns whose names are those of corners, axles or sides."""
+        return [k for k, name in enumerate(self.names) if compact(name) in _CORNERS]
+
+    @property
     def others(self) -> list[str]:
         """The names of the further columns."""
         return [name for k, name in enumerate(self.names) if name and k not in self.columns]
@@ -86,11 +94,11 @@ _Parts: TypeAlias = tuple[Head, Sequence[Row], Sequence[Row]]
 """The head of a table, and the rows above and below it."""
 
 
-def read_plain(file: Path, text: str, wanted: str | None = None) -> HardpointTable:
+def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
     """Return the points of a text by name.
 
     Args:
-        wanted: section of the names, if the text has assignments of several suspensions.
+        supplied: section or corner of the names, if the text has several suspensions.
 
     Raises:
         CaseError: no head, or a row at odds with the head.
@@ -111,7 +119,7 @@ def read_plain(file: Path, text: str, wanted: str | None = None) -> HardpointTab
             file, "", f"is empty, expected a table of hardpoints; begin it with {','.join(HEAD)}"
         )
     if is_assignments(lines):
-        return read_assignments(file, lines, facts, wanted)
+        return read_assignments(file, lines, facts, supplied)
     if len(lines) > MOST_LINES:
         raise fault(
             file,
@@ -119,26 +127,26 @@ def read_plain(file: Path, text: str, wanted: str | None = None) -> HardpointTab
             f"found {len(lines)} lines, expected a suspension's, {MOST_LINES} at most; take out the"
             " others",
         )
-    if wanted is not None:
+    if supplied.sheet is not None:
         raise fault(
             file,
             "--sheet",
-            f"found {shown(wanted)} for a table of text, expected none; leave it out",
+            f"found {shown(supplied.sheet)} for a table of text, expected none; leave it out",
         )
-    return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts)
+    return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
 
 
-def read_spreadsheet(file: Path, wanted: str | None) -> HardpointTable:
+def read_spreadsheet(file: Path, supplied: Supplied) -> HardpointTable:
     """Return the points of a workbook by name.
 
     Args:
-        wanted: name of the sheet; None for the only sheet with a table.
+        supplied: name of the sheet, or corner; without, the only sheet with a table.
 
     Raises:
         CaseError: the file is no readable workbook, no sheet or several sheets have a head, or a
             row is at odds with the head.
     """
-    sheets = read_sheets(file, wanted, MOST_ROWS)
+    sheets = read_sheets(file, supplied.sheet, MOST_ROWS)
     tables = [sheet for sheet in sheets if _parts(file, sheet.sheet) is not None]
     if sheets and not tables:
         names = ", ".join(shown(sheet.name) for sheet in sheets)
@@ -148,8 +156,20 @@ def read_spreadsheet(file: Path, wanted: str | None) -> HardpointTable:
             f"found no head on the sheets {names}, expected {','.join(HEAD)}; write it above the"
             " points",
         )
-    sheet = one_sheet(file, tables, "--sheet NAME")
-    return read_rows(sheet, f"Sheet {shown(sheet.name)}:", {})
+    corners = {sheet.name: corner_of(sheet.name) for sheet in tables}
+    if supplied.corner is not None and all(corners.values()):
+        wanted = wanted_corner(file, supplied.corner)
+        tables = [each for each in tables if agree(corners[each.name] or ("", ""), wanted)]
+        if not tables:
+            names = ", ".join(map(shown, corners))
+            problem = f"found the sheets {names}, expected one of {supplied.corner}"
+            raise fault(file, "--corner", f"{problem}; correct it, or choose by --sheet NAME")
+    option = "--sheet NAME, or --corner FL" if all(corners.values()) else "--sheet NAME"
+    sheet = one_sheet(file, tables, option)
+    found = read_rows(sheet, f"Sheet {shown(sheet.name)}:", {}, supplied)
+    if found.corner is None and (corner := corners[sheet.name]):
+        found = replace(found, corner=corner, side=found.side or corner[1] or None)
+    return found
 
 
 def _delimiter(table: Table) -> str:
@@ -183,15 +203,17 @@ def _joined(words: Sequence[Cell]) -> Sequence[Cell]:
     return words
 
 
-def read_rows(table: Table, tool: str, facts: dict[str, str]) -> HardpointTable:
+def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied) -> HardpointTable:
     """Return the points of a table by name.
 
     Args:
         tool: program of the format.
-        facts: unit, axes and template, from comments.
+        facts: unit, axes, side and template, from comments.
+        supplied: corner, if the rows are of several.
 
     Raises:
-        CaseError: no head and no other known form, or a row at odds with it.
+        CaseError: no head and no other known form, a row at odds with it, or rows of several
+            corners.
     """
     file, delimiter, rows = table.file, table.delimiter.strip(" "), [*table.rows()]
     if table.delimiter == " ":
@@ -232,6 +254,8 @@ def read_rows(table: Table, tool: str, facts: dict[str, str]) -> HardpointTable:
                 where,
                 "found a second head, expected one table (of the front, or of the rear); keep one",
             )
+    chosen, body, others = _of_one_corner(file, head, body, supplied.corner)
+    left_out += others
     found: list[tuple[str, str, Sequence[Cell]]] = []
     for where, cells in body:
         own = [cells[k] if k < len(cells) else "" for k in head.columns]
@@ -246,11 +270,49 @@ def read_rows(table: Table, tool: str, facts: dict[str, str]) -> HardpointTable:
         raise fault(
             file, "", "found a head and no row, expected hardpoints; the file was cut: save it anew"
         )
-    left_out += [f"column {brief(name)}" for name in head.others]
+    of_corners = head.of_corners if chosen else []
+    columns = [name for k, name in enumerate(head.names) if k not in of_corners]
+    left_out += [f"column {brief(name)}" for name in head.others if name in columns]
     return HardpointTable(
         *(file, tool, points, unit or facts.get("unit")),
         *(facts.get("axes"), facts.get("template"), left_out),
+        side=facts.get("side") or (chosen or ("", ""))[1] or None,
+        corner=chosen,
     )
+
+
+def _of_one_corner(
+    file: Path, head: Head, body: Sequence[Row], said: str | None
+) -> tuple[tuple[str, str] | None, Sequence[Row], list[str]]:
+    """Return the corner of the points by its columns, its rows, and what was left out; None without
+    such columns. A blank cell has the corner above, as merged cells do.
+    """
+    places = head.of_corners
+    if not places or not body:
+        return None, body, []
+    corners: list[tuple[str, str]] = []
+    above = dict.fromkeys(places, "")
+    for _, cells in body:
+        above |= {k: str(cells[k]) for k in places if k < len(cells) and cells[k] != ""}
+        found = [corner_of(text, head.names[k]) for k, text in above.items()]
+        if None in found:
+            return None, body, []
+        axles, sides = zip(*filter(None, found), strict=True)
+        corners.append(("".join(dict.fromkeys(axles)), "".join(dict.fromkeys(sides))))
+    names = dict.fromkeys(corners)
+    wanted = None if said is None else wanted_corner(file, said)
+    chosen = [each for each in names if wanted is None or agree(each, wanted)]
+    if len(chosen) != 1:
+        listed = shortened([" ".join(filter(None, each)) for each in names], MOST_NAMED)
+        where, expected, advice = head.where, "those of one corner", "choose it by --corner FL"
+        if said is not None:
+            where, expected, advice = "--corner", said, "choose one of them"
+        raise fault(file, where, f"found points of {listed}, expected {expected}; {advice}")
+    kept = [row for row, corner in zip(body, corners, strict=True) if corner == chosen[0]]
+    others = [
+        f"{corners.count(each)} rows of {' '.join(each)}" for each in names if each != chosen[0]
+    ]
+    return chosen[0], kept, others
 
 
 def _points(
@@ -350,7 +412,7 @@ def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     if not {"x", "y", "z"} <= columns.keys():
         return None
     if "name" not in columns:  # the only column before the coordinates, under any name, or beside
-        before = [*range(min(columns.values()))]
+        before = [k for k in range(min(columns.values())) if compact(texts[k]) not in _CORNERS]
         if len(before) != 1:
             before = [k for k in range(4) if k not in columns.values()]
             if before[0] != 3 or any(texts[3:]):  # below no name, at the end

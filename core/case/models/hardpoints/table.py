@@ -17,6 +17,7 @@ from ....mechanism.mechanism import Vector
 from ...io.document import decimal, fault, shown, unknown_name, usable
 from ...io.table import UNIT_NAMES, numeral
 from ...units import LENGTHS, Unit
+from .templates import corner_of
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "forward": (0, 1.0),
@@ -71,6 +72,8 @@ class HardpointTable:
         template: template of the points, if the file names it.
         static_toe, static_camber: angles of the wheel at design, if the file gives them [rad].
         left_out: other content, without use for kinematics or a template.
+        side: side of the wheel, if the file states it.
+        corner: axle and side of the points, if the file tells those of several wheels apart.
     """
 
     file: Path
@@ -82,6 +85,19 @@ class HardpointTable:
     left_out: Sequence[str] = ()
     static_toe: float = 0.0
     static_camber: float = 0.0
+    side: str | None = None
+    corner: tuple[str, str] | None = None
+
+
+def wanted_corner(file: Path, said: str) -> tuple[str, str]:
+    """Return the axle and the side that --corner states.
+
+    Raises:
+        CaseError: it is no corner.
+    """
+    if (found := corner_of(said)) is None:
+        raise unknown_name(file, "--corner", said, ("FL", "FR", "RL", "RR"), "a corner")
+    return found
 
 
 def twice(file: Path, where: str, name: str, before: str) -> CaseError:

@@ -30,21 +30,59 @@ _SIDES = (
     re.compile(r"(?P<side>left|right|fl|fr|rl|rr)_(?P<name>.+)"),
 )
 """Side or corner at the end of a normal name, or at its start."""
+_FRONT_REAR = {"front": ("front", "f"), "rear": ("rear", "r", "back")}
+_LEFT_RIGHT = {"left": ("left", "l", "lh"), "right": ("right", "r", "rh")}
+_WORDS: Mapping[str, tuple[str, str]] = {
+    **{word: (axle, "") for axle, words in _FRONT_REAR.items() for word in words if len(word) > 1},
+    **{word: ("", side) for side, words in _LEFT_RIGHT.items() for word in words if len(word) > 2},
+    **{
+        pair: (axle, side)
+        for axle, firsts in _FRONT_REAR.items()
+        for side, seconds in _LEFT_RIGHT.items()
+        for first in firsts
+        for second in seconds
+        for pair in (first + second, second + first)
+    },
+    "vl": ("front", "left"),  # in German: vorn, hinten
+    "vr": ("front", "right"),
+    "hl": ("rear", "left"),
+    "hr": ("rear", "right"),
+}
 _ARM = re.compile(r"([ul])ca_(front|rear|outer)")
-_ARMS = ("{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
+_ARMS = ("{}", "{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
 _ENDS: Mapping[str, Sequence[str]] = {
     end: (
         *(f"{word}{joined}" for word in words for joined in ("", "_pivot", "_inboard", "_inner")),
-        *(f"{before}_{word}" for word in words for before in ("inboard", "inner", "chassis")),
+        *(f"{place}_{word}" for word in words for place in ("inboard", "inner", "in", "chassis")),
         short,
     )
     for end, words, short in (("front", ("front", "fore"), "if"), ("rear", ("rear", "aft"), "ir"))
-} | {"outer": ("outer", "outboard", "outer_ball_joint", "ball_joint", "knuckle", "upright", "o")}
+} | {
+    "outer": (
+        "outer",
+        "outboard",
+        "outer_ball_joint",
+        "ball_joint",
+        "knuckle",
+        "upright",
+        "o",
+        "out",
+    )
+}
 _OPTIMUM = {"front": "CHAS_{}For", "rear": "CHAS_{}Aft", "outer": "UPRI_{}Pnt"}
 _RODS = ("tierod", "trackrod", "track_rod", "steering_rod", "tr")
 _ROD_ENDS: Mapping[str, Sequence[str]] = {
-    TIEROD_INNER: ("inner", "inboard", "chassis", "rack", "i", "inner_ball_joint"),
-    "tierod_outer": ("outer", "outboard", "upright", "knuckle", "hub", "o", "outer_ball_joint"),
+    TIEROD_INNER: ("inner", "inboard", "chassis", "rack", "i", "in", "inner_ball_joint"),
+    "tierod_outer": (
+        "outer",
+        "outboard",
+        "upright",
+        "knuckle",
+        "hub",
+        "o",
+        "out",
+        "outer_ball_joint",
+    ),
 }
 
 
@@ -152,9 +190,40 @@ def side_of(name: str) -> tuple[str, str]:
     return plain, ""
 
 
+def corner_of(text: str, column: str = "") -> tuple[str, str] | None:
+    """Return the axle and the side in the name of a corner: ("front", "left") for "FL", ("rear",
+    "") for "rear"; None for another text.
+
+    Args:
+        column: head of the column of the text; below "side", "R" is right, below "axle" rear.
+    """
+    word = compact(text)
+    for head, words, k in (("axle", _FRONT_REAR, 0), ("side", _LEFT_RIGHT, 1)):
+        if compact(column) == head:
+            name = next((name for name, others in words.items() if word in others), "")
+            return ((name, "") if k == 0 else ("", name)) if name else None
+    return _WORDS.get(word)
+
+
+def corner_in(name: str) -> tuple[str, str]:
+    """Return the axle and the side at the end or at the start of a hardpoint's name; empty texts
+    without.
+    """
+    plain = normal(name)
+    for pattern in _SIDES:
+        if found := pattern.fullmatch(plain):
+            return corner_of(found["side"]) or ("", side_of(name)[1])
+    return "", ""
+
+
+def agree(found: tuple[str, str], wanted: tuple[str, str]) -> bool:
+    """Return whether axle and side of a corner are the wanted ones, or left open."""
+    return all(a in ("", b) or not b for a, b in zip(found, wanted, strict=True))
+
+
 def _further_names(role: str) -> Iterable[str]:
     """Yield names of wishbones and tie rods in tables of Adams/Car, Lotus Suspension Analysis,
-    suspension-explorer, OptimumK and others.
+    suspension-explorer, OptimumK, Assetto Corsa and others.
     """
     yield from (f"{rod}_{end}" for rod in _RODS for end in _ROD_ENDS.get(role, ()))
     if found := _ARM.fullmatch(role):
@@ -163,6 +232,8 @@ def _further_names(role: str) -> Iterable[str]:
         if end == "outer":
             yield from (f"{level}_ball_joint", f"{level[0]}bj")
         yield _OPTIMUM[end].format(level[:3].capitalize())
+        place = {"u": "top", "l": "bottom"}[found[1]]
+        yield f"wbtyre_{place}" if end == "outer" else f"wbcar_{place}_{end}"
 
 
 def _read_templates() -> dict[str, Template]:

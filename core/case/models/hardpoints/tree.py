@@ -10,16 +10,18 @@ one suspension are read.
 
 from __future__ import annotations
 
+import ast
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from ....errors import brief, remedy, shortened
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, parse, parse_yaml, shown
+from ...io.document import fault, parse, parse_yaml, shown, unknown_name
+from ...io.reader_options import NOTHING, Supplied
 from ...io.table import is_number
 from ...units import LENGTHS
 from .programs import without_comments
@@ -32,8 +34,9 @@ from .table import (
     number,
     one_unit,
     twice,
+    wanted_corner,
 )
-from .templates import ROLES, TEMPLATE_NAMES, compact, normal
+from .templates import ROLES, TEMPLATE_NAMES, agree, compact, corner_of, normal
 
 FEWEST = 3
 """Fewest points, rows or assignments to recognise a form."""
@@ -45,7 +48,7 @@ _AXIS = re.compile(
     r"(?P<name>.*[^\s_.\-\[(:])(?:[\s_.\-\[(:]+(?P<axis>[xyzXYZ])|(?<=[a-z0-9])(?P<bare>[XYZ]))[\])]?"
 )
 _AXIS_FIRST = re.compile(r"(?P<axis>[xyzXYZ])[\s_.\-:]+(?P<name>.+)")
-_FACT = re.compile(r"#?\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
+_FACT = re.compile(r"#?\s*(unit|axes|template|side)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
 _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc", "xyz", "point")
 _NAMES = ("name", "id", "label", "point")
 # Three numbers that are no place.
@@ -102,18 +105,82 @@ class Leaf:
         return ((*above, split[0]), split[1]) if split else None
 
 
-def read_tree(file: Path, text: str, wanted: str | None) -> HardpointTable:
-    """Return the points of a YAML or JSON file.
+def read_tree(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+    """Return the points of a YAML, JSON or TOML file.
 
     Args:
-        wanted: section of the tree, if several have points.
+        supplied: section or corner of the tree, if several have points.
 
     Raises:
-        CaseError: no YAML or JSON, no points, or points of several suspensions.
+        CaseError: no such text, no points, or points of several suspensions.
     """
     if file.suffix.lower() == ".json":
-        return _table(file, "JSON", json_tree(file, without_comments(text)), wanted)
-    return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], wanted)
+        return _table(file, "JSON", json_tree(file, without_comments(text)), supplied)
+    if file.suffix.lower() == ".toml":
+        return _table(file, "TOML", toml_tree(file, text), supplied)
+    return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], supplied)
+
+
+def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+    """Return the points of the assignments of a Python script, dictionaries among them. Nothing is
+    evaluated; what is no number, text, list or dictionary of these is left out and listed.
+
+    Raises:
+        CaseError: not Python, no points, or points of several suspensions.
+    """
+    left_out: list[str] = []
+    leaves = [Leaf((key,), value, key) for key, value in _facts_of_comments(text)]
+    try:
+        for each in ast.parse(text).body:
+            targets = each.targets if isinstance(each, ast.Assign) else []
+            if isinstance(each, ast.AnnAssign):
+                targets = [each.target]
+            if not targets:
+                left_out.append(f"line {each.lineno}")
+                continue
+            value = _literal(source) if (source := getattr(each, "value", None)) else ""
+            for target in targets:
+                path = _KEY.sub(r".\1", ast.unparse(target)).split(".")
+                where = f"line {each.lineno} "
+                found = _leaves(value, tuple(path))
+                leaves += [replace(leaf, where=where + leaf.where) for leaf in found]
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        why = brief(f"{type(error).__name__}: {error}".replace("\n", " "))
+        raise fault(file, "", f"is no Python script of points ({why}); correct it") from None
+    return _table(file, "Python", leaves, supplied, left_out)
+
+
+def _literal(node: ast.AST) -> Any:
+    """Return the value of an expression of literals, and the text of another one. A call with one
+    list, or with three numbers, is a point: `np.array([1, 2, 3])`, `Vector(1, 2, 3)`.
+    """
+    match node:
+        case ast.Constant(value=int() | float() | str()):
+            return node.value
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
+            return -number
+        case ast.List(elts=items) | ast.Tuple(elts=items):
+            return [_literal(item) for item in items]
+        case ast.Dict():
+            keys = ["**" if key is None else str(_literal(key)) for key in node.keys]
+            return _named_values(zip(keys, map(_literal, node.values), strict=True))
+        case ast.Call(func=ast.Name(id="dict"), args=[]):
+            return _named_values((str(each.arg), _literal(each.value)) for each in node.keywords)
+        case ast.Call(args=[ast.List() | ast.Tuple() as only], keywords=[]):
+            return _literal(only)
+        case ast.Call(args=[_, _, _] as items, keywords=[]):
+            return [_literal(item) for item in items]
+        case _:
+            return ast.unparse(node)
+
+
+def _named_values(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"the key {key!r} stands twice")
+        found[key] = value
+    return found
 
 
 def json_tree(file: Path, text: str) -> list[Leaf]:
@@ -124,6 +191,17 @@ def json_tree(file: Path, text: str) -> list[Leaf]:
     """
     listed = text.lstrip().startswith("[")
     return [*_leaves(parse(file, f'{{"points": {text}}}' if listed else text))]
+
+
+def toml_tree(file: Path, text: str) -> list[Leaf]:
+    """Return the values of a TOML text, and facts of its comments.
+
+    Raises:
+        CaseError: not TOML.
+    """
+    facts = _facts_of_comments(text)
+    stated = [Leaf((key,), value, key) for key, value in facts]
+    return [*_leaves(parse(file, text)), *stated]
 
 
 def has_points(tree: Sequence[Leaf]) -> bool:
@@ -149,6 +227,11 @@ def fact_of(text: str) -> tuple[str, str] | None:
     return (found[1].lower(), found[2].strip()) if found else None
 
 
+def _facts_of_comments(text: str) -> list[tuple[str, str]]:
+    comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
+    return [fact for comment in comments if (fact := fact_of(comment))]
+
+
 def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
     """Return whether most lines of a text, without comments, assign something."""
     assigned = sum(_ASSIGNED.fullmatch(line) is not None for _, line in lines[:MOST_LINES])
@@ -156,14 +239,15 @@ def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
 
 
 def read_assignments(
-    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], wanted: str | None
+    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], supplied: Supplied
 ) -> HardpointTable:
     """Return the points of assignments.
 
     Args:
         lines: places and texts of the lines.
         facts: unit, axes and template, from comments.
-        wanted: section of the names, such as `front` in `front.lca_front`, if several have points.
+        supplied: section or corner of the names, such as `front` in `front.lca_front`, if several
+            have points.
 
     Raises:
         CaseError: no points, several units, or points of several suspensions.
@@ -203,7 +287,7 @@ def read_assignments(
             raise fault(file, units[unit], f"{problem}; correct either")
         facts.setdefault("unit", unit)
     stated_facts = [Leaf((key,), value, key) for key, value in facts.items()]
-    return _table(file, "Assigned", [*found, *stated_facts], wanted, left_out)
+    return _table(file, "Assigned", [*found, *stated_facts], supplied, left_out)
 
 
 def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
@@ -237,13 +321,9 @@ def _named(item: Any) -> tuple[str, Any]:
 
 
 def _table(
-    file: Path, tool: str, tree: Sequence[Leaf], wanted: str | None, left_out: Sequence[str] = ()
+    file: Path, tool: str, tree: Sequence[Leaf], supplied: Supplied, left_out: Sequence[str] = ()
 ) -> HardpointTable:
-    """Return the points of a tree.
-
-    Args:
-        wanted: section of the tree, if several have points.
-    """
+    """Return the points of a tree."""
     points, others = _points(file, tree)
     facts = _facts(others)
     if not points:
@@ -253,7 +333,7 @@ def _table(
             "found no point, expected three numbers such as lca_front: [0.1, 0.3, 0.2], or x, y and"
             " z below a name; give a file of hardpoints (beside a URDF, give the URDF)",
         )
-    chosen, dropped = _of_one_suspension(file, [*points], wanted)
+    chosen, dropped, corner = _of_one_suspension(file, [*points], supplied)
     found: dict[str, Hardpoint] = {}
     for keys, name in chosen.items():
         if name in found:
@@ -266,7 +346,9 @@ def _table(
     if unused := [leaf.where for leaf in others if leaf.value not in facts.values()]:
         listed.append(f"values {shortened([brief(each) for each in unused], 8)}")
     return HardpointTable(
-        file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed
+        *(file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed),
+        side=facts.get("side") or (corner or ("", ""))[1] or None,
+        corner=corner,
     )
 
 
@@ -321,13 +403,18 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
             compact(value) in TEMPLATE_NAMES
         ):
             facts.setdefault("template", value)
+        elif key == "side" and value.lower() in ("left", "right"):
+            facts.setdefault("side", value)
     return facts
 
 
 def _of_one_suspension(
-    file: Path, paths: Sequence[Keys], wanted: str | None
-) -> tuple[dict[Keys, str], list[str]]:
-    """Return the names of the points of one suspension by their paths, and what was left out."""
+    file: Path, paths: Sequence[Keys], supplied: Supplied
+) -> tuple[dict[Keys, str], list[str], tuple[str, str] | None]:
+    """Return the names of the points of one suspension by their paths, what was left out, and the
+    corner that keys name, if it is asked for.
+    """
+    wanted = supplied.sheet
     left_out: list[str] = []
     kept = {keys: keys for keys in paths}
     contained = {
@@ -354,6 +441,22 @@ def _of_one_suspension(
         if rest := len(kept) - len(found):
             left_out.append(f"{rest} points of other sections")
         kept = found
+    corner = None
+    named = {keys: [k for k in short[:-1] if corner_of(k)] for keys, short in kept.items()}
+    if supplied.corner is not None and any(named.values()):
+        corner = wanted_corner(file, supplied.corner)
+        short = {
+            keys: tuple(
+                key for k, key in enumerate(short) if k + 1 == len(short) or not corner_of(key)
+            )
+            for keys, short in kept.items()
+            if all(agree(corner_of(key) or ("", ""), corner) for key in named[keys])
+        }
+        if not any(named[keys] for keys in short):
+            known = dict.fromkeys(key for keys in named.values() for key in keys)
+            raise unknown_name(file, "--corner", supplied.corner, known, "a corner of the file")
+        left_out += [f"{len(kept) - len(short)} points of other corners"]
+        kept = short
     sides = {keys: _side(short) for keys, short in kept.items()}
     right = [keys for keys, side in sides.items() if side is _RIGHT]
     if right and _LEFT in sides.values():
@@ -370,7 +473,7 @@ def _of_one_suspension(
             file,
             "",
             f"found points in {', '.join(map(shown, sections))}, expected those of one suspension;"
-            " choose a section by --sheet NAME",
+            " choose a section by --sheet NAME, or --corner FL",
         )
     names = {
         keys: ".".join(
@@ -378,7 +481,7 @@ def _of_one_suspension(
         )
         for keys, short in kept.items()
     }
-    return names, left_out
+    return names, left_out, corner
 
 
 def _below(keys: Keys, wanted: str) -> Keys:

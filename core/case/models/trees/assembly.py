@@ -84,7 +84,7 @@ class Pose:
         return dict(zip(self.tree.moves, self.values, strict=True))
 
     @cached_property
-    def carried(self) -> Mapping[str, Place]:
+    def displacements(self) -> Mapping[str, Place]:
         """Displacement of each moving link since the pose of the tree."""
         found: dict[str, Place] = {GROUND: ORIGIN}
         for move, value in zip(self.tree.moves.values(), self.values, strict=True):
@@ -116,14 +116,14 @@ class Pose:
         """
         along, about = np.zeros((2, 3, self.unknowns))
         for move in self._paths[link]:
-            columns, before = self.columns[move.name], self.carried[move.outer]
+            columns, before = self.columns[move.name], self.displacements[move.outer]
             if move.kind == "slide":
                 along[:, columns[0]] = [*before.direction(move.axis)]
                 continue
             if move.kind == "free":
                 along[:, columns[:3]] = np.eye(3)
             # a free link turns about its own point where that is now
-            carrier = self.carried[move.inner] if move.kind == "free" else before
+            carrier = self.displacements[move.inner] if move.kind == "free" else before
             arm = point - carrier.point(move.point)
             axes = (move.axis,) if move.kind == "hinge" else (X, Y, Z)
             for column, axis in zip(columns[-len(axes) :], axes, strict=True):
@@ -131,7 +131,7 @@ class Pose:
                 about[:, column], along[:, column] = [*a], [*cross(a, arm)]
         return along, about
 
-    def stepped(self, step: Array) -> Pose:
+    def after(self, step: Array) -> Pose:
         """Return the pose after a step of the unknowns."""
         values: list[Value] = []
         for move, value in zip(self.tree.moves.values(), self.values, strict=True):
@@ -144,9 +144,9 @@ class Pose:
             values.append(_about(value.point(move.point), turned).then(value))
         return Pose(self.tree, values)
 
-    def settled(self) -> Tree:
+    def as_tree(self) -> Tree:
         """Return the tree in this pose."""
-        tree, carried = self.tree, self.carried
+        tree, carried = self.tree, self.displacements
         moves: dict[str, Move] = {}
         for (name, move), value in zip(tree.moves.items(), self.values, strict=True):
             before = carried[move.inner if move.kind == "free" else move.outer]
@@ -179,15 +179,15 @@ class Pose:
 
     def _points(self, links: tuple[str, str], points: tuple[Vec3, Vec3]) -> tuple[Vec3, Vec3]:
         (i, j), (p, q) = links, points
-        return self.carried[i].point(p), self.carried[j].point(q)
+        return self.displacements[i].point(p), self.displacements[j].point(q)
 
     def ends(self, closure: Closure) -> tuple[Place, Place]:
         """Return the present places of the frames of a closure."""
-        first, second = map(self._carried_end, closure.links, closure.places)
+        first, second = map(self._end, closure.links, closure.places)
         return first, second
 
-    def _carried_end(self, link: str, place: Place) -> Place:
-        carried = self.carried[link]
+    def _end(self, link: str, place: Place) -> Place:
+        carried = self.displacements[link]
         return Place(carried.point(place.at), carried.turn * place.turn)
 
 
@@ -235,7 +235,7 @@ class Closing:
             closure: the user's own tolerance [m].
         """
         tree = pose.tree
-        points = [pose.carried[each.outer].point(each.point) for each in tree.moves.values()]
+        points = [pose.displacements[each.outer].point(each.point) for each in tree.moves.values()]
         for each in tree.ties:
             if isinstance(each, Closure):
                 points += [end.at for end in pose.ends(each)]
@@ -405,19 +405,19 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
                 " that is nearer by --start keyframe:NAME, or values of some joints by --start"
                 " JOINT=VALUE ..., from which the nearest closed pose is taken however far it is"
             )
-        pose = _closed(closing, pose, ((*start.given, *driven), start.given, ()))
+        pose = _nearest_closed(closing, pose, ((*start.given, *driven), start.given, ()))
         left = closing.gap(pose)
         if left > closing.limit:
             raise _open(closing, start, pose, opened, left)
         notes.append(_note(closing, start, pose, opened, left))
-    settled = Pose.of(pose.settled())
+    closed = Pose.of(pose.as_tree())
     # of the tree in this pose, whose changes since the zero pose it knows itself
-    closing = replace(closing, ties=settled.tree.ties)
-    free = closing.null(closing.rows(settled)[1])
-    return Assembled(settled.tree, free, settled.columns, closing, start.text, tuple(notes))
+    closing = replace(closing, ties=closed.tree.ties)
+    free = closing.null(closing.rows(closed)[1])
+    return Assembled(closed.tree, free, closed.columns, closing, start.text, tuple(notes))
 
 
-def _closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:
+def _nearest_closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:
     """Return the nearest closed pose found, with the first possible one of some sets of moves at
     rest.
     """
@@ -426,13 +426,13 @@ def _closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -
         moving = np.ones(start.unknowns)
         for name in given:
             moving[[*start.columns[name]]] = 0.0
-        found = _descended(closing, start, moving)
+        found = _descend(closing, start, moving)
         if closing.gap(found) <= max(closing.tolerance, CLOSED * closing.size):
             break
     return found
 
 
-def _descended(closing: Closing, pose: Pose, moving: Array) -> Pose:
+def _descend(closing: Closing, pose: Pose, moving: Array) -> Pose:
     metres, last = closing.metres(pose), math.inf
     near = max(NEAR, closing.tolerance / closing.size)
     best, least = pose, math.inf
@@ -453,7 +453,7 @@ def _descended(closing: Closing, pose: Pose, moving: Array) -> Pose:
             mu, last = DAMPING * min(1.0, float(residual @ residual)), math.inf
             damped = slope @ slope.T + mu * np.eye(len(slope))
             step = -slope.T @ np.linalg.lstsq(damped, residual, rcond=None)[0]
-        pose = pose.stepped(metres * moving * step)
+        pose = pose.after(metres * moving * step)
     return best
 
 
@@ -473,7 +473,7 @@ def _open(closing: Closing, start: Start, pose: Pose, opened: float, left: float
 
 def _note(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> str:
     """Return the note on the assembly: the gap, and how far each move went."""
-    moved = sorted(_moved(start.pose, pose), key=lambda each: -each[0])
+    moved = sorted(_movements(start.pose, pose), key=lambda each: -each[0])
     texts = [text for size, text in moved if size > 1e-3 * moved[0][0]]
     kept = f", of which {left:.2g} m are left, within {closing.why}" * (
         left > CLOSED * closing.size
@@ -485,7 +485,7 @@ def _note(closing: Closing, start: Start, pose: Pose, opened: float, left: float
     )
 
 
-def _moved(before: Pose, after: Pose) -> Iterator[tuple[float, str]]:
+def _movements(before: Pose, after: Pose) -> Iterator[tuple[float, str]]:
     """Yield the size and text of each move's change."""
     for name, move in before.tree.moves.items():
         old, new = before.value_of[name], after.value_of[name]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +26,11 @@ from ....joints import (
     Translational,
 )
 from ....joints.base import triad
-from ....kinematics import degrees_of_freedom
+from ....kinematics import degrees_of_freedom, reduce_rows
 from ....mechanism.body import Body, Inertia, checked_inertia
 from ....mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ....mechanism.mechanism import GROUND, Mechanism, Point
-from ....mechanism.motions import Absolute, JointAngle, JointDisplacement, Motion, Table
+from ....mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
@@ -37,8 +38,9 @@ from ...io.document import SMALLEST, explained, fault, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
-from .driving import Driving, choose_held, read_driving, read_start
+from .driving import Driving, Freedom, choose_held, read_driving, read_start
 from .element import Names
+from .limits import motor_ranges
 from .place import Place, coordinates
 from .tree import Closure, Coupling, Mass, Move, Spring, Tree, together
 
@@ -60,10 +62,26 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
         CaseError: the options do not say how it moves, its start does not close, or there is no
             joint for one of its ties.
     """
-    return _Parts(*posed(tree, supplied)).case()
+    return _Parts(*model_of(tree, supplied)).case()
 
 
-def posed(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
+def undriven(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
+    """Return the mechanism of a tree without drivers, the tree in its closed start, and its links
+    with a free turn about themselves.
+
+    Raises:
+        CaseError: its start does not close, or there is no joint for one of its ties.
+    """
+    _require_coupled(tree)
+    model = assemble(read_start(tree, ()), None)
+    spins = find_spins(model.tree, ())
+    whole = _Parts(model, Driving({}, (), ()), spins).mechanism()
+    if not model.is_exact:
+        whole = reduce_rows(whole, model.closing.tolerance, [*tree.joints]).mechanism
+    return whole, model.tree, {spin.move.inner for spin in spins.values()}
+
+
+def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
     """Return a tree in its closed start, its driven and held moves, and its links that spin.
 
     Raises:
@@ -75,6 +93,15 @@ def posed(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[s
     model = assemble(start, supplied.closure, driving.moves)
     spins = find_spins(model.tree, driving.fixed)
     axes = {name: spin.axis for name, spin in spins.items()}
+    if not (driving.moves or driving.fixed or supplied.hold_rest):
+        own = read_driving(tree, replace(supplied, drive=motor_ranges(tree)))
+        if own.driven and len(own.driven) == Freedom(model, axes).dof:
+            driving = own
+            note = (
+                f"nothing is said of what drives it: {', '.join(own.driven)} move through their"
+                " limits, as the file has motors there; other motions by --drive"
+            )
+            model = replace(model, notes=(*model.notes, note))
     return model, choose_held(model, driving, axes, hold_rest=supplied.hold_rest), spins
 
 
@@ -119,8 +146,6 @@ class _Parts:
     def case(self) -> Case:
         """Return the case, without rows that are redundant within the digits."""
         tree, model, closing = self.tree, self.model, self.model.closing
-        bodies = [*self._weighed()]
-        weighed = any(body.mass for body in bodies)
         with explained(tree.file):
             drivers = [
                 (JointAngle if isinstance(self.joints[name], Revolute) else JointDisplacement)(
@@ -128,12 +153,8 @@ class _Parts:
                 )
                 for name in self.driving.moves
             ]
-            mechanism = Mechanism(
-                *(tree.file.stem, bodies, [*self.joints.values()], [*self._points()], drivers),
-                [*self.couplers.values()],
-                gravity=tree.gravity if weighed else NO_GRAVITY,
-                forces=[*self._springs()],
-            )
+        mechanism = self.mechanism(drivers)
+        weighed = any(body.mass for body in mechanism.bodies)
         left_out = [*self.left_out, *(f"{what} ({n})" for what, n in tree.left_out.items())]
         heavy = ", with the masses of its bodies" * weighed
         others = ", ".join(left_out) or "nothing"
@@ -157,6 +178,18 @@ class _Parts:
                 " --closure",
             )
         return with_all_motions(case)
+
+    def mechanism(self, drivers: Sequence[Driver] = ()) -> Mechanism:
+        """Return the mechanism with all its rows."""
+        tree, bodies = self.tree, [*self._bodies()]
+        weighed = any(body.mass for body in bodies)
+        with explained(tree.file):
+            return Mechanism(
+                *(tree.file.stem, bodies, [*self.joints.values()], [*self._points()], drivers),
+                [*self.couplers.values()],
+                gravity=tree.gravity if weighed else NO_GRAVITY,
+                forces=[*self._springs()],
+            )
 
     def _unused(self, wanted: str) -> str:
         """Return an unused name: ties, moves and links of a model may share names."""
@@ -194,7 +227,7 @@ class _Parts:
                 self._couple(each)
             elif id(each) not in replaced:
                 name = self._unused(each.name)
-                self.joints[name] = _closed(each, name)
+                self.joints[name] = _joint_of(each, name)
         for spin in self.spins.values():
             if not spin.is_rod:
                 name = self._unused(f"{spin.move.inner}: no spin")
@@ -246,7 +279,7 @@ class _Parts:
             if body in moving:
                 yield Point(f"site {site}" if site in named else site, body, coordinates(place.at))
 
-    def _weighed(self) -> Iterator[Body]:
+    def _bodies(self) -> Iterator[Body]:
         """Yield the bodies with their masses.
 
         A rod that is a distance has its mass at its ends, which is right for its weight and not for
@@ -271,7 +304,7 @@ class _Parts:
             e0, e1, e2, e3 = (float(x) if abs(x) >= SMALLEST else 0.0 for x in place.turn)
             body = Body(name, coordinates(place.at), (e0, e1, e2, e3), name in self.fixed)
             if masses[name] and not body.fixed:
-                heavy = _weighed(body, together(masses[name]))
+                heavy = _with_mass(body, together(masses[name]))
                 if heavy is None:
                     unknown.add(name)
                 body = heavy or body
@@ -311,9 +344,7 @@ class _Parts:
             except MechanismError:
                 self.tree.count(strut.described)
 
-    def _spring_of(
-        self, move: Move, spring: Spring, law: Mapping[str, float]
-    ) -> ForceElement | None:
+    def _spring_of(self, move: Move, spring: Spring, law: Mapping[str, Any]) -> ForceElement | None:
         """Return the force element of a move; None of a locked one, whose spring does nothing."""
         if not move.is_axial:
             raise MechanismError("a spring of three turns, expected one of an axis")
@@ -358,7 +389,7 @@ def _locked(tree: Tree) -> set[str]:
     return found
 
 
-def _closed(closure: Closure, name: str) -> Joint:
+def _joint_of(closure: Closure, name: str) -> Joint:
     """Return the joint of a closure; a remaining gap is divided."""
     p, q = (place.at for place in closure.places)
     if closure.holds == "distance":
@@ -381,7 +412,7 @@ def _lump(rod: Mass, spin: Spin, masses: Mapping[str, list[Mass]]) -> bool:
     return True
 
 
-def _weighed(body: Body, mass: Mass) -> Body | None:
+def _with_mass(body: Body, mass: Mass) -> Body | None:
     """Return a body with a mass given in global axes; None if no rigid body has it, as no one has a
     moment of inertia alone.
     """

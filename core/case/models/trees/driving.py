@@ -16,9 +16,10 @@ import numpy as np
 from ....algebra import quat, vec
 from ....errors import CaseError, remedy, with_article
 from ....trajectory import Array
-from ...io.document import decimal, fault, shown, unknown_name, usable
+from ...io.document import decimal, fault, interval, measure, shown, unknown_name, usable
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
+from ...units import ANGLES, LENGTHS
 from .assembly import Assembled, Pose, Start, Value
 from .element import Element
 from .place import ORIGIN, Place, unit_quaternion
@@ -27,6 +28,8 @@ from .tree import UNKNOWNS, Move, Tree
 COORDINATES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}
 KEYFRAME = "keyframe:"
 SAMPLES = 41
+# A range of more turns without a unit is more likely in degrees than in radians.
+MANY_TURNS = 2.0
 # Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
 AT_REST = 1e-6
 # A move that has less of them may have it by the file's digits alone, which lead the mechanism
@@ -100,7 +103,11 @@ def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = N
 
     expected = COORDINATES[move.kind]
     try:
-        numbers = [decimal(each) for each in texts]
+        if key is None and move.is_axial:
+            units, bare = (ANGLES, "rad") if move.kind == "hinge" else (LENGTHS, "m")
+            numbers = [measure(each, units, bare)[0] for each in texts]
+        else:
+            numbers = [decimal(each) for each in texts]
     except ValueError:
         numbers = [math.nan]
     if len(numbers) != expected or not all(map(usable, numbers)):
@@ -188,8 +195,8 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
 def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
     """Return the move, its values, and how many were asked for; names may hold colons too."""
     form = (
-        "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates [rad, m], 2 to"
-        f" {MOST_SAMPLES} samples"
+        "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates, rad or m unless"
+        f" a unit is given, 2 to {MOST_SAMPLES} samples"
     )
 
     def error(problem: str) -> CaseError:
@@ -208,9 +215,10 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
         raise error(
             f"found {shown(text)}, expected {form}; say from where to where: {name}:START:STOP"
         )
-    samples = None
+    turns, samples, unit = tree.joints[name].kind == "hinge", None, ""
     try:
-        start, stop = map(decimal, numbers[:2])
+        units, bare = (ANGLES, "rad") if turns else (LENGTHS, "m")
+        (start, stop), unit = interval(numbers[:2], units, bare)
         if len(numbers) == 3:
             samples = int(numbers[2])
     except ValueError:
@@ -218,6 +226,14 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
     count = SAMPLES if samples is None else samples
     if not (math.isfinite(stop - start) and start != stop and 1 < count <= MOST_SAMPLES):
         raise error(f"found {shown(text)}, expected {form}; correct the numbers")
+    if turns and not unit and (count_of := abs(stop - start) / math.tau) > MANY_TURNS:
+        samples_of = "".join(f":{each}" for each in numbers[2:])
+        ends = ":".join(numbers[:2])
+        raise error(
+            f"{name} would turn {count_of:.3g} times from {start:g} to {stop:g} rad; write"
+            f" {name}:{ends}deg{samples_of} for degrees, or {name}:{ends}rad{samples_of} if radians"
+            " are meant"
+        )
     return name, np.linspace(start, stop, count), samples
 
 

@@ -152,7 +152,7 @@ class Element:
         text = self.attributes.get(name)
         if text is not None:
             advice = "expand its macros: xacro FILE" if "${" in text else "correct the attribute"
-            return self._parsed(text, counts, f"{name}: ", advice)
+            return self._parse(text, counts, f"{name}: ", advice)
         if default is None:
             raise self.fault(f"{name}: missing, expected {_numbers(counts)}; add the attribute")
         return tuple(default)
@@ -171,7 +171,7 @@ class Element:
         """
         if not self.text and default is not None:
             return tuple(default)
-        return self._parsed(self.text, counts, "", "correct the text")
+        return self._parse(self.text, counts, "", "correct the text")
 
     def value(self, tag: str, count: int) -> tuple[float, ...]:
         """Return the numbers of the child of a tag, in its text or its attribute; zeros without
@@ -197,7 +197,7 @@ class Element:
             raise self.fault(f"{name}: missing, expected a name; add the attribute")
         return found
 
-    def _parsed(
+    def _parse(
         self, text: str, counts: Sequence[int], before: str, advice: str
     ) -> tuple[float, ...]:
         try:
@@ -317,10 +317,15 @@ _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")
 
 
 def significant_digits(root: Element) -> int:
+    """Return `printed_digits` of a model; one without any is taken to have six."""
+    return printed_digits(root) or _FEWEST
+
+
+def printed_digits(root: Element) -> int:
     """Return the number of significant digits of the places of a model, without zeros at the end.
 
-    Numbers of six digits and more count, half of which have as many or more; a model without any is
-    taken to have six.
+    Numbers of six digits and more count, half of which have as many or more; 0 without any, whose
+    numbers are a designer's own.
     """
     counts: list[int] = []
     for element in root.below():
@@ -329,4 +334,4 @@ def significant_digits(root: Element) -> int:
         for found in map(_NUMBER.fullmatch, " ".join(texts).split()):
             if found and (count := len(found[1].replace(".", "").rstrip("0"))) >= _FEWEST:
                 counts.append(count)
-    return int(statistics.median(counts)) if counts else _FEWEST
+    return int(statistics.median(counts)) if counts else 0

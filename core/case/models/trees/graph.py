@@ -24,7 +24,7 @@ FIXED = (WORLD, GROUND)
 
 
 Freedom: TypeAlias = tuple[str, Kind, Vec3]
-"""End of a move's name, after its joint, its kind and its axis."""
+"""A move: the end of its name, which begins with its joint's, its kind and its axis."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Joint:
         return Joint(name, links, moves, element)
 
     @property
-    def reversed(self) -> Joint:
+    def reverse(self) -> Joint:
         """The same joint with the links exchanged; its coordinates keep their values."""
         moves = [replace(move, axis=-move.axis) for move in reversed(self.moves)]
         return replace(self, links=(self.links[1], self.links[0]), moves=moves)
@@ -120,7 +120,7 @@ class Graph:
         self.tree.require_moving(self.root)
         return self.tree
 
-    def spanned(self) -> tuple[list[Joint], list[Loop]]:
+    def spanning_tree(self) -> tuple[list[Joint], list[Loop]]:
         """Return the joints of a spanning tree, outer ones first, and the loops.
 
         The tree begins at the fixed links, then at links without a joint above them, then
@@ -144,7 +144,7 @@ class Graph:
                     other = joint.links[forward]
                     if id(joint) not in used and other not in reached:
                         used.add(id(joint))
-                        spanning.append(joint if forward else joint.reversed)
+                        spanning.append(joint if forward else joint.reverse)
                         reached.add(other)
                         waiting.append(other)
 
@@ -183,7 +183,7 @@ class _Hanging:
     def hang(self) -> None:
         """Hang all links, and tie them."""
         graph, tree = self.graph, self.tree
-        joints, loops = graph.spanned()
+        joints, loops = graph.spanning_tree()
         inner = {joint.links[1] for joint in joints}
         for name, place in graph.places.items():
             if name not in inner:

@@ -28,7 +28,7 @@ from .mjcf_language import (
     Classes,
     Compiler,
     direction,
-    expanded,
+    expand,
     read_compiler,
     require_known_attributes,
 )
@@ -72,7 +72,7 @@ def read_mjcf(file: Path, root: Element) -> Tree:
             or equality without a sense.
     """
     _require_model(root)
-    root = expanded(file, root)
+    root = expand(file, root)
     _require_model(root)
     require_known_attributes(root)
     _require_rigid(root)
@@ -156,6 +156,7 @@ class _Reader:
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
         driven = [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS]
         tree.actuated.update(filter(None, driven))
+        tree.degrees, tree.limited = self.compiler.degrees, self.compiler.limited
         if tree.masses:
             tree.gravity = self._gravity()
         return tree
@@ -500,7 +501,7 @@ def mass_of(
         element, at, _ = inertials[-1]
         found = _inertial(element)
         place = at.then(compiler.place(element))
-        return None if found.is_stand_in else _bounded(found.seen_in(place), compiler)
+        return None if found.is_stand_in else _within_bounds(found.seen_in(place), compiler)
     masses: list[Mass] = []
     for element, at, within in geoms if compiler.from_geoms != "false" else ():
         complete = classes.complete(element, "geom", within)
@@ -509,7 +510,7 @@ def mass_of(
     if not masses and any(compiler.least):
         # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
         masses.append(Mass(0.0, compiler.place(body).at, np.zeros((3, 3))))
-    return _bounded(together(masses), compiler) if masses else None
+    return _within_bounds(together(masses), compiler) if masses else None
 
 
 def _inertial(element: Element) -> Mass:
@@ -544,7 +545,7 @@ def _geom(element: Element, compiler: Compiler) -> Mass | None:
     return Mass(mass, ZERO, mass * np.diag(moments))
 
 
-def _bounded(found: Mass, compiler: Compiler) -> Mass:
+def _within_bounds(found: Mass, compiler: Compiler) -> Mass:
     """Return a mass within the bounds of the compiler."""
     if not (any(compiler.least) or compiler.balanced):
         return found

@@ -189,6 +189,7 @@ class Compiler:
         least: lower bounds of mass and principal moments [kg, kg m^2].
         balanced: principal moments that break the triangle inequality become their mean.
         total: mass of the whole model [kg]; negative for no such rule.
+        limited: a joint with a range is limited, unless it says otherwise.
     """
 
     degrees: bool = True
@@ -199,6 +200,7 @@ class Compiler:
     least: tuple[float, float] = (0.0, 0.0)
     balanced: bool = False
     total: float = -1.0
+    limited: bool = True
 
     def angle(self, value: float) -> float:
         """Return an angle of the file [rad]."""
@@ -308,6 +310,7 @@ def read_compiler(root: Element) -> Compiler:
             (element.number("boundmass", mass), element.number("boundinertia", moment)),
             element.flag("balanceinertia", default=found.balanced),
             element.number("settotalmass", found.total),
+            element.flag("autolimits", default=found.limited),
         )
     return found
 
@@ -346,7 +349,7 @@ class _Expansion:
         for child in around.children:
             match child.tag:
                 case "include":
-                    found += self.children(self._included(child), depth + 1)
+                    found += self.children(self._include(child), depth + 1)
                 case "replicate" if self.compiler is not None:
                     inside = self.children(child, depth + 1)
                     found += self._copies(child, inside, self.compiler)
@@ -359,7 +362,7 @@ class _Expansion:
                 raise child.too_many()
         return found
 
-    def _included(self, element: Element) -> Element:
+    def _include(self, element: Element) -> Element:
         element.require_known(("file",))
         name = element.attributes.get("file", "")
         folder = self.root.parent.resolve()
@@ -412,8 +415,8 @@ class _Expansion:
         own = {key: text for key, text in element.attributes.items() if key == "childclass"}
         for k in range(count):
             place = Place(at, compiler.euler([k * angle for angle in turn]))
-            named = [_renamed(each, f"{separator}{k:0{digits}}") for each in inside]
-            attributes = {"pos": _written(place.at), "quat": _written(place.turn), **own}
+            named = [_with_suffix(each, f"{separator}{k:0{digits}}") for each in inside]
+            attributes = {"pos": _text(place.at), "quat": _text(place.turn), **own}
             yield replace(element, tag="frame", attributes=attributes, children=named)
             at = place.point(offset)
 
@@ -425,18 +428,18 @@ def _near(file: Path, folder: Path) -> bool:
     return file.is_relative_to(folder) or (beside and file.is_relative_to(around))
 
 
-def _written(values: Iterable[float]) -> str:
+def _text(values: Iterable[float]) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
-def _renamed(element: Element, suffix: str) -> Element:
+def _with_suffix(element: Element, suffix: str) -> Element:
     own = element.attributes
     name = {"name": own["name"] + suffix} if own.get("name") else {}
-    children = [_renamed(each, suffix) for each in element.children]
+    children = [_with_suffix(each, suffix) for each in element.children]
     return replace(element, attributes={**own, **name}, children=children)
 
 
-def expanded(file: Path, root: Element) -> Element:
+def expand(file: Path, root: Element) -> Element:
     """Return the model without includes and replicates.
 
     Raises:

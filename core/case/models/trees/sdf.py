@@ -128,7 +128,7 @@ class Frames:
         name = element.attributes.get("name", "")
         if not name or SCOPE in name or name in (WORLD, MODEL):
             raise element.fault(f"name: found {shown(name)}, expected a name of its own; give one")
-        full = _joined(scope, name)
+        full = _full_name(scope, name)
         if full in self.found:
             raise element.repeated_name(name, "them")
         self.found[full] = Framed(element, scope, default, attached)
@@ -228,7 +228,7 @@ class Frames:
         """
         element = self.found[model].element
         if name := element.attributes.get("canonical_link", ""):
-            return _joined(model, name)
+            return _full_name(model, name)
         for full, each in (*self.links.items(), *self.models.items()):
             if each.scope == model:
                 return full
@@ -248,10 +248,10 @@ def within(scope: str, name: str) -> str:
     """
     if name == MODEL:
         return scope
-    return "" if name == WORLD else _joined(scope, name)
+    return "" if name == WORLD else _full_name(scope, name)
 
 
-def _joined(scope: str, name: str) -> str:
+def _full_name(scope: str, name: str) -> str:
     return f"{scope}{SCOPE}{name}" if scope else name
 
 

@@ -225,6 +225,8 @@ class Tree:
         actuated: moves with a motor.
         keyframes: by name.
         left_out: numbers of parts without a meaning for kinematics, by name.
+        dialect: root element of its file.
+        degrees, limited: of MJCF, limits are in degrees, and ranges are limits unless said.
     """
 
     file: Path
@@ -249,6 +251,9 @@ class Tree:
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
     names: Names = field(default_factory=Names)
+    dialect: str = ""
+    degrees: bool = False
+    limited: bool = True
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:

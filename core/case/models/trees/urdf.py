@@ -285,7 +285,7 @@ class _Robot:
         joint = Joint.of(name, (links[0], links[1]), first.at, freedoms, element)
         if ball:
             return Loop(joint, (Place(first.at, IDENTITY), Place(second.at, IDENTITY)))
-        return Loop(joint, (_fitted(first, second, joint.moves), second))
+        return Loop(joint, (_frame_behind(first, second, joint.moves), second))
 
     def _gazebo(self) -> Frames:
         """Add the joints of SDF in <gazebo>, which close loops; return all frames.
@@ -381,7 +381,7 @@ def _axis(element: Element, tag: str, place: Place) -> Vec3:
     return place.direction(direction(child, child.numbers("xyz", 3)))
 
 
-def _fitted(first: Place, second: Place, moves: Sequence[Move]) -> Place:
+def _frame_behind(first: Place, second: Place, moves: Sequence[Move]) -> Place:
     """Return the first frame of a loop, moved by the joint's own moves to the second one.
 
     The rest between both is the gap of the loop.

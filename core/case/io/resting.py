@@ -1,0 +1,88 @@
+"""Cases at the resting pose of their mechanism, the table [equilibrium]."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...algebra import Vec3
+from ...errors import CaseError, MechanismError
+from ...jet import Jet
+from ...joints.base import unit
+from ...kinematics import Equilibria, StaticModel
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import JointDriver, Motion, PointCoordinate, Ramp, Table
+from ...trajectory import Array
+from ..case import TIME, Case, Sweep
+from ..compliance import Resting
+from ..measures import JointAngle, JointDisplacement
+
+_COORDINATES: Any = {"rotation": JointAngle, "translation": JointDisplacement}
+
+
+def at_rest(case: Case, resting: Resting) -> Case:
+    """Return the case at rest: its free drivers follow the equilibrium with gravity and springs.
+
+    The native engine finds the poses, at each value of a held driver that is swept, else one. All
+    engines then have the same poses and find the efforts, which vanish for free drivers.
+
+    Raises:
+        CaseError: a driver that moves is free.
+        SolveError: there is no equilibrium near the design, or nothing holds a body.
+    """
+    mechanism, sweep = case.mechanism, case.sweep
+    moving = {*sweep.motions, sweep.driver} - {TIME}
+    if loose := sorted(moving - {*resting.held}):
+        raise CaseError(
+            f"case {case.name!r}: driver {loose[0]!r} moves, and [equilibrium] leaves it free; name"
+            " it in held, or take its motion and sweep out"
+        )
+    held = [each for each in mechanism.drivers if each.name in resting.held]
+    free = [each for each in mechanism.drivers if each.name not in resting.held]
+    path = replace(sweep, rate=sweep.rate or 1.0).path
+    travel = {
+        name: motion.at(path.times)[0] for name, motion in path.motions.items() if name != TIME
+    }
+    model = StaticModel(replace(mechanism, drivers=held))
+    found = model.solve({}, travel or {})
+    found.require_reached(lambda k, share: f"sample {k}, {share:.6g} of its travel")
+    values = {each.name: _values(mechanism, each, found) for each in free}
+    unstable = [
+        f"the resting pose is unstable: {way}" for way in dict.fromkeys(found.unstable) if way
+    ]
+    motions: dict[str, Motion] = {}
+    if not travel:
+        motions = {name: Ramp(float(x[0])) for name, x in values.items()}
+        at = Sweep(TIME, np.ones(1), 0.0, motions=motions)
+    else:
+        motions = {name: _through(path.times, x) for name, x in values.items()}
+        at = replace(sweep, rate=0.0, motions={**sweep.motions, **motions})
+    return replace(case, sweep=at, assembly=(*case.assembly, *unstable))
+
+
+def _through(times: Array, values: Array) -> Motion:
+    order = np.argsort(times)
+    known, first = np.unique(times[order], return_index=True)
+    if len(known) < 2:
+        raise MechanismError("a swept equilibrium needs two samples or more; give more, or none")
+    return Table(tuple(known.tolist()), tuple(values[order][first].tolist()))
+
+
+def _values(mechanism: Mechanism, driver: Any, found: Equilibria) -> Array:
+    """Return a driver's values from design at equilibria [m or rad], shape (n,)."""
+    if isinstance(driver, PointCoordinate):
+        point = mechanism.point(driver.point)
+        moved = found.place(point.body, point.position) - np.array(point.position)
+        return moved @ np.array([*unit(driver.direction)])
+    assert isinstance(driver, JointDriver)
+    measure = _COORDINATES[driver.freedom](driver.name, 0.0, 0.0, "", joint=driver.joint)
+    at, design = dict[str, Vec3](), dict[str, Vec3]()
+    for point in measure.markers(mechanism):
+        place = found.place(point.body, point.position)
+        still = np.zeros(len(place))
+        at[point.name] = Vec3(*(Jet(place[:, k], still, still) for k in range(3)))
+        zero = np.zeros(())
+        design[point.name] = Vec3(*(Jet(np.array(x), zero, zero) for x in point.position))
+    return np.asarray(measure.of(at, design).x)

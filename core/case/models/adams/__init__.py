@@ -1,0 +1,1 @@
+"""Datasets of Adams Solver (.adm), read into cases."""

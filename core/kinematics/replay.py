@@ -1,0 +1,341 @@
+"""Replay: the native rows at poses, velocities and accelerations that something else computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SolveError, UnknownNameError
+from ..mechanism.mechanism import GROUND, Mechanism
+from ..mechanism.motions import Path
+from ..trajectory import QUANTITIES, Array, BodyMotion, Trajectory
+from .forces.reactions import ForceRows, MotionLanes
+from .formulation.cartesian import Cartesian
+from .formulation.constraints import Constraint, frames
+from .formulation.formulation import Relation
+
+WIDTHS = {"poses": 7, "velocities": 6, "accelerations": 6}
+"""Numbers of a body, by argument of `residuals`."""
+TURN = 2.0 * np.pi
+# Angles are this near to zero at one sample as at another: rounding must not decide [rad].
+NEAR = 1e-3
+# Lanes at once: some 10 kB each for twenty bodies.
+MOST_LANES = 20_000
+# Divides what is left where nothing is allowed: far below all rounding.
+SMALLEST = 1e-100
+
+
+@dataclass(frozen=True, eq=False)
+class Worst:
+    """The row and sample farthest out of what is allowed.
+
+    Attributes:
+        value, allowed: what is left, and what is allowed [m, m/s or m/s^2].
+    """
+
+    joint: str
+    bodies: tuple[str, ...]
+    sample: int
+    value: float
+    allowed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """What poses, velocities and accelerations leave of the native rows over n samples.
+
+    Lengths are in metres; angles are times the mechanism's unit of length, near its size.
+
+    Attributes:
+        joints, bodies: joint (or coupler, or driver) and moving bodies of each row.
+        position, velocity, acceleration: phi, J v - nu and J a - gamma, shape (n, rows); None
+            without these rates.
+        allowed: by quantity, what printed digits allow, shape (n, rows); empty without digits.
+        not_judged: joints that need a body without poses, and the body.
+    """
+
+    joints: Sequence[str]
+    bodies: Sequence[tuple[str, ...]]
+    position: Array
+    velocity: Array | None
+    acceleration: Array | None
+    allowed: Mapping[str, Array]
+    not_judged: Mapping[str, str]
+
+    def worst(self, quantity: str, tolerance: float = 0.0) -> Worst | None:
+        """Return the row and sample with the largest residual over what is allowed.
+
+        None without rows or rates.
+
+        Args:
+            tolerance: allowed beside the digits [m, m/s or m/s^2].
+        """
+        left: Array | None = getattr(self, quantity)
+        if left is None or not np.isfinite(left).any():
+            return None
+        allowed = tolerance + self.allowed.get(quantity, np.zeros(left.shape))
+        ratio = np.abs(left) / np.maximum(allowed, SMALLEST)
+        k, row = divmod(int(np.nanargmax(ratio)), left.shape[1])
+        found = abs(float(left[k, row])), float(allowed[k, row])
+        return Worst(self.joints[row], self.bodies[row], k, *found)
+
+
+def residuals(
+    mechanism: Mechanism,
+    poses: Mapping[str, ArrayLike],
+    velocities: Mapping[str, ArrayLike] | None = None,
+    accelerations: Mapping[str, ArrayLike] | None = None,
+    *,
+    digits: Mapping[str, ArrayLike] | None = None,
+) -> Residuals:
+    """Return what poses from elsewhere leave of the native rows of joints and couplers.
+
+    Drivers are not judged. A joint is judged if both its bodies have poses, or are fixed.
+
+    Args:
+        poses: by body, at n samples: origin, global [m], and Euler parameters e0..e3 of body ->
+            global, shape (n, 7). NaN at samples without a pose.
+        velocities: of the same bodies: velocity of the origin, global [m/s], and angular velocity
+            in the body's axes [rad/s], shape (n, 6); as `BodyMotion.v`.
+        accelerations: likewise, their rates [m/s^2, rad/s^2], shape (n, 6); as `BodyMotion.a`.
+        digits: by body, how far each of these numbers may be off, such as half a unit of its last
+            printed digit: shape (n, 7), or (n, 13) and (n, 19) with velocities and accelerations.
+
+    Raises:
+        SolveError: a shape is wrong, or there is no pose.
+        UnknownNameError: there is no such body.
+    """
+    given = {"poses": poses, "velocities": velocities, "accelerations": accelerations}
+    tables = {what: each for what, each in given.items() if each is not None}
+    if accelerations is not None and velocities is None:
+        raise SolveError("residuals: accelerations need velocities; give both")
+    known = [body.name for body in mechanism.moving]
+    motions: dict[str, BodyMotion] = {}
+    moved: dict[str, list[BodyMotion]] = {}
+    count = len(np.asarray(next(iter(poses.values()), ())))
+    for name in poses:
+        if name not in known:
+            raise UnknownNameError("moving body", name, known)
+        each = [_table(what, name, tables[what], (count, WIDTHS[what])) for what in tables]
+        numbers = np.hstack(each)
+        motions[name] = _motion(numbers)
+        if digits and name in digits:
+            half = _table("digits", name, digits, numbers.shape)
+            moved[name] = [_motion(numbers + half * row) for row in np.eye(numbers.shape[1])]
+    return replayed(mechanism, motions, moved)
+
+
+def _table(what: str, name: str, given: Mapping[str, ArrayLike], shape: tuple[int, ...]) -> Array:
+    found = np.asarray(given.get(name, ()), dtype=np.float64)
+    if found.shape != shape:
+        raise SolveError(
+            f"residuals: {what} of body {name!r} have shape {found.shape}, expected {shape}: a row"
+            " for each sample"
+        )
+    return found
+
+
+def _motion(numbers: Array) -> BodyMotion:
+    r, p, v, a = np.split(numbers, [3, 7, 13], axis=1)
+    p = p / np.linalg.norm(p, axis=1)[:, None]
+    return BodyMotion(r, p, v if v.size else None, a if a.size else None)
+
+
+def replayed(
+    mechanism: Mechanism,
+    motions: Mapping[str, BodyMotion],
+    moved: Mapping[str, Sequence[BodyMotion]] | None = None,
+) -> Residuals:
+    """Return what motions of bodies leave of the native rows; see `residuals`.
+
+    Args:
+        motions: by body; rates are judged as far as all bodies have them.
+        moved: by body, its motion after each recorded number is moved by half its last digit.
+
+    Raises:
+        SolveError: there is no motion.
+    """
+    if not motions:
+        raise SolveError("residuals: there is no pose of a body; give those of some")
+    part, not_judged = judged_part(mechanism, motions)
+    orders = min(1 + (m.v is not None) * (1 + (m.a is not None)) for m in motions.values())
+    rows = _Rows(part, orders)
+    with np.errstate(invalid="ignore"):
+        left = rows.left(motions)
+        limits = rows.changes(motions, left, moved) if moved else []
+    position, *rates = left
+    velocity, acceleration = (*rates, None, None)[:2]
+    names = [mechanism.given_name(owner) for owner, _ in rows.formulation.owners]
+    allowed: dict[str, Array] = dict(zip(QUANTITIES, limits, strict=False))
+    found = position, velocity, acceleration
+    return Residuals(names, rows.bodies, *found, allowed, not_judged)
+
+
+def judged_part(mechanism: Mechanism, known: Iterable[str]) -> tuple[Mechanism, dict[str, str]]:
+    """Return the mechanism of the known bodies, without drivers and loads, and the joints that need
+    another body, with its name.
+    """
+    names = {*known, *(body.name for body in mechanism.bodies if body.fixed), GROUND}
+    without = {
+        each.name: next((body for body in each.bodies if body not in names), "")
+        for each in mechanism.joints
+    }
+    without |= {
+        each.name: next((without[name] for name in each.joints if without[name]), "")
+        for each in mechanism.couplers
+    }
+    part = replace(
+        mechanism,
+        bodies=[each for each in mechanism.bodies if each.name in names],
+        joints=[each for each in mechanism.joints if not without[each.name]],
+        couplers=[each for each in mechanism.couplers if not without[each.name]],
+        points=[each for each in mechanism.points if each.body in names],
+        **dict.fromkeys(("drivers", "forces", "reduced"), ()),
+    )
+    return part, {mechanism.given_name(name): body for name, body in without.items() if body}
+
+
+def count_turns(angle: Array) -> Array:
+    """Return an angle known up to whole turns [rad], counted from sample to sample, from the first
+    that is as near to zero as any.
+    """
+    whole = np.unwrap(angle)
+    off = np.abs(np.sin(0.5 * whole))
+    first = np.flatnonzero(off <= off.min(initial=1.0) + NEAR)[:1]
+    return whole - TURN * np.round(whole[first] / TURN)
+
+
+class _Rows:
+    """The native rows of a mechanism without drivers, and of their rates as far as wanted."""
+
+    def __init__(self, mechanism: Mechanism, orders: int) -> None:
+        self.mechanism, self.orders = mechanism, orders
+        self.turns: dict[str, Array] = {}
+        self.formulation = Cartesian.of(mechanism, frames(mechanism))
+        self.bodies = [self._bodies(c) for _, c in _numbered(self.formulation)]
+
+    def _bodies(self, c: Constraint | Relation) -> tuple[str, ...]:
+        """Return the moving bodies of a row."""
+        pair = [c.i, c.j] if isinstance(c, Constraint) else []
+        for name in () if isinstance(c, Constraint) else c.weights:
+            pair += self.mechanism.joint(name.rpartition(".")[0]).bodies
+        return tuple(dict.fromkeys(b for b in pair if b in self.formulation.columns))
+
+    def left(self, motions: Mapping[str, BodyMotion]) -> list[Array]:
+        """Return what motions leave of the rows, shape (n, rows) each [m, m/s, m/s^2]."""
+        count = len(next(iter(motions.values())).r)
+        none = np.zeros((count, 6))
+        rated = {
+            name: BodyMotion(m.r, m.p, none if m.v is None else m.v, none if m.a is None else m.a)
+            for name, m in motions.items()
+        }
+        solved, path = np.ones(count, dtype=np.bool_), Path({}, np.zeros(count))
+        still = Trajectory({}, solved, np.zeros(count, dtype=np.int64), 0.0, bodies=rated)
+        lines = ForceRows(MotionLanes(self.mechanism, path, still))
+        f, states, unit = lines.formulation, lines.lanes.at, lines.lanes.frame.unit
+        at = f.configuration(self._turned({**lines.equations.at.state}))
+        found = [f.phi(at)]
+        if self.orders > 1:
+            rows = f.rows(at)
+            v = [x for k in f.bodies for x in (*states.twists[k].v, *states.twists[k].w)]
+            own, velocity = _less(f, f.nu(at), rows, v)
+            found.append(velocity)
+            if self.orders > 2:
+                a = [states.accelerations[k] for k in f.bodies]
+                a = [x for each in a for x in (*each.v_t, *each.w_t)]
+                found.append(_less(f, f.gamma(at, [*v, *own]), rows, a)[1])
+        return [unit * lines.stacked(each) if each else np.zeros((count, 0)) for each in found]
+
+    def _turned(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return a state with all turns of coupled joints: poses tell an angle up to whole turns,
+        which follow from sample to sample, from the one nearest to the design.
+        """
+        for key in [f"x {name}" for name in self.formulation.coordinates if "rotation" in name]:
+            (x,) = state[key]
+            if key not in self.turns:
+                there = np.flatnonzero(np.isfinite(x))
+                self.turns[key] = np.zeros(len(x))
+                self.turns[key][there] = count_turns(x[there])
+            around = np.resize(self.turns[key], len(x))
+            state[key] = (x - TURN * np.round((x - around) / TURN),)
+        return state
+
+    def changes(
+        self,
+        motions: Mapping[str, BodyMotion],
+        left: Sequence[Array],
+        moved: Mapping[str, Sequence[BodyMotion]],
+    ) -> list[Array]:
+        """Return what moved numbers change in the rows, summed over the numbers."""
+        found = [np.zeros_like(each) for each in left]
+        at_once = max(1, MOST_LANES // len(left[0]))
+        for group in self._apart([name for name in moved if name in motions]):
+            most = max(len(moved[name]) for name in group)
+            for first in range(0, most, at_once):
+                columns = range(first, min(first + at_once, most))
+                lanes = {
+                    name: _joined(
+                        [
+                            moved[name][k] if name in group and k < len(moved[name]) else motion
+                            for k in columns
+                        ]
+                    )
+                    for name, motion in motions.items()
+                }
+                for total, x, y in zip(found, self.left(lanes), left, strict=True):
+                    total += np.abs(x.reshape(len(columns), *y.shape) - y).sum(axis=0)
+        return found
+
+    def _apart(self, names: Sequence[str]) -> list[list[str]]:
+        """Return groups of bodies; two of a group share no row, and are moved together."""
+        groups: list[list[str]] = []
+        for name in names:
+            beside = {other for row in self.bodies if name in row for other in row}
+            group = next((each for each in groups if beside.isdisjoint(each)), None)
+            if group is None:
+                groups.append(group := [])
+            group.append(name)
+        return groups
+
+
+def _numbered(formulation: Cartesian) -> Iterator[tuple[int, Constraint | Relation]]:
+    """Yield number and constraint of every row."""
+    every = (
+        c
+        for c in formulation.constraints
+        for _ in range(c.primitive.n if isinstance(c, Constraint) else 1)
+    )
+    yield from enumerate(every)
+
+
+def _joined(motions: Sequence[BodyMotion]) -> BodyMotion:
+    """Return the lanes of several motions, one after the other."""
+    parts = [[getattr(each, key) for each in motions] for key in ("r", "p", "v", "a")]
+    return BodyMotion(*(None if each[0] is None else np.concatenate(each) for each in parts))  # pyright: ignore[reportArgumentType]
+
+
+def _less(
+    formulation: Cartesian,
+    right: Sequence[Any],
+    rows: Sequence[Mapping[int, Any]],
+    rates: Sequence[Any],
+) -> tuple[list[Any], list[Any]]:
+    """Return the rates of the joints' coordinates, by their measuring rows, and J times all rates
+    less the right-hand sides.
+    """
+    bodies = len(rates)
+    left = [
+        sum((x * rates[c] for c, x in row.items() if c < bodies), -b)
+        for row, b in zip(rows, right, strict=True)
+    ]
+    own: list[Any] = [0.0] * (formulation.unknowns - bodies)
+    for k, c in _numbered(formulation):
+        if isinstance(c, Constraint) and c.coordinate:
+            column = formulation.coordinates[c.coordinate]
+            own[column - bodies] = -left[k] / rows[k][column]
+    coordinates = (sum(x * own[c - bodies] for c, x in row.items() if c >= bodies) for row in rows)
+    return own, [x + y for x, y in zip(left, coordinates, strict=True)]

@@ -1,0 +1,1 @@
+"""Statics: equilibria of mechanisms with springs, bushings and loads, and their compliance."""

@@ -1,0 +1,358 @@
+"""Equilibria along a path of loads and travel, from the design position.
+
+Two walks lead to an equilibrium, all lanes together and each with its own steps. The first takes
+away the unbalance at design (weight, springs, preload); the second brings loads and travel
+in proportion. A step is accepted if
+
+- Newton's corrections contract as Kantorovich's theorem asks,
+- the determinant of the tangent keeps the signs of its blocks, and
+- points between its ends are near the path too, with the same signs.
+
+Otherwise it is halved. So no walk leaps over a turning point of the load to an equilibrium far
+away: there the stiffness has another sign between the ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...algebra import quat, vec
+from ...errors import SolveError
+from ...mechanism.mechanism import Mechanism
+from ...primitives.base import Pose
+from ...program.llvm.compiler import available
+from ...program.llvm.executor import Executor, bind
+from ...program.llvm.jit import LlvmCode, make_loops_ready
+from ...trajectory import Array, BodyMotion
+from ..formulation.cartesian import COLUMNS
+from .equations import (
+    BY,
+    DRIVE,
+    EFFORTS,
+    LOAD,
+    MULTIPLIERS,
+    REST,
+    SIGNS,
+    STEP,
+    LoadPoint,
+    motion_of,
+    null_space,
+    put_design,
+    static_equations,
+)
+
+Lanes = NDArray[np.bool_]
+
+# Newton's theorem (Kantorovich): if the second correction is at most a quarter of the first, a
+# solution is near, is the only one there, and moves continuously to the start of the step.
+CONTRACTION = 0.25
+# Corrections are in units of the mechanism's size and in radians. Below the first number the next
+# one is round-off, as it is the square; stiff bushings beside soft ones raise the round-off.
+SETTLED, ROUND_OFF = 1e-8, 1e-13
+# Steps of larger corrections are looked at in three places, others in their middle.
+LONG = 1e-2
+MOST_ITERATIONS = 12
+# Steps are halved to this part of the way so far. A turning point is then known to eleven digits.
+SHORTEST = 2.0**-36
+# The round-off of eigenvalues, as a part of the largest.
+NEGATIVE = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibria:
+    """Equilibria at n samples, or the last ones on the way.
+
+    Attributes:
+        reached: whether the walk came to the end, shape (n,).
+        share: the last part of loads and travel in equilibrium, shape (n,).
+        bodies: poses of the moving bodies at the last equilibrium.
+        efforts: of held drivers [N or N m], shape (n,).
+        by_load: derivatives by force and torque at each load: of the motion of each body's internal
+            origin [m/N, rad/N, ...], shape (n, unknowns, 6), and of efforts, shape (n, drivers, 6).
+        by_driver: the same by each held driver, shape (n, unknowns) and (n, drivers).
+        least: smallest eigenvalue of the reduced stiffness over the largest, shape (n,).
+        unstable: the motion away by itself, by sample; empty for a stable equilibrium.
+        iterations: Newton iterations, shape (n,).
+    """
+
+    model: StaticModel
+    reached: Lanes
+    share: Array
+    bodies: Mapping[str, BodyMotion]
+    states: Mapping[str, Array]
+    efforts: Mapping[str, Array]
+    by_load: Mapping[str, tuple[Array, Array]]
+    by_driver: Mapping[str, tuple[Array, Array]]
+    least: Array
+    unstable: Sequence[str]
+    iterations: NDArray[np.int64]
+
+    def place(self, body: str, position: Sequence[float]) -> Array:
+        """Return a point of a body, given at design [m], shape (n, 3)."""
+        frame = self.model.equations.frame
+        arm = frame.arm(body, position)
+        if body not in self.model.equations.columns:
+            return np.tile(np.array(position), (len(self.share), 1))
+        pose = self._pose(body)
+        moved = frame.unit * (pose.u + pose.swing(arm))
+        return np.array(position) + np.stack([x + np.zeros(len(self.share)) for x in moved], axis=1)
+
+    def turned(self, body: str, direction: Sequence[float]) -> Array:
+        """Return a direction fixed in a body, given at design [-], shape (n, 3)."""
+        found = self._pose(body).turn(vec(direction))
+        return np.stack([x + np.zeros(len(self.share)) for x in found], axis=1)
+
+    def motion(self, step: Array, body: str, position: Sequence[float]) -> Array:
+        """Return the motion of a point and the turn of its body [m, rad], shape (n, 6, ...), for
+        motions of the unknowns, shape (n, unknowns, ...).
+        """
+        equations = self.model.equations
+        found = np.zeros((len(step), 6, *step.shape[2:]))
+        if body in equations.columns:
+            first = equations.columns[body]
+            pose = self._pose(body)
+            arm = pose.turn(equations.frame.arm(body, position))
+            reach = equations.frame.unit * np.stack([x + np.zeros(len(step)) for x in arm], axis=1)
+            own = step[:, first : first + COLUMNS]
+            found[:, 3:] = own[:, 3:]
+            turns = np.moveaxis(own[:, 3:], 1, -1)
+            swept = np.cross(turns, reach.reshape(len(step), *(1,) * (step.ndim - 2), 3))
+            found[:, :3] = equations.frame.unit * own[:, :3] + np.moveaxis(swept, -1, 1)
+        return found
+
+    def _pose(self, body: str) -> Pose:
+        u, q = self.states[f"u {body}"], self.states[f"q {body}"]
+        return Pose.of(vec([*u]), quat([*q]))
+
+    def require_reached(self, what: Callable[[int, float], str]) -> None:
+        """Raise SolveError with the last equilibrium of the first sample out of reach.
+
+        Args:
+            what: describes a sample's loads and travel, at a share of them.
+        """
+        if self.reached.all():
+            return
+        k = int(np.argmin(self.reached))
+        raise SolveError(
+            f"no equilibrium at {what(k, 1.0)}: the last is at {what(k, float(self.share[k]))},"
+            " where the path turns back (snap-through) or meets another one; give smaller loads or"
+            " travel, or stiffer springs"
+        )
+
+
+class StaticModel:
+    """A mechanism ready for statics. Its drivers are held; `Mechanism.released` has bushings in
+    place of joints.
+
+    Raises:
+        SolveError: nothing holds a body, or weight and springs have no equilibrium near the design.
+    """
+
+    def __init__(self, mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> None:
+        self.mechanism, self.equations = mechanism, static_equations(mechanism, loads)
+        self.drivers = [each.name for each in mechanism.drivers]
+        vectors = self.equations.vectors
+        names = [*self.equations.design, MULTIPLIERS]
+        self._state = [slot for name in names for slot in vectors[name]]
+        self._tests = [self.equations.plan.slots[name] for name in (STEP, SIGNS)]
+        if compiled := available():
+            make_loops_ready()
+        self._code = LlvmCode(self.equations.plan) if compiled else None
+
+    def executor(self, lanes: int) -> Executor:
+        """Return the programs bound to lanes at design."""
+        made = bind(self.equations.plan, lanes, self._code)
+        put_design(made, self.equations.vectors, self.equations.design, self.drivers)
+        made.put(self.equations.vectors[MULTIPLIERS], self.equations.multipliers[:, None])
+        return made
+
+    @cached_property
+    def rest(self) -> tuple[Array, float]:
+        """State and multipliers in equilibrium without loads and travel, and the share of weight
+        and springs at the end of the walk: one, unless there is no such equilibrium.
+        """
+        executor = self.executor(1)
+        share, _ = self._walk(executor, partial(self._put_rest, executor))
+        return executor.get(self._state), float(share[0])
+
+    def _put_rest(self, executor: Executor, share: Array) -> None:
+        left = self.equations.rest[:, None]
+        executor.put(self.equations.vectors[REST], (1.0 - share) * left)
+
+    def solve(
+        self, loads: Mapping[str, Array], travel: Mapping[str, Array], *, slopes: bool = True
+    ) -> Equilibria:
+        """Return the equilibria of samples.
+
+        Args:
+            loads: force and torque by load point [N, N m], shape (n, 6).
+            travel: values of held drivers from design [m or rad], shape (n,). Without loads and
+                travel there is one sample.
+            slopes: whether to compute compliance and stability.
+        """
+        n = next((len(each) for each in (*loads.values(), *travel.values())), 1)
+        executor, vectors = self.executor(n), self.equations.vectors
+        state, settled = self.rest
+        if settled == 1.0:
+            executor.put(self._state, state)
+        elif not any(np.any(values) for values in loads.values()):
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: no equilibrium at rest; from the design"
+                f" position it follows {settled:.3g} of its weight and of its springs' forces;"
+                " correct free lengths and preloads, hold a driver, or give loads"
+            )
+
+        def put(share: Array) -> None:
+            if settled < 1.0:  # only loads hold it: they come with weight and springs
+                self._put_rest(executor, share)
+            for name, values in loads.items():
+                executor.put(vectors[f"{LOAD}{name}"], share * np.asarray(values).T)
+            for name, values in travel.items():
+                executor.put(vectors[f"{DRIVE}{name}"], self._drive(name, share * values))
+
+        share, iterations = self._walk(executor, put)
+        executor.run("compliance")
+        return self._read(executor, share, iterations, slopes)
+
+    def _drive(self, name: str, values: Array) -> Array:
+        if self.mechanism.driver(name).turns:
+            return np.array([values, np.cos(0.5 * values), np.sin(0.5 * values)])
+        still = np.zeros(len(values))
+        return np.array([values / self.equations.frame.unit, 1.0 + still, still])
+
+    def _walk(
+        self, executor: Executor, put: Callable[[Array], None]
+    ) -> tuple[Array, NDArray[np.int64]]:
+        """Walk from share zero to one; return the last share in equilibrium, and iterations."""
+        n = executor.lanes
+        share, step, count = np.zeros(n), np.ones(n), np.zeros(n, np.int64)
+        put(share)
+        state = executor.get(self._state)
+        executor.run("newton")  # for the signs at the start, where its correction is round-off
+        signs = executor.get(self._tests)[1]
+        executor.put(self._state, state)
+        while (active := (share < 1.0) & (step >= SHORTEST * np.maximum(share, SHORTEST))).any():
+            target = np.where(active, np.minimum(1.0, share + step), share)
+            put(target)
+            accepted, used, first = self._newton(executor, signs)
+            accepted &= active
+            found = executor.get(self._state)
+            longest = first[accepted].max(initial=0.0)
+            for part in (0.5, 0.25, 0.75)[: 3 if longest > LONG else 1 if longest > SETTLED else 0]:
+                put(share + part * (target - share))
+                executor.put(self._state, state + part * (found - state))
+                executor.run("newton")
+                size, at_part = executor.get(self._tests)
+                accepted &= (size <= CONTRACTION * first + SETTLED) & (at_part == signs)
+                used += 1
+            count += np.where(active, used, 0)
+            state = np.where(accepted, found, state)
+            executor.put(self._state, state)
+            share = np.where(accepted, target, share)
+            step = np.where(accepted, 2.0 * step, 0.5 * step)
+        put(share)
+        return share, count
+
+    def _newton(self, executor: Executor, signs: Array) -> tuple[Lanes, NDArray[np.int64], Array]:
+        """Return the lanes with an equilibrium by contracting corrections, the iterations, and the
+        size of the first correction.
+        """
+        n = executor.lanes
+        first = np.full(n, np.nan)
+        last, used = np.full(n, np.inf), np.zeros(n, np.int64)
+        good, settled = np.ones(n, np.bool_), np.zeros(n, np.bool_)
+        for _ in range(MOST_ITERATIONS):
+            executor.run("newton")
+            size, found = executor.get(self._tests)
+            first = np.where(np.isnan(first), size, first)
+            used += good & ~settled
+            slow = ~(size <= CONTRACTION * last)
+            settled |= good & (size <= SETTLED) & (slow | (size <= ROUND_OFF)) & (found == signs)
+            good &= settled | ~(slow & ~((size <= SETTLED) & (found == signs)))
+            last = size
+            if (settled | ~good).all():
+                break
+        return good & settled, used, first
+
+    def _read(
+        self, executor: Executor, share: Array, iterations: NDArray[np.int64], slopes: bool
+    ) -> Equilibria:
+        equations, n = self.equations, len(share)
+
+        def get(name: str) -> Array:
+            return executor.get(equations.vectors[name])
+
+        states = {name: get(name) for name in equations.design}
+        m = len(self.drivers)
+        efforts = get(EFFORTS) if m else np.empty((0, n))
+
+        def by(names: Sequence[str]) -> tuple[Array, Array]:
+            found = np.stack([get(f"{BY}{name}") for name in names], axis=-1).swapaxes(0, 1)
+            return found[:, : equations.unknowns], found[:, equations.unknowns :]
+
+        by_load = {
+            each.name: by([f"{each.name}.{k}" for k in range(6)]) for each in equations.loads
+        }
+        by_driver = dict[str, tuple[Array, Array]]()
+        for name in self.drivers:
+            per = 1.0 if self.mechanism.driver(name).turns else 1.0 / equations.frame.unit
+            step, of_efforts = by([name])
+            by_driver[name] = per * step[..., 0], per * of_efforts[..., 0]
+        least, unstable = np.full(n, np.nan), [""] * n
+        if slopes:
+            executor.run("tangent")
+            least, unstable = self._stability(get("tangent"))
+        return Equilibria(
+            self,
+            share >= 1.0,
+            share,
+            self._bodies(states, n),
+            states,
+            dict(zip(self.drivers, efforts, strict=True)),
+            by_load,
+            by_driver,
+            least,
+            unstable,
+            iterations,
+        )
+
+    def _bodies(self, states: Mapping[str, Array], n: int) -> dict[str, BodyMotion]:
+        frame, found = self.equations.frame, dict[str, BodyMotion]()
+        for body in self.mechanism.moving:
+            pose = Pose.of(vec([*states[f"u {body.name}"]]), quat([*states[f"q {body.name}"]]))
+            moved = frame.unit * (pose.u + pose.swing(frame.arm(body.name, body.origin)))
+            r = np.array(body.origin) + np.stack([x + np.zeros(n) for x in moved], axis=1)
+            p = np.stack([x + np.zeros(n) for x in pose.q * quat(body.euler_parameters)], axis=1)
+            found[body.name] = BodyMotion(r, p, np.zeros((n, 6)), np.zeros((n, 6)))
+        return found
+
+    def _stability(self, entries: Array) -> tuple[Array, list[str]]:
+        """Return the smallest eigenvalue of the reduced stiffness over the largest, and the motion
+        of a negative one.
+        """
+        n, unknowns = entries.shape[1], self.equations.unknowns
+        order = self.equations.order
+        matrix = np.zeros((n, order, order))
+        rows, columns = np.array(self.equations.tangent).T
+        matrix[:, rows, columns] = entries.T
+        least, said = np.full(n, np.nan), list[str]()
+        for k in range(n):
+            free = null_space(matrix[k, unknowns:, :unknowns], unknowns)
+            if not free.shape[1]:
+                said.append("")
+                continue
+            stiffness = matrix[k, :unknowns, :unknowns]
+            values, modes = np.linalg.eigh(free.T @ (0.5 * (stiffness + stiffness.T)) @ free)
+            largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
+            least[k] = values[0] / largest
+            said.append(self._motion(free @ modes[:, 0]) if least[k] < -NEGATIVE else "")
+        return least, said
+
+    def _motion(self, motion: Any) -> str:
+        return motion_of(self.equations.columns, motion)

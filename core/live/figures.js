@@ -1,0 +1,153 @@
+"use strict";
+// Curves of the outputs over the sweep, with a ghost and limits, and their key numbers.
+
+// The figures of a group of outputs.
+//   axis: of the sweep; state: `answer`, `ghost` and `limits` by output.
+// Returns `group` (draw the outputs of a group) and `draw`.
+function figures(box, outputs, axis, state) {
+  const driver = axis.values.map((value) => value * axis.scale);
+  const [along, across] = axis.up ? ["y", "x"] : ["x", "y"];
+  let drawn = [];
+
+  function trace(output, curves, name, line) {
+    const values = (curves[output.name] || []).map((v) => (v === null ? null : v * output.scale));
+    const places = { [along]: driver, [across]: values };
+    return { type: "scatter", mode: "lines", ...places, name, meta: name, line };
+  }
+  const traces = (output) => [
+    ...(state.ghost && state.ghost !== state.answer
+      ? [trace(output, state.ghost.outputs, "ghost", { width: 2, dash: "dash", color: "#D55E00" })]
+      : []),
+    trace(output, state.answer.outputs, "design", { width: 2, color: "#0072B2" }),
+  ];
+  function bands({ name }) {
+    const [low, high] = state.limits.get(name) || [];
+    const whole = { [`${along}0`]: 0, [`${along}1`]: 1, [`${along}ref`]: "paper", type: "line" };
+    return [low, high].filter(Number.isFinite).map((value) => ({
+      ...whole,
+      [`${across}0`]: value,
+      [`${across}1`]: value,
+      line: { color: "#009E73", width: 2, dash: "dot" },
+    }));
+  }
+  function start(output) {
+    const figure = document.createElement("figure");
+    const plotBox = document.createElement("div");
+    Object.assign(plotBox, { className: "plot", tabIndex: 0 });
+    plotBox.setAttribute("role", "img");
+    const label = `${output.label} over ${axis.title}; arrow keys read values`;
+    plotBox.setAttribute("aria-label", label);
+    plotBox.dataset.output = output.name;
+    figure.append(plotBox);
+    box.append(figure);
+    const title = output.shown_unit ? `${output.label} [${output.shown_unit}]` : output.label;
+    const side = { title: { text: axis.title } };
+    if (axis.up < 0) side.autorange = "reversed";
+    const layout = {
+      [`${along}axis`]: side,
+      [`${across}axis`]: { title: { text: title }, hoverformat: ".6g" },
+      hovermode: `${along} unified`,
+      shapes: bands(output),
+    };
+    return { output, figure: plot(plotBox, { data: traces(output), layout }) };
+  }
+  return {
+    group(name) {
+      box.replaceChildren();
+      drawn = outputs.filter(({ group }) => group === name).map(start);
+    },
+    draw() {
+      for (const { output, figure } of drawn) figure.change(traces(output), bands(output));
+    },
+  };
+}
+
+// The key numbers: outputs at some poses, such as the ends of the travel and design, with their
+// gradients, and limits.
+//   columns: of each pose its word, and the value of an output there; changed: called when a limit
+//   changes.
+// Returns `show`.
+function keyNumbers(table, outputs, columns, state, changed) {
+  const first = outputs.some(({ group }) => group === "outputs") ? "outputs" : "coordinates";
+  const main = outputs.filter(({ group }) => group === first);
+  const named = new Map(outputs.map((output) => [output.name, output]));
+  const slope = ({ name }) => named.get(`${name}.per_travel`);
+  const cell = (kind, text, className = "") =>
+    Object.assign(document.createElement(kind), { textContent: text, className });
+  const heads = ["output", ...columns.map(({ word }) => word), "low", "high"];
+  const headRow = document.createElement("tr");
+  headRow.append(
+    ...heads.map((text, k) =>
+      Object.assign(cell("th", text, k ? "number" : ""), { scope: "col" }),
+    ),
+  );
+  table.querySelector("thead").replaceChildren(headRow);
+  const rows = main.map((output) => {
+    const row = document.createElement("tr");
+    const head = Object.assign(cell("th", output.label), { scope: "row" });
+    if (output.shown_unit) head.append(smallText(output.shown_unit));
+    const cells = columns.map(() => cell("td", "", "number"));
+    const ends = ["low", "high"].map((end, k) => {
+      const input = Object.assign(document.createElement("input"), { autocomplete: "off" });
+      input.setAttribute("aria-label", `${end} limit of ${output.label} [${output.shown_unit}]`);
+      input.addEventListener("change", () => {
+        const both = state.limits.get(output.name) || [NaN, NaN];
+        both[k] = typed(input.value);
+        if (!Number.isFinite(both[k])) input.value = "";
+        state.limits.set(output.name, both);
+        changed();
+        show();
+      });
+      const holder = cell("td", "", "number");
+      holder.append(input);
+      return holder;
+    });
+    row.append(head, ...cells, ...ends);
+    row.dataset.output = output.name;
+    return { output, cells, row };
+  });
+  table.querySelector("tbody").replaceChildren(...rows.map(({ row }) => row));
+
+  function show() {
+    for (const { output, cells } of rows) {
+      const [low, high] = state.limits.get(output.name) || [];
+      const rate = slope(output);
+      columns.forEach(({ valueOf }, k) => {
+        const value = valueOf(output.name);
+        const known = typeof value === "number";
+        const scaled = known ? value * output.scale : NaN;
+        cells[k].textContent = known ? shown(scaled, ".4g") : "–";
+        cells[k].dataset.value = known ? String(value) : "";
+        cells[k].classList.toggle("over", scaled < low || scaled > high);
+        const each = rate && valueOf(rate.name);
+        const gradient = typeof each === "number" ? shown(each * rate.scale, ".4g") : "";
+        if (gradient) cells[k].append(smallText(`${gradient} ${rate.shown_unit}`));
+      });
+    }
+  }
+  return { show };
+}
+
+// The numbers of the table that move an output most, with bars.
+function showRanking(table, { samples, effects, output }, { scale, shown_unit }, unit, words) {
+  const row = (kind, texts) => {
+    const made = document.createElement("tr");
+    made.append(
+      ...texts.map((text, k) =>
+        Object.assign(document.createElement(kind), {
+          textContent: text,
+          className: k ? "number" : "",
+        }),
+      ),
+    );
+    return made;
+  };
+  const perUnit = scale * unit.metres;
+  const head = `${output} [${shown_unit || "1"}/${unit.name}]`;
+  table.querySelector("thead").replaceChildren(row("th", [head, ...words]));
+  const text = (slope) => (slope === null ? "–" : shown(slope * perUnit, ".3g"));
+  const rows = effects
+    .slice(0, 8)
+    .map(({ point, axis, slopes }) => row("td", [`${point} ${axis}`, ...slopes.map(text)]));
+  table.querySelector("tbody").replaceChildren(...rows);
+}

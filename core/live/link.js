@@ -1,0 +1,39 @@
+"use strict";
+// The link to the server: questions of which one is on its way, and the newest waits.
+
+// Connect, and call `on[type]` for each message, `on.lost` at the end.
+// Returns `ask`, which sends a message under a kind: while an answer to the kind is due, only the
+// newest message of it waits; and `tell`, which sends at once.
+function linkTo(on) {
+  const token = new URLSearchParams(location.search).get("token") || "";
+  const socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(token)}`);
+  const due = new Map(); // kind: number of the message on its way
+  const next = new Map(); // kind: message that waits
+  let count = 0;
+
+  function tell(message) {
+    count += 1;
+    socket.send(JSON.stringify({ ...message, id: count }));
+    return count;
+  }
+  function ask(kind, message) {
+    if (due.has(kind)) return next.set(kind, message);
+    due.set(kind, tell(message));
+  }
+  function settle(number) {
+    for (const [kind, sent] of due) {
+      if (sent !== number) continue;
+      due.delete(kind);
+      const message = next.get(kind);
+      next.delete(kind);
+      if (message) ask(kind, message);
+    }
+  }
+  socket.addEventListener("message", ({ data }) => {
+    const message = JSON.parse(data);
+    settle(message.id);
+    on[message.type](message);
+  });
+  socket.addEventListener("close", () => on.lost());
+  return { ask, tell, isDue: (kind) => due.has(kind) };
+}

@@ -1,0 +1,298 @@
+"use strict";
+// The live page: the page owns the design, and the server answers for numbers.
+
+const METRES = { mm: 0.001, cm: 0.01, m: 1, inch: 0.0254, in: 0.0254, foot: 0.3048, ft: 0.3048 };
+const DIRECTIONS = {
+  forward: [0, 1],
+  rearward: [0, -1],
+  left: [1, 1],
+  right: [1, -1],
+  up: [2, 1],
+  down: [2, -1],
+};
+
+(() => {
+  const one = (selector) => document.querySelector(selector);
+  const state = { answer: null, ghost: null, limits: new Map(), upwards: 0, latest: 0, times: [] };
+  let opening = null;
+  let edited = false;
+  let parts = null;
+  let asked = 0;
+  window.kincheckLive = state; // for scripts and tests
+
+  const say = (text) => (one("#state").textContent = text);
+  function trouble(text, where = "#trouble") {
+    one(where).textContent = text;
+    one(where).hidden = !text;
+  }
+  const link = linkTo({
+    opening: (message) => open(message),
+    answer: (message) => answered(message),
+    pose: (message) => posed(message),
+    reached: (message) => reached(message),
+    refused(message) {
+      trouble(message.message);
+      if (parts.table) parts.table.mark(message.point);
+      document.body.classList.add("stale");
+      say("not assembled: curves and scene are those of the last design that was");
+      state.latest += 1;
+    },
+    ranking: (message) => ranked(message),
+    verdict: (message) => verdict(message),
+    saved: (message) => say(`saved as ${message.name}`),
+    invalid: (message) => trouble(message.message),
+    changed: (message) => trouble(message.message, "#changed"),
+    lost: () => say("connection lost; start kincheck serve again: your numbers stay here"),
+  });
+
+  state.isDue = () => link.isDue("solve") || link.isDue("move");
+
+  function open(message) {
+    opening = message;
+    document.title = `${message.file} · kincheck live`;
+    one("#file").textContent = message.file;
+    for (const each of document.querySelectorAll("[data-kind]")) {
+      each.hidden = each.dataset.kind !== message.kind;
+    }
+    const groups = [...new Set(message.outputs.map(({ group }) => group))];
+    one("#group").replaceChildren(...groups.map((name) => new Option(name, name)));
+    one("#engines").replaceChildren(...message.engines.map(engineBox));
+    state.upwards = message.axis.up;
+    parts = { first: true };
+    if (message.kind === "table") openTable();
+    else openModel();
+  }
+
+  function engineBox(name) {
+    const label = document.createElement("label");
+    const box = Object.assign(document.createElement("input"), { type: "checkbox", value: name });
+    box.checked = name === "native" || name === "mujoco";
+    label.append(box, ` ${name}`);
+    return label;
+  }
+
+  function openTable() {
+    const { points, unit, axes } = opening;
+    const places = axes.split(",").map((word) => DIRECTIONS[word]);
+    const size = METRES[unit];
+    const view = {
+      step: 1e-4 / size,
+      metres(row) {
+        const at = [0, 0, 0];
+        places.forEach(([axis, sign], i) => (at[axis] = sign * size * row[i]));
+        return at;
+      },
+      file: (at) => places.map(([axis, sign]) => (sign * at[axis]) / size),
+    };
+    const design = designOf(points, solve);
+    const choose = (k) => {
+      parts.planes.choose(k);
+      parts.table.chosen(k);
+    };
+    parts.design = design;
+    state.rows = () => design.rows();
+    state.spots = (plane) => parts.planes.spots(plane);
+    parts.planes = planes(one("#planes"), points, view, design, choose);
+    parts.table = pointTable(one("#points"), points, unit, design, { choose, refuse: trouble });
+    one("#points caption").textContent =
+      `${unit}; x, y, z are ${axes.replaceAll(",", ", ")}.` +
+      " Arrow keys: 1, with Shift 10, with Alt 0.1.";
+    one("#name").value = opening.save;
+    one("#ranked").replaceChildren(
+      ...opening.outputs
+        .filter(({ group }) => group !== "coordinates")
+        .map(({ label, name }) => new Option(label, name)),
+    );
+    one("#ranked").onchange = rank;
+    one("#undo").onclick = () => design.undo();
+    one("#redo").onclick = () => design.redo();
+    one("#reset").onclick = () => design.all(design.start);
+    one("#ghost").onclick = () => {
+      state.ghost = state.answer;
+      parts.planes.ghost(state.ghost.drawing);
+      parts.figures.draw();
+    };
+    one("#saving").onsubmit = (event) => {
+      event.preventDefault();
+      trouble("");
+      link.tell({ type: "save", points: design.rows(), name: one("#name").value });
+    };
+    addEventListener("keydown", (event) => {
+      if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
+      if (event.target.id === "name") return;
+      event.preventDefault();
+      if (event.shiftKey) design.redo();
+      else design.undo();
+    });
+    parts.table.show();
+    solve();
+  }
+
+  function openModel() {
+    parts.sliders = sliders(one("#sliders"), opening.drivers, (drivers, rests) => {
+      state.asked = performance.now();
+      link.ask("move", { type: "move", drivers, measured: rests });
+    });
+    state.asked = performance.now();
+    link.ask("solve", { type: "solve", points: [] });
+    reached(null);
+  }
+
+  // Ask for the reach of one driver after the other.
+  function reached(message) {
+    if (message) parts.sliders.reach(message);
+    const next = opening.drivers[asked];
+    asked += 1;
+    if (next) link.tell({ type: "reach", driver: next.name });
+  }
+
+  function solve() {
+    const [undo, redo] = parts.design.can();
+    one("#undo").disabled = !undo;
+    one("#redo").disabled = !redo;
+    one("#verdicts tbody").replaceChildren();
+    edited = true;
+    trouble("");
+    parts.table.show();
+    parts.planes.draw();
+    state.asked = performance.now();
+    link.ask("solve", { type: "solve", points: parts.design.rows() });
+  }
+
+  function answered(message) {
+    state.answer = message;
+    state.ghost = state.ghost || message;
+    document.body.classList.remove("stale");
+    trouble(message.message);
+    if (parts.table) parts.table.mark("");
+    if (!message.drawing.bodies.length) return;
+    if (parts.first) start(message);
+    else {
+      parts.scene.change(message.drawing);
+      parts.figures.draw();
+      if (parts.planes) parts.planes.change(message.drawing);
+    }
+    parts.numbers.show();
+    const lost = message.solved.filter((each) => !each).length;
+    const count = message.solved.length;
+    say(lost ? `${count - lost} of ${count} samples reached` : `${count} samples`);
+    measure(message.milliseconds);
+    clearTimeout(parts.settling);
+    if (parts.design) parts.settling = setTimeout(rank, 250);
+  }
+
+  function start(message) {
+    parts.first = false;
+    const { outputs, axis } = opening;
+    one("#scene [data-layer=forces]").closest("label").hidden = !message.drawing.arrows.length;
+    parts.scene = mechanism(one("#scene"), message.drawing);
+    const slider = one("#scene input[type=range]");
+    slider.max = message.drawing.steps.length - 1;
+    slider.value = message.drawing.start;
+    if (parts.planes) {
+      parts.planes.change(message.drawing);
+      parts.planes.ghost(message.drawing);
+    }
+    parts.figures = figures(one("#figures"), outputs, axis, state);
+    const drawAgain = () => parts.figures.draw();
+    parts.numbers = keyNumbers(one("#numbers"), outputs, columns(), state, drawAgain);
+    parts.figures.group(one("#group").value);
+    one("#group").onchange = () => parts.figures.group(one("#group").value);
+    document.documentElement.dataset.ready = "";
+  }
+
+  // The words of the key samples.
+  function words() {
+    return state.upwards ? ["rebound", "design", "jounce"] : ["first", "design", "last"];
+  }
+
+  // The poses of the key numbers: the key samples, or the pose of the sliders.
+  function columns() {
+    const sizes = opening.axis.values.map(Math.abs);
+    const design = sizes.indexOf(Math.min(...sizes));
+    const at = (sample) => (name) => (state.answer.outputs[name] || [])[sample];
+    const ofPose = (name) => (state.pose ? state.pose.outputs[name] : at(design)(name));
+    if (!parts.planes) return [{ word: "pose", valueOf: ofPose }];
+    const samples = [0, design, sizes.length - 1];
+    return words().map((word, k) => ({ word, valueOf: at(samples[k]) }));
+  }
+
+  // The time from an edit to its picture.
+  function measure(steps) {
+    requestAnimationFrame(() => {
+      state.latest += 1;
+      const whole = performance.now() - state.asked;
+      state.times.push(whole);
+      const server = Object.values(steps).reduce((total, each) => total + each, 0);
+      const text = `server ${server.toFixed(0)} ms, edit to screen ${whole.toFixed(0)} ms`;
+      one("#cost").textContent = text;
+    });
+  }
+
+  function rank() {
+    if (!one("#ranked").value || link.isDue("solve")) return;
+    link.ask("rank", { type: "rank", points: parts.design.rows(), output: one("#ranked").value });
+  }
+  function ranked(message) {
+    const output = opening.outputs.find(({ name }) => name === message.output);
+    const unit = { name: opening.unit, metres: METRES[opening.unit] };
+    showRanking(one("#ranking"), { ...message, output: output.label }, output, unit, words());
+  }
+
+  function posed(message) {
+    if (!parts.scene) return; // the sweep is still being solved
+    const { drawing } = state.answer;
+    state.pose = message;
+    const bodies = drawing.bodies.map((body) => {
+      const pose = message.bodies[body.name];
+      return pose ? { ...body, r: [pose.slice(0, 3)], p: [pose.slice(3)] } : body;
+    });
+    const whole = message.share === 1;
+    const far = `${shown(100 * message.share, ".3g")} % of the way`;
+    const steps = [whole ? "pose of the sliders" : `the way ends at ${far}`];
+    parts.scene.change({ ...drawing, bodies, steps, start: 0, paths: [], arrows: [] });
+    parts.sliders.show(message);
+    parts.numbers.show();
+    trouble(message.message);
+    say(whole ? "all loops closed" : `not reached: ${far}`);
+    measure(message.milliseconds);
+  }
+
+  one("#check").onclick = () => {
+    const engines = [...document.querySelectorAll("#engines input:checked")].map(
+      ({ value }) => value,
+    );
+    if (!engines.length) return trouble("check: tick an engine");
+    one("#verdicts tbody").replaceChildren();
+    edited = false;
+    say("the engines are solving");
+    const points = parts.design ? { points: parts.design.rows() } : {};
+    link.tell({ type: "check", engines, ...points });
+  };
+  function verdict({ engine, outcome, worst, output, message, last }) {
+    if (edited) return; // it is of numbers that are no more
+    const row = document.createElement("tr");
+    const cell = (kind, textContent, className = "") =>
+      Object.assign(document.createElement(kind), { textContent, className });
+    const far = worst === null ? "" : `${shown(worst, ".3g")} × tolerance (${output})`;
+    row.append(
+      Object.assign(cell("th", engine), { scope: "row" }),
+      cell("td", outcome, `outcome ${outcome}`),
+      cell("td", [far, message].filter(Boolean).join("; ")),
+    );
+    one("#verdicts tbody").append(row);
+    if (last) say("checked");
+  }
+
+  one("#csv").onclick = () => {
+    const { outputs, axis } = opening;
+    const known = outputs.filter(({ name }) => state.answer.outputs[name]);
+    const head = ["driver [SI]", ...known.map(({ name, unit }) => `${name} [${unit}]`)];
+    const cell = (value) => (value === null ? "" : String(value));
+    const rows = axis.values.map((value, k) =>
+      [value, ...known.map(({ name }) => state.answer.outputs[name][k])].map(cell).join(","),
+    );
+    const stem = opening.file.replace(/\.[^.]*$/, "");
+    save([head.join(","), ...rows, ""].join("\n"), "text/csv", `${stem}_curves.csv`);
+  };
+})();

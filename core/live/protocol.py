@@ -1,0 +1,297 @@
+"""Messages of the live page as JSON: questions of a page, and answers of the server.
+
+Lengths of points are in the unit and along the axes of the file; everything else is SI.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeAlias
+
+import msgspec
+
+VERSION = 1
+LARGEST_MESSAGE = 64_000
+"""Largest message of a page [bytes]: hundreds of points take less."""
+MOST_POINTS = 1_000
+
+Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+Identifier: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+Rows: TypeAlias = Annotated[
+    list[tuple[Number, Number, Number]], msgspec.Meta(max_length=MOST_POINTS)
+]
+"""The points of a table in its order."""
+Name: TypeAlias = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+Values: TypeAlias = list[float | None]
+
+
+class _Message(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    tag_field="type",
+    tag=str.lower,
+):
+    """A message; its answers carry the same number."""
+
+    id: Identifier = 0
+
+
+class Solve(_Message, frozen=True):
+    """Solve a table with these points."""
+
+    points: Rows
+
+
+class Rank(_Message, frozen=True):
+    """Find the effect of each number of a table on an output."""
+
+    points: Rows
+    output: Name
+
+
+class Move(_Message, frozen=True):
+    """Move a mechanism straight from its design to these values of its drivers [m or rad].
+
+    Attributes:
+        measured: whether the distance from a singular pose is wanted, which takes longer.
+    """
+
+    drivers: Annotated[dict[Name, Number], msgspec.Meta(max_length=100)]
+    measured: bool = False
+
+
+class Reach(_Message, frozen=True):
+    """Find the travel of a driver while the others rest."""
+
+    driver: Name
+
+
+class Check(_Message, frozen=True):
+    """Solve by several engines in worker processes, and judge them; without points, the file."""
+
+    engines: Annotated[list[Name], msgspec.Meta(min_length=1, max_length=20)]
+    points: Rows | None = None
+
+
+class Save(_Message, frozen=True):
+    """Write a table with these points to a new file beside the user's own."""
+
+    points: Rows
+    name: Name
+
+
+Asked: TypeAlias = Solve | Rank | Move | Reach | Check | Save
+
+
+class LivePoint(msgspec.Struct, frozen=True):
+    """A row of the table: its name, numbers as in the file, and roles in the template; none for a
+    row without use in the template.
+    """
+
+    name: str
+    position: tuple[float, float, float]
+    roles: tuple[str, ...]
+
+
+class LiveOutput(msgspec.Struct, frozen=True):
+    """An output: its value times scale is in the shown unit.
+
+    Attributes:
+        group: "outputs", "per travel" or "coordinates".
+    """
+
+    name: str
+    label: str
+    unit: str
+    shown_unit: str
+    scale: float
+    group: str
+
+
+class LiveDriver(msgspec.Struct, frozen=True):
+    """A driver for the page to move, with the ends of its slider [m or rad]."""
+
+    name: str
+    unit: str
+    design: float
+    low: float
+    high: float
+
+
+class LiveAxis(msgspec.Struct, frozen=True):
+    """The axis of the sweep: values times scale are in the shown unit.
+
+    Attributes:
+        up: 1 for an axis drawn upwards, -1 for downwards, 0 for one to the right.
+    """
+
+    title: str
+    values: list[float]
+    scale: float
+    up: int
+
+
+class Opening(_Message, frozen=True):
+    """The file as it is: the first message to a page.
+
+    Attributes:
+        kind: "table" or "model".
+        unit, axes: of the points.
+        save: a free name for a new file.
+    """
+
+    protocol: int
+    kind: str
+    file: str
+    source: str
+    unit: str
+    axes: str
+    points: list[LivePoint]
+    outputs: list[LiveOutput]
+    axis: LiveAxis
+    drivers: list[LiveDriver]
+    engines: list[str]
+    save: str
+
+
+class Answer(_Message, frozen=True):
+    """The motion over the sweep.
+
+    Attributes:
+        outputs: values by output; null without a value.
+        solved: whether each sample was reached.
+        drawing: the scene, as in reports; its frames are the samples in `frames`.
+        message: why samples are missing; empty if none are.
+        milliseconds: time of each step.
+    """
+
+    outputs: dict[str, Values]
+    solved: list[bool]
+    drawing: dict[str, Any]
+    frames: list[int]
+    message: str
+    milliseconds: dict[str, float]
+
+
+class Pose(_Message, frozen=True):
+    """A pose of a mechanism.
+
+    Attributes:
+        drivers: values reached, by driver [m or rad].
+        share: of the way from the design.
+        bodies: origin and Euler parameters, seven numbers, by body.
+        distance: smallest singular value of the rows over the one at design: 0 is a singular pose;
+            null if it was not asked for.
+        message: why the way ends before; empty if it does not.
+    """
+
+    drivers: dict[str, float]
+    share: float
+    bodies: dict[str, list[float]]
+    outputs: dict[str, float | None]
+    distance: float | None
+    message: str
+    milliseconds: dict[str, float]
+
+
+class Reached(_Message, frozen=True):
+    """The values up to which a mechanism moves if only this driver does [m or rad], and the
+    reason on either side; empty if the slider ends before.
+    """
+
+    driver: str
+    low: float
+    high: float
+    messages: tuple[str, str]
+
+
+class Refused(_Message, frozen=True):
+    """A design without a solution.
+
+    Attributes:
+        message: the message to a file with these numbers.
+        point: the row of the table at fault; empty if unknown.
+    """
+
+    message: str
+    point: str
+
+
+class Effect(msgspec.Struct, frozen=True):
+    """Derivative of an output by a number of the table at the key samples [output's unit per m]."""
+
+    point: str
+    axis: str
+    slopes: Values
+
+
+class Ranking(_Message, frozen=True):
+    """The effects on an output at the samples of rebound, design and jounce, the largest first."""
+
+    output: str
+    samples: list[int]
+    effects: list[Effect]
+
+
+class Verdict(_Message, frozen=True):
+    """An engine's result.
+
+    Attributes:
+        worst: largest deviation over its tolerance; null if nothing was compared.
+        output: the output with this deviation.
+    """
+
+    engine: str
+    outcome: str
+    worst: float | None
+    output: str
+    message: str
+    last: bool
+
+
+class Saved(_Message, frozen=True):
+    """A file was written."""
+
+    name: str
+
+
+class Invalid(_Message, frozen=True):
+    """A message without an answer, and the reason."""
+
+    message: str
+
+
+class Changed(_Message, frozen=True):
+    """The file has other content than at the opening of the page."""
+
+    message: str
+
+
+Told: TypeAlias = (
+    Opening | Answer | Pose | Reached | Refused | Ranking | Verdict | Saved | Invalid | Changed
+)
+
+_DECODER = msgspec.json.Decoder(Asked)
+
+
+def read(text: str | bytes) -> Asked:
+    """Return a message of a page.
+
+    Raises:
+        msgspec.MsgspecError: it is none.
+    """
+    return _DECODER.decode(text)
+
+
+def encode(message: Told) -> str:
+    """Return a message to a page as JSON."""
+    return msgspec.json.encode(message).decode()
+
+
+def live_schema() -> dict[str, Any]:
+    """Return the JSON Schema of both directions."""
+    (asked, told), parts = msgspec.json.schema_components(
+        [Asked, Told], ref_template="#/$defs/{name}"
+    )
+    return {"asked": asked, "told": told, "$defs": parts}

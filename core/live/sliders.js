@@ -1,0 +1,91 @@
+"use strict";
+// A slider for each driver of a mechanism, with its reach and the distance from singular poses.
+
+const TICKS = 2000;
+
+// The sliders in a box.
+//   moved: called with the values of all drivers, and whether the gesture rests.
+// Returns `show` (a pose) and `reach` (the travel of a driver).
+function sliders(box, drivers, moved) {
+  const values = Object.fromEntries(drivers.map(({ name, design }) => [name, design]));
+  const degrees = 180 / Math.PI;
+  const scaleOf = ({ unit }) => (unit === "rad" ? degrees : 1000);
+  const unitName = ({ unit }) => (unit === "rad" ? "°" : "mm");
+  let resting = 0;
+
+  function move(name, value) {
+    values[name] = value;
+    moved({ ...values }, false);
+    clearTimeout(resting);
+    resting = setTimeout(() => moved({ ...values }, true), 250);
+  }
+  const rows = drivers.map((driver) => {
+    const { name, low, high } = driver;
+    const scale = scaleOf(driver);
+    const make = (kind, more) => Object.assign(document.createElement(kind), more);
+    const slider = make("input", { type: "range", min: 0, max: TICKS, step: 1 });
+    const number = make("input", { type: "text", inputMode: "decimal", autocomplete: "off" });
+    slider.setAttribute("aria-label", `${name} [${unitName(driver)}]`);
+    number.setAttribute("aria-label", `value of ${name} [${unitName(driver)}]`);
+    const place = (value) => Math.round(((value - low) / (high - low)) * TICKS);
+    slider.addEventListener("input", () => {
+      const value = low + ((high - low) * Number(slider.value)) / TICKS;
+      number.value = shown(scale * value, ".5g");
+      move(name, value);
+    });
+    number.addEventListener("change", () => {
+      const value = typed(number.value) / scale;
+      if (!Number.isFinite(value)) return set(values[name]);
+      slider.value = place(value);
+      move(name, value);
+    });
+    const set = (value) => {
+      slider.value = place(value);
+      number.value = shown(scale * value, ".5g");
+    };
+    set(values[name]);
+    const note = make("small", { className: "quiet" });
+    const row = make("div", { className: "slider" });
+    const label = make("span", { textContent: name });
+    row.append(label, slider, number, make("span", { textContent: unitName(driver) }), note);
+    return { driver, row, slider, set, note, place };
+  });
+  const home = Object.assign(document.createElement("button"), { textContent: "design position" });
+  home.type = "button";
+  home.addEventListener("click", () => {
+    rows.forEach(({ driver, set }) => {
+      values[driver.name] = driver.design;
+      set(driver.design);
+    });
+    moved({ ...values }, true);
+  });
+  const meter = document.createElement("meter");
+  Object.assign(meter, { min: 0, max: 1, low: 0.05, high: 0.2, optimum: 1, value: 1 });
+  meter.setAttribute("aria-label", "distance from singular poses, against that at design");
+  const distance = Object.assign(document.createElement("span"), { className: "quiet" });
+  const last = document.createElement("div");
+  last.className = "row";
+  last.append(home, "distance from singular poses ", meter, distance);
+  box.replaceChildren(...rows.map(({ row }) => row), last);
+
+  return {
+    show(pose) {
+      if (pose.distance !== null) {
+        meter.value = Math.min(1, pose.distance);
+        distance.textContent = `${shown(pose.distance, ".3g")} of that at design`;
+      }
+    },
+    reach({ driver: name, low, high, messages }) {
+      const found = rows.find(({ driver }) => driver.name === name);
+      const { driver, slider, note, place } = found;
+      const [from, to] = [low, high].map((value) => (100 * place(value)) / TICKS);
+      slider.style.setProperty("--from", `${from}%`);
+      slider.style.setProperty("--to", `${to}%`);
+      const text = [low, high].map((value) => shown(scaleOf(driver) * value, ".4g")).join(" to ");
+      note.textContent = messages.some(Boolean)
+        ? `reaches ${text} ${unitName(driver)} if the others rest`
+        : "";
+      note.title = messages.filter(Boolean).join("\n");
+    },
+  };
+}

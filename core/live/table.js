@@ -1,0 +1,133 @@
+"use strict";
+// The points of a table, to type in, and the history of its numbers.
+
+const FINE = 1e4; // numbers are kept to so many parts of a unit
+
+// A number as typed, with a decimal comma or point; NaN if it is none.
+function typed(text) {
+  const plain = text.trim().replace(",", ".").replace("−", "-");
+  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
+}
+
+// The design: the numbers of all points, with undo and redo.
+//   changed: called after each change.
+function designOf(points, changed) {
+  const copy = (rows) => rows.map((row) => row.slice());
+  const start = points.map(({ position }) => position.slice());
+  let rows = copy(start);
+  let before = [];
+  let after = [];
+  const same = (a, b) => a.every((row, k) => row.every((value, i) => value === b[k][i]));
+
+  function go(from, to) {
+    if (!from.length) return;
+    to.push(copy(rows));
+    rows = from.pop();
+    changed();
+  }
+  return {
+    start,
+    rows: () => rows,
+    can: () => [before.length > 0, after.length > 0],
+    // Begin a gesture: everything up to the next one is undone together.
+    begin() {
+      if (before.length && same(before.at(-1), rows)) return;
+      before.push(copy(rows));
+      after = [];
+    },
+    set(k, position) {
+      rows[k] = position.map((value) => Math.round(value * FINE) / FINE);
+      changed();
+    },
+    all(next) {
+      this.begin();
+      rows = copy(next);
+      changed();
+    },
+    undo() {
+      while (before.length && same(before.at(-1), rows)) before.pop();
+      go(before, after);
+    },
+    redo: () => go(after, before),
+  };
+}
+
+// The table of the points: typed numbers and arrow keys go to the design.
+//   choose: called with the point that has the focus; refuse: with what is no number.
+// Returns `show` (the numbers), `mark` (the point that a message is about) and `chosen`.
+function pointTable(table, points, unit, design, { choose, refuse }) {
+  const text = (value) => String(value);
+  const inputs = points.map(({ name }, k) =>
+    ["x", "y", "z"].map((axis, i) => {
+      const input = document.createElement("input");
+      Object.assign(input, { type: "text", inputMode: "decimal", autocomplete: "off" });
+      input.setAttribute("aria-label", `${name} ${axis} [${unit}]`);
+      input.dataset.point = name;
+      input.dataset.axis = axis;
+      input.addEventListener("focus", () => choose(k));
+      input.addEventListener("change", () => take(input, k, i));
+      input.addEventListener("keydown", (event) => step(event, k, i));
+      return input;
+    }),
+  );
+
+  function take(input, k, i) {
+    const value = typed(input.value);
+    if (!Number.isFinite(value)) {
+      refuse(`${points[k].name} ${"xyz"[i]}: found “${input.value}”, expected a number`);
+      return show();
+    }
+    put(k, i, value);
+  }
+  function put(k, i, value) {
+    design.begin();
+    design.set(k, design.rows()[k].map((old, j) => (j === i ? value : old)));
+  }
+  function step(event, k, i) {
+    const by = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (event.key === "Enter") {
+      const below = inputs[Math.min(k + 1, inputs.length - 1)][i];
+      below.focus();
+      below.select();
+    }
+    if (!by) return;
+    event.preventDefault();
+    const value = typed(event.target.value);
+    const from = Number.isFinite(value) ? value : design.rows()[k][i];
+    put(k, i, from + by * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1));
+  }
+  const body = table.querySelector("tbody");
+  const rows = points.map(({ name, roles }, k) => {
+    const head = Object.assign(document.createElement("th"), { scope: "row", textContent: name });
+    if (!roles.length) head.append(smallText("not used"));
+    const cells = inputs[k].map((input) => {
+      const cell = Object.assign(document.createElement("td"), { className: "number" });
+      cell.append(input);
+      return cell;
+    });
+    const row = document.createElement("tr");
+    row.append(head, ...cells);
+    return row;
+  });
+  body.replaceChildren(...rows);
+
+  function show() {
+    design.rows().forEach((row, k) =>
+      row.forEach((value, i) => {
+        inputs[k][i].value = text(value);
+        inputs[k][i].classList.toggle("changed", value !== design.start[k][i]);
+      }),
+    );
+  }
+  function mark(name) {
+    rows.forEach((row, k) => row.classList.toggle("wrong", points[k].name === name));
+  }
+  function chosen(at) {
+    rows.forEach((row, k) => row.classList.toggle("chosen", k === at));
+  }
+  return { show, mark, chosen };
+}
+
+function smallText(text) {
+  return Object.assign(document.createElement("small"), { textContent: text, className: "quiet" });
+}

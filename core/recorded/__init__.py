@@ -1,0 +1,1 @@
+"""Recordings of other programs as engines: their files, their meaning, and their verdict."""

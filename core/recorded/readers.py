@@ -1,0 +1,223 @@
+"""Readers of recordings: tables, motions of OpenSim (.mot, .sto), results of Adams in XML (.res),
+and MAT-files, of Modelica tools (level 4) and of MATLAB (level 5).
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case.io.document import fault, read_bytes, read_text, shown
+from ..case.io.reference_samples import layout_of, read_table, samples_of
+from ..case.io.table import unit_of_head
+from ..case.models.trees.element import Element, parse_xml
+from ..errors import CaseError, brief, remedy
+from ..trajectory import Array
+from .recording import Choose, Column, Head, Recording, column_of
+
+LARGEST_FILE = 256_000_000
+LESS = "write fewer samples or channels"
+_OPENSIM, _END = (".mot", ".sto"), "endheader"
+_DEGREES = re.compile(r"^\s*inDegrees\s*=\s*(yes|no)\s*$", re.IGNORECASE | re.MULTILINE)
+# Blocks of an analysis that are no motion.
+_NO_MOTION = ("modelInput", "initialConditions")
+_POSE = "_XFORM"
+_UNIT = re.compile(r"\[([^\]|]*)")
+_V73 = (b"MATLAB 7.3", b"\x89HDF")
+
+UNREAD: Mapping[str, str] = {
+    ".abf": "a binary result of MotionSolve; in HyperGraph, export the curves as CSV",
+    ".mrf": "a binary result of MotionSolve; in HyperGraph, export the curves as CSV",
+    ".sbr": "a binary result of Simpack; in its PostProcessor, export the channels as CSV",
+    ".req": "a request file of Adams; say RESULTS/XRF in the deck, which writes XML (.res)",
+    ".gra": "a graphics file of Adams; say RESULTS/XRF in the deck, which writes XML (.res)",
+    ".mdf": "a measurement file (MDF); export the channels as CSV",
+    ".mf4": "a measurement file (MDF); export the channels as CSV",
+    ".fmu": "a model, not its results; say --fmu FILE",
+}
+"""Formats that are not read, and the export to choose, by suffix."""
+
+
+def read_recording(
+    file: Path, choose: Choose, *, analysis: str | None = None, sheet: str | None = None
+) -> Recording:
+    """Read a recording of any known format.
+
+    Args:
+        analysis: name of one of several analyses of Adams results.
+        sheet: name of a sheet of a workbook with several.
+
+    Raises:
+        CaseError: the file is unreadable, of another format, or holds several analyses.
+    """
+    suffix = file.suffix.lower()
+    if suffix in UNREAD:
+        raise fault(file, "", f"found {UNREAD[suffix]}")
+    if suffix == ".res":
+        return _of_adams(file, choose, analysis)
+    if analysis is not None:
+        raise fault(file, "--analysis", "found for a file without analyses; leave it out")
+    if suffix == ".mat":
+        return _of_mat(file, choose)
+    return _of_table(file, choose, sheet)
+
+
+def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
+    opensim = file.suffix.lower() in _OPENSIM
+    table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
+    layout = layout_of(table)
+    chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
+    samples = samples_of(table, chosen, gaps=True)
+    columns: dict[int, Column] = {}
+    for k, values, printed, text in zip(
+        chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
+    ):
+        head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
+        columns[k] = Column(head, values, printed.half(np.nan_to_num(values)))
+    if not opensim:
+        return Recording(file, columns)
+    stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS))
+    if stated is None:
+        return Recording(file, columns, "OpenSim")
+    angle = "deg" if stated[1].lower() == "yes" else "rad"
+    note = f"{file}: angles without a unit in {angle}, as its head says"
+    return Recording(file, columns, "OpenSim", angle, [note])
+
+
+def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
+    text = read_text(file, LARGEST_FILE, LESS)
+    if not text.lstrip().startswith("<"):
+        what = "no XML, as of old results of Adams" if text.strip() else "an empty file"
+        advice = "say RESULTS/XRF in the deck, which writes XML"
+        raise fault(file, "", f"found {what}, expected results in XML; {advice}")
+    root = parse_xml(file, text)
+    if root.tag != "Results":
+        raise root.fault("found another document, expected <Results> of Adams; give its .res")
+    found = {
+        (analysis.attributes.get("name", ""), data.attributes.get("name", "")): (analysis, data)
+        for analysis in root.only("Analysis")
+        for data in analysis.only("Data")
+        if not data.attributes.get("name", "").startswith(_NO_MOTION)
+    }
+    names = {key: key[1] for key in found}
+    if len({*names.values()}) < len(names):
+        names = {key: "/".join(key) for key in found}
+    chosen = [key for key, name in names.items() if wanted in (None, name, key[0])]
+    if len(chosen) != 1:
+        listed = ", ".join(map(shown, names.values())) or "none"
+        advice = remedy(wanted, names.values()) if wanted else "say --analysis NAME"
+        raise fault(file, "--analysis", f"found the analyses {listed}, expected one; {advice}")
+    analysis, data = found[chosen[0]]
+    heads = _heads(analysis)
+    steps = [(step, step.text.split()) for step in data.only("Step")]
+    for step, numbers in steps:
+        if len(numbers) < max(heads, default=0):
+            problem = f"found {len(numbers)} numbers, expected {max(heads)}, one a component"
+            raise step.fault(f"{problem}; write the results anew")
+    ids = [*heads]
+    columns = {
+        k: column_of(file, "step", heads[ids[k]], (row[ids[k] - 1] for _, row in steps))
+        for k in choose([*heads.values()])
+    }
+    note = f"{file}: read the analysis {names[chosen[0]]}"
+    program = " ".join(analysis.attributes.get("Solver", "").split())
+    kinematic = chosen[0][1].lower().startswith("kinematic")
+    return Recording(file, columns, program or "Adams", notes=[note], kinematic=kinematic)
+
+
+def _heads(analysis: Element) -> Mapping[int, Head]:
+    """Return the heads of components by their ids."""
+    found: dict[int, Head] = {}
+    for entity in (each for map_ in analysis.only("StepMap") for each in map_.only("Entity")):
+        name = entity.attributes.get("name", "")
+        part = (
+            entity.attributes.get("entity", ""),
+            name.removesuffix(_POSE),
+            f"PART_{entity.attributes.get('objectId', '')}",
+        )
+        for each in entity.only("Component"):
+            number = each.attributes.get("id", "")
+            if not (number.isascii() and number.isdigit() and 0 < len(number) < 9 and int(number)):
+                problem = f"id: found {shown(number)}, expected a whole number from 1"
+                raise each.fault(f"{problem}; write the results anew")
+            unit = each.attributes.get("unitsValue", "").replace("**", "^").replace("sec", "s")
+            head = f"{name}.{each.attributes.get('name', '')}"
+            posed = part if name.endswith(_POSE) else ()
+            found[int(number)] = Head(head, "" if unit == "no_units" else unit, posed)
+    return found
+
+
+def _of_mat(file: Path, choose: Choose) -> Recording:
+    data = read_bytes(file, LARGEST_FILE, LESS)
+    if data.startswith(_V73):
+        raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
+    try:
+        scipy_io: Any = import_module("scipy.io")  # slow to import
+        found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
+        modelica = "Aclass" in found and "dataInfo" in found
+        series = [*(_of_modelica(found) if modelica else _of_matlab(found))]
+    except CaseError:
+        raise
+    except Exception as error:  # scipy raises many errors for a damaged file
+        what = brief(f"{type(error).__name__}: {error}")
+        expected = "expected one of MATLAB (save with -v7) or of a Modelica tool; or give CSV"
+        raise fault(file, "", f"found no readable MAT-file ({what}), {expected}") from None
+    chosen = choose([head for head, _ in series])
+    columns = {k: Column(series[k][0], *_numbers(series[k][1])) for k in chosen}
+    return Recording(file, columns, "Modelica" if modelica else "MATLAB")
+
+
+def _numbers(values: Any) -> tuple[Array, Array]:
+    """Return numbers, and half the distance of those of single precision."""
+    single = values.dtype == np.float32
+    exact = values.astype(np.float64)
+    known = np.where(np.isfinite(exact), exact, np.nan)
+    half = 0.5 * np.spacing(np.abs(values)).astype(np.float64) if single else np.zeros(len(values))
+    return known, half
+
+
+def _of_modelica(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
+    """Yield heads and values by the layout of Dymola and OpenModelica; constants are repeated."""
+    kind = ["".join(row).rstrip("\0 ") for row in found["Aclass"]]
+    turned = len(kind) > 3 and kind[3] == "binTrans"
+
+    def table(name: str) -> Any:
+        return found[name].T if turned else found[name]
+
+    names, texts = (
+        ["".join(row).rstrip("\0 ") for row in table(key)] for key in ("name", "description")
+    )
+    count = len(table("data_2"))
+    for name, text, (block, column, *_) in zip(
+        names, texts, table("dataInfo").tolist(), strict=True
+    ):
+        values = table(f"data_{int(block) or 2}")[:, abs(int(column)) - 1]
+        values = -values if column < 0 else values
+        unit = _UNIT.search(text)
+        if block == 1:  # constants have their first and last value
+            values = np.repeat(values[:1], count)
+        yield Head(name, unit[1].strip() if unit else ""), values
+
+
+def _of_matlab(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
+    """Yield columns of matrices and of the fields of structs, those of one length."""
+    tables: dict[str, Any] = {}
+    for name, each in found.items():
+        if name.startswith("__"):
+            continue
+        if each.dtype.names and each.size == 1:
+            tables |= {f"{name}.{field}": each[field].item() for field in each.dtype.names}
+        else:
+            tables[name] = each
+    for name, each in tables.items():
+        numbers: Any = np.asarray(each)
+        if numbers.dtype.kind in "fiu" and numbers.ndim == 2:
+            numbers = numbers.T if numbers.shape[0] == 1 else numbers
+            for k in range(numbers.shape[1]):
+                yield Head(name if numbers.shape[1] == 1 else f"{name}({k + 1})"), numbers[:, k]

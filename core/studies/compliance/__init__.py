@@ -1,0 +1,1 @@
+"""Kinematics and compliance of a suspension: its equilibria over travel and over loads."""

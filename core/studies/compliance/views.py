@@ -1,0 +1,181 @@
+"""The results of a compliance study as JSON, as a table, and as a page."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...case.compliance import Load
+from ...report.figures import Figure, Style
+from ...report.page_model import Plot
+from ...report.page_parts import environment, figure_parts
+from ...trajectory import Array
+from ...unit_text import with_unit
+from .study import ComplianceCurves, ComplianceResults
+
+SCHEMA = "kincheck-compliance/1"
+DEGREE = 180.0 / math.pi
+SHOWN: Mapping[str, tuple[str, float]] = {
+    "m": ("mm", 1e3),
+    "rad": ("deg", DEGREE),
+    "rad/m": ("deg/m", DEGREE),
+    "m/N": ("mm/kN", 1e6),
+    "rad/N": ("deg/kN", 1e3 * DEGREE),
+    "1/N": ("1/kN", 1e3),
+    "m/(N m)": ("mm/(100 N m)", 1e5),
+    "rad/(N m)": ("deg/(100 N m)", 1e2 * DEGREE),
+    "1/(N m)": ("1/(100 N m)", 1e2),
+    "N/m": ("N/mm", 1e-3),
+    "N m/rad": ("N m/deg", 1.0 / DEGREE),
+}
+"""Unit and factor of tables and pages, by SI unit; files in JSON are in SI."""
+_HERE = Path(__file__).parent
+
+
+def as_data(results: ComplianceResults) -> dict[str, Any]:
+    """Return the results as plain data in SI; null without an equilibrium."""
+    return {
+        "schema": SCHEMA,
+        "case": results.case,
+        "signs": results.signs,
+        **_data(results.travel),
+        "loads": {str(name): _data(each) for name, each in results.loads.items()},
+        "failures": results.failures,
+    }
+
+
+def _data(curves: ComplianceCurves) -> dict[str, Any]:
+    return {
+        curves.axis: _listed(curves.at),
+        "wheel_center": _listed(curves.wheel_center),
+        "spin_axis": _listed(curves.spin_axis),
+        "wheel_load": _listed(curves.wheel_load),
+        "compliance": _listed(curves.compliance),
+        "outputs": {
+            name: {"unit": each.unit, "sense": each.sense, "position": _listed(each.values)}
+            for name, each in curves.outputs.items()
+        },
+        "rigid": {name: _listed(values) for name, values in curves.rigid.items()},
+        "notes": [*curves.notes],
+    }
+
+
+def _listed(values: Array) -> Any:
+    found: Any = values.astype(object)
+    found[~np.isfinite(values)] = None
+    return found.tolist()
+
+
+def unit_of_axis(curves: ComplianceCurves) -> tuple[str, float]:
+    """Return unit and factor of the axis."""
+    if curves.axis == "travel":
+        return SHOWN["rad" if curves.turning else "m"]
+    return ("N m" if curves.axis == Load.ALIGNING else "N"), 1.0
+
+
+def table(results: ComplianceResults) -> str:
+    """Return the curves as CSV: a row for each sample over travel, then over each load."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    first = results.travel
+    center = [f"wheel_center_{axis} [mm]" for axis in "xyz"]
+    names = {name: SHOWN.get(each.unit, (each.unit, 1.0)) for name, each in first.outputs.items()}
+    rigid = [f"{name}.rigid" for name in first.rigid]
+    heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
+    heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
+    if results.signs:
+        text.write(f"# {results.signs}\n")
+    writer.writerow(["over", "value", "unit", *center, "wheel_load [N]", *heads])
+    for curves in (first, *results.loads.values()):
+        unit, factor = unit_of_axis(curves)
+        columns: list[Sequence[float] | Array] = [
+            *(1e3 * curves.wheel_center.T),
+            curves.wheel_load,
+            *(size * curves.outputs[name].values for name, (_, size) in names.items()),
+            *(
+                names[each.removesuffix(".rigid")][1] * curves.rigid[each.removesuffix(".rigid")]
+                if curves.rigid
+                else np.full(len(curves.at), np.nan)
+                for each in rigid
+            ),
+        ]
+        for at, *row in zip(curves.at, *columns, strict=True):
+            writer.writerow([curves.axis, repr(float(factor * at)), unit, *map(_cell, row)])
+    return text.getvalue()
+
+
+def _cell(value: float) -> str:
+    return repr(float(value)) if math.isfinite(value) else ""
+
+
+def lines(results: ComplianceResults) -> Iterator[str]:
+    """Yield the slopes and rates at the sample nearest to design, and the ends of each curve."""
+    curves = results.travel
+    k = int(np.argmin(np.abs(curves.at)))
+    unit, factor = unit_of_axis(curves)
+    yield f"{results.case}: {results.signs}"
+    yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
+    for name, each in curves.outputs.items():
+        shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        if not np.isfinite(each.values).any():
+            yield f"  {with_unit(name, shown)}  –"
+            continue
+        low, high = (size * end(each.values) for end in (np.nanmin, np.nanmax))
+        value = size * each.values[k]
+        yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
+
+
+def page(results: ComplianceResults) -> str:
+    """Return the page: curves over travel with the rigid ones beside, then over each load."""
+    figures: dict[str, Figure] = {}
+    sections: list[tuple[str, list[Style], list[Plot]]] = []
+    soft, rigid = Style.number(0, "with bushings"), Style.number(1, "rigid joints")
+    for number, curves in enumerate((results.travel, *results.loads.values())):
+        unit, factor = unit_of_axis(curves)
+        x, plots = _drawn(factor * curves.at), list[Plot]()
+        load = ("wheel_load", "N", curves.wheel_load)
+        every = [load, *((name, each.unit, each.values) for name, each in curves.outputs.items())]
+        for name, si, values in every:
+            shown, size = SHOWN.get(si, (si, 1.0))
+            data = [soft.curve(x, _drawn(size * values))]
+            if name in curves.rigid:
+                data.append(rigid.curve(x, _drawn(size * curves.rigid[name])))
+            key = f"curve-{number}-{len(plots)}"
+            plots.append(Plot(key, f"{name} over {curves.axis}", ""))
+            figures[key] = {
+                "data": data,
+                "layout": {
+                    "xaxis": {"title": {"text": with_unit(curves.axis, unit)}, "zeroline": True},
+                    "yaxis": {"title": {"text": with_unit(name, shown)}},
+                    "hovermode": "x unified",
+                },
+            }
+        styles = [soft, rigid] if curves.rigid else [soft]
+        sections.append((f"Over {curves.axis}", styles, plots))
+    return (
+        environment(_HERE)
+        .get_template("compliance.html")
+        .render(
+            title=f"Kinematics and compliance of {results.case}",
+            results=results,
+            sections=sections,
+            matrix=_matrix(results.travel),
+            **figure_parts(figures),
+        )
+    )
+
+
+def _drawn(values: Array) -> list[float | None]:
+    return [float(f"{x:.10g}") if math.isfinite(x) else None for x in values.tolist()]
+
+
+def _matrix(curves: ComplianceCurves) -> list[list[str]]:
+    """Return the compliance at the sample nearest to design as text [SI]."""
+    k = int(np.argmin(np.abs(curves.at)))
+    return [[f"{x:.4g}" for x in row] for row in curves.compliance[k].tolist()]

@@ -1,0 +1,37 @@
+"""Robots whose motors and limits say what moves, run without --drive."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
+
+JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
+<origin xyz="1 0 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="{3}" effort="1" velocity="1"/>
+</joint>"""
+MOTOR = '<transmission name="{0} drive"><joint name="{0}"/><actuator name="{0} m"/></transmission>'
+
+
+def arm(folder: Path, *motors: str, upper: str = "1") -> Path:
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "upper", "fore"))
+    joints = JOINT.format("shoulder", "base", "upper", upper)
+    joints += JOINT.format("elbow", "upper", "fore", "0.25")
+    (file := folder / "arm.urdf").write_text(
+        f"<robot name='arm'>{links}{joints}{''.join(map(MOTOR.format, motors))}</robot>"
+    )
+    return file
+
+
+def test_motors_move_through_their_limits(tmp_path):
+    case = load(arm(tmp_path, "shoulder", "elbow"))
+    assert case.sweep.driver == "shoulder"
+    assert [case.sweep.values[0], case.sweep.values[-1]] == [-0.5, 1.0]
+    assert np.ptp(case.sweep.path.motions["elbow"].at(case.sweep.path.times)[0]) == 0.75
+    assert any("shoulder, elbow move through their limits" in note for note in case.assembly)
+
+
+@pytest.mark.parametrize(("motors", "upper"), [(("shoulder",), "1"), (("shoulder", "elbow"), "-1")])
+def test_too_few_motors_or_limits_ask(motors, upper, tmp_path):
+    with pytest.raises(CaseError, match="nothing said of what drives it"):
+        load(arm(tmp_path, *motors, upper=upper))

@@ -1,0 +1,302 @@
+"""Efforts and reactions at rest, resting poses, efforts at other joints, frames of reactions."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import adapters, cases
+from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.case.measures import DriverEffort, JointForce, JointMoment
+from kincheck.core.case.quantity import with_markers
+from kincheck.core.cli.main import main
+from kincheck.core.errors import CaseError, KincheckError
+from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.run import run
+from scipy.optimize import brentq
+
+G = 9.81
+ARM = """
+schema = "kincheck-case/1"
+name = "arm"
+source = "made"
+gravity = [0.0, 0.0, -9.81]
+[bodies.arm]
+euler_parameters = [0.5, 0.5, 0.5, 0.5]
+mass = 2.0
+center_of_mass = [0.2, 0.0, 0.0]
+inertia = [0.001, 0.02, 0.02, 0.0, 0.0, 0.0]
+[bodies.hand]
+mass = 1.0
+center_of_mass = [0.5, 0.0, 0.0]
+inertia = [0.001, 0.01, 0.01, 0.0, 0.0, 0.0]
+[joints.shoulder]
+type = "revolute"
+bodies = ["ground", "arm"]
+point = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[joints.elbow]
+type = "revolute"
+bodies = ["arm", "hand"]
+point = [0.4, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[points.tip]
+body = "hand"
+position = [0.6, 0.0, 0.0]
+[drivers.lift]
+type = "joint_angle"
+joint = "shoulder"
+[drivers.bend]
+type = "joint_angle"
+joint = "elbow"
+[forces.coil]
+type = "torsion_spring_damper"
+joint = "shoulder"
+stiffness = 50.0
+damping = 30.0
+"""
+SWEEP = """
+[sweep]
+driver = "lift"
+start = -0.4
+stop = 0.4
+steps = 5
+rate = 0
+[drivers.bend.motion]
+type = "ramp"
+rate = 0.5
+"""
+EFFORTS = """
+[outputs.lift]
+type = "driver_effort"
+driver = "lift"
+[outputs.bend]
+type = "driver_effort"
+driver = "bend"
+"""
+
+
+def read(tmp_path, text):
+    file = tmp_path / "arm.toml"
+    file.write_text(text)
+    return load_case(file)
+
+
+def values(case, engine="native"):
+    """Return the outputs of a case by an engine."""
+    engine = adapters.engine(engine)
+    (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    assert not record.outcome.bad, record.message
+    return {name: np.array(each.position, float) for name, each in record.outputs.items()}
+
+
+def held(lift, bend):
+    """Return the efforts that hold the arm, from potential energy: turns about y lower x > 0."""
+    both = lift + bend
+    elbow = -G * 0.1 * np.cos(both)
+    weight = G * (2.0 * 0.2 * np.cos(lift) + 1.0 * 0.4 * np.cos(lift))
+    return -weight + elbow + 50.0 * lift, elbow
+
+
+ENGINES = ["native", "pinocchio", "mujoco", "exudyn"]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rate_zero_gives_static_efforts(tmp_path, engine):
+    """Without a damper's and inertia's part, at all samples of both drivers."""
+    found = values(read(tmp_path, ARM + SWEEP + EFFORTS), engine)
+    lift = np.linspace(-0.4, 0.4, 5)
+    expected = held(lift, 0.5 * lift)
+    assert found["lift"] == pytest.approx(expected[0], abs=1e-11)
+    assert found["bend"] == pytest.approx(expected[1], abs=1e-11)
+
+
+def test_static_case_is_written_as_read(tmp_path):
+    case = read(tmp_path, ARM + SWEEP + EFFORTS)
+    again = tmp_path / "again.toml"
+    again.write_text(case_text(case))
+    assert load_case(again).sweep.static
+    assert values(load_case(again))["lift"] == pytest.approx(values(case)["lift"], rel=1e-15)
+
+
+def test_rates_are_not_results_at_rest(tmp_path):
+    case = read(tmp_path, ARM + SWEEP + '[outputs.x]\npoint = "tip"\ncomponent = "x"\n')
+    engine = adapters.engine("pinocchio")
+    (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    assert (record.outcome.value, record.message) == ("pass", "")
+    assert record.outputs["x"].velocity is None
+
+
+def test_option_static_equals_rate_zero(tmp_path, capsys):
+    moving = (ARM + SWEEP + EFFORTS).replace("rate = 0\n", "rate = 2.0\n")
+    (tmp_path / "arm.toml").write_text(moving)
+    out = tmp_path / "out.json"
+    command = ["run", str(tmp_path / "arm.toml"), "--engine", "native", "pinocchio", "--static"]
+    assert main([*command, "--json", str(out)]) == 0
+    records = json.loads(out.read_text())["records"]
+    lift = np.linspace(-0.4, 0.4, 5)
+    for record in records:
+        assert record["outputs"]["lift"]["position"] == pytest.approx(
+            held(lift, 0.25 * lift)[0], abs=1e-11
+        )
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_resting_pose_needs_no_effort(tmp_path, engine):
+    """Both drivers are free: a coil at the shoulder, and the hand hangs straight down."""
+    text = ARM + "[equilibrium]\n" + EFFORTS
+    text += '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
+    text += "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
+    found = values(read(tmp_path, text), engine)
+    assert found["lift"] == pytest.approx([0.0], abs=1e-12)
+    assert found["bend"] == pytest.approx([0.0], abs=1e-12)
+
+    def bent(lift):
+        return brentq(lambda x: held(lift, x)[1] + 8.0 * x, -2.0, 2.0, xtol=1e-15)
+
+    angle = brentq(lambda x: held(x, bent(x))[0], -1.0, 1.0, xtol=1e-15)
+    assert found["angle"] == pytest.approx([angle], abs=1e-12)
+
+
+def test_resting_pose_follows_a_held_driver(tmp_path):
+    text = ARM + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS
+    text += '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
+    text += '[sweep]\ndriver = "bend"\nstart = -0.5\nstop = 0.5\nsteps = 3\n'
+    case = read(tmp_path, text)
+    found = values(case, "mujoco")
+    assert found["lift"] == pytest.approx(np.zeros(3), abs=1e-11)
+    for bend, angle, effort in zip((-0.5, 0.0, 0.5), found["angle"], found["bend"], strict=True):
+        expected = brentq(lambda x, bend=bend: held(x, bend)[0], -1.0, 1.0, xtol=1e-15)
+        assert angle == pytest.approx(expected, abs=1e-12)
+        assert effort == pytest.approx(held(expected, bend)[1], abs=1e-11)
+
+
+def test_unstable_resting_pose_is_noted(tmp_path):
+    upright = ARM.replace("gravity = [0.0, 0.0, -9.81]", "gravity = [-100.0, 0.0, 0.0]")
+    upright = upright.replace("gravity = [-100", "gravity = [-100")
+    case = read(tmp_path, upright + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS)
+    assert "unstable: body" in "".join(case.assembly)
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ('[equilibrium]\nheld = ["twist"]\n', "'twist'"),
+        ("[equilibrium]\n" + SWEEP, "'bend' moves, and .equilibrium. leaves it free"),
+        ("", "sweep: missing"),
+    ],
+)
+def test_equilibrium_of_contradictions_is_refused(tmp_path, more, expected):
+    with pytest.raises(CaseError, match=expected):
+        read(tmp_path, ARM + more + EFFORTS)
+
+
+def test_pose_without_equilibrium_is_refused(tmp_path):
+    """A hand on a frictionless elbow, held out by nothing."""
+    loose = ARM.replace("gravity = [0.0, 0.0, -9.81]", "gravity = [0.0, 0.0, 0.0]")
+    with pytest.raises(KincheckError, match=r"body 'hand' turns about .* freely"):
+        read(tmp_path, loose + "[equilibrium]\n" + EFFORTS)
+
+
+@pytest.mark.parametrize("name", ["rssr", "four_bar"])
+def test_effort_at_another_joint_is_by_virtual_work(name):
+    """An actuator there holds the same mechanism: found by driving that joint instead."""
+    case = cases.load("four_bar")
+    mechanism = case.mechanism
+    driver = mechanism.drivers[0]
+    other = "rocker_pivot"
+    wanted = DriverEffort("there", 1e-9, 0.0, "", driver=driver.name, at=other)
+    wanted = wanted.bound(mechanism)
+    sweep = replace(case.sweep, values=np.array([0.2, 0.9]), rate=0.0)
+    moved = replace(
+        case,
+        mechanism=with_markers(mechanism, [wanted]),
+        outputs=(wanted,),
+        sweep=sweep,
+        reference={},
+    )
+    native = adapters.engine("native")
+    solved = native.solve(native.build(moved), moved, 1e-13)
+    found = output_series(moved, wanted, solved).position
+    # virtual work by finite differences of the rocker's angle
+    own = DriverEffort("own", 1e-9, 0.0, "", driver=driver.name).bound(mechanism)
+    plain = replace(moved, mechanism=with_markers(mechanism, [own]), outputs=(own,))
+    effort = output_series(plain, own, native.solve(native.build(plain), plain, 1e-13)).position
+    (there, _) = wanted.rates
+    h = 1e-5
+
+    def angles(x):
+        at = replace(moved, sweep=replace(sweep, values=sweep.values + x, rate=1.0))
+        at = replace(at, mechanism=with_markers(mechanism, [there]), outputs=(there,))
+        return output_series(at, there, native.solve(native.build(at), at, 1e-13)).position
+
+    slope = (angles(h) - angles(-h)) / (2.0 * h)
+    assert found == pytest.approx(effort / slope, rel=1e-8)
+
+
+def test_reactions_turn_with_frame_and_move_with_point(tmp_path):
+    case = read(tmp_path, ARM + SWEEP + EFFORTS)
+    mechanism = case.mechanism
+    common = (1e-9, 0.0, "")
+    every = [
+        *(JointForce(f"g{x}", *common, joint="elbow", component=x) for x in "xyz"),
+        *(JointForce(f"b{x}", *common, joint="elbow", component=x, frame="body") for x in "xyz"),
+        *(
+            JointForce(f"j{x}", *common, joint="shoulder", component=x, frame="joint")
+            for x in "xyz"
+        ),
+        *(JointForce(f"s{x}", *common, joint="shoulder", component=x) for x in "xyz"),
+        JointMoment("m", *common, joint="elbow", component="y", about="tip"),
+        JointMoment("o", *common, joint="elbow", component="y"),
+    ]
+    bound = tuple(each.bound(mechanism) for each in every)
+    case = replace(case, mechanism=with_markers(mechanism, bound), outputs=bound)
+    for engine in ("native", "pinocchio"):
+        found = values(case, engine)
+        # the hand weighs 9.81 N, and hangs on the elbow: it is turned by 1.5 times the driver
+        turn = 1.5 * np.linspace(-0.4, 0.4, 5)
+        assert found["gz"] == pytest.approx(np.full(5, G), abs=1e-11)
+        assert found["bx"] == pytest.approx(-G * np.sin(turn), abs=1e-11)
+        assert found["bz"] == pytest.approx(G * np.cos(turn), abs=1e-11)
+        # z of the joint's frame is its axis, y of the global one
+        size = np.hypot(found["jx"], found["jy"])
+        assert size == pytest.approx(np.full(5, 3.0 * G), abs=1e-11)
+        assert found["jz"] == pytest.approx(np.zeros(5), abs=1e-11)
+        # the tip is 0.2 m beyond the elbow
+        assert found["m"] == pytest.approx(found["o"] + G * 0.2 * np.cos(turn), abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ('type = "joint_force"\nabout = "tip"', "the same about any point"),
+        ('type = "joint_moment"\nabout = "toe"', "'toe'"),
+        ('type = "joint_force"\nframe = "wheel"', "global, body, joint"),
+    ],
+)
+def test_reaction_in_unknown_frame_is_refused(tmp_path, keys, expected):
+    output = f'[outputs.r]\n{keys}\njoint = "elbow"\ncomponent = "x"\n'
+    with pytest.raises(KincheckError, match=expected):
+        read(tmp_path, ARM + SWEEP + output)
+
+
+def test_reactions_option_adds_every_determined_force(tmp_path, capsys):
+    (tmp_path / "arm.toml").write_text(ARM + SWEEP + EFFORTS)
+    out = tmp_path / "out.json"
+    case = str(tmp_path / "arm.toml")
+    command = ["run", case, "--reactions", "--engine", "native", "pinocchio", "--json", str(out)]
+    assert main(command) == 0
+    outputs = json.loads(out.read_text())["records"][1]["outputs"]
+    assert [*outputs][:3] == ["shoulder.force_x", "shoulder.force_y", "shoulder.force_z"]
+    assert outputs["elbow.force_z"]["position"] == pytest.approx([G] * 5, abs=1e-11)
+    assert outputs["coil.force"]["unit"] == "N m"
+    shown = capsys.readouterr().out
+    assert shown.index("N m") < shown.index("m/s")
+
+
+def test_reactions_option_names_undetermined_joints(tmp_path, capsys):
+    assert main(["run", "four_bar", "--reactions", "--static", "--engine", "native"]) == 0
+    said = capsys.readouterr().out
+    assert said.count("redundant rows leave") == 4
+    assert "joint 'crank_pin': redundant rows leave" in said

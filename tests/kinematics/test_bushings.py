@@ -1,0 +1,273 @@
+"""Bushings and curves: wrenches in closed form, balance of power, all engines, and their keys.
+
+Expected torques at one pose: gradients of energies in the angles of each law, computed by central
+differences of long doubles and, for the Cardan law, read from a record of OpenSim's BushingForce.
+"""
+
+import re
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.adapters.shared.force_solution import curve_force, elastic_torque
+from kincheck.core.algebra import ZERO, Quat, vec
+from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.case.io.model_writer import written
+from kincheck.core.errors import KincheckError, MechanismError
+from kincheck.core.kinematics.forces.equations import BodyStates, bushing, force_of
+from kincheck.core.kinematics.formulation.constraints import frames
+from kincheck.core.mechanism.body import Body
+from kincheck.core.mechanism.loads import Bushing
+from kincheck.core.mechanism.mechanism import GROUND, Mechanism
+from kincheck.core.primitives.base import Pose
+
+from ..support.loads import solved, traced
+
+ROTATION = np.array([0.08, -0.05, 0.12])
+TORQUES = {
+    "euler_parameters": (8.41809643, -9.72167752, 5.77711516),
+    "cardan": (8.28625694, -9.51133482, 5.70973763),
+}
+TABLE = ((-0.01, -200.0), (0.0, 0.0), (0.005, 10.0), (0.02, 1000.0))
+
+
+def rotated(vector):
+    """Return the Euler parameters of a rotation vector."""
+    angle = np.linalg.norm(vector)
+    return Quat(float(np.cos(angle / 2)), vec((np.sin(angle / 2) / angle * vector).tolist()))
+
+
+def at_pose(element, u, q):
+    """Return an element between the ground and one body at work at a pose at rest."""
+    mechanism = Mechanism("block", [Body("block")], [], forces=[element])
+    states = BodyStates(frames(mechanism, 1.0), {"block": Pose.of(vec(u), q)}, {}, {})
+    return bushing(element, states)
+
+
+@pytest.mark.parametrize("law", TORQUES)
+def test_bushing_turned_has_its_laws_torque(law):
+    element = Bushing("b", GROUND, "block", (0, 0, 0), turning_stiffness=(100, 200, 50), law=law)
+    found = at_pose(element, (0.0, 0.0, 0.0), rotated(ROTATION))
+    assert [*found.wrenches[GROUND].torque] == pytest.approx(TORQUES[law], abs=6e-9)
+    assert [*found.wrenches["block"].torque] == pytest.approx([-x for x in TORQUES[law]], abs=6e-9)
+
+
+def test_bushing_displaced_has_force_along_first_bodys_axes():
+    element = Bushing("b", GROUND, "block", (0, 0, 0), stiffness=(1e5, 2e5, 3e5), preload=(1, 2, 3))
+    found = at_pose(element, (0.003, -0.002, 0.004), rotated(ROTATION))
+    assert [*found.wrenches[GROUND].force] == pytest.approx([301.0, -398.0, 1203.0], rel=1e-14)
+    # the force acts at the second body's point
+    assert [*found.wrenches["block"].torque] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    expected = np.cross([0.003, -0.002, 0.004], [301.0, -398.0, 1203.0])
+    assert [*found.wrenches[GROUND].torque] == pytest.approx(expected.tolist(), rel=1e-13)
+
+
+@pytest.mark.parametrize("law", TORQUES)
+@pytest.mark.parametrize("angle", [0.3, 1.4, 2.9])
+def test_torque_of_large_turns_equals_matrix_form(law, angle):
+    """The adapters' torque, from a rotation matrix, against the one from Euler parameters."""
+    axes = ((1.0, 2.0, 0.5), (2.0, -1.0, 0.0))
+    element = Bushing(
+        "b", GROUND, "block", (0, 0, 0), axes, turning_stiffness=(30, 70, 110), law=law
+    )
+    direction = np.array([0.9, -0.1, 0.2] if law == "cardan" else [0.3, -0.8, 0.5])
+    q = rotated(angle * direction / np.linalg.norm(direction))
+    triad = np.array(element.triad)
+    A = Pose.of(ZERO, q).A
+    matrix = np.array([[*(A @ vec(column))] for column in np.eye(3).tolist()]).T
+    own = elastic_torque(element, triad @ matrix @ triad.T)
+    found = at_pose(element, (0.0, 0.0, 0.0), q).wrenches[GROUND].torque
+    assert [*found] == pytest.approx((triad.T @ own).tolist(), abs=1e-12 * 330)
+
+
+def test_curve_passes_rows_smoothly_and_straight_beyond():
+    for x, y in TABLE:
+        assert force_of(TABLE, x) == pytest.approx(y, abs=1e-12)
+    x = np.linspace(-0.05, 0.06, 2001)
+    y = force_of(TABLE, x)
+    assert np.diff(y).min() >= 0.0
+    slopes = np.diff(y) / np.diff(x)
+    # a jump of the slope would be as large as the slopes themselves
+    assert np.abs(np.diff(slopes)).max() <= 0.02 * slopes.max()
+    assert np.abs(np.diff(y[:3], 2)).max() <= 1e-11
+    assert np.abs(np.diff(y[-3:], 2)).max() <= 1e-11
+    expected = [curve_force(TABLE, float(each)) for each in x]
+    assert y == pytest.approx(expected, abs=1e-11)
+
+
+def bushed(tmp_path, law):
+    """Return a driven arm and hand with a bushing between them, and a spring with a curve."""
+    file = tmp_path / f"{law}.toml"
+    file.write_text(BUSHED.replace("LAW", law))
+    return load_case(file)
+
+
+@pytest.mark.parametrize("law", TORQUES)
+def test_power_of_bushings_is_balanced(tmp_path, law):
+    case = bushed(tmp_path, law)
+    for way in (solved, traced):
+        forces = way(case.mechanism, case).forces
+        assert np.abs(forces.power).max() <= 1e-12 * forces.largest_power.max()
+
+
+@pytest.mark.parametrize("law", TORQUES)
+@pytest.mark.parametrize("engine", ["pinocchio", "mujoco", "exudyn", "drake", "dart", "simbody"])
+def test_every_engine_agrees_on_bushings(tmp_path, law, engine):
+    engine, native = adapters.engine(engine), adapters.engine("native")
+    if engine.version() is None:
+        pytest.skip(f"{engine.name} is not installed here")
+    case = bushed(tmp_path, law)
+    expected, found = (
+        each.solve(each.build(case), case, 1e-12).forces for each in (native, engine)
+    )
+    for name in case.mechanism.drivers:
+        scale = np.abs(expected.drivers[name.name]).max()
+        assert found.drivers[name.name] == pytest.approx(
+            expected.drivers[name.name], abs=1e-11 * scale
+        )
+    for name in ("b", "s"):
+        scale = np.abs(expected.elements[name]).max()
+        assert found.elements[name] == pytest.approx(expected.elements[name], abs=1e-11 * scale)
+
+
+def test_case_with_bushings_reads_as_written(tmp_path):
+    case = bushed(tmp_path, "cardan")
+    again = tmp_path / "again.toml"
+    again.write_text(case_text(case))
+    other = load_case(again).mechanism
+    assert other.bushings == case.mechanism.bushings
+    assert other.forces == case.mechanism.forces
+    front = case.mechanism.bushings[0]
+    assert front.name == "h.front"
+    assert front.stiffness == (1e6, 2e6, 3e6)
+    assert front.turning_stiffness == (1.0, 1.0, 1.0)
+    assert case.mechanism.force("b").curve[1] == TABLE
+
+
+def test_released_joint_leaves_its_bushings(tmp_path):
+    soft = bushed(tmp_path, "cardan").mechanism.released()
+    assert [joint.name for joint in soft.joints] == ["g"]
+    assert [each.name for each in soft.forces] == ["b", "s", "h.front"]
+    assert [each.name for each in soft.drivers] == ["e"]
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("stiffness = -3000", "stiffness is -3000.0.*zero or more"),
+        ("stiffness = [1, 2]", "a number, or three along the axes"),
+        ("stiffness = 1\nlaw = 'chrono'", "euler_parameters, cardan"),
+        ("stiffness = 1\naxes = [[1, 0, 0], [1, 1, 0]]", "45 degrees apart, expected 90"),
+        ("curve = [[0, 0], [0, 1]]", "deflections must increase"),
+        ("curve = [[1, 5], [2, 9]]", "no force of it is zero"),
+        ("curve = [[0, 0], [1, 9, 4]]", "a table"),
+        ("damping = 0", "has no stiffness"),
+    ],
+)
+def test_bushing_of_bad_values_is_refused(tmp_path, given, expected):
+    file = tmp_path / "bad.toml"
+    text = BUSHED.replace("LAW", "cardan").replace("stiffness = [1000, 2000, 3000]\n", given + "\n")
+    file.write_text(text.replace("turning_stiffness = 1000\n", "").replace(AXES, ""))
+    with pytest.raises(KincheckError, match=re.compile(expected, re.DOTALL)):
+        load_case(file)
+
+
+def test_spring_without_stiffness_or_curve_is_refused(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text(re.sub(r"curve = \[\[-50.*\n", "", BUSHED.replace("LAW", "cardan")))
+    with pytest.raises(KincheckError, match="stiffness: missing"):
+        load_case(file)
+
+
+def test_bushing_on_unknown_body_is_refused():
+    with pytest.raises(MechanismError, match="'wheel'"):
+        Mechanism(
+            "m", [Body("a")], [], forces=[Bushing("b", "wheel", "a", (0, 0, 0), stiffness=1.0)]
+        )
+
+
+@pytest.mark.parametrize("target", adapters.WRITERS)
+def test_writers_name_bushings_and_curves_left_out(tmp_path, target):
+    case = bushed(tmp_path, "cardan")
+    text = "".join(map(str, written(case, adapters.writer(target)).values()))
+    assert re.search(r"Left out:[^\n]*force 'b' \(bushing\)[^\n]*force 's'", text)
+
+
+AXES = "axes = [[0, 1, 0], [0, 0, 1]]\n"
+BUSHED = """\
+schema = "kincheck-case/1"
+name = "b"
+source = "made"
+gravity = [0.0, 0.0, -9.81]
+[units]
+length = "mm"
+[bodies.arm]
+mass = 2.0
+center_of_mass = [200, 0, 0]
+inertia = [1000, 20000, 20000, 0, 0, 0]
+[bodies.hand]
+mass = 1.0
+center_of_mass = [500, 0, 0]
+[joints.h]
+type = "revolute"
+bodies = ["ground", "arm"]
+point = [0, 0, 0]
+axis = [0, 1, 0]
+[joints.h.bushings.front]
+axes = [[0, 1, 0], [0, 0, 1]]
+stiffness = [1000, 2000, 3000]
+turning_stiffness = 1000
+[joints.g]
+type = "revolute"
+bodies = ["arm", "hand"]
+point = [400, 0, 0]
+axis = [0, 0.2, 1]
+[points.tip]
+body = "hand"
+position = [600, 0, 0]
+[drivers.d]
+type = "joint_angle"
+joint = "h"
+[drivers.e]
+type = "joint_angle"
+joint = "g"
+[drivers.e.motion]
+type = "sine"
+amplitude = 0.3
+frequency = 0.5
+[sweep]
+driver = "d"
+start = -0.3
+stop = 0.4
+steps = 8
+rate = 2.0
+[forces.b]
+type = "bushing"
+bodies = ["arm", "hand"]
+point = [450, 20, 10]
+axes = [[1, 1, 0], [0, 0, 1]]
+stiffness = [100, 200, 300]
+turning_stiffness = [10000, 20000, 40000]
+damping = [1, 2, 3]
+turning_damping = 500
+preload = [10, -5, 3]
+law = "LAW"
+curve = [[], [[-10, -200], [0, 0], [5, 10], [20, 1000]], []]
+[forces.s]
+type = "spring_damper"
+bodies = ["hand", "ground"]
+points = [[550, 0, 0], [600, 0, 300]]
+curve = [[-50, -300], [0, 0], [50, 100], [80, 900]]
+[outputs.M]
+type = "driver_effort"
+driver = "d"
+[outputs.N]
+type = "driver_effort"
+driver = "e"
+[outputs.B]
+type = "element_force"
+force = "b"
+[outputs.S]
+type = "element_force"
+force = "s"
+"""

@@ -1,0 +1,294 @@
+"""Equilibria against closed forms, energies and a strut that six simulators agree on.
+
+tests/data/elastokinematics has the numbers, and where they come from.
+"""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core.errors import SolveError
+from kincheck.core.joints import Revolute, Translational
+from kincheck.core.kinematics import LoadPoint, StaticModel
+from kincheck.core.mechanism.body import Body
+from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
+from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def read(name):
+    return json.loads((DATA / name).read_text())
+
+
+def bushing_of(facts, name, i, j, factor=1.0, turning=1.0):
+    """Return a bushing of the data, its stiffness times factors."""
+    return Bushing(
+        name,
+        i,
+        j,
+        facts["point"],
+        facts["axes"][:2],
+        tuple(factor * k for k in facts["stiffness"]),
+        tuple(turning * k for k in facts["turning_stiffness"]),
+    )
+
+
+def three(facts):
+    every = enumerate(facts["bushings"])
+    return [bushing_of(each, f"b{k}", GROUND, "block") for k, each in every]
+
+
+def block(bushings):
+    return StaticModel(
+        Mechanism("block", [Body("block")], [], forces=bushings), [LoadPoint("o", "block", ORIGIN)]
+    )
+
+
+def compliance(found, load="o", body="block", point=ORIGIN):
+    return found.motion(found.by_load[load][0], body, point)
+
+
+def skew(a):
+    return np.cross(np.eye(3), a)
+
+
+def test_compliance_of_bushings_is_inverse_of_their_stiffness():
+    """C = (sum S^T K S)^-1 at zero load."""
+    facts = read("1_body_on_three_bushings.json")
+    bushings = [
+        bushing_of(each, f"b{k}", GROUND, "block") for k, each in enumerate(facts["bushings"])
+    ]
+    stiffness = np.zeros((6, 6))
+    for each in bushings:
+        axes, S = np.array(each.triad), np.eye(6)
+        S[:3, 3:] = skew(each.point).T
+        own = np.zeros((6, 6))
+        own[:3, :3] = axes.T @ np.diag(each.stiffness) @ axes
+        own[3:, 3:] = axes.T @ np.diag(each.turning_stiffness) @ axes
+        stiffness += S.T @ own @ S
+    expected = np.linalg.inv(stiffness)
+    loads = np.array([[0.0] * 6, facts["finite_load"]])
+    found = block(bushings).solve({"o": loads}, {})
+    C = compliance(found)
+    assert np.abs(C[0] - expected).max() <= 4e-15 * np.abs(expected).max()
+    assert np.abs(C[0] - C[0].T).max() <= 1e-14 * np.abs(C[0]).max()
+    assert np.abs(C[1] - C[1].T).max() > 1e-6 * np.abs(C[1]).max()  # the load is not at zero torque
+    assert found.place("block", ORIGIN)[1] == pytest.approx(facts["displacement"], abs=1e-17)
+    assert found.bodies["block"].p[1] == pytest.approx(facts["euler_parameters"], abs=1e-15)
+
+
+ARM = Mechanism(
+    "arm",
+    [Body("arm")],
+    [Revolute("hinge", GROUND, "arm", point=ORIGIN, axis=(0.0, 0.0, 1.0))],
+)
+STOP = ((-0.1, -100.0), (0.0, 0.0), (0.1, 100.0), (0.1001, 120.0), (0.2, 18100.0))
+PROGRESSIVE = PchipInterpolator(*np.array(STOP).T)
+
+
+@pytest.mark.parametrize(
+    ("element", "load", "angle"),
+    [
+        # k sin(th) = F a cos(th)
+        (
+            Bushing("t", GROUND, "arm", ORIGIN, turning_stiffness=(0.0, 0.0, 500.0)),
+            300.0,
+            math.atan(300.0 * 0.4 / 500.0),
+        ),
+        # k b sin(th) b cos(th) = F a cos(th)
+        (
+            Bushing("s", GROUND, "arm", (0.25, 0.0, 0.0), stiffness=(0.0, 2e5, 0.0)),
+            8000.0,
+            math.asin(8000.0 * 0.4 / (2e5 * 0.25**2)),
+        ),
+        # k th = F a cos(th)
+        (
+            TorsionSpringDamper("c", "hinge", 500.0),
+            900.0,
+            brentq(lambda x: 500.0 * x - 900.0 * 0.4 * math.cos(x), 0.0, 1.5, xtol=1e-15),
+        ),
+        # progressive(b sin(th)) b cos(th) = F a cos(th), beyond the stop at 0.1 m
+        (
+            Bushing("b", GROUND, "arm", (0.25, 0.0, 0.0), curve=((), STOP, ())),
+            400.0,
+            math.asin(brentq(lambda x: PROGRESSIVE(x) * 0.25 - 160.0, 0.0, 0.2, xtol=1e-16) / 0.25),
+        ),
+    ],
+    ids=["torsion", "side", "coil", "stop"],
+)
+def test_loaded_arm_turns_as_closed_form(element, load, angle):
+    model = StaticModel(replace(ARM, forces=[element]), [LoadPoint("tip", "arm", (0.4, 0.0, 0.0))])
+    found = model.solve({"tip": np.array([[0.0, load, 0.0, 0.0, 0.0, 0.0]])}, {})
+    assert found.reached.all()
+    x, y, _ = found.turned("arm", (1.0, 0.0, 0.0))[0]
+    assert math.atan2(y, x) == pytest.approx(angle, abs=1e-14)
+
+
+def test_load_at_elastic_centre_moves_without_turning():
+    places = [(0.3, 0.0, 0.0), (-0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0)]
+    bushings = [
+        Bushing(f"b{k}", GROUND, "block", place, stiffness=(1e5, 2e5, 3e5), turning_stiffness=10.0)
+        for k, place in enumerate(places)
+    ]
+    load = np.array([[5e4, -3e4, 2e4, 0.0, 0.0, 0.0]])
+    found = block(bushings).solve({"o": load}, {})
+    assert found.place("block", ORIGIN)[0] == pytest.approx([0.125, -0.0375, 1.0 / 60.0], abs=1e-16)
+    assert found.bodies["block"].p[0] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-16)
+
+
+def snap():
+    """Return a slider at a height between two springs, and its data."""
+    facts = read("4_snap_through.json")
+    at = (0.0, 0.0, facts["h"])
+    springs = [
+        SpringDamper(f"s{x:g}", "slider", GROUND, (at, (x, 0.0, 0.0)), facts["k"])
+        for x in (facts["a"], -facts["a"])
+    ]
+    guide = Translational("guide", GROUND, "slider", at, (0.0, 0.0, 1.0))
+    mechanism = Mechanism("snap", [Body("slider", at)], [guide], forces=springs)
+    return StaticModel(mechanism, [LoadPoint("top", "slider", at)]), facts
+
+
+def test_snap_through_gives_last_reachable_load():
+    model, facts = snap()
+    limit = facts["limit_load"]
+    loads = np.zeros((8, 6))
+    loads[:, 2] = [-x * limit for x in (0.5, 0.999, 1.0 - 1e-9, 1.0 + 1e-9, 1.5, 15.0, 20.0, 100.0)]
+    found = model.solve({"top": loads}, {})
+    assert found.reached.tolist() == [True] * 3 + [False] * 5
+    last = found.share[3:] * -loads[3:, 2]
+    assert last == pytest.approx([limit] * 5, rel=1e-9)
+    heights = found.place("slider", (0.0, 0.0, facts["h"]))[3:, 2]
+    assert heights == pytest.approx([facts["height_at_limit"]] * 5, abs=1e-5)
+    with pytest.raises(SolveError, match=r"no equilibrium at 90\.57.*last is at 90\.57.*snap"):
+        found.require_reached(lambda k, share: f"{share * -loads[k, 2]:.2f} N")
+
+
+def strut(factor=1.0, turning=1.0, rigid=False):
+    facts = read("5_strut_kc.json")
+    given = cases.load("mcpherson_strut_loaded").mechanism
+    if rigid:
+        soft, bushings = (), []
+    else:
+        soft = ("lca_pivot", "strut_top")
+        bushings = [
+            bushing_of(each, each["name"], *each["bodies"], factor, turning)
+            for each in facts["bushings"]
+        ]
+    mechanism = replace(
+        given,
+        joints=[joint for joint in given.joints if joint.name not in soft],
+        forces=[*given.forces, *bushings],
+    )
+    patch = tuple(facts["contact_patch"])
+    return StaticModel(mechanism, [LoadPoint("patch", "knuckle", patch)]), facts
+
+
+def test_strut_on_bushings_is_where_six_simulators_have_it():
+    model, facts = strut()
+    rows = facts["results"]
+    loads = np.array([each["load_at_contact_patch"] for each in rows])
+    found = model.solve({"patch": loads}, {"stroke": np.array([each["travel"] for each in rows])})
+    expected = [each["wheel_center"] for each in rows]
+    assert np.abs(found.place("knuckle", facts["wheel_center"]) - expected).max() <= 1e-15
+    axes = [each["spin_axis"] for each in rows]
+    assert np.abs(found.turned("knuckle", facts["spin_axis"]) - axes).max() <= 1e-14
+    wheel = [each["wheel_load"] for each in rows]
+    assert found.efforts["stroke"] == pytest.approx(wheel, abs=1e-10)
+    patch = tuple(facts["contact_patch"])
+    for C, each in zip(compliance(found, "patch", "knuckle", patch), rows, strict=True):
+        given = np.array(each["compliance_contact_patch"])
+        assert np.abs(C - given).max() <= 1e-14 * np.abs(given).max()
+
+
+def test_wheel_rate_is_derivative_of_wheel_load():
+    model, _ = strut()
+    travel, h = np.array([-0.03, 0.0, 0.04]), 1e-4
+    loads = {"patch": np.zeros((3, 6))}
+    found = model.solve(loads, {"stroke": travel})
+    ends = [model.solve(loads, {"stroke": travel + x}).efforts["stroke"] for x in (h, -h)]
+    expected = (ends[0] - ends[1]) / (2.0 * h)
+    assert found.by_driver["stroke"][1][:, 0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_stiff_bushings_tend_to_the_rigid_mechanism():
+    """The distance is of first order in the reciprocal stiffness."""
+    facts = read("6_rigid_limit.json")
+    load = {"patch": np.array([[500.0, 1000.0, 0.0, 0.0, 0.0, 0.0]])}
+    travel = {"stroke": np.array([0.03])}
+    center = (0.975, 0.715, 0.101)
+    found = strut(rigid=True)[0].solve(load, travel)
+    rigid = found.place("knuckle", center)[0]
+    assert rigid == pytest.approx(facts["rigid"]["wheel_center"], abs=1e-15)
+    assert found.efforts["stroke"][0] == pytest.approx(facts["rigid"]["wheel_load"], abs=1e-9)
+    for row in facts["rows"]:
+        found = strut(row["scale"], 0.0)[0].solve(load, travel)
+        place = found.place("knuckle", center)[0]
+        assert place == pytest.approx(row["wheel_center"], abs=2e-15)
+        assert found.efforts["stroke"][0] == pytest.approx(row["wheel_load"], abs=2e-8)
+    scaled = np.linalg.norm(place - rigid) * row["scale"]
+    assert scaled == pytest.approx(8.60778e-4, rel=1e-5)
+
+
+def test_work_of_a_load_is_stored():
+    """Gauss's rule over the ramp; the energy is written down in terms of places alone."""
+    facts = read("1_body_on_three_bushings.json")
+    bushings = [
+        bushing_of(each, f"b{k}", GROUND, "block") for k, each in enumerate(facts["bushings"])
+    ]
+    load = 2.0 * np.array(facts["finite_load"])
+    load[3:] = 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    shares = np.append(0.5 * (nodes + 1.0), 1.0)
+    found = block(bushings).solve({"o": shares[:, None] * load}, {})
+    C = compliance(found)[:8]
+    work = 0.5 * np.sum(weights * shares[:8] * np.einsum("i,nij,j->n", load, C, load))
+    energy = 0.0
+    for each in bushings:
+        moved = np.array(each.triad) @ (found.place("block", each.point)[-1] - each.point)
+        turned = 2.0 * np.array(each.triad) @ found.bodies["block"].p[-1, 1:]
+        energy += 0.5 * (each.stiffness @ moved**2 + each.turning_stiffness @ turned**2)
+    assert work == pytest.approx(energy, rel=1e-13)
+
+
+def test_body_that_nothing_holds_is_named():
+    bushing = Bushing(
+        "soft", GROUND, "arm", ORIGIN, stiffness=1e5, turning_stiffness=(9.0, 9.0, 0.0)
+    )
+    mechanism = Mechanism("free", [Body("arm")], [], forces=[bushing])
+    with pytest.raises(SolveError, match=r"'arm' turns about \[0, 0, 1\] freely.*'soft'"):
+        StaticModel(mechanism)
+
+
+def test_upright_pendulum_on_soft_spring_is_unstable():
+    def least(stiffness):
+        mechanism = replace(
+            ARM,
+            bodies=[Body("arm", mass=2.0, center_of_mass=(0.0, 0.5, 0.0))],
+            forces=[TorsionSpringDamper("coil", "hinge", stiffness)],
+            gravity=(0.0, -10.0, 0.0),
+        )
+        model = StaticModel(mechanism, [LoadPoint("o", "arm", ORIGIN)])
+        return model.solve({"o": np.zeros((1, 6))}, {}).unstable[0]
+
+    assert least(10.5) == ""
+    assert least(9.5) == "body 'arm' turns about [0, 0, 1]"
+
+
+def test_driver_that_holds_nothing_is_refused():
+    mechanism = replace(
+        ARM,
+        points=[Point("tip", "arm", (0.4, 0.0, 0.0))],
+        drivers=[JointAngle("turn", "hinge"), PointCoordinate("push", "tip", (0.0, 1.0, 0.0))],
+    )
+    with pytest.raises(SolveError, match="driver 'push' holds nothing"):
+        StaticModel(mechanism)

@@ -1,0 +1,96 @@
+"""A server of the live page in this process, and the table that it serves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.cli.main import registry
+from kincheck.core.cli.serve import judge_by
+from kincheck.core.live.server import LiveServer
+from kincheck.core.live.table import LiveTable
+from websockets.sync.client import ClientConnection, connect
+
+CAR = """\
+# template: double_wishbone
+# units: mm
+# axes: forward,left,up
+name,x,y,z,meaning
+uca_front,90,260,285,a comment that stays
+uca_rear,-110,265,280,
+uca_outer,-15,540,312,
+lca_front,120,210,125,
+lca_rear,-130,215,120,
+lca_outer,5,575,118,
+tierod_inner,70,220,150,
+tierod_outer,75,560,148,
+wheel_center,0,612,228,
+wheel_contact,0,612,0,
+"""
+TRAVEL = Supplied(travel="0.03:21")
+
+
+@pytest.fixture
+def car(tmp_path: Path) -> Path:
+    path = tmp_path / "car.csv"
+    path.write_text(CAR, "utf-8")
+    return path
+
+
+@pytest.fixture
+def served(car: Path) -> Iterator[LiveServer]:
+    known = registry()
+    server = LiveServer(car, lambda: LiveTable(car, TRAVEL), known.engines, judge_by(known))
+    yield server
+    server.close()
+
+
+class Page:
+    """A client that speaks the protocol."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.opening = self.told("opening")
+        self.points = [each["position"] for each in self.opening["points"]]
+
+    def say(self, **message: Any) -> None:
+        self.socket.send(json.dumps(message))
+
+    def told(self, kind: str) -> dict[str, Any]:
+        """Return the next message of a kind."""
+        while True:
+            message = json.loads(self.socket.recv(timeout=120))
+            if message["type"] == kind:
+                return message
+
+    def moved(self, name: str, axis: int, by: float) -> list[list[float]]:
+        """Return the points with one number moved."""
+        rows = [[*row] for row in self.points]
+        names = [each["name"] for each in self.opening["points"]]
+        rows[names.index(name)][axis] += by
+        return rows
+
+
+@pytest.fixture
+def open_page(served: LiveServer) -> Iterator[Callable[[], Page]]:
+    host = f"127.0.0.1:{served.port}"
+    with ExitStack() as pages:
+        yield lambda: Page(
+            pages.enter_context(
+                connect(
+                    f"ws://{host}/socket?token={served.token}",
+                    origin=f"http://{host}",
+                    max_size=None,
+                )
+            )
+        )
+
+
+@pytest.fixture
+def page(open_page: Callable[[], Page]) -> Page:
+    return open_page()

@@ -1,0 +1,329 @@
+"""The server of the live page: who gets in, what it answers, and how it ends."""
+
+import http.client
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+
+import jsonschema
+import pytest
+from kincheck import load, run
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.live.model import LiveModel
+from kincheck.core.live.protocol import LARGEST_MESSAGE, live_schema
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from .conftest import CAR, TRAVEL
+
+
+def status(server, path, method="GET", **headers):
+    """The status of a request, whose host is this machine unless given; and its headers."""
+    talk = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    talk.putrequest(method, path, skip_host="Host" in headers)
+    for name, value in headers.items():
+        talk.putheader(name.replace("_", "-"), value)
+    talk.endheaders()
+    answer = talk.getresponse()
+    answer.read()
+    return answer.status, answer.headers
+
+
+def test_server_listens_on_this_machine_alone(served):
+    assert served.listener.socket.getsockname()[0] == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    ("path", "headers", "expected"),
+    [
+        ("/?token={token}", {}, 200),
+        ("/live.js", {}, 200),
+        ("/live.css", {}, 200),
+        ("/", {}, 403),
+        ("/?token=wrong", {}, 403),
+        ("/?token=%C3%A9", {}, 403),
+        ("/?token={token}", {"Host": "evil.example"}, 403),
+        ("/?token={token}", {"Host": "127.0.0.1.evil.example"}, 403),
+        ("/?token={token}", {"Origin": "http://evil.example"}, 403),
+        ("/?token={token}", {"Origin": "http://127.0.0.1:1"}, 403),
+        ("/live.js", {"Host": "evil.example"}, 403),
+        ("/car.csv?token={token}", {}, 404),
+        ("/../car.csv", {}, 404),
+        ("/%2e%2e/car.csv", {}, 404),
+        ("/socket?token={token}", {}, 403),
+    ],
+)
+def test_request_gets_only_its_own_page(served, path, headers, expected):
+    assert status(served, path.format(token=served.token), **headers)[0] == expected
+
+
+def test_page_may_neither_be_framed_nor_load_others(served):
+    _, headers = status(served, f"/?token={served.token}")
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "unsafe-inline'; connect" in policy.partition("style-src-attr")[2]
+    assert headers["Referrer-Policy"] == "no-referrer"
+
+
+def test_post_is_refused(served):
+    assert status(served, f"/?token={served.token}", "POST")[0] == 403
+
+
+@pytest.mark.parametrize("case", ["token", "origin", "host"])
+def test_socket_of_a_stranger_is_refused(served, case):
+    host = f"127.0.0.1:{served.port}"
+    token = "x" if case == "token" else served.token
+    origin = "http://evil.example" if case == "origin" else f"http://{host}"
+    more = {"Host": "evil.example"} if case == "host" else {}
+    address = f"ws://{host}/socket?token={token}"
+    with (
+        pytest.raises(InvalidStatus, match="403"),
+        connect(address, origin=origin, additional_headers=more),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[" * 9000,
+        "{}",
+        '{"type": "solve"}',
+        '{"type": "solve", "points": [[1, 2, NaN]]}',
+        '{"type": "solve", "points": [[1, 2, 1e999]]}',
+        '{"type": "solve", "points": [[1, 2]]}',
+        '{"type": "solve", "points": [], "more": 1}',
+        '{"type": "rank", "points": [], "output": ""}',
+        '{"type": "check", "engines": []}',
+        '{"type": "eval", "text": "1"}',
+        b"\xff\x00",
+    ],
+)
+def test_bad_message_is_told_and_the_next_answered(page, text):
+    page.socket.send(text)
+    assert page.told("invalid")["message"].startswith("message: ")
+    page.say(type="solve", points=page.points, id=4)
+    assert page.told("answer")["id"] == 4
+
+
+def test_message_beyond_the_limit_ends_the_page(page):
+    page.socket.send(" " * (LARGEST_MESSAGE + 1))
+    with pytest.raises(ConnectionClosed):
+        page.told("answer")
+
+
+def test_messages_follow_the_schema(page, served):
+    schema = live_schema()
+    told = {"$ref": "#/told", **schema}
+    jsonschema.validate(page.opening, told)
+    asked = [
+        {"type": "solve", "id": 1, "points": page.points},
+        {"type": "rank", "id": 2, "points": page.points, "output": "toe"},
+        {"type": "solve", "id": 3, "points": page.moved("uca_outer", 2, -400)},
+    ]
+    for message, kind in zip(asked, ("answer", "ranking", "refused"), strict=True):
+        jsonschema.validate(message, {"$ref": "#/asked", **schema})
+        page.say(**message)
+        jsonschema.validate(found := page.told(kind), told)
+        assert found["id"] == message["id"]
+
+
+def test_edit_answers_what_run_gives_for_the_saved_table(page, car):
+    """The numbers of a program whose inputs are hardpoints, against one made for the table."""
+    points = page.moved("uca_outer", 1, 10.0)
+    page.say(type="solve", points=points, id=1)
+    found = page.told("answer")["outputs"]
+    page.say(type="save", points=points, name="other.csv", id=2)
+    assert page.told("saved")["name"] == "other.csv"
+    (record,) = run(load(car.with_name("other.csv"), TRAVEL), "native").records
+    assert {*record.outputs} == {*found}
+    for name, expected in record.outputs.items():
+        assert found[name] == pytest.approx(expected.position, rel=1e-9, abs=1e-12, nan_ok=True)
+
+
+def test_ranking_gives_what_a_moved_point_changes(page):
+    """Against the difference of two tables that are read and solved anew."""
+    page.say(type="rank", points=page.points, output="toe")
+    effects = {(e["point"], e["axis"]): e["slopes"] for e in page.told("ranking")["effects"]}
+    toe = []
+    for by in (0.05, -0.05):
+        page.say(type="solve", points=page.moved("tierod_inner", 2, by))
+        toe.append(page.told("answer")["outputs"]["toe"])
+    for slope, sample in zip(effects["tierod_inner", "z"], (0, 10, 20), strict=True):
+        assert slope == pytest.approx((toe[0][sample] - toe[1][sample]) / 1e-4, rel=1e-5, abs=1e-9)
+
+
+def test_refusal_names_the_row(page):
+    page.say(type="solve", points=page.moved("uca_outer", 2, -400), id=7)
+    found = page.told("refused")
+    assert found["point"] == "uca_outer"
+    assert "expected" in found["message"] or "not above" in found["message"]
+
+
+def test_travel_out_of_reach_is_marked_and_told(page):
+    page.say(type="solve", points=page.moved("tierod_outer", 1, -40.0), id=7)
+    message = json.loads(page.socket.recv(timeout=60))
+    if message["type"] == "answer" and not all(message["solved"]):
+        assert message["message"]
+        lost = [k for k, solved in enumerate(message["solved"]) if not solved]
+        assert all(message["outputs"]["toe"][k] is None for k in lost)
+
+
+def test_of_many_edits_the_last_is_answered(page):
+    for k in range(100):
+        page.say(type="solve", points=page.moved("uca_outer", 1, 0.1 * k), id=k)
+    answers = [page.told("answer")["id"]]
+    while answers[-1] != 99:
+        answers.append(page.told("answer")["id"])
+    assert len(answers) < 100
+
+
+def test_two_pages_do_not_disturb_each_other(open_page):
+    one, other = open_page(), open_page()
+    one.say(type="solve", points=one.moved("uca_outer", 1, 5.0), id=1)
+    other.say(type="solve", points=other.points, id=1)
+    first, second = one.told("answer")["outputs"], other.told("answer")["outputs"]
+    assert first["camber"] != second["camber"]
+
+
+def test_page_that_ends_early_leaves_the_server_alive(served, open_page):
+    gone = open_page()
+    gone.say(type="solve", points=gone.points)
+    gone.socket.socket.close()
+    page = open_page()
+    page.say(type="solve", points=page.points, id=3)
+    assert page.told("answer")["id"] == 3
+
+
+def test_save_keeps_the_text_and_all_files(page, car):
+    page.say(type="save", points=page.moved("uca_front", 0, 2.5), name="car_2.csv")
+    page.told("saved")
+    assert car.read_text("utf-8") == CAR
+    expected = CAR.replace("uca_front,90,", "uca_front,92.5,")
+    assert car.with_name("car_2.csv").read_text("utf-8") == expected
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["car.csv", "../car_2.csv", "/tmp/x.csv", ".x.csv", "x.toml", "a\0.csv", "x", "a/b.csv"],
+)
+def test_save_refuses_other_places_and_present_files(page, car, name):
+    before = sorted(car.parent.rglob("*"))
+    page.say(type="save", points=page.moved("uca_front", 0, 2.5), name=name)
+    assert page.told("invalid")["message"].startswith("save ")
+    assert sorted(car.parent.rglob("*")) == before
+    assert car.read_text("utf-8") == CAR
+
+
+def test_save_follows_no_link(page, car):
+    victim = car.with_name("victim")
+    car.with_name("link.csv").symlink_to(victim)
+    page.say(type="save", points=page.points, name="link.csv")
+    page.told("invalid")
+    assert not victim.exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
+def test_save_in_a_folder_without_rights_is_told(page, car):
+    car.parent.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    page.say(type="save", points=page.points, name="other.csv")
+    assert "cannot be written" in page.told("invalid")["message"]
+
+
+def test_file_changed_underneath_is_told_and_read_anew(page, car, open_page):
+    car.write_text(CAR.replace("uca_front,90,", "uca_front,95,"), "utf-8")
+    page.say(type="solve", points=page.points)
+    assert "has changed" in page.told("changed")["message"]
+    assert open_page().points[0] == [95.0, 260.0, 285.0]
+
+
+def test_file_spoilt_underneath_refuses_a_new_page(car, served, page):
+    car.write_text("name,x,y,z\n", "utf-8")
+    host = f"127.0.0.1:{served.port}"
+    with connect(f"ws://{host}/socket?token={served.token}", origin=f"http://{host}") as other:
+        assert "expected hardpoints" in json.loads(other.recv(timeout=20))["message"]
+    page.say(type="solve", points=page.points, id=5)
+    assert page.told("answer")["id"] == 5
+
+
+def test_check_tells_each_engine_and_ignores_strange_ones(page):
+    page.say(type="check", engines=["native"], points=page.points, id=2)
+    found = page.told("verdict")
+    assert (found["engine"], found["outcome"], found["last"]) == ("native", "unjudged", True)
+    page.say(type="check", engines=["os:system"], points=page.points)
+    assert "os:system" in page.told("invalid")["message"]
+
+
+def test_model_closes_its_loops_at_every_slider_value(tmp_path):
+    live = LiveModel(tmp_path / "rssr", load("rssr"))
+    (driver,) = live.drivers.values()
+    found = live.pose(1, {driver.name: driver.design + 0.3}, measured=True)
+    assert found.share == 1.0
+    assert found.distance is not None
+    assert found.distance > 0.0
+    assert found.drivers[driver.name] == pytest.approx(driver.design + 0.3, abs=1e-12)
+
+
+def test_model_out_of_reach_shows_the_last_pose(tmp_path):
+    live = LiveModel(tmp_path / "strut", load("mcpherson_strut"))
+    (driver,) = live.drivers.values()
+    found = live.pose(1, {driver.name: 5.0}, measured=False)
+    reached = live.reach(2, driver.name)
+    assert 0.0 < found.share < 1.0
+    assert found.message
+    assert reached.high < driver.high
+    assert reached.messages[1]
+
+
+def kincheck(*words):
+    return subprocess.Popen(
+        [sys.executable, "-m", "kincheck", "serve", *map(str, words), "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def test_interrupt_ends_with_130_and_one_line(car):
+    process = kincheck(car)
+    assert process.stdout is not None
+    address = process.stdout.readline()
+    assert address.startswith("http://127.0.0.1:")
+    process.send_signal(signal.SIGINT)
+    out, errors = process.communicate(timeout=30)
+    assert (process.returncode, out, errors) == (130, "", "kincheck: interrupted\n")
+
+
+def test_once_ends_when_the_page_closes(car):
+    process = kincheck(car, "--once")
+    assert process.stdout is not None
+    host, _, token = process.stdout.readline().strip().partition("/?token=")
+    with connect(f"{host.replace('http', 'ws')}/socket?token={token}", origin=host):
+        pass
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize("words", [["absent.csv"], ["four_bar", "--port", "1"]])
+def test_what_cannot_be_served_is_status_2(words, car):
+    if words[-1] == "1" and os.geteuid() == 0:
+        words = ["four_bar", "--port", "70000"]
+    process = kincheck(*words)
+    out, errors = process.communicate(timeout=60)
+    assert (process.returncode, out) == (2, "")
+    assert "Traceback" not in errors
+
+
+def test_axle_answers_for_both_wheels(car):
+    from kincheck.core.live.table import LiveTable
+
+    live = LiveTable(car, Supplied(travel="0.03:5", axle="roll"))
+    points = [each.position for each in live.opening([]).points]
+    outputs = live.answer(1, points).outputs
+    assert outputs["left_camber"] == pytest.approx(outputs["right_camber"][::-1], abs=1e-12)

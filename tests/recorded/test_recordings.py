@@ -1,0 +1,343 @@
+"""Recordings as engines: a four-bar by closed form in 40 digits, as other programs write it."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+from kincheck.adapters import engine
+
+DATA = Path(__file__).parent.parent / "data" / "recordings"
+NATIVE = engine("native")
+CASE = DATA / "fourbar.toml"
+PARTS = {"PART_2": "crank", "PART_3": "coupler", "PART_4": "rocker"}
+XYZW, EULER = "quaternion xyzw qx qy qz qw", "euler 123 a b c"
+
+
+def maps(attitude, parts=PARTS):
+    """Return the options that state poses in columns like crank.x."""
+    return [
+        word for part in parts for word in ("--map", f"{part}={PARTS[part]}: x y z, {attitude}")
+    ]
+
+
+@pytest.fixture
+def judged(kincheck_main, tmp_path):
+    """Returns status and record of a recording of the four-bar; the record is None without one."""
+
+    def run(file, *options):
+        out = tmp_path / "out.json"
+        case = [CASE, "--recorded", file, *options, "--json", out, "--quiet"]
+        status = kincheck_main("run", *case, engines=[NATIVE])
+        records = json.loads(out.read_text())["records"] if out.exists() else [None]
+        return status, records[-1]
+
+    return run
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Returns a file with the changed rows of a table of the data folder."""
+
+    def write(name, change):
+        rows = list(csv.reader((DATA / name).read_text().splitlines()))
+        file = tmp_path / "changed.csv"
+        file.write_text("".join(",".join(row) + "\n" for row in change(rows)))
+        return file
+
+    return write
+
+
+def largest(record, quantity="position"):
+    """Return the largest deviation of outputs."""
+    found = [each[quantity] for each in record["errors"].values()]
+    return max(each["max_abs"] for each in found if each)
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "gap"),
+    [
+        ("fourbar.res", [], 1e-15),
+        ("fourbar_xyzw.csv", maps(XYZW), 7.6e-10),
+        ("fourbar_123.csv", maps(EULER), 3.3e-9),
+        ("fourbar_xyzw.csv", [w + ", first" if "=" in w else w for w in maps(XYZW)], 1e-8),
+    ],
+)
+def test_recorded_poses_of_truth_pass(judged, file, options, gap):
+    status, record = judged(DATA / file, *options)
+    assert (status, record["outcome"], record["mode"]) == (0, "pass", "recorded")
+    assert record["engine"] == Path(file).stem
+    assert 0.0 < record["details"]["rows"]["position"] < gap
+
+
+def test_adams_results_are_judged_in_all_rates(judged):
+    _, record = judged(DATA / "fourbar.res", "--analysis", "kinematic_001")
+    assert largest(record) < 2e-15
+    assert largest(record, "velocity") < 1e-14
+    assert largest(record, "acceleration") < 1e-13
+    assert "read the analysis kinematic_001" in record["message"]
+
+
+@pytest.mark.parametrize(
+    ("file", "tolerance"),
+    [("fourbar_modelica.mat", 2e-15), ("fourbar_modelica_single.mat", 1e-7)],
+)
+def test_modelica_results_of_truth_pass(judged, file, tolerance):
+    options = ["--map", "MOTION_1=crank.phi", "--map", "JOINT_4.angle=rocker.phi"]
+    status, record = judged(DATA / file, *options)
+    assert status == 0
+    assert largest(record) < tolerance
+
+
+def test_opensim_motion_of_truth_passes(judged):
+    options = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+    status, record = judged(DATA / "fourbar.mot", *options)
+    assert status == 0
+    assert largest(record) < 1e-9
+    assert "angles without a unit in deg" in record["message"]
+
+
+@pytest.mark.parametrize("column", [2, 5, 7, 8, 13, 14, 16, 18, 21])
+@pytest.mark.parametrize("name", ["fourbar_xyzw.csv", "fourbar_123.csv"])
+def test_one_moved_number_fails_by_name(judged, table, name, column):
+    quaternions = "xyzw" in name
+    if not quaternions and column > 18:
+        return
+    sample = 7 * column % 73
+
+    def moved(rows):
+        head, cell = rows[0][column], rows[sample + 1][column]
+        length = head.endswith("m]")
+        by = (1e-5 if quaternions else 1e-2) if length else (1e-4 if quaternions else 6e-3)
+        rows[sample + 1][column] = f"{float(cell) + by:.9g}"
+        return rows
+
+    status, record = judged(table(name, moved), *maps(XYZW if quaternions else EULER))
+    part = next(p for p, body in PARTS.items() if rows_head(name, column).startswith(body))
+    found = re.search(r"gap of \S+ m in (\w+) at sample (\d+) \(([^)]*)\)", record["message"])
+    assert status == 1
+    assert found is not None
+    assert (int(found[2]), part in found[3]) == (sample, True)
+    assert "72 of 73 samples" in record["message"]
+
+
+def rows_head(name, column):
+    return (DATA / name).read_text().split("\n", 1)[0].split(",")[column]
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (2, "recorded poses leave a gap of 1e-05 m in JOINT_2 at sample 40 (PART_2)"),
+        (26, "recorded velocities leave 1e-05 m/s in JOINT_2 at sample 40 (PART_3)"),
+        (51, "recorded accelerations leave 1e-05 m/s² in JOINT_4 at sample 40 (PART_4)"),
+    ],
+)
+def test_moved_number_of_adams_results_is_named(judged, tmp_path, number, text):
+    steps = (DATA / "fourbar.res").read_text().split('<Step type="kinematic">')
+    head, tail = steps[41].split("</Step>")
+    numbers = head.split()
+    numbers[number - 1] = repr(float(numbers[number - 1]) + 0.01)
+    steps[41] = "\n" + " ".join(numbers) + "\n</Step>" + tail
+    file = tmp_path / "moved.res"
+    file.write_text('<Step type="kinematic">'.join(steps))
+    status, record = judged(file)
+    assert status == 1
+    assert text in record["message"]
+
+
+@pytest.mark.parametrize(
+    ("file", "wrong", "right"),
+    [
+        ("fourbar_123.csv", "euler 321 a b c", "read as euler 123 the gap"),
+        ("fourbar_xyzw.csv", "quaternion wxyz qx qy qz qw", "read as quaternion xyzw the gap"),
+        ("fourbar_xyzw.csv", "quaternion xyzw inverted qx qy qz qw", "quaternion xyzw the gap"),
+        ("fourbar_xyzw.csv", XYZW + ", position x y z [mm]", "positions in m, not mm, the gap"),
+    ],
+)
+def test_wrong_convention_is_named(judged, file, wrong, right):
+    texts = [w.replace("x y z, ", "") if "[mm]" in wrong else w for w in maps(wrong)]
+    status, record = judged(DATA / file, *texts)
+    assert status == 1
+    assert right in record["message"]
+
+
+ANGLES = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+
+
+def test_other_zeros_are_explained_and_then_pass(judged):
+    rate = ["--map", "JOINT_4.angle.velocity=rocker rate"]
+    status, record = judged(DATA / "fourbar_angles.csv", *ANGLES, *rate)
+    stated = re.findall(r'--map "([^"]*)"', record["message"])
+    assert status == 1
+    assert stated == [
+        "MOTION_1=crank-50 [deg]",
+        "JOINT_4.angle=-rocker+90 [deg]",
+        "JOINT_4.angle.velocity=-rocker rate [deg/s]",
+    ]
+    options = [word for text in stated for word in ("--map", text)]
+    status, record = judged(DATA / "fourbar_angles.csv", *options)
+    assert status == 0
+    assert 8e-7 < largest(record) < 9e-7
+
+
+RIGHT = ["--map", "MOTION_1=crank-50 [deg]", "--map", "JOINT_4.angle=-rocker+90 [deg]"]
+
+
+def shifted(rows):
+    return [rows[0], *([a[0], *b[1:]] for a, b in zip(rows[2:], rows[1:], strict=False))]
+
+
+def from_zero(rows):
+    return [rows[0], *([f"{float(row[0]) - 50:.4f}", *row[1:]] for row in rows[1:])]
+
+
+@pytest.mark.parametrize(
+    ("options", "change", "text"),
+    [
+        (RIGHT, shifted, "the recording shifted by one sample, each taken from the next"),
+        (
+            ["--map", "MOTION_1=-crank+50 [deg]", *RIGHT[2:]],
+            list,
+            'read with --map "MOTION_1=crank-50 [deg]" the recording leaves',
+        ),
+        (
+            [*RIGHT[:3], "JOINT_4.angle=-rocker [rad]"],
+            list,
+            "times pi/180",
+        ),
+        (
+            ["--map", "MOTION_1=crank [rad]", *RIGHT[2:]],
+            from_zero,
+            'read with --map "MOTION_1=crank [deg]" the recording leaves',
+        ),
+    ],
+    ids=["late", "driver sign", "output unit", "driver unit"],
+)
+def test_slip_is_named_and_not_applied(judged, table, options, change, text):
+    status, record = judged(table("fourbar_angles.csv", change), *options)
+    assert status == 1
+    assert text in record["message"]
+
+
+def test_offset_has_a_unit_of_its_own(judged):
+    options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
+    assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
+
+
+def test_joints_without_poses_are_not_judged(judged):
+    status, record = judged(DATA / "fourbar_xyzw.csv", *maps(XYZW, ["PART_2", "PART_4"]))
+    assert status == 0
+    assert (
+        "joints not judged, without the pose of a body: JOINT_2 (PART_3), JOINT_3 (PART_3)"
+        in (record["message"])
+    )
+
+
+def test_nothing_comparable_is_not_judged(judged, tmp_path):
+    file = tmp_path / "driver.csv"
+    file.write_text("MOTION_1 [deg]\n0\n5\n")
+    status, record = judged(file)
+    assert (status, record["outcome"]) == (2, "unjudged")
+
+
+@pytest.mark.parametrize("rows", [slice(20, 50), slice(1, None, 4), slice(1, 2)])
+def test_windows_and_coarser_samples_pass(judged, table, rows):
+    file = table("fourbar_xyzw.csv", lambda every: [every[0], *every[rows]])
+    assert judged(file, *maps(XYZW))[0] == 0
+
+
+def test_equal_rows_at_an_event_are_merged(judged, table):
+    file = table("fourbar_xyzw.csv", lambda rows: [*rows[:10], *rows[9:]])
+    status, record = judged(file, *maps(XYZW))
+    assert (status, len(record["driver"]["MOTION_1"])) == (0, 73)
+    assert "merged 1 row" in record["message"]
+
+
+def test_unequal_rows_at_an_event_need_a_choice(judged, table, capsys):
+    def changed(rows):
+        return [*rows[:10], [*rows[9][:2], "-0.04", *rows[9][3:]], *rows[10:]]
+
+    file = table("fourbar_xyzw.csv", changed)
+    assert judged(file, *maps(XYZW))[0] == 2
+    assert 'say which rows to take: --map "event=first"' in capsys.readouterr().err
+    assert judged(file, *maps(XYZW), "--map", "event=first")[0] == 0
+    assert judged(file, *maps(XYZW), "--map", "event=last")[0] == 1
+
+
+@pytest.mark.parametrize("cell", ["", "NaN"])
+@pytest.mark.parametrize(
+    ("column", "text"),
+    [(2, "left out 1 sample without the pose of a driver"), (9, "PART_3 at 1 sample")],
+)
+def test_gaps_are_left_out_and_named(judged, table, cell, column, text):
+    def holed(rows):
+        rows[9][column] = cell
+        return rows
+
+    status, record = judged(table("fourbar_xyzw.csv", holed), *maps(XYZW))
+    assert status == 0
+    assert text in record["message"]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda t: t.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term"),
+         "found the analyses 'kinematic_001', 'dynamic_002', expected one; say --analysis NAME"),
+        (lambda t: t[:5000], "not valid XML"),
+        (lambda t: "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),
+        (lambda t: "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "expected"),
+    ],
+    ids=["two analyses", "cut off", "old text", "entities"],
+)  # fmt: skip
+def test_unreadable_adams_results_are_refused(judged, tmp_path, capsys, change, text):
+    file = tmp_path / "changed.res"
+    file.write_text(change((DATA / "fourbar.res").read_text()))
+    assert judged(file)[0] == 2
+    assert text in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("a.abf", b"\0", "binary result of MotionSolve; in HyperGraph, export the curves as CSV"),
+        ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
+        ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
+        ("a.mat", b"MATLAB 7.3 MAT-file", "found a MAT-file of version 7.3; in MATLAB: save"),
+        ("a.mat", b"junk" * 99, "found no readable MAT-file"),
+        ("a.csv", b"time,z\n0,1\n", "found the columns 'time', 'z', expected one of MOTION_1"),
+    ],
+)
+def test_other_files_are_refused_with_the_export(judged, tmp_path, capsys, name, content, text):
+    file = tmp_path / name
+    file.write_bytes(content)
+    assert judged(file)[0] == 2
+    assert text in capsys.readouterr().err
+
+
+def test_accuracy_is_stated_apart_from_digits(judged, table):
+    def moved(rows):
+        rows[8][1] = f"{float(rows[8][1]) + 1e-5:.9g}"
+        return rows
+
+    file = table("fourbar_xyzw.csv", moved)
+    assert judged(file, *maps(XYZW))[0] == 1
+    status, record = judged(file, *maps(XYZW), "--accuracy", "position=0.02 mm")
+    assert status == 0
+    assert record["details"]["rows"]["position"] == pytest.approx(1e-5, rel=1e-3)
+
+
+def test_driver_on_an_even_grid_has_no_digits(judged, tmp_path):
+    _, truth = judged(DATA / "fourbar.mot", *ANGLES)
+    angles = truth["outputs"]["JOINT_4.angle"]["position"]
+    file = tmp_path / "a.csv"
+
+    def write(change):
+        rows = [f"{5 * k},{x + change * (k == 30)!r}" for k, x in enumerate(angles)]
+        file.write_text("\n".join(["MOTION_1 [deg],JOINT_4.angle [rad]", *rows]))
+        return judged(file, "--accuracy", "JOINT_4.angle=1e-8 rad")[0]
+
+    assert write(0.0) == 0
+    assert write(1e-6) == 1

@@ -1,0 +1,342 @@
+"""Kinematics and compliance: strut and axle against their data, slopes against differences."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.cli.main import main
+from kincheck.core.errors import KincheckError
+from kincheck.core.kinematics import LoadPoint, StaticModel
+from kincheck.core.studies.compliance.study import compliance
+
+DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
+STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
+AXLE = json.loads((DATA / "8_hmmwv_axle.json").read_text())
+JOINTS = {"lca_front": "lca_pivot", "lca_rear": "lca_pivot", "top": "strut_top"}
+
+
+def bushing_table(joint, name, bodies, point, axes, stiffness, turning):
+    lines = {
+        "bodies": json.dumps(bodies),
+        "point": list(point),
+        "axes": [list(map(float, axis)) for axis in axes[:2]],
+        "stiffness": list(stiffness),
+        "turning_stiffness": list(turning),
+    }
+    return f"[joints.{joint}.bushings.{name}]\n" + "".join(f"{k} = {v}\n" for k, v in lines.items())
+
+
+def strut_text(more=""):
+    """Return the built-in strut with bushings, its contact, and outputs of a wheel."""
+    text = case_text(cases.load("mcpherson_strut_loaded")).partition("[reference]")[0]
+    text = text.replace('truth = "in_house_oracle"\n', "")
+    for each in STRUT["bushings"]:
+        numbers = (each["point"], each["axes"], each["stiffness"], each["turning_stiffness"])
+        text += bushing_table(JOINTS[each["name"]], each["name"], each["bodies"], *numbers)
+    text += f'[points.contact_patch]\nbody = "knuckle"\nposition = {STRUT["contact_patch"]}\n'
+    return text + more
+
+
+WHEEL = """
+[suspension]
+convention = "CONVENTION"
+side = "left"
+forward = [1.0, 0.0, 0.0]
+up = [0.0, 0.0, 1.0]
+wheel_radius = 0.3
+[outputs.toe]
+type = "toe"
+[outputs.camber]
+type = "camber"
+"""
+
+
+def strut(tmp_path, more=""):
+    file = tmp_path / "strut.toml"
+    file.write_text(strut_text(more))
+    return load_case(file)
+
+
+def test_command_writes_what_six_simulators_have(tmp_path, capsys):
+    rows = STRUT["results"]
+    (tmp_path / "strut.toml").write_text(strut_text())
+    files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
+    case = str(tmp_path / "strut.toml")
+    assert main(["kc", case, "--travel=0:50mm:2", "--load", "lateral=0:1kN:2", *files]) == 0
+    found = json.loads((tmp_path / "json").read_text())
+    assert found["travel"] == [0.0, 0.05]
+    assert found["wheel_center"][0] == pytest.approx(rows[0]["wheel_center"], abs=1e-15)
+    assert found["spin_axis"][0] == pytest.approx(rows[0]["spin_axis"], abs=1e-14)
+    assert found["wheel_load"][0] == pytest.approx(rows[0]["wheel_load"], abs=1e-10)
+    given = np.array(rows[0]["compliance_contact_patch"])
+    assert np.abs(np.array(found["compliance"][0]) - given).max() <= 1e-14 * np.abs(given).max()
+    lateral = found["loads"]["lateral"]
+    assert lateral["lateral"] == [0.0, 1000.0]
+    assert lateral["wheel_center"][1] == pytest.approx(rows[1]["wheel_center"], abs=1e-15)
+    given = np.array(rows[1]["compliance_contact_patch"])
+    assert np.abs(np.array(lateral["compliance"][1]) - given).max() <= 1e-14 * np.abs(given).max()
+    assert "wheel_rate [N/mm]" in capsys.readouterr().out
+    table = [*csv.reader((tmp_path / "csv").read_text().splitlines()[1:])]
+    assert [row[0] for row in table[1:]] == ["travel"] * 2 + ["lateral"] * 2
+    assert float(table[2][table[0].index("wheel_rate [N/mm]")]) == pytest.approx(
+        found["outputs"]["wheel_rate"]["position"][1] / 1000.0
+    )
+    page = (tmp_path / "out" / "kc.html").read_text()
+    assert "Kinematics and compliance of mcpherson_strut_loaded" in page
+    assert "https:" not in page
+
+
+def test_constant_load_acts_over_all_travel(tmp_path):
+    """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
+    row = STRUT["results"][2]
+    case = strut(
+        tmp_path,
+        WHEEL.replace("CONVENTION", "iso8855").replace(
+            "wheel_radius", 'drive = "outboard"\nwheel_radius'
+        ),
+    )
+    fx, fy, _, _, _, mz = row["load_at_contact_patch"]
+    loads = {"longitudinal": fx, "lateral": fy, "aligning": mz}
+    found = compliance(case, [row["travel"]], loads).travel
+    assert found.wheel_center[0] == pytest.approx(row["wheel_center"], abs=1e-14)
+    assert found.wheel_load[0] == pytest.approx(row["wheel_load"], abs=1e-9)
+
+
+@pytest.mark.parametrize("convention", ["iso8855", "sae_j670"])
+@pytest.mark.parametrize("load", ["lateral", "longitudinal", "braking", "aligning"])
+def test_slopes_by_load_are_differences(tmp_path, convention, load):
+    case = strut(tmp_path, WHEEL.replace("CONVENTION", convention))
+    results = compliance(case, [0.0], {load: [-1.0, 0.0, 1.0]})
+    curve = results.loads[load]
+    suffix = "torque" if load == "aligning" else "force"
+    for name in ("toe", "camber"):
+        slope = curve.outputs[f"{name}.per_{load}_{suffix}"].values[1]
+        low, _, high = curve.outputs[name].values
+        assert slope == pytest.approx(0.5 * (high - low), rel=1e-5)
+    # a force to the left moves the wheel to the left: positive y in ISO 8855
+    if load == "lateral":
+        moved = curve.wheel_center[2, 1] - curve.wheel_center[0, 1]
+        assert moved > 0.0 if convention == "iso8855" else moved < 0.0
+
+
+def test_slope_by_travel_is_that_of_the_soft_suspension(tmp_path):
+    case = strut(tmp_path, WHEEL.replace("CONVENTION", "iso8855"))
+    found = compliance(case, [-1e-4, 0.0, 1e-4]).travel
+    low, _, high = found.outputs["toe"].values
+    slope = found.outputs["toe.per_travel"].values[1]
+    assert slope == pytest.approx((high - low) / 2e-4, rel=1e-6)
+    low, _, high = found.rigid["toe"]
+    assert slope != pytest.approx((high - low) / 2e-4, rel=1e-3)
+
+
+def axle_text(bar):
+    """Return the axle of the data, with an anti-roll bar or without, as a case file."""
+    left = {name: np.array(place) for name, place in AXLE["points"].items()}
+    text = """schema = "kincheck-case/1"
+name = "axle"
+source = "Project Chrono, HMMWV front axle"
+gravity = [0.0, 0.0, -9.80665]
+"""
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        p = {name: place * [1.0, sign, 1.0] for name, place in left.items()}
+        bodies = {
+            "uca": ("uca_u", 5.813, (-0.106, sign * 0.589, 0.218)),
+            "lca": ("lca_u", 23.965, (0.0, sign * 0.547, -0.059)),
+            "up": ("wc", 34.155, (-0.04, sign * 0.82, -0.026)),
+        }
+        for name, (origin, mass, center) in bodies.items():
+            text += f"[bodies.{name}_{side}]\norigin = {p[origin].tolist()}\nmass = {mass}\n"
+            text += f"center_of_mass = {list(center)}\n"
+        for arm in ("uca", "lca"):
+            front, back = p[f"{arm}_f"], p[f"{arm}_b"]
+            h = (front - back) / np.linalg.norm(front - back)
+            text += f'[joints.{arm}_hinge_{side}]\ntype = "revolute"\n'
+            text += f'bodies = ["ground", "{arm}_{side}"]\n'
+            text += f"point = {(0.5 * (front + back)).tolist()}\naxis = {h.tolist()}\n"
+            first = np.cross(np.eye(3)[np.abs(h).argmin()], h)
+            first /= np.linalg.norm(first)
+            axes = first, np.cross(h, first)
+            for end, place in (("front", front), ("back", back)):
+                bodies, k, turning = ["ground", f"{arm}_{side}"], [7e7] * 3, [1e5, 1e5, 0.0]
+                place = place.tolist()
+                text += bushing_table(f"{arm}_hinge_{side}", end, bodies, place, axes, k, turning)
+            text += f'[joints.{arm}_ball_{side}]\ntype = "spherical"\n'
+            text += f'bodies = ["{arm}_{side}", "up_{side}"]\npoint = {p[f"{arm}_u"].tolist()}\n'
+        text += f'[joints.tie_{side}]\ntype = "distance"\nbodies = ["up_{side}", "ground"]\n'
+        text += f"points = [{p['tie_u'].tolist()}, {p['tie_c'].tolist()}]\n"
+        text += f'[forces.spring_{side}]\ntype = "spring_damper"\n'
+        text += f'bodies = ["ground", "lca_{side}"]\nstiffness = 181496.15\nfree_length = 0.339\n'
+        text += f"points = [{p['spr_c'].tolist()}, {p['spr_a'].tolist()}]\n"
+        text += f'[points.wc_{side}]\nbody = "up_{side}"\nposition = {p["wc"].tolist()}\n'
+        text += f'[drivers.jounce_{side}]\ntype = "point_coordinate"\npoint = "wc_{side}"\n'
+        text += "direction = [0.0, 0.0, 1.0]\n"
+        if bar:
+            text += f"[bodies.bar_{side}]\norigin = [0.35, {sign * 0.35}, -0.05]\n"
+            text += f'[joints.link_{side}]\ntype = "distance"\n'
+            text += f'bodies = ["bar_{side}", "lca_{side}"]\n'
+            text += f"points = [[0.1, {sign * 0.45}, -0.05], [0.1, {sign * 0.6}, -0.3]]\n"
+    if bar:
+        hinges = {"mount": ("ground", "bar_l", 0.35), "twist": ("bar_l", "bar_r", 0.0)}
+        for name, (i, j, y) in hinges.items():
+            text += f'[joints.{name}]\ntype = "revolute"\nbodies = ["{i}", "{j}"]\n'
+            text += f"point = [0.35, {y}, -0.05]\naxis = [0.0, 1.0, 0.0]\n"
+        text += '[forces.bar]\ntype = "bushing"\nbodies = ["bar_l", "bar_r"]\n'
+        text += f"point = [0.35, 0.0, -0.05]\nturning_stiffness = [0.0, {bar}, 0.0]\n"
+    return (
+        text
+        + """[sweep]
+driver = "jounce_l"
+start = -0.05
+stop = 0.05
+steps = 11
+[drivers.jounce_r.motion]
+type = "ramp"
+rate = 1.0
+[suspension]
+convention = "iso8855"
+side = "left"
+forward = [1.0, 0.0, 0.0]
+up = [0.0, 0.0, 1.0]
+wheel_center = "wc_l"
+wheel_radius = 0.47
+travel = "jounce_l"
+[suspension.other]
+wheel_center = "wc_r"
+travel = "jounce_r"
+[outputs.toe]
+type = "toe"
+[outputs.roll_center_height]
+type = "roll_center_height"
+"""
+    )
+
+
+def test_axle_has_its_wheel_rates(tmp_path):
+    rows = AXLE["rows"]
+    file = tmp_path / "axle.toml"
+    file.write_text(axle_text(rows["anti_roll_bar_turning_stiffness"]))
+    case = load_case(file)
+    found = compliance(case, [0.0, 0.02])
+    curves = found.travel.outputs
+    assert found.travel.wheel_load[0] == pytest.approx(rows["static_wheel_load"], rel=1e-12)
+    parallel, opposite = rows["wheel_rate_parallel"], rows["wheel_rate_opposite"]
+    assert curves["wheel_rate"].values[0] == pytest.approx(parallel, rel=1e-10)
+    assert curves["wheel_rate_opposite"].values[0] == pytest.approx(opposite, rel=1e-10)
+    track = 2.0 * 0.91
+    assert curves["roll_stiffness"].values[0] == pytest.approx(track**2 / 2 * opposite, rel=1e-10)
+    share = (opposite - parallel) / opposite
+    assert curves["anti_roll_share"].values[0] == pytest.approx(share, rel=1e-8)
+    C = found.travel.compliance
+    assert C.shape == (2, 12, 12)
+    assert np.abs(C[0] - C[0].T).max() <= 1e-14 * np.abs(C[0]).max()
+    rolled = compliance(case, [0.02], axle="roll").travel
+    assert rolled.wheel_center[0, 2] == pytest.approx(found.travel.wheel_center[1, 2], abs=1e-12)
+    assert rolled.wheel_load[0] > found.travel.wheel_load[1]  # the bar is twisted
+
+
+def test_axle_free_under_its_load_has_the_datas_compliance(tmp_path):
+    """Both wheels are free in height; loads and displacements at their centres."""
+    rows = AXLE["rows"]
+    file = tmp_path / "axle.toml"
+    file.write_text(axle_text(rows["anti_roll_bar_turning_stiffness"]))
+    soft = load_case(file).mechanism.released()
+    object.__setattr__(soft, "drivers", ())
+    x, y, z = AXLE["points"]["wc"]
+    ends = {"l": ("up_l", (x, y, z)), "r": ("up_r", (x, -y, z))}
+    model = StaticModel(soft, [LoadPoint(name, *end) for name, end in ends.items()])
+    load = np.array([[0.0, 0.0, rows["static_wheel_load"], 0.0, 0.0, 0.0]])
+    found = model.solve({"l": load, "r": load}, {})
+    motions = [[found.motion(found.by_load[k][0], *end)[0] for k in ends] for end in ends.values()]
+    C = np.block(motions)
+    assert 1.0 / (C[2, 2] + C[2, 8]) == pytest.approx(rows["wheel_rate_parallel"], rel=1e-9)
+    assert C[0, 0] + C[0, 6] == pytest.approx(rows["wheel_center_x_compliance"], rel=1e-9)
+    assert C[5, 5] + C[5, 11] == pytest.approx(rows["aligning_steer_compliance"], rel=1e-9)
+    lateral = rows["lateral_steer_compliance_at_wheel_center"]
+    assert C[5, 1] + C[5, 7] == pytest.approx(lateral, rel=1e-9)
+
+
+def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
+    """A tie rod that is pulled straight leaves no equilibrium at half a metre."""
+    (tmp_path / "strut.toml").write_text(strut_text())
+    out = tmp_path / "found.json"
+    case = str(tmp_path / "strut.toml")
+    assert main(["kc", case, "--travel=0:0.9:2", "--json", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "no equilibrium at travel 0.9 m: the last is at travel" in said
+    found = json.loads(out.read_text())
+    assert found["wheel_load"][0] > 0.0
+    assert found["wheel_load"][1] is None
+
+
+@pytest.mark.parametrize(
+    ("more", "options", "expected"),
+    [
+        ('[compliance]\nwheel = "hub"\n', [], "'hub'"),
+        ('[compliance]\ncontact = "nowhere"\n', [], "'nowhere'"),
+        ("[compliance]\nheld = []\n", [], "no held driver lifts the wheel"),
+        ("", ["--axle", "roll"], "needs both wheels"),
+        ("", ["--load", "vertical=0:1:2"], "'vertical' is none of"),
+        ("", ["--travel=0:1"], "START:STOP:SAMPLES"),
+        ("", ["--travel=0:1furlong:3"], "START:STOP:SAMPLES"),
+    ],
+)
+def test_study_that_lacks_facts_says_so(tmp_path, capsys, more, options, expected):
+    (tmp_path / "strut.toml").write_text(strut_text(more))
+    assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_rig_is_written_as_read(tmp_path):
+    table = '[compliance]\nwheel = "knuckle"\nloads = ["lateral"]\ntire_stiffness = 2e5\n'
+    case = strut(tmp_path, table)
+    again = tmp_path / "again.toml"
+    again.write_text(case_text(case))
+    assert load_case(again).rig == case.rig
+    found = compliance(case, [0.0]).travel.outputs
+    assert not any("braking" in name for name in found)
+    rate = found["wheel_rate"].values[0]
+    assert found["ride_rate"].values[0] == pytest.approx(rate * 2e5 / (rate + 2e5))
+
+
+def test_released_joint_of_held_driver_is_refused(tmp_path):
+    text = strut_text('[compliance]\nheld = ["stroke", "turn"]\n').replace(
+        "[sweep]", '[drivers.turn]\ntype = "joint_angle"\njoint = "lca_pivot"\n\n[sweep]'
+    )
+    file = tmp_path / "held.toml"
+    file.write_text(text)
+    with pytest.raises(KincheckError, match="'turn' is held, and its joint gives way"):
+        compliance(load_case(file))
+
+
+def test_bushings_in_a_file_serve_a_hardpoint_table(tmp_path, capsys):
+    table, rubber = tmp_path / "car.csv", tmp_path / "rubber.toml"
+    assert main(["templates", "double_wishbone"]) == 0
+    table.write_text(capsys.readouterr().out)
+    rubber.write_text(
+        "".join(
+            bushing_table(arm, end, ["ground", arm[:3]], place, np.eye(3), [5e6] * 3, [50.0] * 3)
+            for arm, ends in HINGES.items()
+            for end, place in ends.items()
+        )
+    )
+    out = tmp_path / "out.json"
+    options = ["--bushings", str(rubber), "--travel=-0.03:0.03:3", "--json", str(out)]
+    assert main(["kc", str(table), *options]) == 0
+    found = json.loads(out.read_text())
+    assert found["wheel_load"][1] == pytest.approx(0.0, abs=1e-6)  # it has no spring and no mass
+    C = np.array(found["compliance"][1])
+    assert np.abs(C - C.T).max() <= 1e-12 * np.abs(C).max()
+    assert C[1, 1] > 1e-8
+    rubber.write_text(rubber.read_text().replace("lca_pivot", "lower_pivot"))
+    assert main(["kc", str(table), *options]) == 2
+    assert "'lower_pivot'" in capsys.readouterr().err
+
+
+HINGES = {
+    "uca_pivot": {"front": (0.09, 0.26, 0.285), "rear": (-0.11, 0.265, 0.28)},
+    "lca_pivot": {"front": (0.12, 0.21, 0.125), "rear": (-0.13, 0.215, 0.12)},
+}

@@ -1,0 +1,151 @@
+"""kincheck same: files of one mechanism in several formats, and planted differences by hand."""
+
+import json
+from pathlib import Path
+
+import pytest
+from kincheck import adapters, cases
+from kincheck.core.case.io.model_writer import written
+from kincheck.core.case.models.undriven import undriven_case, undriven_file
+from kincheck.core.cli.main import main
+from kincheck.core.studies.same import compare
+
+LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
+MIMIC = '<mimic joint="left" multiplier="-1" offset="0.02"/>'
+GRIPPER = f"""<robot name="gripper">
+  <link name="base"/>
+  <link name="left_link"><inertial><origin xyz="0.01 0.02 0.05"/><mass value="0.2"/>
+    <inertia ixx="1e-4" iyy="1.5e-4" izz="8e-5" ixy="1e-5" ixz="0" iyz="0"/></inertial></link>
+  <link name="right_link"><inertial><mass value="0.3"/>
+    <inertia ixx="1e-4" iyy="1e-4" izz="8e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="left" type="revolute"><parent link="base"/><child link="left_link"/>
+    <origin xyz="0.03 0 0.1" rpy="0.1 0.2 0.3"/><axis xyz="0 1 0"/>{LIMIT}</joint>
+  <joint name="right" type="revolute"><parent link="base"/><child link="right_link"/>
+    <origin xyz="-0.03 0 0.1" rpy="-0.1 0.2 -0.3"/><axis xyz="0 1 0"/>
+    <limit lower="-0.8" upper="0.3" effort="5" velocity="2"/>{MIMIC}</joint>
+</robot>"""
+# A hinge's axis through its origin, seen from the other side.
+REVERSED = GRIPPER.replace(
+    '<axis xyz="0 1 0"/><limit lower="-0.2" upper="0.8"',
+    '<axis xyz="0 -1 0"/><limit lower="-0.8" upper="0.2"',
+).replace('multiplier="-1"', 'multiplier="1"')
+
+
+def against(tmp_path, text, *options, first=GRIPPER):
+    files = tmp_path / "a.urdf", tmp_path / "b.urdf"
+    for file, each in zip(files, (first, text), strict=True):
+        file.write_text(each)
+    status = main(
+        ["same", *map(str, files), "--json", str(out := tmp_path / "found.json"), *options]
+    )
+    found = json.loads(out.read_text())
+    assert status == {"same": 0, "differs": 1, "not judged": 2}[found["verdict"]]
+    return found
+
+
+SAME = {
+    "as it is": (GRIPPER, ""),
+    "reversed axis": (REVERSED, "sense of left: reversed in b.urdf"),
+    "limits": (GRIPPER.replace(LIMIT, ""), "lost in b.urdf: limits of left"),
+    "other limits": (GRIPPER.replace('"0.8"', '"0.7"'), "limits of left: -0.2 to 0.8"),
+    "effort": (GRIPPER.replace('upper="0.8" effort="5"', 'upper="0.8"'), "effort limit of left"),
+    "degrees": (
+        GRIPPER.replace('"-0.2" upper="0.8"', '"-11.4591559" upper="45.8366236"'),
+        "as between degrees and radians",
+    ),
+    "mass": (GRIPPER.replace('"0.2"/>\n', '"0.25"/>\n'), "mass of left_link: 0.2 against 0.25 kg"),
+    "product of inertia": (GRIPPER.replace('ixy="1e-5"', 'ixy="-1e-5"'), "inertia of left_link"),
+    "centre": (GRIPPER.replace("0.01 0.02 0.05", "0.01 0.02 0.06"), "centre of mass of left_link"),
+    "renamed links": (GRIPPER.replace("left_link", "finger"), ""),
+}
+
+
+@pytest.mark.parametrize(("text", "lost"), SAME.values(), ids=SAME)
+def test_same_motion_with_something_lost_says_what(text, lost, tmp_path):
+    found = against(tmp_path, text)
+    assert found["verdict"] == "same", found["reason"]
+    assert found["largest_m"] < 1e-15
+    assert found["freedoms"] == [1, 1]
+    assert lost in "; ".join(found["lost"])
+    assert bool(found["lost"]) == bool(lost)
+
+
+DIFFERENT = {
+    "no mimic": (GRIPPER.replace(MIMIC, ""), "freedom 1 against 2: right.mimic in a.urdf only"),
+    "sense of the mimic": (GRIPPER.replace('"-1"', '"1"'), "right.mimic"),
+    "offset of the mimic": (GRIPPER.replace('"0.02"/>', '"0.03"/>'), "right.mimic"),
+    "axis by a microradian": (GRIPPER.replace('"0 1 0"', '"1e-6 1 0"', 1), "left of b.urdf"),
+    "hinge by 0.1 mm": (GRIPPER.replace('="0.03 0', '="0.0301 0'), "left of b.urdf"),
+    "millimetres": (
+        GRIPPER.replace("0.03 0 0.1", "30 0 100"),
+        "1000 times those of a.urdf, as between metres and millimetres",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "reason"), DIFFERENT.values(), ids=DIFFERENT)
+def test_other_motion_names_joint_and_place(text, reason, tmp_path):
+    found = against(tmp_path, text)
+    assert found["verdict"] == "differs"
+    assert reason in found["reason"]
+    assert found["largest_m"] > 1e-9
+
+
+def test_moved_base_is_told_as_placement(tmp_path):
+    moved = GRIPPER.replace('<link name="base"/>', '<link name="root"/><link name="base"/>')
+    moved = moved.replace(
+        "</robot>",
+        '<joint name="mount" type="fixed"><parent link="root"/><child link="base"/>'
+        '<origin xyz="1 2 3" rpy="0 0 0.5"/></joint></robot>',
+    )
+    found = against(tmp_path, moved)
+    assert found["verdict"] == "same"
+    assert "turned by 0.5 rad and moved by (1, 2, 3) m" in found["notes"][-1]
+
+
+def test_unmatched_links_are_not_judged(tmp_path):
+    text = GRIPPER.replace("left_link", "x").replace("right_link", "y")
+    twins = text.replace(MIMIC, "").replace("0.03 0 0.1", "0.04 0 0.1")
+    twins = twins.replace("-0.04", "-0.03").replace('rpy="-0.1 0.2 -0.3"', 'rpy="0 0 0"')
+    first = GRIPPER.replace(MIMIC, "")
+    found = against(tmp_path, twins, first=first)
+    assert found["verdict"] == "not judged"
+    assert "--match LINK=LINK" in found["reason"]
+    options = ["--match", "left_link=x", "--match", "right_link=y"]
+    assert against(tmp_path, twins, *options, first=first)["verdict"] == "differs"
+
+
+@pytest.mark.parametrize("name", ["four_bar", "five_bar", "hooke_joint_cross", "mcpherson_arm"])
+@pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf"])
+def test_written_case_is_the_same_mechanism(name, form, tmp_path):
+    case = cases.load(name)
+    for suffix, text in written(case, adapters.writer(form), None).items():
+        (tmp_path / f"{name}{suffix}").write_text(text)
+    (file,) = (each for each in tmp_path.iterdir() if not each.name.endswith(".json"))
+    found = compare(undriven_case(case, name), undriven_file(file), {})
+    assert found.verdict == "same", found.reason
+    assert found.largest is not None
+    assert found.largest < 1e-14
+
+
+def test_converted_file_is_within_its_digits(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    (file := tmp_path / "gripper.urdf").write_text(GRIPPER)
+    assert main(["same", str(file), "--converted-by", "mujoco"]) == 0
+    text = capsys.readouterr().out
+    assert "all of it by the files' digits" in text
+    assert "velocity limit of left, right" in text
+
+
+def test_other_mechanisms_differ_by_freedoms():
+    pair = (undriven_case(cases.load(name), name) for name in ("four_bar", "five_bar"))
+    found = compare(*pair, {})
+    assert found.verdict == "differs"
+    assert "freedom 1 against 2" in found.reason
+    assert found.largest is None
+
+
+def test_one_file_asks_for_another(tmp_path, capsys):
+    (file := Path(tmp_path) / "gripper.urdf").write_text(GRIPPER)
+    assert main(["same", str(file)]) == 2
+    assert "expected two or more" in capsys.readouterr().err
