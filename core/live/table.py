@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -205,19 +206,15 @@ class LiveTable:
     def _prepare(self, case: Case) -> tuple[list[str], PreparedDesigns]:
         """Return the key of a program, and the program, compiled."""
         bodies = [body.name for body in case.mechanism.moving]
-        designs = NativeSolver().prepare_designs(
-            case.mechanism,
-            case.sweep.path,
-            [*places(case.mechanism)],
-            without_forces(case).points,
-            bodies=bodies,
-        )
-        if available():
-            from ..program.llvm.jit import compiled_at_once
-
-            with compiled_at_once():  # otherwise an edit in between waits for the compiler
-                for _ in range(2):
-                    designs.solve(_numbers(case), TOL)
+        with _at_once():  # otherwise an edit in between waits for the compiler
+            designs = NativeSolver().prepare_designs(
+                case.mechanism,
+                case.sweep.path,
+                [*places(case.mechanism)],
+                without_forces(case).points,
+                bodies=bodies,
+            )
+            designs.solve(_numbers(case), TOL)
         return _structure(case), designs
 
     def _prepared(self, case: Case) -> PreparedDesigns:
@@ -330,6 +327,14 @@ def as_values(values: Array) -> Values:
 def _computed(case: Case) -> list[Quantity]:
     """Return the outputs of motion from one solution; see `HELD_BUT` for the others."""
     return [each for each in case.outputs if not each.forces and HELD_BUT not in each.facts]
+
+
+def _at_once() -> AbstractContextManager[None]:
+    if not available():
+        return nullcontext()
+    from ..program.llvm.jit import compiled_at_once
+
+    return compiled_at_once()
 
 
 def _numbers(case: Case) -> Array:

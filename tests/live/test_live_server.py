@@ -7,6 +7,7 @@ import signal
 import stat
 import subprocess
 import sys
+from dataclasses import replace
 
 import jsonschema
 import pytest
@@ -14,6 +15,8 @@ from kincheck import load, run
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.live.model import LiveModel
 from kincheck.core.live.protocol import LARGEST_MESSAGE, live_schema
+from kincheck.core.live.table import LiveTable
+from kincheck.core.program.llvm import jit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -327,3 +330,18 @@ def test_axle_answers_for_both_wheels(car):
     points = [each.position for each in live.opening([]).points]
     outputs = live.answer(1, points).outputs
     assert outputs["left_camber"] == pytest.approx(outputs["right_camber"][::-1], abs=1e-12)
+
+
+@pytest.mark.parametrize("axle", [None, "heave"])
+def test_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
+    """The first answer has compiled all that an edit runs: none waits for the compiler."""
+    pytest.importorskip("llvmlite")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
+    live = LiveTable(car, replace(TRAVEL, axle=axle))
+    compiled = []
+    monkeypatch.setattr(jit, "load", lambda *content: compiled.append(content))
+    points = [list(each) for each in live.positions]
+    for k in range(60):
+        points[5][2] += 0.01 * k
+        assert all(live.answer(k, points).solved)
+    assert compiled == []
