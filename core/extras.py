@@ -1,4 +1,4 @@
-"""Optional libraries: their import on use, and the command to install a missing one."""
+"""Libraries: optional ones on use, the command to install a missing one, and threads of numpy."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ import shlex
 from typing import Any
 
 from .errors import KincheckError
+
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment variables that set the number of linear algebra threads when numpy is loaded."""
 
 
 def how_to_install(extra: str) -> str:

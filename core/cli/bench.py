@@ -139,7 +139,7 @@ def _engines(options: argparse.Namespace, registry: Registry) -> int:
 
 
 def _measured(options: argparse.Namespace, registry: Registry, *, formulation: bool) -> int:
-    from ..harness.provenance import THREADS
+    from ..extras import THREADS
     from ..harness.record import Outcome
     from ..report.meter import Meter
     from ..report.sections import deliver

@@ -10,13 +10,13 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
+from ..extras import THREADS
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..case.models.undriven import Undriven
     from ..studies.same import Comparison
 
-THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 STATUS = {"same": Status.WITHIN, "differs": Status.DEVIATES, "not judged": Status.FAILED}
 """Exit status by verdict."""
 CONVERTERS = ("mujoco",)
@@ -67,8 +67,6 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 the same motion, whether something is lost or not, 1 it differs, 2 not judged or
     not read.
     """
-    from ..harness.provenance import THREADS
-
     for name in THREADS:  # many small matrices: threads would wait for each other
         os.environ.setdefault(name, "1")
     from ..case.io.atomic_files import require_writable

@@ -25,9 +25,6 @@ from .record import OutputSeries, Record, Results
 from .scheduler_delay import waited
 from .suspect import suspect
 
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Environment variables that set the number of linear algebra threads when numpy is loaded."""
-
 
 def results(
     cases: Sequence[Case],

@@ -14,8 +14,9 @@ from dataclasses import replace
 from threading import Lock, Thread, Timer
 from typing import IO, BinaryIO, cast
 
+from ...extras import THREADS
 from ..execution import Attempt, Facts, Failure, bounded
-from ..provenance import THREADS, readable
+from ..provenance import readable
 from ..record import Outcome
 from ..resource_limits import STARTUP, Limits
 from .messages import pack, read, write

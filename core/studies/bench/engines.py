@@ -13,9 +13,10 @@ import msgspec
 
 from ...case.case import Case, without_forces
 from ...errors import KincheckError, number_of
+from ...extras import THREADS
 from ...harness.engine import Engine
 from ...harness.native_engine import NativeEngine
-from ...harness.provenance import THREADS, circumstances
+from ...harness.provenance import circumstances
 from ...program.llvm import compiler
 from ...program.llvm.jit import compiled_at_once
 from ...report.figure_data import Effort
