@@ -14,12 +14,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.kinematics import NativeSolver
 from scipy.spatial.transform import Rotation
 
-from ..support.adams_texts import MM, UNITS, Deck
-
-AT = np.array([120.0, -40.0, 75.0])
-AXES = Rotation.from_euler("ZXZ", [30.0, 50.0, -20.0], degrees=True)
-X, Y, Z = AXES.as_matrix().T
-HALF = Rotation.from_rotvec(np.pi * X)
+from ..support.adams_texts import AT, AXES, HALF, MM, UNITS, Deck, X, Y, Z, about, driven, jointed
 
 
 def read(tmp_path, text, name="deck.adm", **options):
@@ -32,19 +27,6 @@ def refused(tmp_path, text, **options):
     with pytest.raises(CaseError) as found:
         read(tmp_path, text, **options)
     return str(found.value)
-
-
-def about(axis, angle):
-    return Rotation.from_rotvec(angle * axis)
-
-
-def jointed(statement, *, of_j=AXES, of_i=AXES, ground_first=False):
-    """A deck of one part on the ground, both markers at one place."""
-    deck = Deck(3).part(2)
-    ends = ((11, 2, of_i), (12, 1, of_j)) if not ground_first else ((11, 1, of_i), (12, 2, of_j))
-    for number, part, turn in ends:
-        deck.marker(number, part, AT, turn)
-    return deck.add(f"{statement}, I = 11, J = 12".replace(", PITCH", ",PITCH"))
 
 
 NONE, TURN = np.zeros(3), Rotation.identity()
@@ -151,14 +133,6 @@ MOTIONS = {
     * (lambda s: s * s * (3 - 2 * s))(np.clip((TIMES - 0.5) / 0.5, 0, 1)),
     "-(1D3 - 999.5)*TIME*2": -TIMES,
 }
-
-
-def driven(function, kind="ROTATION", joint="REVOLUTE", units=UNITS, start=0.4, offset=0.0):
-    deck = Deck(5, units).part(2)
-    deck.marker(11, 2, AT + offset * Z, AXES * Rotation.from_euler("z", start))
-    deck.marker(12, 1, AT, AXES)
-    deck.add(f"JOINT/1, {joint}, I = 11, J = 12")
-    return deck.add(f"MOTION/7, {kind}, JOINT = 1", f", FUNCTION = {function}")
 
 
 def turns(deck, poses):

@@ -11,6 +11,8 @@ import zipfile
 import pytest
 from kincheck.adapters import engine
 
+from ..support.crank import MECHANISM
+
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 pytestmark = [
     pytest.mark.skipif(COMPILER is None, reason="no C compiler"),
@@ -18,23 +20,7 @@ pytestmark = [
     pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="no FMPy"),
 ]
 NATIVE = engine("native")
-CASE = """
-schema = "kincheck-case/1"
-name = "crank"
-source = "a crank of half a metre"
-[bodies.crank]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[points.tip]
-body = "crank"
-position = [0.5, 0, 0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pivot"
-[drivers.turn.motion]
+CASE = f"""{MECHANISM}[drivers.turn.motion]
 type = "sine"
 amplitude = 0.7
 frequency = 1.0

@@ -8,24 +8,10 @@ import sys
 import pytest
 from kincheck.adapters import engine
 
+from ..support.crank import MECHANISM
+
 NATIVE = engine("native")
-CASE = """
-schema = "kincheck-case/1"
-name = "crank"
-source = "a crank of half a metre"
-[bodies.crank]
-[joints.pivot]
-type = "revolute"
-bodies = ["ground", "crank"]
-point = [0, 0, 0]
-axis = [0, 0, 1]
-[points.tip]
-body = "crank"
-position = [0.5, 0, 0]
-[drivers.turn]
-type = "joint_angle"
-joint = "pivot"
-[sweep]
+CASE = f"""{MECHANISM}[sweep]
 driver = "turn"
 start = -1.0
 stop = 1.0

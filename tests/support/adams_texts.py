@@ -5,6 +5,10 @@ from scipy.spatial.transform import Rotation
 
 UNITS = "UNITS/LENGTH = MILLIMETER, MASS = KILOGRAM, FORCE = NEWTON, TIME = SECOND\n"
 MM = 1e-3
+AT = np.array([120.0, -40.0, 75.0])
+AXES = Rotation.from_euler("ZXZ", [30.0, 50.0, -20.0], degrees=True)
+X, Y, Z = AXES.as_matrix().T
+HALF = Rotation.from_rotvec(np.pi * X)
 
 
 class Deck:
@@ -70,3 +74,24 @@ def euler(turn):
     """REULER of a rotation, in degrees."""
     angles = turn.as_euler("ZXZ", degrees=True)
     return "REULER = " + ", ".join(f"{float(x)!r}D" for x in angles)
+
+
+def about(axis, angle):
+    return Rotation.from_rotvec(angle * axis)
+
+
+def jointed(statement, *, of_j=AXES, of_i=AXES, ground_first=False):
+    """A deck of one part on the ground, both markers at one place."""
+    deck = Deck(3).part(2)
+    ends = ((11, 2, of_i), (12, 1, of_j)) if not ground_first else ((11, 1, of_i), (12, 2, of_j))
+    for number, part, turn in ends:
+        deck.marker(number, part, AT, turn)
+    return deck.add(f"{statement}, I = 11, J = 12".replace(", PITCH", ",PITCH"))
+
+
+def driven(function, kind="ROTATION", joint="REVOLUTE", units=UNITS, start=0.4, offset=0.0):
+    deck = Deck(5, units).part(2)
+    deck.marker(11, 2, AT + offset * Z, AXES * Rotation.from_euler("z", start))
+    deck.marker(12, 1, AT, AXES)
+    deck.add(f"JOINT/1, {joint}, I = 11, J = 12")
+    return deck.add(f"MOTION/7, {kind}, JOINT = 1", f", FUNCTION = {function}")
