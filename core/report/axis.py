@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..case.units import ANGLES, LENGTHS
 from ..harness.record import Record
 from ..unit_text import value_text, with_unit
 
@@ -30,6 +31,18 @@ DRIVER_UNITS = {
     "time": "s",
 }
 """SI unit of the values of a driver, by its type."""
+
+
+def in_table_units(unit: str, facts: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the name of an SI unit in the units of a case of hardpoints, and its size [SI]. Rates
+    of change per metre stay per metre, and forces and torques in N and N m.
+    """
+    units = {"m": LENGTHS[facts["units"]["length"]], "rad": ANGLES[facts["units"]["angle"]]}
+    measure, *per = unit.split("/", 1)
+    found = units.get(measure)
+    return ("/".join([found.name, *per]), found.size) if found else (unit, 1.0)
+
+
 # Directions in files are exact, or have the three digits of a table, which this tolerance allows.
 ALONG = 1 - 1e-5
 

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
-from ..case.units import ANGLES, LENGTHS
 from ..harness.record import OutputSeries, Record, Results
-from .axis import DRIVER_UNITS
+from .axis import DRIVER_UNITS, in_table_units
 
 COLUMNS: Mapping[str, Kind] = {
     "case": Kind.TEXT,
@@ -86,15 +85,12 @@ def _columns(
     about: Mapping[str, Any], record: Record, outputs: Mapping[str, OutputSeries]
 ) -> dict[str, list[float | None]]:
     """Return the values of drivers and outputs in the units of the table, by their heads."""
-    units = {"m": LENGTHS[about["units"]["length"]], "rad": ANGLES[about["units"]["angle"]]}
     drivers = {about["driver"]["name"]: about["driver"], **about["motions"]}
     found = dict[str, list[float | None]]()
 
     def add(name: str, unit: str, values: Sequence[float | None]) -> None:
-        measure, *per = unit.split("/", 1)
-        into = units.get(measure)
-        size, text = (into.size, into.name) if into else (1.0, measure)
-        head = f"{name} [{'/'.join([text, *per])}]" if unit not in ("", "1") else name
+        text, size = in_table_units(unit, about)
+        head = name if text in ("", "1") else f"{name} [{text}]"
         found[head] = [None if each is None else each / size for each in values]
 
     for name, values in record.driver.items():

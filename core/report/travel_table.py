@@ -12,11 +12,10 @@ from rich.text import Text
 
 from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
-from ..case.units import LENGTHS
 from ..harness.record import Outcome, Record, Results
 from ..unit_text import unit_text, with_unit
 from . import terminal
-from .axis import DISPLAY, DRIVER_UNITS
+from .axis import DRIVER_UNITS, in_table_units
 
 NAMES = (
     "toe",
@@ -77,19 +76,14 @@ def _rows(
         per = record.outputs.get(name + PER_TRAVEL)
         gradient, per_unit = "", ""
         if per is not None and per.position:
-            measure, _, rest = per.unit.partition("/")
-            shown, factor = _shown(measure, facts)
+            per_unit, factor = _shown(per.unit, facts)
             gradient = _number(per.position[design], factor)
-            per_unit = f"{unit_text(shown)}/{rest}" if rest else unit_text(shown)
         yield visible(with_unit(name, unit)), *cells, gradient, per_unit
 
 
-def _shown(measure: str, facts: Mapping[str, Any]) -> tuple[str, float]:
-    """Return the unit of a table for an SI unit, and its number per SI unit."""
-    length = LENGTHS[facts["units"]["length"]]
-    return (
-        (length.name, 1.0 / length.size) if measure == "m" else DISPLAY.get(measure, (measure, 1.0))
-    )
+def _shown(unit: str, facts: Mapping[str, Any]) -> tuple[str, float]:
+    text, size = in_table_units(unit, facts)
+    return unit_text(text).replace("deg", "\N{DEGREE SIGN}"), 1.0 / size
 
 
 def _number(value: float | None, scale: float) -> str:
