@@ -10,8 +10,8 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from kincheck.core.extras import THREADS
 from kincheck.core.harness.execution import here
-from kincheck.core.harness.provenance import THREADS
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run

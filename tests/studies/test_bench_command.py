@@ -10,7 +10,7 @@ import msgspec
 import pytest
 from kincheck.core.cli import bench as command
 from kincheck.core.cli import main
-from kincheck.core.harness.provenance import THREADS
+from kincheck.core.extras import THREADS
 from kincheck.core.studies.bench import engines
 from kincheck.core.studies.paper import formulation
 

@@ -74,6 +74,7 @@ class Fake:
     loop: str = "python"
     settings: dict = field(default_factory=dict)
     solves: int = 0
+    untimed: bool = False
 
     @property
     def in_process(self):
