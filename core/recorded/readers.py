@@ -17,7 +17,7 @@ from ..case.io.document import fault, read_bytes, read_text, shown
 from ..case.io.reference_samples import layout_of, read_table, samples_of
 from ..case.io.table import unit_of_head
 from ..case.models.trees.element import Element, parse_xml
-from ..errors import CaseError, brief, remedy
+from ..errors import MOST_NAMED, CaseError, brief, remedy, shortened
 from ..trajectory import Array
 from .recording import Choose, Column, Head, Recording, column_of
 
@@ -73,21 +73,23 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
-    samples = samples_of(table, chosen, gaps=True)
+    samples = samples_of(table, chosen, remarks=True, gaps=True)
     columns: dict[int, Column] = {}
     for k, values, printed, text in zip(
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
         head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
         columns[k] = Column(head, values, printed.half(np.nan_to_num(values)))
+    rows = shortened(samples.left_out, MOST_NAMED)
+    notes = [f"{file}: left out the rows without numbers: {rows}"] if rows else []
     if not opensim:
-        return Recording(file, columns)
+        return Recording(file, columns, notes=notes)
     stated = _DEGREES.search(read_text(file, LARGEST_FILE, LESS))
     if stated is None:
-        return Recording(file, columns, "OpenSim")
+        return Recording(file, columns, "OpenSim", notes=notes)
     angle = "deg" if stated[1].lower() == "yes" else "rad"
     note = f"{file}: angles without a unit in {angle}, as its head says"
-    return Recording(file, columns, "OpenSim", angle, [note])
+    return Recording(file, columns, "OpenSim", angle, [note, *notes])
 
 
 def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:

@@ -242,6 +242,14 @@ BROKEN = {
         ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [0]]\n[outputs.tip_x]"),
         ["reference.rows[1]", "found 1 numbers"],
     ),
+    "an empty row": (
+        ("[outputs.tip_x]", "[reference]\nrows = [[-0.1, 1], [], [0.1, 1]]\n[outputs.tip_x]"),
+        ["reference.rows[1]", "found no numbers"],
+    ),
+    "an empty first row": (
+        ("[outputs.tip_x]", "[reference]\nrows = [[], [-0.1, 1]]\n[outputs.tip_x]"),
+        ["reference.rows[0]", "found no numbers"],
+    ),
     "rows off the grid": (
         (
             "[outputs.tip_x]",

@@ -218,3 +218,20 @@ def test_first_rows_with_gaps_are_samples(tmp_path):
     file.write_text("Travel [mm],toe [deg]\n-50,\n-40,\n0,0.1\n50,0.2\n")
     samples = samples_of(read_table(file, None, "--sheet"), [0, 1], gaps=True)
     assert samples.numbers[:, 0].tolist() == [-50.0, -40.0, 0.0, 50.0]
+
+
+def test_rows_of_a_case_are_no_remarks(tmp_path):
+    """Only curves and recordings may hold remarks: their readers tell what is left out."""
+    file = tmp_path / "reference.csv"
+    file.write_text("push,tip_x\n0,1\nsensor changed\n1,2\n")
+    table = read_table(file, None, "--sheet")
+    assert samples_of(table, remarks=True).left_out == ["line 3 (sensor changed)"]
+    with pytest.raises(CaseError, match="line 3"):
+        samples_of(table)
+
+
+def test_blank_row_of_a_curve_is_left_out(tmp_path):
+    file = tmp_path / "rig.csv"
+    file.write_text("Travel [mm],toe [deg]\n-50,0.3\n,,\n50,0.2\n")
+    samples = samples_of(read_table(file, None, "--sheet"), [0, 1], remarks=True, gaps=True)
+    assert samples.numbers[:, 0].tolist() == [-50.0, 50.0]

@@ -100,7 +100,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     found = match(file, where, heads, driver, known, stated, _side(case))
     left_out = [head for k, head in enumerate(heads) if head and k not in found]
     targets = [*found.values()]
-    samples, equal = _once(samples_of(table, [*found], gaps=True))
+    samples, equal = _once(samples_of(table, [*found], remarks=True, gaps=True))
     columns = zip(samples.columns, targets, strict=True)
     samples = replace(
         samples, columns=[f"{text} [{each.unit}]" if each.unit else text for text, each in columns]

@@ -210,13 +210,19 @@ def _numbers(cells: Sequence[Cell]) -> int:
     return sum(map(is_number, cells))
 
 
-def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool = False) -> Samples:
+def samples_of(
+    table: Table,
+    wanted: Sequence[int] | None = None,
+    *,
+    remarks: bool = False,
+    gaps: bool = False,
+) -> Samples:
     """Return the samples of a table: a head and rows of numbers; a row of units may stand between.
-
-    Rows without a number are remarks, or the head again; those of numbers between them are read.
 
     Args:
         wanted: indices of the columns to read, the driver first; None for all.
+        remarks: whether rows without a number are remarks, or the head again, and no faults; the
+            caller tells those left out.
         gaps: whether empty cells and "nan" are gaps, and no faults.
 
     Raises:
@@ -231,9 +237,8 @@ def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool 
     printed = [Printed() for _ in wanted]
     for place, cells in islice(table.rows(), layout.body, None):
         cells = trimmed(cells)
-        if not is_number(cells[wanted[0]] if wanted[0] < len(cells) else "") and _is_remark(
-            file, place, cells, layout
-        ):
+        first = cells[wanted[0]] if wanted[0] < len(cells) else ""
+        if remarks and not is_number(first) and _is_remark(file, place, cells, layout):
             left_out.append(f"{place} ({brief(', '.join(map(str, filter(None, cells))))})")
             continue
         if not every and not any(cells[n] != "" for n in wanted if n < len(cells)):
@@ -281,7 +286,7 @@ def _is_remark(file: Path, place: str, cells: Sequence[Cell], layout: Layout) ->
     if _numbers(cells) or any(text.startswith(("=", "#N", "#R", "#V", "#D")) for text in texts):
         return False
     if texts in layout.rows or 2 * _filled(cells) <= len(layout.heads) or _filled(cells) == 1:
-        return texts[0].lower().lstrip("+-") != "nan"
+        return not texts or texts[0].lower().lstrip("+-") != "nan"
     raise fault(
         file,
         place,
@@ -319,7 +324,7 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Tabl
     """Return the table of the rows in a case file.
 
     Raises:
-        CaseError: there are no rows.
+        CaseError: there are no rows, or one of them is empty.
     """
     if keys.rows is None:
         raise fault(
@@ -328,6 +333,9 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Tabl
             "found neither file nor rows, expected one of them; name a CSV file or give the rows",
         )
     own = (output.name for output in outputs if not output.name.endswith(PER_TRAVEL))
+    for k, row in enumerate(keys.rows):
+        if not row:  # no blank line, as a table of text may have
+            raise fault(file, f"{ROWS}[{k}]", "found no numbers; complete the row or take it out")
     rows = [(f"{ROWS}[{k}]", [*map(repr, row)]) for k, row in enumerate(keys.rows)]
     head = (COLUMNS, keys.columns or ["driver", *own])
     return Table(file, delimiter=",", sheet=[head, *rows])
