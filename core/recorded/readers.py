@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import io
 import re
+import struct
+import zlib
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -29,6 +31,8 @@ _DEGREES = re.compile(r"^\s*inDegrees\s*=\s*(yes|no)\s*$", re.IGNORECASE | re.MU
 _NO_MOTION = ("modelInput", "initialConditions")
 _POSE = "_XFORM"
 _UNIT = re.compile(r"\[([^\]|]*)")
+# Of MAT-files of level 5: bytes of the head, type of a compressed element; bytes unpacked at once.
+_MATLAB_HEAD, _COMPRESSED, _CHUNK = 128, 15, 1_000_000
 _V73 = (b"MATLAB 7.3", b"\x89HDF")
 
 UNREAD: Mapping[str, str] = {
@@ -160,6 +164,8 @@ def _of_mat(file: Path, choose: Choose) -> Recording:
     if data.startswith(_V73):
         raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
     try:
+        if _expanded(data) > LARGEST_FILE:
+            raise fault(file, "", f"found more than {LARGEST_FILE} bytes when unpacked; {LESS}")
         scipy_io: Any = import_module("scipy.io")  # slow to import
         found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
         modelica = "Aclass" in found and "dataInfo" in found
@@ -173,6 +179,22 @@ def _of_mat(file: Path, choose: Choose) -> Recording:
     chosen = choose([head for head, _ in series])
     columns = {k: Column(series[k][0], *_numbers(series[k][1])) for k in chosen}
     return Recording(file, columns, "Modelica" if modelica else "MATLAB")
+
+
+def _expanded(data: bytes) -> int:
+    """Return the bytes of the compressed elements of a file of level 5, unpacked."""
+    order = ">" if data[126:128] == b"MI" else "<"
+    place, total = _MATLAB_HEAD, 0
+    while data.startswith(b"MATLAB 5") and place + 8 <= len(data) and total <= LARGEST_FILE:
+        kind, count = struct.unpack_from(f"{order}II", data, place)
+        if kind == _COMPRESSED:
+            unpacker = zlib.decompressobj()
+            rest = data[place + 8 : place + 8 + count]
+            while rest and total <= LARGEST_FILE:
+                total += len(unpacker.decompress(rest, _CHUNK))
+                rest = unpacker.unconsumed_tail
+        place += 8 + count
+    return total
 
 
 def _numbers(values: Any) -> tuple[Array, Array]:
@@ -219,7 +241,8 @@ def _of_matlab(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
             tables[name] = each
     for name, each in tables.items():
         numbers: Any = np.asarray(each)
-        if numbers.dtype.kind in "fiu" and numbers.ndim == 2:
+        # a matrix without rows may state any number of columns
+        if numbers.dtype.kind in "fiu" and numbers.ndim == 2 and numbers.size:
             numbers = numbers.T if numbers.shape[0] == 1 else numbers
             for k in range(numbers.shape[1]):
                 yield Head(name if numbers.shape[1] == 1 else f"{name}({k + 1})"), numbers[:, k]

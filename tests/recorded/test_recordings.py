@@ -3,15 +3,21 @@
 import csv
 import json
 import re
+import struct
+import zlib
 from pathlib import Path
 
+import numpy as np
+import openpyxl
 import pytest
 from kincheck.adapters import engine
+from scipy.io import savemat
 
 DATA = Path(__file__).parent.parent / "data" / "recordings"
 NATIVE = engine("native")
 CASE = DATA / "fourbar.toml"
 PARTS = {"PART_2": "crank", "PART_3": "coupler", "PART_4": "rocker"}
+MODELICA = ["--map", "MOTION_1=crank.phi", "--map", "JOINT_4.angle=rocker.phi"]
 XYZW, EULER = "quaternion xyzw qx qy qz qw", "euler 123 a b c"
 
 
@@ -84,10 +90,70 @@ def test_adams_results_are_judged_in_all_rates(judged):
     [("fourbar_modelica.mat", 2e-15), ("fourbar_modelica_single.mat", 1e-7)],
 )
 def test_modelica_results_of_truth_pass(judged, file, tolerance):
-    options = ["--map", "MOTION_1=crank.phi", "--map", "JOINT_4.angle=rocker.phi"]
-    status, record = judged(DATA / file, *options)
+    status, record = judged(DATA / file, *MODELICA)
     assert status == 0
     assert largest(record) < tolerance
+
+
+def written_as(file, form, crank, rocker):
+    """Write the angles [rad] as a program would, and return the options that state their names."""
+    if form == "workbook":
+        book = openpyxl.Workbook()
+        for row in [("crank [rad]", "rocker [rad]"), *zip(crank.tolist(), rocker.tolist())]:
+            book.active.append(row)
+        book.save(file)
+        return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+    if form == "storage":
+        rows = "".join(f"{x!r}\t{y!r}\n" for x, y in zip(crank.tolist(), rocker.tolist()))
+        file.write_text(f"run\ninDegrees=no\nendheader\ncrank\trocker\n{rows}")
+        return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+    variables, names = {
+        "vectors": ({"crank": crank, "rocker": rocker, "n": 3.0}, ("crank", "rocker")),
+        "matrix": ({"log": np.column_stack([crank, rocker])}, ("log(1)", "log(2)")),
+        "struct": ({"log": {"crank": crank, "rocker": rocker}}, ("log.crank", "log.rocker")),
+    }[form]
+    savemat(file, variables, do_compression=form != "vectors")
+    return ["--map", f"MOTION_1={names[0]} [rad]", "--map", f"JOINT_4.angle={names[1]} [rad]"]
+
+
+@pytest.mark.parametrize(
+    ("form", "suffix"),
+    [
+        ("workbook", ".xlsx"),
+        ("storage", ".sto"),
+        ("vectors", ".mat"),
+        ("matrix", ".mat"),
+        ("struct", ".mat"),
+    ],
+)
+def test_truth_in_other_formats_passes(judged, tmp_path, form, suffix):
+    _, truth = judged(DATA / "fourbar_modelica.mat", *MODELICA)
+    crank = np.array(truth["driver"]["MOTION_1"])
+    rocker = np.array(truth["outputs"]["JOINT_4.angle"]["position"])
+    file = tmp_path / f"run{suffix}"
+    status, record = judged(file, *written_as(file, form, crank, rocker))
+    assert status == 0
+    assert largest(record) < 2e-15
+    rocker[30] += 1e-5
+    status, record = judged(file, *written_as(file, form, crank, rocker))
+    assert status == 1
+    assert record["errors"]["JOINT_4.angle"]["position"]["worst_step"] == 30
+
+
+def test_matrix_without_rows_is_left_out(judged, tmp_path, capsys):
+    file = tmp_path / "run.mat"
+    file.write_bytes(struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0")
+    assert judged(file)[0] == 2
+    assert "found the columns none, expected one of MOTION_1" in capsys.readouterr().err
+
+
+def test_unpacked_size_of_a_file_is_bounded(judged, tmp_path, capsys):
+    head = b"MATLAB 5.0".ljust(124) + b"\0\1IM"
+    packed = zlib.compress(bytes(300_000_000), 9)
+    file = tmp_path / "run.mat"
+    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    assert judged(file)[0] == 2
+    assert "bytes when unpacked; write fewer samples or channels" in capsys.readouterr().err
 
 
 def test_opensim_motion_of_truth_passes(judged):
