@@ -4,13 +4,13 @@ the options --map in lines "# map NAME=COLUMN". What is read is judged.
 
 import argparse
 import io
-import random
 import re
 import struct
 from functools import cache
+from importlib import import_module
+from typing import Any
 
 import numpy as np
-import scipy.io
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.cli.recorded_options import recorded_engines
@@ -66,12 +66,10 @@ ADAMS = """<?xml version="1.0" encoding="UTF-8"?>
 <Step>1 0 0 0 0.4 0 0</Step></Data>
 </Analysis></Results>
 """
-WORDS = (
-    *"turn turn.velocity x tip_x time crank.x pin.FX event=first event=last frame first body".split(),
-    *"euler 321 fixed inverted quaternion wxyz omega alpha acceleration velocity".split(),
-    *"[deg] [mm] (rad) rad/s [N] # map = + - , ; : NaN inf 1e400 -0 1,5 endheader inDegrees=yes".split(),
-    *"Results Analysis Data Step Entity Component StepMap name id unitsValue entity objectId".split(),
-)  # fmt: skip
+WORDS = """turn turn.velocity x tip_x time crank.x pin.FX event=first event=last frame first body
+euler 321 fixed inverted quaternion wxyz omega alpha acceleration velocity endheader inDegrees=yes
+[deg] [mm] (rad) rad/s [N] # map = + - , ; : NaN inf 1e400 -0 1,5 Results Analysis Data Step Entity
+Component StepMap name id unitsValue entity objectId""".split()
 
 
 def one(data: bytes) -> None:
@@ -123,11 +121,12 @@ def seeds() -> list[bytes]:
     opensim = "motion\nnRows=4\ninDegrees=yes\nendheader\nturn\tx\n" + "\n".join(
         f"{a}\t{x}" for a, x in rows
     )
+    scipy_io: Any = import_module("scipy.io")
     stream = io.BytesIO()
     turn = np.radians([a for a, _ in rows])
-    scipy.io.savemat(stream, {"turn": turn, "x": np.array([x for _, x in rows]), "n": 3.0})
+    scipy_io.savemat(stream, {"turn": turn, "x": np.array([x for _, x in rows]), "n": 3.0})
     log = io.BytesIO()
-    scipy.io.savemat(log, {"turn": np.float32(turn), "log": {"turn": turn}, "x": np.cos(turn)})
+    scipy_io.savemat(log, {"turn": np.float32(turn), "log": {"turn": turn}, "x": np.cos(turn)})
     return [
         *(text.encode() for text in (plain, german, posed, named, euler, opensim, ADAMS)),
         *(each.getvalue() for each in (stream, log)),
@@ -162,4 +161,4 @@ def modelica(turn: np.ndarray, x: np.ndarray) -> bytes:
     )
 
 
-mutate = changing(changed_xml, changed_lines, words=WORDS)
+mutate = changing(changed_xml, changed_lines, words=(*WORDS,))

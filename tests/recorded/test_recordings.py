@@ -97,15 +97,16 @@ def test_modelica_results_of_truth_pass(judged, file, tolerance):
 
 def written_as(file, form, crank, rocker):
     """Write the angles [rad] as a program would, and return the options that state their names."""
+    rows = np.column_stack([crank, rocker]).tolist()
     if form == "workbook":
         book = openpyxl.Workbook()
-        for row in [("crank [rad]", "rocker [rad]"), *zip(crank.tolist(), rocker.tolist())]:
+        for row in [("crank [rad]", "rocker [rad]"), *rows]:
             book.active.append(row)
         book.save(file)
         return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
     if form == "storage":
-        rows = "".join(f"{x!r}\t{y!r}\n" for x, y in zip(crank.tolist(), rocker.tolist()))
-        file.write_text(f"run\ninDegrees=no\nendheader\ncrank\trocker\n{rows}")
+        lines = ["run", "inDegrees=no", "endheader", "crank\trocker"]
+        file.write_text("\n".join([*lines, *(f"{x!r}\t{y!r}" for x, y in rows)]))
         return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
     variables, names = {
         "vectors": ({"crank": crank, "rocker": rocker, "n": 3.0}, ("crank", "rocker")),
