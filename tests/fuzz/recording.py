@@ -1,13 +1,15 @@
 """Recordings of a crank: tables, motions of OpenSim, results of Adams and MAT-files; a table states
-the options --map in lines "# map NAME=COLUMN". What is read is judged.
+the options --map in lines "# map NAME=COLUMN". What is read is judged. And descriptions of FMUs.
 """
 
 import argparse
 import io
 import re
 import struct
+import zipfile
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.cli.recorded_options import recorded_engines
 from kincheck.core.recorded.engine import RecordedEngine
+from kincheck.core.recorded.fmu import read_fmu
 
 from .fuzzing import changing, read_or_refused, written
 from .hardpoints import workbook
@@ -66,16 +69,25 @@ ADAMS = """<?xml version="1.0" encoding="UTF-8"?>
 <Step>1 0 0 0 0.4 0 0</Step></Data>
 </Analysis></Results>
 """
+FMU = b"<fmiModelDescription"
+SCALAR = """<ScalarVariable valueReference="%d" name="%s" causality="%s"><Real unit="m"/>
+</ScalarVariable>"""
+FLOAT = '<Float64 valueReference="%d" name="%s" causality="%s" unit="m"/>'
 WORDS = """turn turn.velocity x tip_x time crank.x pin.FX event=first event=last frame first body
 euler 321 fixed inverted quaternion wxyz omega alpha acceleration velocity endheader inDegrees=yes
 [deg] [mm] (rad) rad/s [N] # map = + - , ; : NaN inf 1e400 -0 1,5 Results Analysis Data Step Entity
-Component StepMap name id unitsValue entity objectId""".split()
+Component StepMap name id unitsValue entity objectId
+fmiVersion guid ModelVariables ScalarVariable Real unit ModelExchange TypeDefinitions Derivatives
+valueReference causality parameter declaredType""".split()
 
 
 def one(data: bytes) -> None:
     """Read one input as the kind of file that it begins like."""
     start = data.lstrip()[:1]
     maps = [each.strip() for each in MAP.findall(data.decode("latin-1"))]
+    if data.startswith(FMU):
+        read_or_refused(lambda: read_fmu(packed(data), crank(), ["turn=turn [rad]", "x=x [m]"]))
+        return
     if data.startswith(b"PK"):
         name = "run.xlsx"
     elif start == b"<":
@@ -85,6 +97,16 @@ def one(data: bytes) -> None:
     else:
         name = "run.mot" if b"endheader" in data else "run.csv"
     read_or_refused(lambda: _judged(name, data, maps))
+
+
+def packed(description: bytes) -> Path:
+    """An FMU of that description, with a binary for each machine."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("modelDescription.xml", description)
+        for machine in ("linux64", "x86_64-linux"):
+            archive.writestr(f"binaries/{machine}/crank.so", b"")
+    return written("crank.fmu", stream.getvalue())
 
 
 def _judged(name: str, data: bytes, maps: list[str]) -> None:
@@ -122,13 +144,22 @@ def seeds() -> list[bytes]:
         f"{a}\t{x}" for a, x in rows
     )
     scipy_io: Any = import_module("scipy.io")
+    fmus = [
+        f'<fmiModelDescription fmiVersion="{fmi}.0" {token}="1" generationTool="own">'
+        '<CoSimulation modelIdentifier="crank"/><ModelVariables>'
+        f"{''.join(variables)}</ModelVariables></fmiModelDescription>"
+        for fmi, token, variables in (
+            (2, "guid", [SCALAR % (1, "turn", "input"), SCALAR % (2, "x", "output")]),
+            (3, "instantiationToken", [FLOAT % (1, "turn", "input"), FLOAT % (2, "x", "output")]),
+        )
+    ]
     stream = io.BytesIO()
     turn = np.radians([a for a, _ in rows])
     scipy_io.savemat(stream, {"turn": turn, "x": np.array([x for _, x in rows]), "n": 3.0})
     log = io.BytesIO()
     scipy_io.savemat(log, {"turn": np.float32(turn), "log": {"turn": turn}, "x": np.cos(turn)})
     return [
-        *(text.encode() for text in (plain, german, posed, named, euler, opensim, ADAMS)),
+        *(text.encode() for text in (plain, german, posed, named, euler, opensim, ADAMS, *fmus)),
         *(each.getvalue() for each in (stream, log)),
         modelica(turn, np.cos(turn) / 10),
         *workbook([line.split(",") for line in plain.splitlines()]),
