@@ -427,3 +427,73 @@ def test_driver_on_an_even_grid_has_no_digits(judged, tmp_path):
 
     assert write(0.0) == 0
     assert write(1e-6) == 1
+
+
+GEARS = """schema = "kincheck-case/1"
+name = "gears"
+source = "made up for this test"
+[bodies.a]
+[bodies.b]
+origin = [0.3, 0, 0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "a"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.other]
+type = "revolute"
+bodies = ["ground", "b"]
+point = [0.3, 0, 0]
+axis = [0, 0, 1]
+[couplers.mesh]
+type = "gear"
+joints = ["pin", "other"]
+ratio = -0.4
+[points.tip]
+body = "b"
+position = [0.4, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pin"
+[sweep]
+driver = "turn"
+start = 0
+stop = 12
+steps = 61
+[outputs.x]
+point = "tip"
+component = "x"
+relative = false
+"""
+HINGE = 'type = "revolute"\nbodies = ["ground", "b"]'
+RACK = GEARS.replace(HINGE, HINGE.replace("revolute", "translational")).replace("ratio = -0.4", "")
+RACK = RACK.replace('type = "gear"', 'type = "rack_pinion"\nradius = 0.05')
+RACK = RACK.replace('component = "x"', 'component = "z"')
+
+
+@pytest.mark.parametrize("driven", ["by column", "by poses"])
+@pytest.mark.parametrize("first", [0, 20, 45])
+@pytest.mark.parametrize("kind", ["gears", "rack"])
+def test_coupled_joints_pass_after_several_turns(kincheck_main, tmp_path, kind, first, driven):
+    turn = np.linspace(0.0, 12.0, 61)[first:]
+    half, nil = 0.5 * turn, 0.0 * turn
+    other = {"gears": -1.25 * turn, "rack": nil}[kind]
+    lift = {"gears": nil, "rack": 0.05 * turn}[kind]
+    columns = {
+        **({"turn": turn} if driven == "by column" else {}),
+        **dict(zip("xyz", (nil, nil, nil), strict=True)),
+        **dict(zip(("e0", "e1", "e2", "e3"), (np.cos(half), nil, nil, np.sin(half)), strict=True)),
+    }
+    columns = {name if name == "turn" else f"a.{name}": x for name, x in columns.items()}
+    columns |= {"b.x": nil + 0.3, "b.y": nil, "b.z": lift, "b.e0": np.cos(other)}
+    columns |= {"b.e1": nil, "b.e2": nil, "b.e3": np.sin(other)}
+    rows = [
+        ",".join(columns),
+        *(",".join(f"{x:.9f}" for x in row) for row in zip(*columns.values(), strict=True)),
+    ]
+    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
+    case.write_text({"gears": GEARS, "rack": RACK}[kind])
+    file.write_text("\n".join(rows))
+    assert kincheck_main("run", case, "--recorded", file, "--quiet", engines=[NATIVE]) == 0
+    case.write_text(case.read_text().replace("-0.4", "-0.40001").replace("0.05", "0.05001"))
+    assert kincheck_main("run", case, "--recorded", file, "--quiet", engines=[NATIVE]) == 1
