@@ -64,7 +64,7 @@ def converter(name: str) -> Any:
     return importlib.import_module(f".{CONVERTERS[name]}", __name__).saved
 
 
-STEPPERS = ("mujoco", "pinocchio", "exudyn")
+STEPPERS = ("mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody")
 """Steppers of free motion, by engine; the module NAME.stepper is a script without kincheck."""
 
 

@@ -29,6 +29,12 @@ def short(tmp_path, duration=0.3, samples=16):
     return file
 
 
+def measured(tmp_path, *options):
+    given = ["--case", str(short(tmp_path)), "--out", str(tmp_path / "site")]
+    assert main(["board", *given, "--steps", "60", *options]) == 0
+    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"]
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("the board")
@@ -65,6 +71,24 @@ def test_semi_implicit_steppers_share_their_error(rows):
     one, other = (errors(rows["mujoco", name, "best"]) for name in ("Euler", "implicitfast"))
     assert one == pytest.approx(other, rel=0.05)
     assert rows["mujoco", "Euler", "best"]["order"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("engine", ["drake", "dart"])
+def test_semi_implicit_engines_share_their_error(engine, rows, tmp_path):
+    package = {"drake": "pydrake.multibody.plant", "dart": "dartpy"}[engine]
+    pytest.importorskip(package, exc_type=ImportError)
+    (*_, best) = measured(tmp_path, "--engine", engine)
+    one = errors(rows["mujoco", "Euler", "best"])
+    assert errors(best)[-2:] == pytest.approx(one[-2:], rel=0.05)
+
+
+def test_error_of_simbody_follows_its_accuracy(tmp_path):
+    pytest.importorskip("opensim", exc_type=ImportError)
+    (row,) = measured(tmp_path, "--engine", "simbody")
+    found = errors(row)
+    assert found == sorted(found, reverse=True)
+    assert found[-1] < 1e-8
+    assert row["runs"][-1]["gap"] < 1e-9
 
 
 @pytest.mark.parametrize("integrator", ["GeneralizedAlpha", "TrapezoidalIndex2"])
@@ -144,7 +168,9 @@ def test_order_and_floor_of_halved_steps():
         return [Run(step=0.5**k, error=error) for k, error in enumerate(found)]
 
     assert order_and_floor(runs(64.0, 16.0, 4.0, 1.0)) == (pytest.approx(2.0), None)
-    assert order_and_floor(runs(64.0, 4.0, 1.0, 1.0)) == (pytest.approx(3.0), 1.0)
+    assert order_and_floor(runs(64.0, 8.0, 1.0, 1.0)) == (pytest.approx(3.0), 1.0)
+    # the first step is too long for any order
+    assert order_and_floor(runs(3.0, 3.0, 0.75, 0.1875)) == (pytest.approx(2.0), None)
     assert order_and_floor(runs(1.0, 1.0, 1.0, 1.0)) == (None, 1.0)
     assert order_and_floor([*runs(8.0, 4.0), Run(step=0.25, message="not finite")]) == (None, None)
 

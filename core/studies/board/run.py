@@ -197,10 +197,13 @@ def order_and_floor(runs: Sequence[Run]) -> tuple[float | None, float | None]:
     if len(pairs) < 2 or len(pairs) < len(runs):
         return None, None
     steps, errors = np.log2(np.array(pairs)).T
-    falling = -np.diff(errors) / -np.diff(steps) >= FLOOR
-    above = 1 + (len(falling) if falling.all() else int(falling.argmin()))
-    floor = None if falling.all() else float(2.0 ** errors.min())
-    if above < 2:
+    falling = [bool(each) for each in np.diff(errors) / np.diff(steps) >= FLOOR]
+    floor = None if falling[-1] else float(2.0 ** errors.min())
+    if True not in falling:
         return None, floor
-    slope, _ = np.polyfit(steps[:above], errors[:above], 1).tolist()
-    return slope, floor
+    # the last steps that lower the error, one after the other
+    last = len(falling) - falling[::-1].index(True)
+    first = last - [*falling[:last][::-1], False].index(False)
+    x, y = steps[first : last + 1], errors[first : last + 1]
+    shift = x - x.mean()
+    return float(shift @ y / (shift @ shift)), floor
