@@ -109,6 +109,7 @@ IMPORTS = {
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/compliance": (". mechanism kinematics case case/suspension report"),
+    "studies/board": ". mechanism kinematics case case/io harness report",
     "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
@@ -123,8 +124,8 @@ IMPORTS = {
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/same studies/diagnosis studies/bench studies/compliance "
-        "live"
+        "studies/paper studies/same studies/diagnosis studies/bench studies/board "
+        "studies/compliance live"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (

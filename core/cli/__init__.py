@@ -23,6 +23,7 @@ COMMANDS = (
     "kc",
     "serve",
     "free",
+    "board",
     "doctor",
     "history",
     "report",

@@ -77,7 +77,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
     drawn_times = [value for trace in times["data"] for value in trace["y"] if value]
     times["layout"]["yaxis"] = ticked_axis(TIMES, drawn_times) | _decade(drawn_times)
-    made = {"error": _floored(errors), "time": times}
+    made = {"error": floored(errors), "time": times}
     return {
         what: each
         for what, each in made.items()
@@ -128,13 +128,13 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
         }
         traces.append(curve | hover)
     times = [value for trace in traces for value in trace["x"] if value]
-    return _floored(
+    return floored(
         {"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}}
     )
 
 
-def _floored(figure: Figure) -> Figure:
-    """Return the figure with a vertical axis for errors."""
+def floored(figure: Figure) -> Figure:
+    """Return the figure with a vertical log axis for errors."""
     positive = [value for trace in figure["data"] for value in trace["y"] if value]
     side, floor = log_axis(
         "largest position error [m]", min(positive, default=1.0), max(positive, default=1.0)

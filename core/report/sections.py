@@ -41,6 +41,7 @@ class Section:
         notes: the method of measurement.
         columns: headings; the first `labels` of them head words, the others numbers.
         diagrams: diagrams above the table, only on the page.
+        links: file that belongs to each row, beside the page; empty for none.
     """
 
     title: str
@@ -50,6 +51,7 @@ class Section:
     labels: int
     rows: Sequence[Sequence[str]]
     diagrams: Sequence[Diagram] = ()
+    links: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
