@@ -72,6 +72,14 @@ def test_compare_of_another_unit_and_axes_is_equal(tmp_path, old, capsys):
     assert "No point that both have differs between old and inch." in printed
 
 
+def test_compare_has_points_in_axes_of_the_first(tmp_path, new, capsys):
+    first = table(
+        tmp_path / "adams.csv", TEMPLATE.sample, axes="rearward,right,up", signs=(-1, -1, 1)
+    )
+    assert main(["compare", first, new]) == 0
+    assert "tierod_inner  new     -70, -220, 150  -70, -223, 150" in capsys.readouterr().out
+
+
 def test_compare_of_equal_names_tells_files_apart(tmp_path, old, new, capsys):
     other = table(tmp_path / "b" / "old.csv", {**TEMPLATE.sample, **MOVED})
     assert main(["compare", old, other, new]) == 0
