@@ -89,7 +89,7 @@ IMPORTS = {
     "harness/reporting": "",
     "recorded": (". primitives joints mechanism kinematics case case/io case/models/trees harness"),
     "history": ". case case/io harness",
-    "report": ". joints mechanism case case/io harness history",
+    "report": ". joints mechanism kinematics case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/truth": ". program mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/truth",
