@@ -16,7 +16,7 @@ from ..unit_text import motion_word, value_text
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .error_figure import error_figure
-from .figure_data import Effort, Past, precision_figure, trend_figures
+from .figure_data import Effort, Mark, Past, marks, precision_figure, trend_figures
 from .figures import Figure, Style, Values, band_is_thin, output_figure
 
 
@@ -32,10 +32,7 @@ class Judged:
     @property
     def ratio(self) -> float:
         """The error in tolerances."""
-        d = self.deviation
-        return (
-            d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
-        )
+        return self.deviation.ratio
 
     @property
     def word(self) -> str:
@@ -98,7 +95,8 @@ class CaseView:
         worst: the deviation closest to its tolerance, or farthest beyond it.
         account: the degrees of freedom, as counted in the paper and by rank.
         scene: the drawn mechanism; None if the results have none.
-        trends: error and time over earlier runs; empty without a history.
+        trends: errors and time over earlier runs; empty without a history.
+        marks: steps and other versions in them.
         precision: error against time at several effort settings, by mode; empty if not measured.
     """
 
@@ -114,6 +112,7 @@ class CaseView:
     account: Mapping[str, Any] | None
     scene: Drawing | None
     trends: list[Plot]
+    marks: Sequence[Mark]
     precision: list[Plot]
 
     def by_engine(self, name: str) -> list[Record]:
@@ -168,6 +167,7 @@ def case_view(
         if name in results.scenes
         else None,
         trends=_trends(anchor, given.history.get(name, ()), styles, figures),
+        marks=marks(given.history.get(name, ())),
         precision=_precision(anchor, given.precision.get(name, ()), styles, figures),
     )
 
@@ -238,7 +238,7 @@ def _trends(
     return [
         Plot(
             f"{anchor}-trend-{what}",
-            f"{what} over {runs} runs, log axis",
+            f"{what.replace('-', ' ')} over {runs} runs, log axis",
             f"{runs} runs, oldest first.",
         )
         for what in made

@@ -181,11 +181,16 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
 
 
 def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
-    runs = [Past(run=str(k), engine="one", max_error=1e-9, us_per_step=2.0) for k in range(2)]
+    runs = [
+        Past(run=str(k), engine="one", errors={"position": 1.0}, us_per_step=2.0) for k in range(2)
+    ]
     for past, drawn in ((runs[1:], False), (runs, True)):
         write_report(results(), tmp_path / "report.html", history={"strut": past})
         text = (tmp_path / "report.html").read_text("utf-8")
-        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-error" in text) == (drawn, drawn)
+        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-position-error" in text) == (
+            drawn,
+            drawn,
+        )
 
 
 def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
