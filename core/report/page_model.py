@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,12 +13,15 @@ from ..harness.labels import against, engine_name, motion_unit, number, output_l
 from ..harness.record import Deviation, OutputSeries, Record, Results
 from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
-from ..unit_text import motion_word, value_text
+from ..unit_text import FORCES, motion_word, value_text
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .error_figure import error_figure
 from .figure_data import Effort, Mark, Past, marks, precision_figure, trend_figures
 from .figures import Figure, Style, Values, band_is_thin, output_figure
+
+ROUND_OFF = 1e-12
+"""Part of a value by which an output may change that counts as constant without a tolerance."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +79,15 @@ class OutputView:
     """One output of a case: its curves against the driver, and their differences to the standard.
 
     Attributes:
+        constant: whether it moves by less than its tolerance, and is right.
         errors: a figure for each compared quantity.
         rates: the quantities of these figures after the first.
     """
 
     name: str
     label: str
+    unit: str
+    constant: bool
     plot: Plot
     errors: list[Plot]
     rates: list[str]
@@ -158,7 +165,7 @@ def case_view(
         records=records,
         evidence=next((record.evidence for record in records if record.evidence), None),
         axis=axis,
-        outputs=outputs,
+        outputs=sorted(outputs, key=lambda each: each.unit not in FORCES),
         worst=worst(deviations),
         account=next(
             (r.details["dof_account"] for r in records if r.details.get("dof_account")), None
@@ -224,7 +231,19 @@ def _output(
         f"{label} against {axis.name}, all engines",
         " ".join([*sentences, axis.besides]).strip(),
     )
-    return OutputView(output, label, plot, errors, compared[1:])
+    constant = all(each.deviation.within for each in deviations) and _constant(
+        [series.position for _, series in curves], band[1] if band else 0.0
+    )
+    unit = curves[0][1].unit
+    return OutputView(output, label, unit, constant, plot, errors, compared[1:])
+
+
+def _constant(curves: Sequence[Values], tolerance: float) -> bool:
+    """Return whether all curves stay at one value, to the tolerance or to round-off."""
+    known = [v for curve in curves for v in curve if v is not None and math.isfinite(v)]
+    if not known:
+        return False
+    return max(known) - min(known) <= max(tolerance, ROUND_OFF * max(map(abs, known)))
 
 
 def _trends(

@@ -15,7 +15,7 @@ from ..case.io.escape import visible
 from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread, unsound
 from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
-from ..unit_text import motion_word
+from ..unit_text import FORCES, motion_word
 from . import terminal
 from .travel_table import print_travel
 
@@ -26,7 +26,6 @@ COLOURS = {
     Outcome.UNAVAILABLE: "yellow",
 }
 LENGTH = "m"
-FORCES = ("N", "N m")
 
 
 def _heads(reactions: bool) -> tuple[str, ...]:
