@@ -14,7 +14,8 @@ from .support.sources import SOURCES, folder_of, imported, module_of, tree
 
 LAYERS = (
     (".",),
-    ("primitives", "program"),
+    ("program",),
+    ("primitives",),
     ("joints",),
     ("mechanism",),
     ("kinematics",),
@@ -34,9 +35,9 @@ LAYERS = (
 
 IMPORTS = {
     ".": "",
-    "primitives": ".",
     "program": ".",
     "program/llvm": ". program",
+    "primitives": ". program",
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
