@@ -108,7 +108,7 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
-    "studies/compliance": (". mechanism kinematics case case/suspension report"),
+    "studies/compliance": (". mechanism kinematics case case/suspension harness report"),
     "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
