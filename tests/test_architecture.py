@@ -109,8 +109,12 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
+<<<<<<< HEAD
     "studies/compliance": (". mechanism kinematics case case/suspension report"),
     "studies/board": ". mechanism kinematics case case/io harness report",
+=======
+    "studies/compliance": (". mechanism kinematics case case/suspension harness report"),
+>>>>>>> kc
     "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
