@@ -64,16 +64,25 @@ _EQUALITIES = ("connect", "weld", "joint", "tendon")
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
 
 
+def whole_mjcf(file: Path, root: Element) -> Element:
+    """Return a model with all that it includes.
+
+    Raises:
+        CaseError: another document, an unknown section, or see `expand`.
+    """
+    _require_model(root)
+    root = expand(file, root)
+    _require_model(root)
+    return root
+
+
 def read_mjcf(file: Path, root: Element) -> Tree:
-    """Return the tree of a model, in its pose qpos0.
+    """Return the tree of a whole model, in its pose qpos0.
 
     Raises:
         CaseError: an unknown element or one of new bodies, a name given twice, a joint, place
             or equality without a sense.
     """
-    _require_model(root)
-    root = expand(file, root)
-    _require_model(root)
     require_known_attributes(root)
     _require_rigid(root)
     return _Reader(file, root).read()
@@ -446,8 +455,7 @@ class _Reader:
                 raise tendon.fault("has the length of a rest pose of its own")
             shortest = math.dist(coordinates(first.at), coordinates(second.at))
         name, spring = tendon.attributes.get("name", "tendon"), Spring(stiffness, damping, shortest)
-        points = first.at, second.at
-        return Strut(name, (i, j), points, spring, tendon, "tendon: spatial")
+        return Strut(name, (i, j), (first, second), spring, tendon, "tendon: spatial")
 
     def _gravity(self) -> Vector:
         """Return the gravity [m/s^2]; the last option counts."""

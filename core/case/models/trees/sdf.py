@@ -21,6 +21,7 @@ from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
+    BUSHING,
     ENTRIES,
     FRICTION,
     LAW,
@@ -57,7 +58,16 @@ IN_JOINT = (
 )
 IN_AXIS = words("xyz limit dynamics mimic use_parent_model_frame initial_position")
 IN_INERTIAL = words("mass density pose inertia frame auto_inertia_params fluid_added_mass")
-_READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT)
+IN_ROOT = words("model world light actor")
+IN_WORLD = (
+    *(*IN_ROOT, "include", "frame", "joint", "plugin", "gravity", "physics"),
+    *words("audio atmosphere magnetic_field scene gui state road population wind"),
+    "spherical_coordinates",
+)
+IN = {"sdf": IN_ROOT, "world": IN_WORLD, "model": IN_MODEL, "link": IN_LINK}
+"""Known elements, by the one around them."""
+IN_LIMIT = words("lower upper effort velocity stiffness dissipation")
+_READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT, BUSHING)
 _COUNTED = words("visual collision sensor light plugin")
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
@@ -120,6 +130,7 @@ class Frames:
             self.joints[full] = self.found[full]
         for element in around.only("frame"):
             element.require_known(("name", "attached_to"), "SDF")
+            element.require_children(("pose",), closed=True)
             base = element.attributes.get("attached_to", "")
             attached = within(scope, base) if base else scope
             self._add(element, scope, attached, attached)
@@ -299,7 +310,7 @@ def read_sdf(file: Path, root: Element) -> Tree:
             graph.tree.gravity = x, y, z
     graph.joints += joints_of(graph, frames, _version(root))
     in_models = [
-        (child, partial(_link, frames, full))
+        (child, partial(_link, frames, full), partial(_framed, frames, full))
         for full, framed in frames.models.items()
         for child in framed.element.children
     ]
@@ -377,6 +388,11 @@ def _link(frames: Frames, model: str, element: Element, name: str) -> str:
     return frames.short(link)
 
 
+def _framed(frames: Frames, model: str, element: Element, name: str) -> tuple[str, Place]:
+    """Return link and place of a frame named by an element of Drake."""
+    return _link(frames, model, element, name), frames.place(element, within(model, name))
+
+
 def _require_apart(graph: Graph, frames: Frames) -> None:
     """Refuse elements that are not read and may join links."""
     joints = {name: frames.short(full) for full in frames.joints for name in _endings(full)}
@@ -387,6 +403,7 @@ def _require_apart(graph: Graph, frames: Frames) -> None:
     around += [(full, each.element) for full, each in frames.links.items()]
     for link, element in around:
         unread.require_all_apart(element.children, _READ, link)
+        element.require_children(IN[element.tag], closed=True)
     for framed in frames.joints.values():
         unread.require_all_apart(framed.element.children, IN_JOINT)
 
@@ -479,6 +496,8 @@ class _Joint:
             raise self.element.fault(f"<{tag}>: missing, expected an axis; add it")
         axis.require_known((), "SDF")
         axis.require_children(IN_AXIS, closed=True)
+        for limit in axis.only("limit"):
+            limit.require_children(IN_LIMIT, closed=True)
         numbers: Sequence[float] = (0.0, 0.0, 1.0)
         given, place = "", self.place
         if (xyz := axis.child("xyz")) is not None:
