@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+from ...core.errors import KincheckError
 from ...core.joints import Distance, Fixed
 from ...core.mechanism.body import Body
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
@@ -88,6 +89,11 @@ def hung(mechanism: Mechanism) -> Tree:
                 whole = part.by is Fixed
                 tree.ties.append(Tie(joint.name, part.ends, part.points, whole, length))
             case Relation():
+                if (count := len(part.terms)) > 2:
+                    raise KincheckError(
+                        f"joint {part.name!r} couples {count} joints, which has no counterpart"
+                        " here; write MJCF or URDF instead"
+                    )
                 one, other, curve = part.follower(signed=False)
                 names = tree.coordinates[one], tree.coordinates[other]
                 found = tree.curves if part.curve else tree.relations

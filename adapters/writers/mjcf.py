@@ -110,7 +110,7 @@ class _Model:
         ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="start", qpos=qpos)
         return document(
             self.root,
-            (["body"], ["joint", "freejoint"], ["site"], ["spatial"], ["numeric"]),
+            (["body"], ["joint", "freejoint"], ["site"], ["spatial", "fixed"], ["numeric"]),
             reserved=["world"],
         )
 
@@ -227,7 +227,15 @@ class _Model:
         ]
 
     def relate(self, relation: Relation) -> None:
-        """Keep a coordinate at a polynomial of another."""
+        """Keep a coordinate at a polynomial of another, or a sum of more at zero."""
+        if len(relation.terms) > 2:
+            name = f"{relation.name}.sum"
+            tendon = ET.SubElement(self.tendons, "fixed", name=name)
+            for joint, freedom, weight in relation.terms:
+                own, sign = self.coordinates[joint, freedom]
+                ET.SubElement(tendon, "joint", joint=own, coef=numbers([sign * weight]))
+            ET.SubElement(self.equalities, "tendon", tendon1=name)
+            return
         one, other, curve = relation.follower(signed=True)
         (name, _), (other_name, _) = self.coordinates[one], self.coordinates[other]
         polynomial = numbers([*curve, 0, 0, 0, 0][:5])

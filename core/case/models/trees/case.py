@@ -16,14 +16,13 @@ from ....joints import (
     Coupler,
     Distance,
     Fixed,
-    Gear,
     Joint,
     PerpendicularAxes,
     Polynomial,
-    RackPinion,
     Revolute,
     Spherical,
     Translational,
+    linear_relation,
 )
 from ....joints.base import triad
 from ....kinematics import degrees_of_freedom, reduce_rows
@@ -113,20 +112,15 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
 
 
 def _require_coupled(tree: Tree) -> None:
-    """Refuse couplings of more than two moves, and curves between sums of moves."""
+    """Refuse curves between sums of moves."""
     for each in tree.ties:
-        if not isinstance(each, Coupling):
+        if not isinstance(each, Coupling) or each.is_linear:
             continue
-        if len(each.moves) > 2:
+        if not len(each.driven) == len(each.driving) == len(each.moves) - 1:
+            own = each.element.attributes.get("name")
             raise each.element.fault(
-                f"couples {len(each.moves)} joints ({', '.join(sorted(each.moves))}), expected"
-                " two; kincheck has no joint for more: remove the equality, and --hold or drive its"
-                " joints"
-            )
-        if not each.is_linear and not len(each.driven) == len(each.driving) == len(each.moves) - 1:
-            raise each.element.fault(
-                "polycoef: is a curve between sums of joints, expected one joint on either side;"
-                " there is no joint for others"
+                "polycoef: is a curve between sums of joints, expected one joint on either side, or"
+                f" a line; leave it out by --without {own or each.element.tag}"
             )
 
 
@@ -244,27 +238,17 @@ class _Parts:
                 )
 
     def _couple(self, coupling: Coupling) -> None:
-        pair, moves = coupling.moves, self.tree.joints
-        # one is locked, none says nothing
-        if len(pair) < 2 or all(isinstance(self.joints[each], Fixed) for each in pair):
+        free = [x for x in coupling.moves if not isinstance(self.joints[x], Fixed)]
+        if len(coupling.moves) < 2 or not free:  # one is locked, none says nothing
             return
         name = self._unused(coupling.name)
         if not coupling.is_linear:
             self.couplers[name] = self._polynomial(coupling, name)
             return
-        (first, a), (second, b) = coupling.weights.items()
-        # a x + b y = 0, for x and y the changes of the two coordinates
-        match moves[first].kind, moves[second].kind:
-            case "hinge", "hinge":
-                found: Coupler = Gear(name, (first, second), -b / a)
-            case "hinge", _:
-                found = RackPinion(name, (first, second), -a / b)
-            case _, "hinge":
-                found = RackPinion(name, (second, first), -b / a)
-            case _:
-                freedoms = "translation", "translation"
-                found = Polynomial(name, (first, second), (0.0, -b / a), freedoms=freedoms)
-        self.couplers[name] = found
+        # the weighted sum of the changes of coordinates is zero
+        weights = {x: weight for x, weight in coupling.weights.items() if x in free}
+        freedoms = [FREEDOMS[self.tree.joints[x].kind] for x in weights]
+        self.couplers[name] = linear_relation(name, weights, freedoms)
 
     def _polynomial(self, coupling: Coupling, name: str) -> Polynomial:
         """Return a curve between two moves, by their changes since the pose of the tree."""

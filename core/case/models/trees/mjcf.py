@@ -140,6 +140,7 @@ class _Reader:
             for text in custom.only("text")
         )
         tendons = [each for section in root.only("tendon") for each in section.children]
+        self.coupling = set[str]()
         self.tendons = {each.attributes.get("name", ""): each for each in tendons}
 
     def read(self) -> Tree:
@@ -369,6 +370,8 @@ class _Reader:
         for wrap in self.tendons[name].only("joint"):
             joint = self.tree.axial(wrap, "joint", wrap.attributes.get("joint"))
             weights[joint] = weights.get(joint, 0.0) + wrap.number("coef")
+        if not {"stiffness", "damping"} & self.tendons[name].attributes.keys():
+            self.coupling.add(name)
         return weights
 
     def _rod(self, name: str, element: Element, tendon: Element) -> Closure:
@@ -416,7 +419,8 @@ class _Reader:
                 try:
                     strut = self._strut(tendon)
                 except CaseError:
-                    tree.count(f"tendon: {tendon.tag}")
+                    if tendon.attributes.get("name") not in self.coupling:
+                        tree.count(f"tendon: {tendon.tag}")
                 else:
                     tree.add_strut(strut)
 
