@@ -155,6 +155,9 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
             from .trees.urdf import read_urdf as read
         case "sdf":
             from .trees.sdf import read_sdf as read
+            from .trees.sdf import whole_sdf
+
+            root = whole_sdf(file, root)
         case _:
             from .trees.mjcf import read_mjcf as read
             from .trees.mjcf import whole_mjcf

@@ -321,6 +321,20 @@ def parse_xml(file: Path, text: str) -> Element:
     return roots[0]
 
 
+def file_near(folder: Path, name: str, suffixes: Collection[str]) -> Path | None:
+    """Return a file that a model in a folder names: in this folder or below, or with one of these
+    suffixes in the folder above or below; None of any other place, whether it is there or not.
+    """
+    try:
+        file = (folder / name).resolve()
+    except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
+        return None
+    around = folder.parent
+    beside = file.suffix.lower() in suffixes and around != around.parent
+    near = file.is_relative_to(folder) or (beside and file.is_relative_to(around))
+    return file if name and near and not Path(name).is_absolute() else None
+
+
 def _without_declaration(text: str) -> str:
     """Return a text without its declaration, which other parsers take after white space too."""
     found = re.match(r"\s*<\?xml\b[^>]*\?>", text)
