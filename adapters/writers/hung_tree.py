@@ -12,11 +12,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
+<<<<<<< HEAD
 import numpy as np
 
 from ...core.algebra import triple
 from ...core.joints import Distance, Fixed, Joint, Revolute, Spherical
 from ...core.joints.base import unit
+=======
+from ...core.errors import KincheckError
+from ...core.joints import Distance, Fixed
+>>>>>>> conv
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
@@ -192,6 +197,11 @@ def hung(mechanism: Mechanism) -> Tree:
             case Closure():
                 tree.ties.extend(ties(part, mechanism))
             case Relation():
+                if (count := len(part.terms)) > 2:
+                    raise KincheckError(
+                        f"joint {part.name!r} couples {count} joints, which has no counterpart"
+                        " here; write MJCF or URDF instead"
+                    )
                 one, other, curve = part.follower(signed=False)
                 names = tree.coordinates[one], tree.coordinates[other]
                 found = tree.curves if part.curve else tree.relations

@@ -64,16 +64,25 @@ _EQUALITIES = ("connect", "weld", "joint", "tendon")
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
 
 
+def whole_mjcf(file: Path, root: Element) -> Element:
+    """Return a model with all that it includes.
+
+    Raises:
+        CaseError: another document, an unknown section, or see `expand`.
+    """
+    _require_model(root)
+    root = expand(file, root)
+    _require_model(root)
+    return root
+
+
 def read_mjcf(file: Path, root: Element) -> Tree:
-    """Return the tree of a model, in its pose qpos0.
+    """Return the tree of a whole model, in its pose qpos0.
 
     Raises:
         CaseError: an unknown element or one of new bodies, a name given twice, a joint, place
             or equality without a sense.
     """
-    _require_model(root)
-    root = expand(file, root)
-    _require_model(root)
     require_known_attributes(root)
     _require_rigid(root)
     return _Reader(file, root).read()
@@ -131,6 +140,7 @@ class _Reader:
             for text in custom.only("text")
         )
         tendons = [each for section in root.only("tendon") for each in section.children]
+        self.coupling = set[str]()
         self.tendons = {each.attributes.get("name", ""): each for each in tendons}
 
     def read(self) -> Tree:
@@ -360,6 +370,8 @@ class _Reader:
         for wrap in self.tendons[name].only("joint"):
             joint = self.tree.axial(wrap, "joint", wrap.attributes.get("joint"))
             weights[joint] = weights.get(joint, 0.0) + wrap.number("coef")
+        if not {"stiffness", "damping"} & self.tendons[name].attributes.keys():
+            self.coupling.add(name)
         return weights
 
     def _rod(self, name: str, element: Element, tendon: Element) -> Closure:
@@ -407,7 +419,8 @@ class _Reader:
                 try:
                     strut = self._strut(tendon)
                 except CaseError:
-                    tree.count(f"tendon: {tendon.tag}")
+                    if tendon.attributes.get("name") not in self.coupling:
+                        tree.count(f"tendon: {tendon.tag}")
                 else:
                     tree.add_strut(strut)
 
@@ -446,8 +459,7 @@ class _Reader:
                 raise tendon.fault("has the length of a rest pose of its own")
             shortest = math.dist(coordinates(first.at), coordinates(second.at))
         name, spring = tendon.attributes.get("name", "tendon"), Spring(stiffness, damping, shortest)
-        points = first.at, second.at
-        return Strut(name, (i, j), points, spring, tendon, "tendon: spatial")
+        return Strut(name, (i, j), (first, second), spring, tendon, "tendon: spatial")
 
     def _gravity(self) -> Vector:
         """Return the gravity [m/s^2]; the last option counts."""

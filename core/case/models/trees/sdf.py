@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
 from ....algebra import Vec3, X, quat, vec
 from ....errors import CaseError, remedy
-from ...io.document import shown
-from .element import DEEPEST, Element, words
+from ...io.case_file import LARGEST_FILE
+from ...io.document import read_text, shown
+from .element import DEEPEST, Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
+    BUSHING,
     ENTRIES,
     FRICTION,
     LAW,
@@ -57,10 +59,22 @@ IN_JOINT = (
 )
 IN_AXIS = words("xyz limit dynamics mimic use_parent_model_frame initial_position")
 IN_INERTIAL = words("mass density pose inertia frame auto_inertia_params fluid_added_mass")
-_READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT)
+IN_ROOT = words("model world light actor")
+IN_WORLD = (
+    *(*IN_ROOT, "include", "frame", "joint", "plugin", "gravity", "physics"),
+    *words("audio atmosphere magnetic_field scene gui state road population wind"),
+    "spherical_coordinates",
+)
+IN = {"sdf": IN_ROOT, "world": IN_WORLD, "model": IN_MODEL, "link": IN_LINK}
+"""Known elements, by the one around them."""
+IN_LIMIT = words("lower upper effort velocity stiffness dissipation")
+_READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT, BUSHING)
 _COUNTED = words("visual collision sensor light plugin")
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
+_PLACED = "placement_frame"
+MOST_INCLUDES, _SUFFIXES = 100, (".sdf", ".world", ".config")
+_WRITE_OUT = "write the whole model out: gz sdf -p FILE > flat.sdf"
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link unless given, of 1 kg [kg m^2]."""
 # Axes were in the model's frame before this version.
@@ -120,6 +134,7 @@ class Frames:
             self.joints[full] = self.found[full]
         for element in around.only("frame"):
             element.require_known(("name", "attached_to"), "SDF")
+            element.require_children(("pose",), closed=True)
             base = element.attributes.get("attached_to", "")
             attached = within(scope, base) if base else scope
             self._add(element, scope, attached, attached)
@@ -261,11 +276,109 @@ def _endings(full: str) -> list[str]:
     return [SCOPE.join(parts[k:]) for k in range(len(parts))]
 
 
+def whole_sdf(file: Path, root: Element) -> Element:
+    """Return a document with the models that it includes from files beside it.
+
+    Raises:
+        CaseError: a model is elsewhere, or an option of its inclusion is not read.
+    """
+    folder = file.parent.resolve()
+    return _Inclusion(folder, folder.parent, _version(root)).whole(root)
+
+
+@dataclass
+class _Inclusion:
+    """The inclusion of models.
+
+    Attributes:
+        folder: of the document that includes.
+        around: all files are in here.
+        version: of SDF.
+        count: how many are included so far, at any depth.
+    """
+
+    folder: Path
+    around: Path
+    version: tuple[int, ...]
+    count: int = 0
+
+    def whole(self, around: Element) -> Element:
+        """Return an element with included models in place of <include>, at any depth."""
+        if not any(each.tag == "include" for each in around.below()):
+            return around
+        found = [
+            self._model(each) if each.tag == "include" else self.whole(each)
+            for each in around.children
+        ]
+        return replace(around, children=found)
+
+    def _model(self, element: Element) -> Element:
+        element.require_known(("merge",), "SDF")
+        if element.choice("merge", _FLAGS, "false") in _TRUE or any(element.only(_PLACED)):
+            raise element.fault(f"has merge or <{_PLACED}>, which are not read; {_WRITE_OUT}")
+        element.require_children(("uri", "name", "pose", "static", "plugin"), closed=True)
+        self.count += 1
+        if self.count > MOST_INCLUDES:
+            raise element.fault(f"found more than {MOST_INCLUDES} includes, or a ring of them")
+        file = self._file(element, _text(element, "uri"))
+        root = parse_xml(file, read_text(file, LARGEST_FILE, "it holds one model"))
+        models = [*root.only("model")]
+        if root.tag != "sdf" or len(models) != 1:
+            raise element.fault(
+                f"{file.name}: found <{root.tag}> with {len(models)} models, expected <sdf> with"
+                f" one; {_WRITE_OUT}"
+            )
+        if (_version(root) < _AXES_IN_JOINT) != (self.version < _AXES_IN_JOINT):
+            raise element.fault(
+                f"{file.name}: is of SDF {root.attributes.get('version')}, whose axes have another"
+                f" meaning than those of the file around it; {_WRITE_OUT}"
+            )
+        folder, self.folder = self.folder, file.parent
+        model = self.whole(models[0])
+        self.folder = folder
+        own = [*element.only("pose", "static", "plugin")]
+        given = {each.tag for each in own if each.tag != "plugin"}
+        children = [*own, *(each for each in model.children if each.tag not in given)]
+        attributes = dict(model.attributes)
+        if name := element.child("name"):
+            attributes["name"] = name.text
+        return replace(model, attributes=attributes, children=children)
+
+    def _file(self, element: Element, uri: str) -> Path:
+        """Return the file of a model: the URI's own, or that named by the folder's model.config."""
+        kind, _, path = uri.rpartition("://")
+        names = [f"../{path}", path] if kind == "model" else [path]
+        places = [file_near(self.folder, name, _SUFFIXES) for name in names]
+        if kind in ("model", ""):
+            # a folder beside the document's has no suffix
+            places += [
+                file_near(self.folder, f"{name}/{inside}", _SUFFIXES)
+                for name in names
+                for inside in ("model.config", "model.sdf")
+            ]
+        near = [each for each in places if each and each.is_relative_to(self.around)]
+        found = [each for each in near if each.is_file()]
+        if not found or kind not in ("model", "file", ""):
+            raise element.fault(
+                f"uri: found {shown(uri)}, expected a model in the folder of the file, in one"
+                f" beside it or below, and there is none; put it there, or {_WRITE_OUT}"
+            )
+        if found[0].suffix != ".config":
+            return found[0]
+        config = parse_xml(found[0], read_text(found[0], LARGEST_FILE, "it describes one model"))
+        files = [*config.only("sdf")]
+        newest = max(files, key=_version, default=config)
+        file = file_near(found[0].parent, newest.text, _SUFFIXES)
+        if file is None or not file.is_file():
+            raise newest.fault(f"found {shown(newest.text)}, expected a file beside it; correct it")
+        return file
+
+
 def read_sdf(file: Path, root: Element) -> Tree:
     """Return the tree of all models in a document, and their worlds, in its zero pose.
 
     Raises:
-        CaseError: included models, unknown frames, or an unknown joint.
+        CaseError: unknown frames, or an unknown joint.
     """
     name = root.attributes.get("name", file.stem)
     graph, frames = Graph.of(root, f"SDF model {name!r} of {file.name}"), Frames()
@@ -273,12 +386,6 @@ def read_sdf(file: Path, root: Element) -> Tree:
     worlds = [*root.only("world")]
     if not (worlds or any(root.only("model"))):
         raise root.fault("has no model, expected one; give a model that moves")
-    for element in root.below():
-        if element.tag == "include":
-            raise element.fault(
-                "takes a model from elsewhere, expected one whole file; write it out: gz sdf -p"
-                " FILE > flat.sdf"
-            )
     for around in (root, *worlds):
         frames.read(around, "")
     if len(frames.found) > MOST_FRAMES:
@@ -299,7 +406,7 @@ def read_sdf(file: Path, root: Element) -> Tree:
             graph.tree.gravity = x, y, z
     graph.joints += joints_of(graph, frames, _version(root))
     in_models = [
-        (child, partial(_link, frames, full))
+        (child, partial(_link, frames, full), partial(_framed, frames, full))
         for full, framed in frames.models.items()
         for child in framed.element.children
     ]
@@ -377,6 +484,11 @@ def _link(frames: Frames, model: str, element: Element, name: str) -> str:
     return frames.short(link)
 
 
+def _framed(frames: Frames, model: str, element: Element, name: str) -> tuple[str, Place]:
+    """Return link and place of a frame named by an element of Drake."""
+    return _link(frames, model, element, name), frames.place(element, within(model, name))
+
+
 def _require_apart(graph: Graph, frames: Frames) -> None:
     """Refuse elements that are not read and may join links."""
     joints = {name: frames.short(full) for full in frames.joints for name in _endings(full)}
@@ -387,6 +499,7 @@ def _require_apart(graph: Graph, frames: Frames) -> None:
     around += [(full, each.element) for full, each in frames.links.items()]
     for link, element in around:
         unread.require_all_apart(element.children, _READ, link)
+        element.require_children(IN[element.tag], closed=True)
     for framed in frames.joints.values():
         unread.require_all_apart(framed.element.children, IN_JOINT)
 
@@ -479,6 +592,8 @@ class _Joint:
             raise self.element.fault(f"<{tag}>: missing, expected an axis; add it")
         axis.require_known((), "SDF")
         axis.require_children(IN_AXIS, closed=True)
+        for limit in axis.only("limit"):
+            limit.require_children(IN_LIMIT, closed=True)
         numbers: Sequence[float] = (0.0, 0.0, 1.0)
         given, place = "", self.place
         if (xyz := axis.child("xyz")) is not None:
