@@ -194,7 +194,7 @@ def folded(function: Any, values: Array) -> Array:
 def largest_size(values: Array) -> Array:
     """Return the largest size of the numbers of each lane, zero without any; NaN if one is."""
     if not len(values):
-        return np.zeros(values.shape[1])
+        return np.zeros(len(values.T))
     sizes: Array = np.abs(values)
     return folded(np.maximum, sizes)
 
