@@ -42,7 +42,7 @@ IMPORTS = {
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
     "kinematics/forces": ". primitives program joints mechanism kinematics/formulation",
-    "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
+    "kinematics/structure": ". primitives program/llvm joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm joints mechanism kinematics/formulation "
         "kinematics/forces kinematics/structure"

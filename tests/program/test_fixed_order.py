@@ -1,0 +1,61 @@
+"""Factors of eight sparse matrices at once against dense ones of numpy."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("llvmlite")
+from kincheck.core.program.llvm.fixed_order import LANES, FixedOrder
+
+EPSILON = float(np.finfo(float).eps)
+
+
+def matrices(n, seed, share=0.2):
+    """Return a random pattern with the diagonal, and diagonally dominant matrices, dense too."""
+    random = np.random.default_rng(seed)
+    rows, columns = np.nonzero((random.random((n, n)) < share) | np.eye(n, dtype=bool))
+    mixed = random.permutation(len(rows))
+    rows, columns = rows[mixed], columns[mixed]
+    entries = random.normal(size=(len(rows), LANES))
+    entries[rows == columns] += 2.0 * n
+    dense = np.zeros((LANES, n, n))
+    dense[:, rows, columns] = entries.T
+    return rows, columns, entries, dense
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 40])
+def test_factors_of_eight_solve_as_dense_ones(n):
+    rows, columns, entries, dense = matrices(n, seed=n)
+    order = FixedOrder(rows, columns, n)
+    order.factor(entries)
+    b = np.random.default_rng(0).normal(size=(n, LANES))
+    for transposed in (False, True):
+        found = order.solve(b, transposed=transposed)
+        for k in range(LANES):
+            matrix = dense[k].T if transposed else dense[k]
+            expected = np.linalg.solve(matrix, b[:, k])
+            # round-off by the condition, below 10 of matrices so dominant, times their rows
+            assert np.abs(found[:, k] - expected).max() <= 100.0 * n * EPSILON
+    assert order.regular.all()
+    assert ((-1.0) ** order.negative == np.sign(np.linalg.det(dense))).all()
+
+
+def test_growth_and_zero_pivots_are_told_for_each_matrix():
+    rows, columns = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    entries = np.tile([[2.0], [1.0], [1.0], [-3.0]], LANES)
+    entries[0, 1], entries[0, 2], entries[3, 3], entries[1, 4] = 1e-3, 0.0, 0.5, np.nan
+    order = FixedOrder(rows, columns, 2)
+    order.factor(entries)
+    assert order.growth[:2] == pytest.approx([0.5, 1e3])
+    assert not order.growth[2] <= 1e300
+    assert order.regular.tolist() == [True, True, False, False, False, True, True, True]
+    assert order.negative[[0, 1]].tolist() == [1, 1]
+
+
+def test_later_matrices_replace_the_factors():
+    rows, columns, entries, dense = matrices(12, seed=3)
+    order = FixedOrder(rows, columns, 12)
+    for scale in (1.0, -4.0):
+        order.factor(scale * entries)
+        found = order.solve(np.ones((12, LANES)))
+        assert np.abs(scale * np.einsum("kij,jk->ik", dense, found) - 1.0).max() <= 1e-13
+    assert (order.negative == 12).all()
