@@ -109,12 +109,8 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
-<<<<<<< HEAD
-    "studies/compliance": (". mechanism kinematics case case/suspension report"),
-    "studies/board": ". mechanism kinematics case case/io harness report",
-=======
     "studies/compliance": (". mechanism kinematics case case/suspension harness report"),
->>>>>>> kc
+    "studies/board": ". mechanism kinematics case case/io harness report",
     "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "

@@ -144,13 +144,9 @@ def limitation_of(case: Case) -> str | None:
     for coupler in case.mechanism.couplers:
         if coupler.curve:
             return f"{coupler}: Exudyn's own solvers have no object that keeps a polynomial"
-<<<<<<< HEAD
-    if case.balance is None and (reason := uneven(case, "Exudyn")) is not None:
-=======
         if len(coupler.joints) > 2:
             return f"{coupler}: this adapter gives Exudyn's own solvers relations of two joints"
-    if (reason := uneven(case, "Exudyn")) is not None:
->>>>>>> conv
+    if case.balance is None and (reason := uneven(case, "Exudyn")) is not None:
         return reason
     if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
         return "turns of coupled joints count from the design, where this motion does not begin"

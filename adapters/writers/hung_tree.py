@@ -12,16 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
-<<<<<<< HEAD
 import numpy as np
 
 from ...core.algebra import triple
+from ...core.errors import KincheckError
 from ...core.joints import Distance, Fixed, Joint, Revolute, Spherical
 from ...core.joints.base import unit
-=======
-from ...core.errors import KincheckError
-from ...core.joints import Distance, Fixed
->>>>>>> conv
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector

@@ -119,11 +119,14 @@ class _Model:
         ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="start", qpos=qpos)
         return document(
             self.root,
-<<<<<<< HEAD
-            (["body"], ["joint", "freejoint"], ["site"], ["spatial"], ["numeric"], [*KINDS]),
-=======
-            (["body"], ["joint", "freejoint"], ["site"], ["spatial", "fixed"], ["numeric"]),
->>>>>>> conv
+            (
+                ["body"],
+                ["joint", "freejoint"],
+                ["site"],
+                ["spatial", "fixed"],
+                ["numeric"],
+                [*KINDS],
+            ),
             reserved=["world"],
         )
 
@@ -245,22 +248,16 @@ class _Model:
         ]
 
     def relate(self, relation: Relation) -> None:
-<<<<<<< HEAD
-        """Keep a coordinate at a polynomial of another."""
-        one, other, curve = relation.follower(signed=False)
-        names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
-=======
         """Keep a coordinate at a polynomial of another, or a sum of more at zero."""
         if len(relation.terms) > 2:
             name = f"{relation.name}.sum"
             tendon = ET.SubElement(self.tendons, "fixed", name=name)
             for joint, freedom, weight in relation.terms:
-                own, sign = self.coordinates[joint, freedom]
-                ET.SubElement(tendon, "joint", joint=own, coef=numbers([sign * weight]))
+                own = self.coordinates[joint, freedom]
+                ET.SubElement(tendon, "joint", joint=own, coef=numbers([weight]))
             ET.SubElement(self.equalities, "tendon", tendon1=name)
             return
-        one, other, curve = relation.follower(signed=True)
-        (name, _), (other_name, _) = self.coordinates[one], self.coordinates[other]
->>>>>>> conv
+        one, other, curve = relation.follower(signed=False)
+        names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
         polynomial = numbers([*curve, 0, 0, 0, 0][:5])
         ET.SubElement(self.equalities, "joint", names, polycoef=polynomial)

@@ -115,7 +115,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
         errors = {(each.engine, each.run): each.errors.get(motion) for each in history}
         each = figure({where: _finite(error) for where, error in errors.items()})
         if _has_values(each) or (motion == "position" and any(past.bad for past in history)):
-            each = _floored(each, f"largest {motion} error [tolerances]", 1.0)
+            each = floored(each, f"largest {motion} error [tolerances]", 1.0)
             floor = each["layout"]["meta"]["floor"]
             each["layout"]["shapes"] = [*accepted(floor, 1.0), *lines]
             failures = (_failures(history, style, motion) for style in drawn)
@@ -124,9 +124,6 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
     drawn_times = [value for trace in times["data"] for value in trace["y"] if value]
     times["layout"]["yaxis"] = ticked_axis(TIMES, drawn_times) | _decade(drawn_times)
-<<<<<<< HEAD
-    made = {"error": floored(errors), "time": times}
-=======
     return made | ({"time": times} if _has_values(times) else {})
 
 
@@ -165,7 +162,6 @@ def _failures(history: Sequence[Past], style: Style, motion: str) -> Figure:
         and max(past.errors.values(), default=0.0) <= 1.0
     }
     found = over | untold
->>>>>>> pages
     return {
         "type": "scatter",
         "mode": "markers",
@@ -221,23 +217,13 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
         }
         traces.append(curve | hover)
     times = [value for trace in traces for value in trace["x"] if value]
-<<<<<<< HEAD
-    return floored(
-        {"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}}
-    )
-
-
-def floored(figure: Figure) -> Figure:
-    """Return the figure with a vertical log axis for errors."""
-=======
     side = ticked_axis(TIMES, times)
     layout = {"xaxis": side, "hovermode": "closest"}
-    return _floored({"data": traces, "layout": layout}, "largest position error [m]")
+    return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
-def _floored(figure: Figure, title: str, *within: float) -> Figure:
+def floored(figure: Figure, title: str, *within: float) -> Figure:
     """Return the figure with a vertical axis for errors, which holds these values too."""
->>>>>>> pages
     positive = [value for trace in figure["data"] for value in trace["y"] if value]
     positive += within
     side, floor = log_axis(title, min(positive, default=1.0), max(positive, default=1.0))

@@ -40,13 +40,9 @@ class Section:
         verdict: the conclusions as sentences.
         notes: the method of measurement.
         columns: headings; the first `labels` of them head words, the others numbers.
-<<<<<<< HEAD
-        diagrams: diagrams above the table, only on the page.
-        links: file that belongs to each row, beside the page; empty for none.
-=======
         diagrams: diagrams above the table, only on the page; those with the same styles side by
             side.
->>>>>>> curves
+        links: file that belongs to each row, beside the page; empty for none.
     """
 
     title: str
