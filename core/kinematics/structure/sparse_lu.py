@@ -238,8 +238,9 @@ class Blocks:
         right = factors.solve(left)
 
         def of_blocks(of: Indices, x: Array) -> Array:
-            squares: Array = x * x
-            return np.bincount((m * of[:, None] + np.arange(m)).ravel(), squares.ravel())
+            squares: Any = x * x
+            found: Any = np.bincount((m * of[:, None] + np.arange(m)).ravel(), squares.ravel())
+            return found
 
         ratio = of_blocks(self._of_rows, left) / of_blocks(self._of_columns, right)
         return np.sqrt(ratio).reshape(-1, m), factors.signs(m)
