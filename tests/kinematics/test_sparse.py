@@ -210,7 +210,7 @@ def test_poses_that_outgrow_an_order_are_factored_in_their_own():
     entries = np.tile(first[:, None], 8)
     entries[0, 3:], entries[3, 7] = 1e-9, 0.0
     entries[2, 7] = 0.0
-    pattern, lanes = Pattern(rows, columns, 2, first), np.arange(8)
+    pattern, lanes = Pattern(rows, columns, 2, np.arange(4), first), np.arange(8)
     b = np.arange(16.0).reshape(2, 8)
     for _ in range(20):  # the order of the others takes its place
         factors = pattern.factor_lanes(entries, lanes)

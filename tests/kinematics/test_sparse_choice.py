@@ -213,7 +213,7 @@ def test_sigmas_of_blocks():
             u, s, v = np.linalg.svd(matrix[own])
             s[-1] *= near
             matrix[own] = (u * s) @ v
-        blocks = Blocks(i, j, n, None)
+        blocks = Blocks(i, j, n, np.arange(len(i)), None)
         one = np.arange(1)
         (found,), (sign,) = (each.T for each in blocks.sigmas(matrix[i, j][:, None], one))
         matrix[3] *= -1.0

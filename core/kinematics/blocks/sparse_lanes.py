@@ -74,7 +74,6 @@ class Rows:
     dropped: Indices
     pattern: Pattern
     blocks: Blocks
-    _solved: Indices
 
     @staticmethod
     def of(kept: Indices, system: System, entries: Array, *, compiled: bool) -> Rows:
@@ -85,29 +84,15 @@ class Rows:
         place = np.full(count, -1, np.intp)
         place[kept] = np.arange(len(kept))
         solved = np.flatnonzero(place[system.rows] >= 0)
-        pattern = place[system.rows[solved]], system.columns[solved], len(kept)
-        values = entries[solved] if compiled else None
+        square = place[system.rows[solved]], system.columns[solved], len(kept), solved
+        values = entries if compiled else None
         dropped = np.setdiff1d(np.arange(count), kept)
-        return Rows(kept, dropped, Pattern(*pattern, values), Blocks(*pattern, values), solved)
-
-    def factor_entries(self, entries: Array) -> int:
-        """Return the number of entries of the factors for entries of all rows."""
-        return self.pattern.factor(entries[self._solved]).entries
+        return Rows(kept, dropped, Pattern(*square, values), Blocks(*square, values))
 
     def begin(self) -> None:
         """Forget the orders of before."""
         self.pattern.begin()
         self.blocks.pattern.begin()
-
-    def factor(self, entries: Array, lanes: Indices) -> FactorsOfLanes:
-        """Return the factors of some lanes for entries of all rows."""
-        return self.pattern.factor_lanes(entries[self._solved], lanes)
-
-    def tests(self, entries: Array, lanes: Indices) -> tuple[Array, Array]:
-        """Return the sigmas of the blocks and the sign of the determinant for entries of all rows,
-        see `Blocks.sigmas`.
-        """
-        return self.blocks.sigmas(entries[self._solved], lanes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +249,7 @@ class SparseLanes(Lanes):
             **counted(mechanism, system.unknowns, count, redundant).details,
             "unknowns": system.unknowns,
             "program": system.sizes,
-            "factor_entries": self.rows.factor_entries(entries[:, 0]),
+            "factor_entries": self.rows.pattern.factor(entries[:, 0]).entries,
         }
         found = self._iterated(system.design, sample, CLOSED, ASSEMBLING)
         (closure,) = found.rest.closure
@@ -337,7 +322,7 @@ class SparseLanes(Lanes):
         here, state = self.here, self.here.state[:, None]
         rest = self._rest(state, sample)
         found = self._motion(state, sample, rest)
-        of_lanes, (sign,) = self.rows.tests(rest.entries, np.arange(1))
+        of_lanes, (sign,) = self.rows.blocks.sigmas(rest.entries, np.arange(1))
         sigmas = of_lanes[:, 0]
         if np.isnan(sign):
             raise SingularError("a block is exactly singular")
@@ -408,7 +393,8 @@ class SparseLanes(Lanes):
             active = np.flatnonzero((~done & (closure < np.inf))[:count])
             if not len(active) or iterations.max() >= most:
                 return Solved(state, rest, iterations, done)
-            factors, step = self.rows.factor(rest.entries, active), np.zeros((len(kept), len(done)))
+            factors = self.rows.pattern.factor_lanes(rest.entries, active)
+            step = np.zeros((len(kept), len(done)))
             step[:, active] = -factors.solve(rest.phi.take(kept, axis=0))[:, active]
             state, last = self.system.stepped(state, step), closure
             iterations[active] += 1.0
@@ -420,7 +406,7 @@ class SparseLanes(Lanes):
     def _motion(self, state: Array, sample: Array, rest: Rest, count: int | None = None) -> Motion:
         """Return the motion of the first lanes."""
         kept, lanes = self.rows.kept, np.flatnonzero(rest.closure[:count] < np.inf)
-        factors = self.rows.factor(rest.entries, lanes)
+        factors = self.rows.pattern.factor_lanes(rest.entries, lanes)
         rates = factors.solve(rest.nu.take(kept, axis=0))
         gamma = self.system.gamma(state, sample, rates)
         return Motion(
@@ -443,7 +429,7 @@ class SparseLanes(Lanes):
 
         state, rest = solved.state, solved.rest
         motion = self._motion(state, sample, rest, count)
-        sigmas, sign = rows.tests(rest.entries, motion.regular)
+        sigmas, sign = rows.blocks.sigmas(rest.entries, motion.regular)
         self.outputs = system.outputs(state, sample, motion.rates, motion.accelerations)
         (branch,) = self.outputs["branch"]
         closure, leftover = rest.closure, largest_size(rest.phi.take(rows.dropped, axis=0))

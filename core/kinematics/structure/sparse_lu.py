@@ -49,30 +49,34 @@ class _Order:
     def solve(self, b: Array, *, transposed: bool) -> Array:
         """Return solutions by the last factors, see `FixedOrder.solve`."""
         first, last = (self.columns, self.rows) if transposed else (self.rows, self.columns)
-        ordered = b.take(np.argsort(first), axis=0)
+        ordered = np.empty_like(b)
+        ordered[first] = b
         return self.factors.solve(ordered, transposed=transposed).take(last, axis=0)
 
     @property
     def signs(self) -> Array:
         """The signs of the determinants, see `Factors.sign`."""
-        return np.where(self.factors.negative % 2 == 0, self.sign, -self.sign)
+        return np.where(self.factors.odd, -self.sign, self.sign)
 
 
 class Pattern:
     """A square pattern of entries.
 
     Args:
-        values: of the entries of one matrix; several ones are factored in its order at first, if
-            that can be by machine code. None if each is factored alone.
+        at: places of the entries among the values of a matrix, which may have others too.
+        values: of one matrix; several ones are factored in its order at first, if that can be by
+            machine code. None if each is factored alone.
     """
 
-    def __init__(self, rows: Indices, columns: Indices, n: int, values: Array | None) -> None:
+    def __init__(
+        self, rows: Indices, columns: Indices, n: int, at: Indices, values: Array | None
+    ) -> None:
         sparse: Any = importlib.import_module("scipy.sparse")
         self._splu: Any = importlib.import_module("scipy.sparse.linalg").splu
         self._matrix = sparse.csc_matrix(
             (np.arange(len(rows)) + 0.0, (rows, columns)), shape=(n, n)
         )
-        self._entries = self._matrix.data.astype(np.intp)
+        self._at, self._entries = at, at[self._matrix.data.astype(np.intp)]
         self._places, self._orders = (rows, columns, n), list[_Order]()
         if values is not None and available():
             self._reorder(self._factor_or_none(values))
@@ -83,7 +87,7 @@ class Pattern:
         self._order, self._strayed = self._orders[0] if self._orders else None, 0
 
     def factor(self, values: Array) -> Factors:
-        """Return the factors of a matrix of these entries.
+        """Return the factors of a matrix.
 
         Raises:
             SingularError: the matrix is singular, or digits are lost in the elimination.
@@ -98,13 +102,13 @@ class Pattern:
             raise
 
     def factor_lanes(self, values: Array, lanes: Indices) -> FactorsOfLanes:
-        """Return the factors of some of several matrices, of entries of shape (entries, m). They
-        are good until the next ones of this pattern.
+        """Return the factors of some of several matrices, of values of shape (values, m). They are
+        good until the next ones of this pattern.
         """
         order = self._order if values.shape[1] == LANES else None
         if order is not None:
             order.factors.factor(values)
-            good = order.factors.regular & (order.factors.growth <= GROWTH)
+            good = (order.factors.growth <= GROWTH) & (order.factors.inverse < np.inf)
             lanes = lanes[~good[lanes]]
             self._strayed += len(lanes)
         alone = {k: self._factor_or_none(values[:, k]) for k in lanes.tolist()}
@@ -128,7 +132,7 @@ class Pattern:
                 return
         rows, columns, n = self._places
         sign = -1.0 if _exchanges(row.tobytes()) % 2 else 1.0
-        self._order = _Order(row, column, sign, FixedOrder(row[rows], column[columns], n))
+        self._order = _Order(row, column, sign, FixedOrder(row[rows], column[columns], n, self._at))
         self._orders.append(self._order)
 
 
@@ -197,14 +201,16 @@ class Blocks:
     """The blocks of a pattern to be solved one after the other.
 
     Args:
-        values: see `Pattern`.
+        at, values: see `Pattern`.
 
     Attributes:
         count: number of blocks.
         pattern: of the entries inside them.
     """
 
-    def __init__(self, rows: Indices, columns: Indices, n: int, values: Array | None) -> None:
+    def __init__(
+        self, rows: Indices, columns: Indices, n: int, at: Indices, values: Array | None
+    ) -> None:
         sparse, graphs = (
             importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
         )
@@ -213,31 +219,31 @@ class Blocks:
         needs = sparse.csr_array((np.ones(len(rows)), (rows, row_of[columns])), shape=(n, n))
         self.count, of_rows = graphs.connected_components(needs, directed=True, connection="strong")
         of_columns: Indices = of_rows[row_of]
-        self._inside = np.flatnonzero(of_rows[rows] == of_columns[columns])
-        inside = rows[self._inside], columns[self._inside]
-        self.pattern = Pattern(*inside, n, None if values is None else values[self._inside])
+        inside = of_rows[rows] == of_columns[columns]
+        self.pattern = Pattern(rows[inside], columns[inside], n, at[inside], values)
         self._start = np.random.default_rng(0).normal(size=(n, 1))
-        # rows and columns block by block
-        self._sides = [np.argsort(of, kind="stable") for of in (of_rows, of_columns)]
-        sizes: Indices = np.bincount(of_rows)
-        self._begins = np.cumsum(sizes) - sizes
+        self._of_rows: Indices = of_rows
+        self._of_columns: Indices = of_columns
 
     def sigmas(self, values: Array, lanes: Indices) -> tuple[Array, Array]:
         """Return an estimate of the smallest singular value of each block, shape (blocks, m), and
-        the sign of the determinant, shape (m,), of some of several matrices, of entries of shape
-        (entries, m); NaN of singular ones and of others.
+        the sign of the determinant, shape (m,), of some of several matrices, of values of shape
+        (values, m); NaN of singular ones and of others.
 
         The estimate is by a step of inverse iteration: of one row exact, else never smaller, and
         closer the more singular a block is.
         """
-        factors = self.pattern.factor_lanes(values[self._inside], lanes)
-        left = factors.solve(np.repeat(self._start, values.shape[1], axis=1), transposed=True)
+        factors, m = self.pattern.factor_lanes(values, lanes), values.shape[1]
+        left = factors.solve(np.repeat(self._start, m, axis=1), transposed=True)
         right = factors.solve(left)
-        sizes = (
-            np.sqrt(np.add.reduceat(x[side] ** 2, self._begins))
-            for side, x in zip(self._sides, (left, right), strict=True)
-        )
-        return np.divide(*sizes), factors.signs(values.shape[1])
+
+        def of_blocks(of: Indices, x: Array) -> Array:
+            squares: Any = x * x
+            found: Any = np.bincount((m * of[:, None] + np.arange(m)).ravel(), squares.ravel())
+            return found
+
+        ratio = of_blocks(self._of_rows, left) / of_blocks(self._of_columns, right)
+        return np.sqrt(ratio).reshape(-1, m), factors.signs(m)
 
 
 @keep_last(64)

@@ -30,25 +30,33 @@ class FixedOrder:
     Args:
         rows, columns: of the entries, in that order, each place once.
         n: number of rows.
+        given: places of the entries among the numbers of a matrix.
 
     Attributes:
         growth: the largest entry of L of each matrix, NaN where its elimination broke off.
+        inverse: the largest inverse of a pivot, infinite where one is zero.
     """
 
-    def __init__(self, rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> None:
+    def __init__(
+        self,
+        rows: NDArray[np.intp],
+        columns: NDArray[np.intp],
+        n: int,
+        given: NDArray[np.intp],
+    ) -> None:
         pattern = _filled(rows, columns, n)
         sizes = [len(row) for row in pattern]
         every = np.fromiter((j for row in pattern for j in sorted(row)), np.int64)
         row, starts = np.repeat(np.arange(n), sizes), np.cumsum([0, *sizes])
         pivots = np.flatnonzero(row == every)
-        places, self.n = row * n + every, n
+        places, self.n, self._taken = row * n + every, n, given
         # what fills in is read from a last row of zeros
         sources = np.full(len(places), len(rows))
         sources[np.searchsorted(places, rows * n + columns)] = np.arange(len(rows))
-        counts = len(rows) + 1, len(places), n, n, 1, n
+        counts = len(rows) + 1, len(places), n, n, 3, n
         room = aligned(sum(counts) * LANES).reshape(-1, LANES)
         numbers = np.split(room, np.cumsum(counts)[:-1])
-        self._given, _, self._inverse, _, (self.growth,), ones = numbers
+        self._given, _, _, _, (self.growth, self.inverse, self._signs), ones = numbers
         self._given[-1], ones[:] = 0.0, 1.0
         self._alive = starts, pivots, every, sources, pivots + 1, room
         at = [address(each) for each in self._alive[:5]]
@@ -60,9 +68,9 @@ class FixedOrder:
         self._lower = at[0], at[1], *table, at_numbers[5]
         self._upper = at[4], at[0] + BYTES, *table, at_numbers[2]
 
-    def factor(self, entries: Array) -> None:
-        """Factor matrices with these entries, shape (entries, LANES)."""
-        self._given[:-1] = entries
+    def factor(self, numbers: Array) -> None:
+        """Factor matrices with these numbers, shape (numbers, LANES)."""
+        numbers.take(self._taken, axis=0, out=self._given[:-1], mode="clip")
         self._factor()
 
     def solve(self, b: Array, *, transposed: bool = False) -> Array:
@@ -80,14 +88,9 @@ class FixedOrder:
         return found
 
     @property
-    def regular(self) -> NDArray[np.bool_]:
-        """Whether no pivot of each matrix is zero."""
-        return np.logical_and.reduce(np.isfinite(self._inverse), axis=0)
-
-    @property
-    def negative(self) -> NDArray[np.intp]:
-        """The number of negative pivots of each matrix."""
-        return np.count_nonzero(self._inverse < 0.0, axis=0)
+    def odd(self) -> NDArray[np.bool_]:
+        """Whether the number of negative pivots of each matrix is odd."""
+        return np.signbit(self._signs)
 
 
 def _filled(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[set[int]]:
@@ -162,6 +165,15 @@ def _factor() -> str:
     back.store(back.load("%work", back.place("%columns", "%q")), "%table", "%q")
     inverse = end.arithmetic("/", end.constant(1.0), end.load("%work", "%i"))
     end.store(inverse, "%inverse", "%i")
+    longest = end.call("maximum", "%inverse_row", end.call("fabs", inverse))
+    # the sign bits of all pivots: those of the other bits have no meaning
+    words = f"<{LANES} x i64>"
+    bits = end.let(f"bitcast {end.vector} {inverse} to {words}")
+    signs = end.let(f"xor {words} {bits}, %signs_row")
+    done = _Loop(LANES, "done")
+    for k, value in enumerate(("%growth_now", longest)):
+        done.store(value, "%growth", str(k))
+    done.lines.append(f"store {words} {signs}, ptr {done.at('%growth', '2')}, align 8")
     places = "ptr %starts, ptr %pivots, ptr %columns, ptr %sources"
     numbers = "ptr %given, ptr %table, ptr %inverse, ptr %work, ptr %growth"
     return f"""define void @factor(i64 %n, {places}, {numbers}) {{
@@ -170,6 +182,8 @@ entry:
 row:
   %i = phi i64 [0, %entry], [%i_next, %end]
   %growth_row = phi {row.vector} [zeroinitializer, %entry], [%growth_now, %end]
+  %inverse_row = phi {row.vector} [zeroinitializer, %entry], [{longest}, %end]
+  %signs_row = phi {words} [zeroinitializer, %entry], [{signs}, %end]
   {row.text}
   br label %copy
 copy:
@@ -209,7 +223,7 @@ end:
   %i_more = icmp slt i64 %i_next, %n
   br i1 %i_more, label %row, label %done
 done:
-  store {row.vector} %growth_now, ptr %growth, align 8
+  {done.text}
   ret void
 }}
 """
