@@ -16,7 +16,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.models.trees.mjcf import STAND_INS
+from ...core.case.models.trees.mjcf_mass import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion

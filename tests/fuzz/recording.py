@@ -3,6 +3,7 @@ the options --map in lines "# map NAME=COLUMN". What is read is judged. And desc
 """
 
 import argparse
+import importlib.util
 import io
 import re
 import struct
@@ -86,6 +87,8 @@ def one(data: bytes) -> None:
     start = data.lstrip()[:1]
     maps = [each.strip() for each in MAP.findall(data.decode("latin-1"))]
     if data.startswith(FMU):
+        if importlib.util.find_spec("fmpy") is None:
+            return
         read_or_refused(lambda: read_fmu(packed(data), crank(), ["turn=turn [rad]", "x=x [m]"]))
         return
     if data.startswith(b"PK"):
