@@ -15,7 +15,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -238,9 +238,9 @@ class Blocks:
         right = factors.solve(left)
 
         def of_blocks(of: Indices, x: Array) -> Array:
-            squares: Any = x * x
-            found: Any = np.bincount((m * of[:, None] + np.arange(m)).ravel(), squares.ravel())
-            return found
+            lane: Indices = np.arange(m)
+            places, numbers = np.repeat(m * of, m) + np.tile(lane, len(of)), x.ravel()
+            return cast("Any", np.bincount)(places, numbers * numbers)
 
         ratio = of_blocks(self._of_rows, left) / of_blocks(self._of_columns, right)
         return np.sqrt(ratio).reshape(-1, m), factors.signs(m)
