@@ -222,8 +222,9 @@ class Blocks:
         inside = of_rows[rows] == of_columns[columns]
         self.pattern = Pattern(rows[inside], columns[inside], n, at[inside], values)
         self._start = np.random.default_rng(0).normal(size=(n, 1))
-        self._of_rows: Indices = of_rows
-        self._of_columns: Indices = of_columns
+        self._sum_rows, self._sum_columns = (
+            sparse.csr_array((np.ones(n), (of, np.arange(n)))) for of in (of_rows, of_columns)
+        )
 
     def sigmas(self, values: Array, lanes: Indices) -> tuple[Array, Array]:
         """Return an estimate of the smallest singular value of each block, shape (blocks, m), and
@@ -236,14 +237,8 @@ class Blocks:
         factors, m = self.pattern.factor_lanes(values, lanes), values.shape[1]
         left = factors.solve(np.repeat(self._start, m, axis=1), transposed=True)
         right = factors.solve(left)
-
-        def of_blocks(of: Indices, x: Array) -> Array:
-            squares: Any = x * x
-            found: Any = np.bincount((m * of[:, None] + np.arange(m)).ravel(), squares.ravel())
-            return found
-
-        ratio = of_blocks(self._of_rows, left) / of_blocks(self._of_columns, right)
-        return np.sqrt(ratio).reshape(-1, m), factors.signs(m)
+        squares = self._sum_rows @ left**2, self._sum_columns @ right**2
+        return np.sqrt(np.divide(*squares)), factors.signs(m)
 
 
 @keep_last(64)
