@@ -25,6 +25,7 @@ From a plan to machine code:
   in memory for them.
 - `llvm.compiler`: compile the text, link the object file, and load it.
 - `llvm.jit`: choose cached code, interpretation or compilation for a plan.
+- `llvm.fixed_order`: factor sparse matrices in lanes, by loops over lists of places.
 - `disk_cache`: keep machine code, tables and traced programs on disk.
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of
