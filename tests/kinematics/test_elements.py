@@ -5,16 +5,15 @@ import pytest
 
 pytest.importorskip("llvmlite")
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, RackPinion, Revolute, Screw
+from kincheck.core.case.joint_probe import probes
 from kincheck.core.joints import Translational
 from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.mechanism.motions import PointCoordinate
 from kincheck.core.studies.bench.ring import ring
 
 from ..support.block_structures import chain_of_hinges, torus
-from ..support.mechanisms import four_bar, mcpherson
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 LANES = 11
@@ -51,17 +50,17 @@ def equations(system, drivers, random):
     return [state, phi, nu, dense, system.gamma(state, sample, rates), *outputs.values()]
 
 
-@pytest.mark.parametrize(
-    "mechanism",
-    [four_bar(), mcpherson(), gears(), ring(5), torus(3, 3)[0], chain_of_hinges(3)],
-    ids=lambda each: each.name,
-)
-@pytest.mark.parametrize("style", [Style.NATIVE, Style.PAPER])
-def test_elements_give_the_equations_of_the_whole(mechanism, style):
+OWN = gears(), ring(5), torus(3, 3)[0], chain_of_hinges(3)
+EVERY = [*OWN, *(case.mechanism for case in probes())]
+"""The probes have joints of all types, one by one."""
+
+
+@pytest.mark.parametrize("mechanism", EVERY, ids=lambda each: each.name)
+def test_elements_give_the_equations_of_the_whole(mechanism):
     drivers = tuple(each.name for each in mechanism.drivers)
     points = tuple(each.name for each in mechanism.points)
     bodies = tuple(each.name for each in mechanism.moving)
-    request = Request(drivers, points, bodies, 2, style)
+    request = Request(drivers, points, bodies)
     systems = [System(Tracer(mechanism, request), compiled=compiled) for compiled in (True, False)]
     found, expected = (equations(each, len(drivers), np.random.default_rng(4)) for each in systems)
     for a, b in zip(found, expected, strict=True):

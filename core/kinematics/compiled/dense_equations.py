@@ -108,9 +108,9 @@ class System:
         outputs, self._executors = tracer.outputs_of_rates(), dict[int, Executor]()
         compiled = compiled and available()
         tables, self._geometry, after = None, np.empty((0, 1)), ""
-        if compiled and isinstance(formulation, Cartesian) and tracer.request.style is Style.NATIVE:
-            lift = is_builtin(tracer.mechanism)
-            found = linked(formulation, tracer.layout, vector_width(), lift=lift)
+        native = tracer.request.style is Style.NATIVE and is_builtin(tracer.mechanism)
+        if compiled and native and isinstance(formulation, Cartesian):
+            found = linked(formulation, tracer.layout, vector_width())
             self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
             self._geometry, after = found.geometry[:, None], AFTER
             last = bytecode(outputs, len(tracer.layout.slots), vector_width())

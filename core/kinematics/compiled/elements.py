@@ -70,19 +70,18 @@ class _Kind:
         return [self.read(each) for each in zip(*slots, strict=True)]
 
 
-def linked(formulation: Cartesian, layout: Layout, width: int, *, lift: bool) -> Elements:
+def linked(formulation: Cartesian, layout: Layout, width: int) -> Elements:
     """Return the equations of a formulation as elements.
 
     Args:
+        formulation: of joints that take numbers known later: those of the library.
         layout: of the slots; more are added to it.
         width: lanes of a vector.
-        lift: whether numbers may be read from slots; else only equal constraints share a program.
     """
     writer = _Writer(formulation, layout)
     first, kinds = 0, dict[Any, list[tuple[Constraint | Relation, int]]]()
     for c in formulation.constraints:
-        key = _kind(c, formulation, lift=lift)
-        kinds.setdefault(key, []).append((c, first))
+        kinds.setdefault(_kind(c, formulation), []).append((c, first))
         first += 1 if isinstance(c, Relation) else c.primitive.n
     for members in kinds.values():
         writer.add([c for c, _ in members], np.array([row for _, row in members]))
@@ -255,12 +254,11 @@ def _coordinates(c: Constraint | Relation) -> tuple[str, ...]:
     return (c.coordinate,) if c.coordinate else ()
 
 
-def _kind(c: Constraint | Relation, formulation: Cartesian, *, lift: bool) -> Any:
+def _kind(c: Constraint | Relation, formulation: Cartesian) -> Any:
     """Return a key, equal for constraints of one kind."""
-    content, moving = _content(c), formulation.columns
+    moving = formulation.columns
     sides = () if isinstance(c, Relation) else (c.i in moving, c.j in moving)
-    numbers = () if lift else tuple(x for x in _leaves(content) if not isinstance(x, Traced))
-    return type(c), sides, len(_coordinates(c)), _signature(content), numbers
+    return sides, len(_coordinates(c)), _signature(_content(c))
 
 
 def _signature(value: Any) -> Any:
