@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -289,8 +290,7 @@ def _rebuilt(value: Any, numbers: Iterator[Scalar]) -> Any:
     new = [_rebuilt(part, numbers) for part in parts]
     if isinstance(value, tuple):
         return tuple(new)
-    names = [each.name for each in fields(value)]
-    return replace(value, **dict(zip(names, new, strict=True)))
+    return replace(value, **dict(zip(_names(value.__class__) or (), new, strict=True)))
 
 
 def _is_number(value: Any) -> bool:
@@ -301,6 +301,11 @@ def _parts(value: Any) -> list[Any] | None:
     """Return the parts of a tuple or of a data class; None of anything else."""
     if isinstance(value, tuple):
         return [*cast("tuple[Any, ...]", value)]
-    if is_dataclass(value):
-        return [getattr(value, each.name) for each in fields(value)]
-    return None
+    names = _names(value.__class__)
+    return None if names is None else [getattr(value, name) for name in names]
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...] | None:
+    """Return the names of the fields of a data class; None of another type."""
+    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else None
