@@ -1,7 +1,7 @@
 """Sparse LU factors of several matrices at once, eliminated in one order: each number is a vector
 of `LANES`, one for each matrix.
 
-The order is known before the numbers, so that no pivot is chosen: the caller judges by the growth.
+The order is known before the numbers: no pivot is chosen, and the caller judges by the growth.
 The loops run over lists of places, row by row; they are the same for all matrices, and read a row
 of eight or so columns in as many nanoseconds.
 """
