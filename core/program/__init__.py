@@ -26,7 +26,6 @@ From a plan to machine code:
 - `llvm.fixed_order`: sparse LU factors of several matrices at once, as loops over lists of places.
 - `llvm.compiler`: compile the text, link the object file, and load it.
 - `llvm.jit`: choose cached code, interpretation or compilation for a plan.
-- `llvm.fixed_order`: factor sparse matrices in lanes, by loops over lists of places.
 - `disk_cache`: keep machine code, tables and traced programs on disk.
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of
