@@ -340,3 +340,48 @@ def _stretches(
                     op = nodes[x][0]
                     (stretch if op == kind else ready.setdefault(op, [])).append(x)
         yield kind, stretch
+
+
+ABREAST = 8
+"""Elements interleaved operation by operation, so that no operation waits for the one before."""
+
+
+def repeated(
+    parts: Sequence[tuple[Bytecode, NDArray[np.intp]]], slots: int, width: int
+) -> Bytecode:
+    """Return tables repeated for many elements each as one table.
+
+    Args:
+        parts: a table for one lane, and the slot of each of its slots by element, shape (slots of
+            the table, elements).
+        slots: number of slots of a lane; intermediate values come after them.
+        width: lanes of a vector.
+    """
+    words, cells = [np.zeros(0, np.intp)], 0
+    for table, places in parts:
+        elements = places.shape[1]
+        abreast = min(ABREAST, elements)
+        # the last group repeats the last element, which gives the same again
+        number = np.arange(-(-elements // abreast) * abreast, dtype=np.intp)
+        groups = number.clip(max=elements - 1).reshape(-1, abreast)
+        own = slots + np.arange(table.cells * abreast).reshape(-1, 1, abreast)
+        own = np.broadcast_to(own, (table.cells, *groups.shape))
+        at: NDArray[np.intp] = np.concatenate([places[:, groups], own]) * (8 * width)
+        cells, given, here = max(cells, table.cells * abreast), table.words.astype(np.intp), 0
+        of_groups = list[NDArray[np.intp]]()
+        while given[here]:
+            op, size = _OPS[int(given[here])], int(given[here + 1]) // 4
+            rows = given[here + 2 : here + 2 + size].reshape(-1, 1 + ARITY[op])
+            placed = np.empty((len(groups), len(rows), abreast, rows.shape[1]), np.intp)
+            # the operands of a constant are its value
+            named = 1 if op == "const" else rows.shape[1]
+            placed[..., :named] = at[rows[:, :named] // 8].transpose(2, 0, 3, 1)
+            placed[..., named:] = rows[:, None, named:]
+            head = KINDS[op], 4 * placed[0].size
+            of_groups += [np.tile(head, (len(groups), 1)), placed.reshape(len(groups), -1)]
+            here += 2 + size
+        words.append(np.concatenate(of_groups, axis=1).ravel())
+    return Bytecode(np.concatenate([*words, np.zeros(2, np.intp)]).astype(np.uint32), cells)
+
+
+_OPS = {kind: op for op, kind in KINDS.items()}

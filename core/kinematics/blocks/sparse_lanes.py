@@ -1,6 +1,6 @@
 """A large mechanism as one sparse system bound to lanes, one sample a lane: a list of one block.
 
-All equations are one program without an elimination; the poses of all lanes are factored at once.
+The equations are elements without an elimination; the poses of all lanes are factored at once.
 Lengths are measured near the size of the bodies, not of the whole mechanism: the entries of the
 matrix and the round-off of the rows depend on that size.
 """

@@ -17,14 +17,18 @@ from numpy.typing import NDArray
 from ...algebra import Scalar
 from ...mechanism.motions import Path
 from ...primitives.base import Twist
-from ...program import Plan, program
-from ...program.llvm.compiler import available
+from ...program import Plan, Program, program
+from ...program.llvm.compiler import available, vector_width
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
+from ...program.straight_line import bytecode
 from ...trajectory import Array
+from ..formulation.cartesian import Cartesian
+from ..formulation.constraints import Style
 from ..formulation.formulation import Configuration
 from ..formulation.state_vectors import samples
-from .compiled_model import Model
+from .compiled_model import Model, is_builtin
+from .elements import AFTER, GEOMETRY, linked
 from .programs import Tracer
 from .request import FROM, RATE, RATE_T, TIME, kept_forces, kept_motions
 
@@ -87,15 +91,48 @@ class System:
         unknowns: n.
         names: by vector of the state, its numbers in a state.
         rows, columns: of the entries of the Jacobian.
+        sizes: operations and flops of each program.
     """
 
     def __init__(self, tracer: Tracer, *, compiled: bool = False) -> None:
         self.tracer = tracer
-        formulation, at, vector = tracer.formulation, tracer.at, tracer.layout.vector
+        formulation, vector = tracer.formulation, tracer.layout.vector
         self.unknowns, self.conditions = tracer.unknowns, formulation.conditions
         names = {name: vector(name, len(value)) for name, value in formulation.design.items()}
         ends = [*accumulate(map(len, names.values()), initial=0)]
         self.names = {name: slice(*ends) for name, ends in zip(names, pairwise(ends), strict=True)}
+        self._sampled = [
+            tracer.layout.scalar(TIME),
+            *(k for name in tracer.request.drivers for k in vector(f"drive {name}", 5)),
+        ]
+        outputs, self._executors = tracer.outputs_of_rates(), dict[int, Executor]()
+        compiled = compiled and available()
+        tables, self._geometry, after = None, np.empty((0, 1)), ""
+        native = tracer.request.style is Style.NATIVE and is_builtin(tracer.mechanism)
+        if compiled and native and isinstance(formulation, Cartesian):
+            found = linked(formulation, tracer.layout, vector_width())
+            self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
+            self._geometry, after = found.geometry[:, None], AFTER
+            last = bytecode(outputs, len(tracer.layout.slots), vector_width())
+            tables = {**found.tables, outputs.name: last}
+            programs = [Program(name, (), {}) for name in found.tables]
+        else:
+            programs = self._traced(names)
+            self.sizes = {each.name: each.size for each in programs}
+        self.sizes[outputs.name] = outputs.size
+        self._vectors = {name: _run(slots) for name, slots in tracer.layout.vectors.items()}
+        self._state, self._after = (
+            _run([slot for name in names for slot in vector(f"{label}{name}", 1)])
+            for label in ("", after)
+        )
+        plan = Plan({each.name: each for each in (*programs, outputs)}, tracer.layout.slots)
+        self._plan = plan
+        self._code = LlvmCode(plan, often=math.inf, tables=tables) if compiled else None
+
+    def _traced(self, names: Mapping[str, Sequence[int]]) -> list[Program]:
+        """Return the programs of all rows, of gamma and of a step."""
+        tracer, vector = self.tracer, self.tracer.layout.vector
+        formulation, at = tracer.formulation, tracer.at
         every, phi, nu = formulation.rows(at), formulation.phi(at), formulation.nu(at)
         self.rows, self.columns = (
             np.array([(i, j) for i, row in enumerate(every) for j in row], np.intp).reshape(-1, 2).T
@@ -109,7 +146,7 @@ class System:
             "gamma": {"gamma": gamma},
             "retract": {name: [*after[name]] for name in names},
         }
-        programs = [
+        return [
             program(
                 name,
                 tracer.tape,
@@ -121,26 +158,11 @@ class System:
             )
             for name, each in wanted.items()
         ]
-        programs.append(tracer.outputs_of_rates())
-        self._vectors = {name: _run(slots) for name, slots in tracer.layout.vectors.items()}
-        self._state = _run([slot for slots in names.values() for slot in slots])
-        self._sampled = [
-            tracer.layout.scalar(TIME),
-            *(k for name in tracer.request.drivers for k in vector(f"drive {name}", 5)),
-        ]
-        self._plan = Plan({each.name: each for each in programs}, tracer.layout.slots)
-        self._code = LlvmCode(self._plan, often=math.inf) if compiled and available() else None
-        self._executors: dict[int, Executor] = {}
 
     @property
     def model_rows(self) -> tuple[Sequence[int], Sequence[int]]:
         """The rows solved and those left out, as they are selected at the design position."""
         return self.tracer.selection.chosen, self.tracer.selection.dropped
-
-    @property
-    def sizes(self) -> dict[str, dict[str, int]]:
-        """Operations and flops of each program."""
-        return {name: each.size for name, each in self._plan.programs.items()}
 
     @property
     def owners(self) -> list[str]:
@@ -205,7 +227,7 @@ class System:
         executor.put(self._state, state)
         executor.put(self._vectors["step"], step)
         executor.run("retract")
-        return executor.get(self._state)
+        return executor.get(self._after)
 
     def outputs(self, state: Array, sample: Array, rate: Array, rate_t: Array) -> dict[str, Array]:
         """Return the wanted motions by name, shape (components, m) each, and the test "branch", by
@@ -244,7 +266,9 @@ class System:
 
     def _executor(self, lanes: int) -> Executor:
         if lanes not in self._executors:  # kept: binding costs more than running
-            self._executors[lanes] = bind(self._plan, lanes, self._code)
+            executor = self._executors[lanes] = bind(self._plan, lanes, self._code)
+            if len(self._geometry):
+                executor.put(self._vectors[GEOMETRY], self._geometry)
         return self._executors[lanes]
 
     def _at(self, state: Array, sample: Array) -> Executor:

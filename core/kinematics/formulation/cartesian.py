@@ -122,7 +122,7 @@ class Cartesian:
             far |= reached
         return far
 
-    @property
+    @cached_property
     def _body_axes(self) -> bool:
         return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
 

@@ -122,6 +122,7 @@ class LlvmCode:
 
     Args:
         often: limit of interpretation, see `OFTEN`; infinite for programs that are never compiled.
+        tables: of all programs, if they are known; those are never compiled.
 
     Attributes:
         stride: slots of a lane, with the cells of intermediate values after `Plan.slots`.
@@ -129,13 +130,18 @@ class LlvmCode:
         interpreted: whether programs are not compiled yet.
     """
 
-    def __init__(self, plan: Plan, often: float = OFTEN) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        often: float = OFTEN,
+        tables: Mapping[str, Bytecode] | None = None,
+    ) -> None:
         self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
         # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width])
-        code = find(self._content)
-        again = code is None and disk_cache.known(self._of_tables)
-        self.interpreted, tables = code is None, {} if code else self._tables()
+        code = None if tables else find(self._content)
+        again = not tables and code is None and disk_cache.known(self._of_tables)
+        self.interpreted, tables = code is None, tables or ({} if code else self._tables())
         self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
         self.memory = PlanInMemory(plan, self.width, self.stride)
         if code:
@@ -145,7 +151,7 @@ class LlvmCode:
         operations = sum(len(each.nodes) for each in plan.programs.values())
         if often == OFTEN:
             often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
-        self._left = often * max(OPERATIONS, operations) // OPERATIONS
+        self._left: float = often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
         """Return a function of a loop, bound to this plan."""

@@ -31,7 +31,7 @@ from .ring import pivot, ring
 from .rounds import Spread, take_turns, warmed
 
 LOOPS = (1, 2, 4, 8, 16)
-CRANKS = (4, 8, 16, 24, 48)
+CRANKS = (4, 8, 16, 24, 48, 100)
 MANY = (16, 100, 1000, 5000)
 """Chain lengths for an engine that solves loop by loop."""
 # Angle of the cranks at design [rad]; a quarter turn from upright the links are in line and the
