@@ -84,7 +84,14 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points.add_argument(
-        "--wheelbase", metavar="M", help="wheelbase [m], for Ackermann and anti-values"
+        "--wheelbase",
+        metavar="M",
+        help="wheelbase [m], for Ackermann, turning circle and anti-values",
+    )
+    points.add_argument(
+        "--rack-per-turn",
+        metavar="M",
+        help="travel of the rack per turn of the steering wheel [m], for the steering ratio",
     )
     points.add_argument(
         "--axle",
