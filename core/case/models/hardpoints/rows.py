@@ -33,6 +33,7 @@ from ...io.table import (
     trimmed,
 )
 from ...units import LENGTHS
+from .matlab import plain_lines
 from .table import (
     Hardpoint,
     HardpointTable,
@@ -114,6 +115,8 @@ def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoint
         for k, line in enumerate(table.lines, 1)
         if line.strip(f" \r{DELIMITERS}")
     ]
+    if file.suffix.lower() == ".m":
+        lines = plain_lines(text)
     if not lines:
         raise fault(
             file, "", f"is empty, expected a table of hardpoints; begin it with {','.join(HEAD)}"
