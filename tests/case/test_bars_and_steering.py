@@ -158,13 +158,13 @@ def test_steering_ratio_of_a_case_file(tmp_path):
 def test_lacking_data_is_said_with_its_remedy(tmp_path):
     at = TEMPLATES["double_wishbone"].sample
     one = car(tmp_path, "double_wishbone", at).source
-    assert "damper_ratio (add the rows damper_lower, damper_upper)" in one
+    assert "damper_ratio (add damper_lower, damper_upper)" in one
     bar = "bar_axis, bar_axis_inner, bar_link_inner, bar_link_outer"
-    assert f"bar_twist (add the rows {bar})" in one
+    assert f"bar_twist (add {bar})" in one
     without = {**at, **BAR}
     del without["bar_link_outer"]
     incomplete = car(tmp_path, "double_wishbone", without)
-    assert "bar_twist (add the rows bar_link_outer)" in incomplete.source
+    assert "bar_twist (add bar_link_outer)" in incomplete.source
     assert "bar" not in [body.name for body in incomplete.mechanism.bodies]
     assert "--wheelbase" not in one
     steered = car(tmp_path, "double_wishbone", {**at, **BAR}, axle="steer").source

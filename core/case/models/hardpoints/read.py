@@ -143,7 +143,7 @@ def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -
     across = {name: (role,) for name, role in template.across.items()} if axle else {}
     wanted = {**template.springs, **template.twists, **across}
     found = [
-        f"{name} (add the rows {', '.join(role for role in roles if role not in at)})"
+        f"{name} (add {', '.join(role for role in roles if role not in at)})"
         for name, roles in wanted.items()
         if not {*roles} <= at.keys()
     ]

@@ -1,4 +1,4 @@
-"""Points in the forms that MATLAB scripts write them in."""
+"""Points in the forms that MATLAB scripts write them in, and in classes of Python scripts."""
 
 import re
 
@@ -50,9 +50,7 @@ def test_matlab_form_is_read(tmp_path, form):
         assert points[name] == pytest.approx(place, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "value", ["[a 2 3]", "[1+1 2 3]", "[1 - 2 3 4]", "2 * [1 2 3]"]
-)
+@pytest.mark.parametrize("value", ["[a 2 3]", "[1+1 2 3]", "[1 - 2 3 4]", "2 * [1 2 3]"])
 def test_matlab_expression_is_left_out_and_listed(tmp_path, value):
     file = tmp_path / "front.m"
     file.write_text(f"{FORMS['fields']}\nhp.other = {value};\nclear all\n")
@@ -70,3 +68,13 @@ def test_matlab_unclosed_bracket_is_refused(tmp_path, text):
     file.write_text(text)
     with pytest.raises(CaseError, match=r"front\.m: "):
         load(file, Supplied("double_wishbone", "mm", "iso"))
+
+
+def test_python_class_of_points_is_read(tmp_path):
+    rows = "\n".join(f"    {name}: tuple = {place}" for name, place in POINTS.items())
+    file = tmp_path / "front.py"
+    file.write_text(f"import numpy\n\nclass Front:\n    wheel = Front()\n{rows}\n")
+    found = read_hardpoints(file, Supplied("double_wishbone", "mm", "iso"))
+    assert {name.split(".")[-1]: each.position for name, each in found.points.items()} == POINTS
+    assert found.left_out[0] == "line 1"
+    assert "wheel" in " ".join(found.left_out)
