@@ -61,6 +61,7 @@ _COLUMN = re.compile(
     r"(?:\s*[\[(_/,]\s*([a-z]+)\s*[\])]?|\s+(?:in\s+)?([a-z]+))?"
 )
 _CORNERS = ("corner", "wheel", "wheelposition", "axle", "side", "location")
+_REMARKS = ("meaning", "remark", "remarks", "comment", "comments", "note", "notes", "description")
 _SIGNS = re.compile(rf"[{DELIMITERS}]+")
 
 
@@ -355,12 +356,14 @@ def _require_complete(
 
     If commas separate the fields, a decimal comma splits a number into two fields. The second is
     indistinguishable from a value of a further column if rows may be shorter or longer than the
-    head.
+    head. A row may lack its remark.
     """
     filled = len(trimmed(cells))
     headed = {k for k, name in enumerate(head.names) if name} | set(head.columns)
     surplus = delimiter and any(cell != "" and k not in headed for k, cell in enumerate(cells))
     exact = delimiter != "," or not head.others or len(cells) == len(head.names)
+    lacking = [name.lower() for name in head.names[len(cells) :]]
+    exact = exact or (bool(lacking) and {*lacking} <= {*_REMARKS})
     if surplus or not exact or max(head.columns) >= filled:
         expected = [name or HEAD[0] for k, name in enumerate(head.names) if k in headed]
         comma = "; a decimal comma needs semicolons between the fields" if delimiter == "," else ""
