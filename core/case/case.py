@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,9 @@ from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
 from .quantity import Quantity
+
+if TYPE_CHECKING:
+    from ..kinematics import LoadPoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +222,19 @@ class Closure:
 
 
 @dataclass(frozen=True, eq=False)
+class Balance:
+    """Samples that are equilibria: the drivers of the case hold, all other motions are free.
+
+    Attributes:
+        places: of further loads.
+        loads: force and torque at each place by its name [N, N m], shape (n, 6).
+    """
+
+    places: tuple[LoadPoint, ...] = ()
+    loads: Mapping[str, Array] = field(default_factory=dict[str, Array])
+
+
+@dataclass(frozen=True, eq=False)
 class Case:
     """The input of engines, and of the harness that judges their results, in SI units.
 
@@ -234,6 +250,7 @@ class Case:
         wheels: each `Vehicle` of [suspension], whether outputs read it or not.
         unforced: drivers without a force, which only follow a recording.
         free: its free motion; None for the default.
+        balance: None unless its samples are equilibria.
     """
 
     name: str
@@ -253,6 +270,7 @@ class Case:
     wheels: tuple[Any, ...] = ()
     unforced: tuple[str, ...] = ()
     free: Free | None = None
+    balance: Balance | None = None
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

@@ -24,6 +24,7 @@ COMMANDS = (
     "kc",
     "serve",
     "free",
+    "board",
     "doctor",
     "history",
     "report",

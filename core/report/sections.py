@@ -42,6 +42,7 @@ class Section:
         columns: headings; the first `labels` of them head words, the others numbers.
         diagrams: diagrams above the table, only on the page; those with the same styles side by
             side.
+        links: file that belongs to each row, beside the page; empty for none.
     """
 
     title: str
@@ -51,6 +52,7 @@ class Section:
     labels: int
     rows: Sequence[Sequence[str]]
     diagrams: Sequence[Diagram] = ()
+    links: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
