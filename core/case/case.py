@@ -37,6 +37,8 @@ class Hardpoint:
         axes: axis among these, and its sign, along each of x, y and z of the table.
         moves: derivatives of the numbers of each following place, see `kinematics.places`, by x, y
             and z of the table [m/m], shape (numbers, 3). They are constant.
+        shim: derivatives of toe and camber at design by x, y and z of the table [rad/m], shape
+            (2, 3), if the joint is moved and the links keep their lengths; None for no such joint.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Hardpoint:
     position: tuple[float, float, float]
     axes: Sequence[tuple[int, float]]
     moves: Mapping[str, Array]
+    shim: Array | None = None
 
 
 SLOW = 2.0**60

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from . import import_options
 from .export import formats, keep_texts
-from .option_types import number, whole
+from .option_types import measured, whole
 from .registry import Registry, Status, given
 
 if TYPE_CHECKING:
@@ -36,9 +36,12 @@ def add(commands: Any) -> None:
     )
     listing.add_argument(
         "--at",
-        type=number,
+        type=measured,
         metavar="VALUE",
-        help="value of the swept driver, in SI units; default: the design position",
+        help=(
+            "value of the swept driver, such as 30mm or -20deg, in SI without a unit; default: the"
+            " design position"
+        ),
     )
     listing.add_argument(
         "--samples",
@@ -98,7 +101,12 @@ def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
         raise KincheckError(unknown("format", options.export, registry.writers))
     case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
-    found = survey(case, options.at, samples=options.samples, seed=options.seed)
+    found = survey(
+        case,
+        import_options.driver_value(options.at, case),
+        samples=options.samples,
+        seed=options.seed,
+    )
     with with_json(found.report(), options.json):
         _print(found, options.json)
         if options.export is not None:

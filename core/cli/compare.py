@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from . import import_options
 from .registry import Registry, Status
-from .run_options import TOL
+from .run_options import TOL, add_curve_files
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -50,13 +50,7 @@ def add(commands: Any) -> None:
     command.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
     )
-    for kind, what in (("csv", "CSV"), ("parquet", "Parquet"), ("xlsx", "a workbook")):
-        command.add_argument(
-            f"--{kind}",
-            type=Path,
-            metavar="FILE",
-            help=f"write the curves as {what}: a column for each output, design and difference",
-        )
+    add_curve_files(command, "a column for each output, design and difference")
     import_options.add_options(command)
 
 
@@ -115,10 +109,10 @@ def _cases(options: argparse.Namespace, registry: Registry) -> list[Case]:
         KincheckError: there are not two, one cannot be read, or they move by other drivers.
     """
     names = [each for name in options.case for each in registry.matching(name)]
-    if len({*names}) < 2:
-        raise KincheckError(f"{names[0]}: found one design, expected two or more; name another")
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise KincheckError(f"{twice}: found twice, expected once; leave one out")
+    if len(names) < 2:
+        raise KincheckError(f"{names[0]}: found one design, expected two or more; name another")
     cases: list[Case] = []
     problems: list[str] = []
     for name in names:

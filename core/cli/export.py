@@ -11,7 +11,7 @@ from typing import Any
 from ..case.io.escape import file_name
 from ..errors import KincheckError, unknown
 from . import import_options
-from .option_types import number
+from .option_types import measured
 from .registry import Registry, Status
 
 FORMATS = {
@@ -51,9 +51,12 @@ def add(commands: Any) -> None:
     )
     export.add_argument(
         "--at",
-        type=number,
+        type=measured,
         metavar="VALUE",
-        help=("value of the swept driver at the start, in SI units; default: the design position"),
+        help=(
+            "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
+            " default: the design position"
+        ),
     )
     import_options.add_options(export)
 
@@ -69,7 +72,11 @@ def _export(options: argparse.Namespace, registry: Registry) -> int:
         raise KincheckError(unknown("format", options.to, registry.writers))
     case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
-    keep_texts(written(case, registry.writer(options.to), options.at), case.name, options.out)
+    keep_texts(
+        written(case, registry.writer(options.to), import_options.driver_value(options.at, case)),
+        case.name,
+        options.out,
+    )
     return Status.WITHIN
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import LEFT_OUT, Supplied
+from ..errors import KincheckError
 from ..report.progress import complain
 from .option_types import positive
 from .registry import add_joint_types
@@ -84,7 +85,14 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points.add_argument(
-        "--wheelbase", metavar="M", help="wheelbase [m], for Ackermann and anti-values"
+        "--wheelbase",
+        metavar="M",
+        help="wheelbase [m], for Ackermann, turning circle and anti-values",
+    )
+    points.add_argument(
+        "--rack-per-turn",
+        metavar="M",
+        help="travel of the rack per turn of the steering wheel [m], for the steering ratio",
     )
     points.add_argument(
         "--axle",
@@ -212,3 +220,28 @@ def supplied(options: argparse.Namespace) -> Supplied:
 def tell_left_out(cases: Iterable[Case]) -> None:
     """Print on standard error the parts of other tools' files that were left out."""
     complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)
+
+
+def driver_value(text: str | None, case: Case) -> float | None:
+    """Return the value of the swept driver in an option, in SI; None without one.
+
+    Raises:
+        KincheckError: it is no number, or has the unit of something else.
+    """
+    from ..case.case import TIME
+    from ..case.io.document import measure
+    from ..case.units import ANGLES, LENGTHS, SECOND
+
+    if text is None:
+        return None
+    driver = case.sweep.driver
+    turns = driver != TIME and case.mechanism.driver(driver).turns
+    units = {"s": SECOND} if driver == TIME else ANGLES if turns else LENGTHS
+    bare = "s" if driver == TIME else "rad" if turns else "m"
+    try:
+        return measure(text, units, bare)[0]
+    except ValueError:
+        raise KincheckError(
+            f"--at: {text!r} is not a number with one of the units {', '.join(units)}, or in"
+            f" {bare}; give a value of the driver {driver}"
+        ) from None

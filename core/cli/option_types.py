@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable
 
 
@@ -35,28 +36,21 @@ def _whole(text: str) -> int | None:
 
 def positive(text: str) -> float:
     """Return the positive number in the text of an option."""
-    found = _number(text)
-    if not found > 0:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not 0.0 < found < math.inf:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12"
         )
     return found
 
 
-def number(text: str) -> float:
-    """Return the finite number in the text of an option."""
-    found = _number(text)
-    if math.isnan(found):
+def measured(text: str) -> str:
+    """Return the text of an option that is a number, with or without a unit."""
+    if not re.fullmatch(r"\s*[-+]?[\d.]*\d\.?(?:[eE][-+]?\d+)?\s*[A-Za-z]*\s*", text):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a number; give one such as -1, 0.5 or 1e-12"
+            f"{text!r} is not a number; give one such as 0.02, 20mm or -3deg"
         )
-    return found
-
-
-def _number(text: str) -> float:
-    """Return the finite number in a text; NaN if it holds none."""
-    try:
-        found = float(text)
-    except ValueError:
-        return math.nan
-    return found if math.isfinite(found) else math.nan
+    return text

@@ -70,13 +70,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
     )
-    for kind, what in (("csv", "CSV"), ("parquet", "Parquet"), ("xlsx", "a workbook")):
-        run.add_argument(
-            f"--{kind}",
-            type=Path,
-            metavar="FILE",
-            help=f"write the curves of all engines and references as {what}",
-        )
+    add_curve_files(run, "the curves of all engines and references")
     run.add_argument(
         "--long",
         action="store_true",
@@ -157,6 +151,12 @@ def add_options(run: argparse.ArgumentParser) -> None:
             " tolerance, limits, versions and commit"
         ),
     )
+
+
+def add_curve_files(command: argparse.ArgumentParser, what: str) -> None:
+    """Add the options for tables of curves."""
+    for kind, form in (("csv", "CSV"), ("parquet", "Parquet"), ("xlsx", "a workbook")):
+        command.add_argument(f"--{kind}", type=Path, metavar="FILE", help=f"write {what} as {form}")
 
 
 def _add_curve_options(run: argparse.ArgumentParser) -> None:

@@ -59,7 +59,8 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         default=[],
         metavar="OUTPUT:LOW:HIGH",
         help=(
-            "specification limits of an output, in the units of the --vary file; one may be empty."
+            "specification limits of an output, as toe:-2:2deg, or in the units of the --vary file;"
+            " one may be empty."
             " The study counts the variants inside, with Cp and Cpk"
         ),
     )

@@ -27,6 +27,9 @@ NAMES = (
     "roll_angle",
     "axle_roll_center_height",
     "ackermann",
+    "ackermann_angles",
+    "turning_circle",
+    "steering_ratio",
 )
 """Outputs of the table, of a wheel or an axle."""
 

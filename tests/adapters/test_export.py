@@ -110,7 +110,7 @@ def test_a_start_that_cannot_be_reached_says_how_far_it_goes():
 )
 def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main.main(["export", "mcpherson_strut", "--to", to, "--at", "0.03"]) == 0
+    assert main.main(["export", "mcpherson_strut", "--to", to, "--at", "30mm"]) == 0
     names = [f"mcpherson_strut{ending}" for ending in endings]
     assert capsys.readouterr().out.split() == names
     texts = {
@@ -127,6 +127,7 @@ def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch
         (["--to", "mjfc"], "there is no format 'mjfc'; did you mean 'mjcf'?"),
         (["--to", "mjcf"], "mcpherson_strut.xml exists already"),
         (["--to", "mjcf", "--at", "nan"], "'nan' is not a number"),
+        (["--to", "mjcf", "--at", "3deg"], "'3deg' is not a number with one of the units m, mm"),
         (
             ["--to", "mjcf", "--out", "nowhere/strut.xml"],
             "--out nowhere/strut.xml: cannot be written; give a file in a folder that exists",

@@ -90,6 +90,12 @@ def expected(name, motion, value):
     }
     if motion == "steer" and abs(value) > 0.005:
         true["ackermann"] = WHEELBASE / road[1] * (b.cotangent - a.cotangent)
+        angles = sorted(np.arctan(1 / abs(each.cotangent)) for each in (a, b))
+        outer, inner = angles if true["ackermann"] > 0.0 else angles[::-1]
+        ideal = np.arctan(1.0 / (1.0 / np.tan(inner) + road[1] / WHEELBASE))
+        true["ackermann_angles"] = (inner - outer) / (inner - ideal)
+        true["turning_circle"] = 2.0 * WHEELBASE / np.sin(outer)
+        true["mean_steer_angle"] = 0.5 * np.sign(a.cotangent) * (inner + outer)
     return true
 
 

@@ -192,6 +192,15 @@ def edited(old, new):
 
 
 THOUSANDS = table(points=integers()).replace("-611", "-1.611")
+
+
+def test_rows_may_end_with_their_coordinates(tmp_path):
+    """A point that is added below a table with remarks: a split number has one field more."""
+    whole = table("name,x,y,z,meaning", "{},{},{},{},a remark")
+    found = read(tmp_path, whole.removesuffix(",a remark\n"))
+    assert found.mechanism == read(tmp_path, whole).mechanism
+
+
 FAULTS = {
     "both signs": (comma(table()).replace("-611,75", "-611.75"), ["line 10", "'-611.75'", "above"]),
     "thousands and decimals": (

@@ -2,12 +2,14 @@
 
 import csv
 import json
+import math
 from dataclasses import replace
 from importlib import import_module
 
 import msgspec
 import numpy as np
 import pytest
+from kincheck.cases import load
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.studies.tolerance.conformance import sparkline
@@ -15,7 +17,8 @@ from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.tolerance.tables import limit_notes, remarks
 from kincheck.core.studies.variation.study_choices import Sampling
-from kincheck.core.studies.variation.variation import Limit
+from kincheck.core.studies.variation.variation import FileUnits, Limit
+from kincheck.core.studies.variation.variation_file import limits_of_texts
 
 from ..support.fakes import crank
 from .test_vary import vary, vary_file
@@ -161,3 +164,27 @@ def test_limits_use_units_of_the_file(file, tmp_path, capsys):
     told = capsys.readouterr().out
     assert "Specification limits" in told
     assert "95 % interval" in told
+
+
+@pytest.mark.parametrize(
+    ("limit", "low", "high"),
+    [
+        ("toe:-2:3deg", -2.0, 3.0),
+        ("toe:-2deg:3deg", -2.0, 3.0),
+        ("toe:-2 deg:", -2.0, math.inf),
+        ("toe::90arcmin", -math.inf, 1.5),
+        ("toe:-1e-1:0.1rad", -math.degrees(0.1), math.degrees(0.1)),
+    ],
+)
+def test_limits_take_a_unit(limit, low, high):
+    (found,) = limits_of_texts([limit], load("mcpherson_suspension"), FileUnits("mm", "rad"))
+    ends = [math.radians(low), math.radians(high)]
+    assert [found.low, found.high] == pytest.approx(ends, rel=1e-15)
+
+
+@pytest.mark.parametrize("limit", ["toe:-2:2mm", "toe:-2deg:2rad", "toe:-2:2dgr", "toe:deg:deg"])
+def test_limits_of_another_unit_are_refused(limit):
+    with pytest.raises(
+        KincheckError, match=r"--limit.*(expected one such as rad|OUTPUT:LOW:HIGH|neither)"
+    ):
+        limits_of_texts([limit], load("mcpherson_suspension"), FileUnits("mm", "rad"))

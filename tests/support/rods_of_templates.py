@@ -57,16 +57,23 @@ def carrier_of(name, at):
     )
 
 
+def turn_about(axis, start, now):
+    """Angle between two directions, seen along an axis."""
+    axis = axis / np.linalg.norm(axis)
+    flat = [a - (a @ axis) * axis for a in (start, now)]
+    return np.arctan2(axis @ np.cross(*flat), flat[0] @ flat[1])
+
+
 def arm_rate(carrier, at, arm, point):
     """Velocity of a point of an arm now, and its place: the arm turns as its ball tells."""
     front, rear, ball = (np.array(at[f"{arm}_{end}"]) for end in ("front", "rear", "outer"))
     axis = (front - rear) / np.linalg.norm(front - rear)
     start, now = ball - rear, carrier.at(ball) - rear
-    flat = [a - (a @ axis) * axis for a in (start, now)]
-    angle = np.arctan2(axis @ np.cross(*flat), flat[0] @ flat[1])
+    flat = now - (now @ axis) * axis
+    angle = turn_about(axis, start, now)
     place = rear + rotation(angle * axis) @ (np.array(at[point]) - rear)
     moving = carrier.velocity(carrier.at(ball))
-    rate = axis @ np.cross(now, moving) / (flat[1] @ flat[1])
+    rate = axis @ np.cross(now, moving) / (flat @ flat)
     return place, rate * np.cross(axis, place - rear)
 
 
@@ -83,6 +90,7 @@ def expected(name, at, travel, spin=(0.0, 1.0, 0.0)):
         "camber": -np.arcsin(s[2]),
         "half_track_change": contact[1] - at["wheel_contact"][1],
         "roll_center_height": contact[1] * vy / vz,
+        "jacking_coefficient": vy / vz,
     }
     for role in TEMPLATES[name].watched:
         values |= dict(zip((f"{role}.{axis}" for axis in "xyz"), carrier.at(at[role]), strict=True))

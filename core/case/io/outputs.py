@@ -279,9 +279,10 @@ def _of_wheel(
     if problem := output.problem:
         raise section.fault(problem)
     for each in own_keys(cls):
-        if isinstance(given[each.name], tuple):  # names of points
-            for point in given[each.name]:
-                check_point(section.at(each.name), point, case.mechanism)
+        value = given[each.name]
+        names: tuple[str, ...] = (value,) if type(value) is str else value  # of points
+        for point in names if isinstance(names, tuple) else ():  # pyright: ignore[reportUnnecessaryIsInstance]
+            check_point(section.at(each.name), point, case.mechanism)
     moving = [*case.sweep.path.motions]
     if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:
         raise section.at("type").fault(

@@ -27,6 +27,7 @@ class Supplied:
         axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
         position: axle of hardpoints, "front" or "rear", for anti-values.
         cg_height: height of the centre of gravity of the vehicle of hardpoints above the road [m].
+        rack_per_turn: travel of the rack per turn of the steering wheel [m].
         brake_share, drive_share: shares of the vehicle's forces at the axle of hardpoints [-].
         drive: driven joints of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in their
             coordinates [rad, m].
@@ -50,6 +51,7 @@ class Supplied:
     axle: str | None = None
     position: str | None = None
     cg_height: str | None = None
+    rack_per_turn: str | None = None
     brake_share: str | None = None
     drive_share: str | None = None
     ask_names: bool = False

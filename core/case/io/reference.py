@@ -293,6 +293,7 @@ class Grid:
     def _check(self, driver: Unit, values: Array) -> None:
         """Refuse rows unfit for interpolation."""
         samples, at = self._samples, 'or take its samples: [sweep] at = "reference"'
+        at += " in the case file, or --at-reference beside --reference"
         if not self._within.any():
             low, high = (driver.written(float(x)) for x in (self._x[0], self._x[-1]))
             ends = " to ".join(driver.written(float(x)) for x in (values[0], values[-1]))

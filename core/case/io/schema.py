@@ -100,7 +100,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          four rods: [["on the body", "on the wheel carrier"], ...], all but the
                          steering rod; (wheel_radius), loaded, to the contact centre; or
                          (wheel_contact), a point of the carrier as far from the wheel centre
-                         (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
+                         (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road;
+                         (rack_per_turn), travel of the rack per turn of the steering wheel
                          (brakes) = "outboard", (drive) = "inboard": support of the torque; outboard
                          on the wheel carrier, inboard on the vehicle body
                          (brake_share), (drive_share): parts of the vehicle's force at this axle,
@@ -364,6 +365,7 @@ class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     axle: Annotated[Axle, _one_of(Axle)] | None = None
     wheelbase: Length | None = None
     cg_height: Length | None = None
+    rack_per_turn: Length | None = None
     brakes: Reactions = Reaction.OUTBOARD
     brake_share: Share | None = None
     drive: Reactions = Reaction.INBOARD
@@ -459,6 +461,10 @@ _OF_FIELDS: Mapping[Any, Any] = {
     float: Number,
     Vector: Numbers3,
     tuple[float, ...]: Numbers,
+    tuple[str, str, str]: Annotated[
+        tuple[str, str, str],
+        Meta(description='three names ["first of the axis", "second", "point of the part"]'),
+    ],
     str | None: Annotated[str | None, Meta(description="a name")],
     Vector | None: Annotated[Vector | None, Meta(description="a direction [x, y, z]")],
     tuple[Vector, Vector]: Annotated[

@@ -25,7 +25,7 @@ from .schema import OtherWheelKeys, SuspensionKeys
 SQUARE = 1e-8
 # A driver's direction so nearly horizontal is no travel.
 LEVEL = 1e-8
-_LENGTHS = ("wheel_radius", "wheelbase", "cg_height")
+_LENGTHS = ("wheel_radius", "wheelbase", "cg_height", "rack_per_turn")
 _NOT_OF_VEHICLE = ("center_plane", "per_travel", "kingpin_links", "travel", "other")
 _OWN = (
     "wheel_center",

@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 
 from ...algebra import Vec3
-from ...jet import Jet, arctan2, sqrt, where
+from ...jet import Jet, arctan2, doubles, sqrt, where
 from ..quantity import HIDDEN
 from .base import SuspensionOutput, held
-from .corner import PARALLEL, Corner, Side, Vehicle
+from .corner import PARALLEL, Corner, Side, Vehicle, angle_in_view
 
 # Wheels steered by less than this have no Ackermann of use [rad]: a quotient of two differences.
 STRAIGHT = 1e-2
+# A rack that turns the wheels by less than this steers nothing [rad/m]: usual ones do 5 to 12.
+NO_STEER = 1e-3
 _CARRIER = ("wheel_center", "spin_marker", "top_marker")
 
 
@@ -92,33 +94,150 @@ class RollAngle(AxleOutput):
 
 
 @dataclass(frozen=True)
-class Ackermann(AxleOutput):
-    """Part of the difference of steer angles that lets both wheels roll about one point of the rear
-    axle's line: wheelbase / track * (cot outer - cot inner), the track being that of the contact
-    centres (W. F. and D. L. Milliken, Race Car Vehicle Dynamics, chapter 19). It has no value while
-    a wheel is straight, or toes against the other.
+class MeanSteerAngle(AxleOutput):
+    """Mean of the steer angles of both wheels (ISO 8855, 7.1.3), their static toe included."""
+
+    type = "mean_steer_angle"
+    measure = "rad"
+    needs = ()
+    reads = ("wheel_center", "spin_marker")
+    positive = "to the left (ISO 8855), to the right (SAE J670)"
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the angle [rad]."""
+        a, b = _to_the_left(left, right)
+        return 0.5 * self.vehicle.convention.up * (a + b)
+
+
+@dataclass(frozen=True)
+class SteeringRatio(AxleOutput):
+    """Turn of the steering wheel per mean steer angle, both as rates: 2 pi / rack_per_turn times
+    the rack's travel per mean steer angle.
+
+    It is of the motion of the rack alone, and has no value while the wheels do not steer.
+
+    Attributes:
+        rack: name of a point of the rack, which moves along the vehicle's y axis.
     """
 
-    type = "ackermann"
+    type = "steering_ratio"
     measure = "1"
+    needs = ("rack_per_turn",)
+    reads = ("wheel_center", "spin_marker")
+    positive = "always"
+
+    rack: str
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points it reads."""
+        return (*super().points, self.rack)
+
+    @property
+    def orders(self) -> int:
+        """Value and rate, which need velocities and accelerations."""
+        return 2
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the ratio [-]."""
+        a, b = _to_the_left(left, right)
+        turned = (0.5 * (a + b)).dot
+        assert self.vehicle.rack_per_turn is not None
+        ratio = 2.0 * np.pi / self.vehicle.rack_per_turn * left.point(self.rack).y.dot / turned
+        known = where(np.abs(turned.x) > NO_STEER * np.abs(left.point(self.rack).y.v), ratio)
+        return np.sign(known.x) * known
+
+
+@dataclass(frozen=True)
+class _WhileSteering(AxleOutput):
+    """A quantity of steered wheels. It has no value while a wheel is straight, or toes against the
+    other.
+    """
+
     needs = ("wheel_radius", "wheelbase")
-    positive = "the inner wheel steered further, fully at 1"
 
     @property
     def orders(self) -> int:
         """The value alone: its rates grow without bound towards straight wheels."""
         return 1
 
+    @abstractmethod
+    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+        """Return the value for cotangents of the steer angles towards the inner wheel.
+
+        Args:
+            ratio: track of the contact centres over the wheelbase [-].
+        """
+
     def both(self, left: Corner, right: Corner) -> Jet:
-        """Return the part of the difference [-]."""
+        """Return the output over the samples."""
         a, b = left.spin, right.spin
-        track = left.contact.y + right.contact.y
-        wheelbase = self.vehicle.wheelbase
-        assert wheelbase is not None
-        # tan of the steer angles: -x / y on the left, x / y on the right
-        quotient = (a.y / a.x + b.y / b.x) * wheelbase / track
-        steered = -np.sign(a.x.x * b.x.x) * np.minimum(np.abs(a.x.x), np.abs(b.x.x))
-        return where(steered > STRAIGHT, quotient)
+        first, second = -(a.y / a.x), b.y / b.x  # to the left
+        to_left = np.where(doubles(b.x) > 0.0, 1.0, 0.0)
+        inner = to_left * first - (1.0 - to_left) * second
+        outer = to_left * second - (1.0 - to_left) * first
+        assert self.vehicle.wheelbase is not None
+        ratio = (left.contact.y + right.contact.y) / self.vehicle.wheelbase
+        x, y = doubles(a.x), doubles(b.x)
+        steered = -np.sign(x * y) * np.minimum(np.abs(x), np.abs(y))
+        return where(steered > STRAIGHT, self.steered(inner, outer, ratio))
+
+
+@dataclass(frozen=True)
+class Ackermann(_WhileSteering):
+    """Part of the difference of cotangents that lets both wheels roll about one point of the rear
+    axle's line: wheelbase / track * (cot outer - cot inner), the track being that of the contact
+    centres (W. F. and D. L. Milliken, Race Car Vehicle Dynamics, chapter 19). It is the wheelbase
+    over the distance behind the front axle at which the axes of both wheels cross.
+    """
+
+    type = "ackermann"
+    measure = "1"
+    positive = "the inner wheel steered further, fully at 1"
+
+    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+        """Return the part of the difference [-]."""
+        return (outer - inner) / ratio
+
+
+@dataclass(frozen=True)
+class AckermannAngles(_WhileSteering):
+    """Part of the difference of steer angles with the inner wheel as it is: (inner - outer) /
+    (inner - ideal), the ideal outer wheel having cot ideal = cot inner + track / wheelbase.
+    Adams/Car calls it percent Ackerman, with its turn centre from the inside wheel.
+    """
+
+    type = "ackermann_angles"
+    measure = "1"
+    positive = "the inner wheel steered further, fully at 1"
+
+    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+        """Return the part of the difference [-]."""
+        one = ratio / ratio
+        a, b, ideal = (arctan2(one, each) for each in (inner, outer, inner + ratio))
+        return (a - b) / (a - ideal)
+
+
+@dataclass(frozen=True)
+class TurningCircle(_WhileSteering):
+    """Diameter of the circle on which the outer front wheel rolls about a point of the rear axle's
+    line: 2 wheelbase / sin outer (J. Reimpell, The Automotive Chassis, without the scrub radius,
+    since the steer angle is that of the wheel itself).
+    """
+
+    type = "turning_circle"
+    positive = "always"
+
+    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+        """Return the diameter [m]."""
+        assert self.vehicle.wheelbase is not None
+        return 2.0 * self.vehicle.wheelbase * sqrt(1.0 + outer * outer)
+
+
+def _to_the_left(left: Corner, right: Corner) -> tuple[Jet, Jet]:
+    """Return the steer angles of both wheels, positive to the left [rad]."""
+    a, b = left.spin, right.spin
+    return angle_in_view(-a.x, a.y), angle_in_view(b.x, b.y)
 
 
 @dataclass(frozen=True)

@@ -92,13 +92,16 @@ class SuspensionOutput(TypedQuantity):
 class WheelOutput(SuspensionOutput):
     """A quantity of one wheel."""
 
+
+@dataclass(frozen=True)
+class _OfCorner(WheelOutput):
     @abstractmethod
     def value(self, corner: Corner) -> Jet:
         """Return the value of the formula over the samples."""
 
 
 @dataclass(frozen=True)
-class Change(WheelOutput):
+class Change(_OfCorner):
     """A coordinate relative to the design position."""
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
@@ -107,7 +110,7 @@ class Change(WheelOutput):
 
 
 @dataclass(frozen=True)
-class Attitude(WheelOutput):
+class Attitude(_OfCorner):
     """An angle or an offset, known at every position.
 
     Attributes:
@@ -123,7 +126,7 @@ class Attitude(WheelOutput):
 
 
 @dataclass(frozen=True)
-class Rate(WheelOutput):
+class Rate(_OfCorner):
     """A quotient of velocities, known only while the wheel travels, with one derivative less.
 
     It is a property of the position: other drivers are held, see `Vehicle.travel`.

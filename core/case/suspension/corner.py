@@ -103,6 +103,7 @@ class Vehicle:
             about which the wheel turns when the fifth rod moves and the height of its centre is
             held.
         cg_height: height of the centre of gravity above the road [m].
+        rack_per_turn: travel of the rack per turn of the steering wheel [m].
         travel: driver of the wheel's travel, if other drivers move too, and that of the axle's
             other wheel if there is one: derivatives by travel move these alone, and hold the
             others. Empty: derivatives are along the sweep.
@@ -124,6 +125,7 @@ class Vehicle:
     kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None = None
     wheelbase: float | None = None
     cg_height: float | None = None
+    rack_per_turn: float | None = None
     brakes: Reaction = Reaction.OUTBOARD
     brake_share: float | None = None
     drive: Reaction = Reaction.INBOARD

@@ -1,5 +1,6 @@
-"""Outputs of a wheel: toe, camber, steer angle, displacements; of its steering axis; and of its
-instantaneous motion: roll centre, motion ratio, anti-dive, anti-squat and anti-lift.
+"""Outputs of a wheel: toe, camber, steer angle, displacements; of its steering axis; turns of its
+arms and bars; and of its instantaneous motion: roll centre, jacking, motion ratio, anti-dive,
+anti-squat and anti-lift.
 
 The steering axis is the physical line through two points, or of a wheel on rods the axis of its
 rotation in steering. It is not the instantaneous axis of rotation in travel.
@@ -12,16 +13,17 @@ centre. Definitions: W. F. and D. L. Milliken, Race Car Vehicle Dynamics, chapte
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
 
-from ...algebra import Vec3
-from ...jet import Jet, arctan2, doubles, norm
+from ...algebra import Vec3, cross
+from ...jet import Jet, arctan2, doubles, norm, sqrt
 from ...trajectory import Array
-from .base import Attitude, Change, Rate
+from .base import Attitude, Change, Rate, WheelOutput
 from .corner import Axle, Convention, Corner, Reaction, angle_in_view, distance, velocity
 
 
@@ -336,6 +338,61 @@ class MotionRatio(Rate):
         """Return the motion ratio [-]."""
         a, b = (corner.point(name) for name in self.between)
         return -distance(a, b).dot / corner.center.z.dot
+
+
+@dataclass(frozen=True)
+class JackingCoefficient(Rate):
+    """Vertical force of the links on the body per lateral force at the contact: the slope of the
+    line from the contact centre to the instant centre of the front view, v_y / v_z.
+
+    By virtual work, a lateral force F outboard changes the force of the springs by F v_y / v_z, and
+    the links carry the rest of the wheel's load.
+    """
+
+    type = "jacking_coefficient"
+    measure = "1"
+    needs = ("wheel_radius",)
+    reads = _CARRIER
+    positive = "a force inboard on the tyre lifts the body"
+
+    def value(self, corner: Corner) -> Jet:
+        """Return the coefficient [-]."""
+        v = corner.contact_velocity
+        return v.y / v.z
+
+
+@dataclass(frozen=True)
+class Twist(WheelOutput):
+    """Turn of a part from design about an axis fixed to the body: of an arm with a torsion bar, a
+    rocker, or half an anti-roll bar.
+
+    Attributes:
+        about: names of two points of the axis, and of a point of the part.
+    """
+
+    type = "twist"
+    measure = "rad"
+    reads = ("wheel_center",)
+    positive = "right-handed about the axis from its first to its second point, on the left side"
+
+    about: tuple[str, str, str]
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Wheel centre, the axis and the part."""
+        return (*super().points, *self.about)
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the angle [rad]: of the part's point at design and now, seen along the axis."""
+        now, then = Corner(self.vehicle, at), Corner(self.vehicle, design)
+        first, second, part = self.about
+        axis = now.point(second) - now.point(first)
+        r, r_design = (each.point(part) - each.point(first) for each in (now, then))
+        along = axis @ axis
+        across = cross(r_design, r) @ axis
+        return arctan2(
+            across * sqrt(along), along * (r_design @ r) - (axis @ r_design) * (axis @ r)
+        )
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
@@ -52,6 +53,8 @@ def _parts(found: Diagnosis, verbose: bool) -> Iterator[Text | Table]:
         yield from _budgets(found)
     if found.sensitivities:
         yield from _sensitivities(found, len(found.sensitivities) if verbose else PLACES)
+    if found.shims:
+        yield from _shims(found)
     if found.determinacy is not None:
         yield from _forces(found.determinacy)
     if found.not_derived and found.samples:
@@ -209,6 +212,16 @@ def _budgets(found: Diagnosis) -> Iterator[Text | Table]:
 def _signs(found: Diagnosis) -> Iterator[Text]:
     if found.signs:
         yield Text(f"signs: {found.signs}")
+
+
+def _shims(found: Diagnosis) -> Iterator[Text | Table]:
+    yield _head("shims of 1 mm at design: links keep their lengths, the wheel keeps its height")
+    heads = [f">{output} {axis}" for output in ("toe", "camber") for axis in "xyz"]
+    table = columns("joint moved along", *heads, "")
+    for name, rows in found.shims.items():
+        numbers = [1e-3 * math.degrees(each) for row in rows for each in row]
+        table.add_row(name, *(f"{0.0 + round(each, 4):+.4f}" for each in numbers), "deg")
+    yield table
 
 
 def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 
 from ...case.case import Case, Quantity
 from ...case.io.document import decimal, fault, join, read_tables, shown, typed
+from ...case.io.table import read_unit
 from ...case.units import ANGLES, LENGTHS, RADIAN, in_units
 from ...errors import KincheckError, remedy, unknown
 from ...joints import Kind
@@ -53,7 +55,12 @@ def unit_of_offsets(
     return str(needed), size
 
 
-_EXPECTED = "expected OUTPUT:LOW:HIGH, one number of which may be missing, such as camber:-1.5:1.5"
+_EXPECTED = (
+    "expected OUTPUT:LOW:HIGH, one number of which may be missing, such as camber:-1.5:1.5"
+    " or toe:-2:2deg"
+)
+# A number or none, and a unit or none.
+_LIMIT = re.compile(r"([-+\u2212]?[\d.]*(?:[eE][-+]?\d+)?)\s*([^\d\s.].*)?")
 
 
 def read_limits(
@@ -76,7 +83,7 @@ def read_limits(
 
 
 def limits_of_texts(texts: Iterable[str], case: Case, units: FileUnits) -> tuple[Limit, ...]:
-    """Return the limits in texts OUTPUT:LOW:HIGH, in the units of a variation file.
+    """Return the limits in texts OUTPUT:LOW:HIGH, in the units of a variation file or a stated one.
 
     Raises:
         KincheckError: a text has another form, there is no such output, or the limits make no
@@ -85,28 +92,45 @@ def limits_of_texts(texts: Iterable[str], case: Case, units: FileUnits) -> tuple
     found: list[Limit] = []
     for text in texts:
         name, *numbers = text.rsplit(":", 2)
+        parts = [_LIMIT.fullmatch(each.strip()) for each in numbers]
+        stated = {part[2] for part in parts if part and part[2]}
         try:
-            low, high = (decimal(each) if each.strip() else None for each in numbers)
+            low, high = (decimal(part[1]) if part and part[1] else None for part in parts)
+            if None in parts or len(stated) > 1:
+                raise ValueError
         except ValueError:
             raise KincheckError(f"--limit: found {text!r}, {_EXPECTED}; correct it") from None
         try:
-            found.append(limit_of(case, units, name, low, high))
+            found.append(limit_of(case, units, name, low, high, *stated))
         except ValueError as error:
             raise KincheckError(f"--limit {text}: {error}") from None
     return tuple(found)
 
 
 def limit_of(
-    case: Case, units: FileUnits, name: str, low: float | None, high: float | None
+    case: Case,
+    units: FileUnits,
+    name: str,
+    low: float | None,
+    high: float | None,
+    stated: str = "",
 ) -> Limit:
     """Return the limits of an output, converted to SI.
+
+    Args:
+        stated: unit of both numbers, if it is not that of the file.
 
     Raises:
         ValueError: there is no such output, or the limits make no sense.
     """
     output, derivative = _found(case, name)
     unit = output.unit + PER_TIME[derivative]
-    _, size = in_units(unit, LENGTHS[units.length], ANGLES[units.angle])
+    shown_unit, size = in_units(unit, LENGTHS[units.length], ANGLES[units.angle])
+    if stated:
+        known, expected = read_unit(stated), read_unit(unit)
+        if known is None or expected is None or known[1] != expected[1]:
+            raise ValueError(f"found the unit {stated!r}, expected one such as {shown_unit}")
+        size = known[0](1.0)
     numbers = [each for each in (low, high) if each is not None]
     if not numbers:
         raise ValueError("found neither low nor high, expected one limit at least; give one")

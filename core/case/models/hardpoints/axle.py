@@ -170,6 +170,7 @@ def mechanism_of(
         x, y, z = at[TIEROD_INNER]
         middle = (x, sides.get("", 1) * y, z)
         joints.append(Translational(SLIDE, GROUND, RACK, middle, AXES["y"]))
+        points += [Point(RACK, RACK, middle)] * steering
         drivers.append(JointDisplacement(RACK_TRAVEL, SLIDE))
     names = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
     bodies = [Body(name) for name in names]

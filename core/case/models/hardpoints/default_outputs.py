@@ -16,6 +16,7 @@ from ....algebra import vec
 from ....dual_numbers import Slope, derivatives
 from ....kinematics import places
 from ....mechanism.mechanism import Mechanism, Vector
+from ....trajectory import Array
 from ...case import Case, Hardpoint, Quantity, size
 from ...io.document import decimal, fault, measure, shown, unknown_name
 from ...io.outputs import default, with_all_coordinates, with_slopes
@@ -25,7 +26,7 @@ from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
 from ...units import LENGTHS
-from .axle import STROKE, AxleMotion
+from .axle import RACK, STROKE, AxleMotion
 from .table import Axes, HardpointTable
 from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 
@@ -95,6 +96,7 @@ def vehicle_of(
         axle=None if position is None else Axle(position),
         wheelbase=_length(file, "wheelbase", supplied.wheelbase),
         cg_height=_length(file, "cg-height", supplied.cg_height),
+        rack_per_turn=_length(file, "rack-per-turn", supplied.rack_per_turn),
         brake_share=_share(file, "brake-share", supplied.brake_share),
         drive_share=_share(file, "drive-share", supplied.drive_share),
         kingpin=template.kingpin or None,
@@ -184,15 +186,23 @@ def with_suspension_outputs(
             add(prefix + kind, kind, wheel)
         add(f"{prefix}half_track_change", "half_track_change", wheel, at=place)
         for name, ends in template.springs.items():
-            if all(role in at for role in ends):
+            if at.keys() >= {*ends}:
                 between = tuple(prefix + role for role in ends)
                 add(prefix + name, "motion_ratio", wheel, between=between)
+        for name, roles in template.twists.items():
+            if at.keys() >= {*roles}:
+                about = tuple(prefix + role for role in roles[:3])
+                add(prefix + name, "twist", wheel, about=about)
         watched += [prefix + role for role in template.watched]
-    if motion is not None and vehicle.wheel_radius is not None:
+    if motion is not None:
         left, right = vehicles.values()
-        turning = steered or motion == AxleMotion.STEER
-        for kind in (*AXLE, *["ackermann"] * bool(vehicle.wheelbase and turning)):
-            add(kind, kind, left, other=right)
+        for name, role in template.across.items():
+            if role in at:
+                between = tuple(f"{side}_{role}" for side in Side)
+                add(name, "motion_ratio", left, between=between)
+        for kind in _defined_of_axle(vehicle, motion, steered=steered):
+            own = {"rack": RACK} if kind == "steering_ratio" else {}
+            add(kind, kind, left, other=right, **own)
     outputs += with_all_coordinates(case, watched).outputs
     return replace(
         case,
@@ -226,7 +236,7 @@ def _defined(vehicle: Vehicle) -> Iterator[str]:
         yield from ("caster", "kingpin_inclination")
     if vehicle.wheel_radius is None:
         return
-    yield "roll_center_height"
+    yield from ("roll_center_height", "jacking_coefficient")
     if vehicle.kingpin:
         yield from ON_THE_ROAD
     if vehicle.axle is None:
@@ -240,11 +250,25 @@ def _defined(vehicle: Vehicle) -> Iterator[str]:
         yield "anti_squat"
 
 
+def _defined_of_axle(vehicle: Vehicle, motion: str, *, steered: bool) -> Iterator[str]:
+    """Yield the types of the outputs of an axle that the data of its vehicle define."""
+    steering = motion == AxleMotion.STEER
+    if vehicle.wheel_radius is not None:
+        yield from AXLE
+        if vehicle.wheelbase and (steering or steered):
+            yield from ("ackermann", "ackermann_angles", "turning_circle")
+    if steering:
+        yield "mean_steer_angle"
+        if vehicle.rack_per_turn:
+            yield "steering_ratio"
+
+
 def hardpoints_of(
     named: Mapping[str, str],
     at: Mapping[str, Vector],
     axes: Axes,
     mechanism_at: Callable[[Mapping[str, Vector]], Mechanism],
+    shims: Mapping[str, Array],
 ) -> tuple[Hardpoint, ...]:
     """Return a hardpoint for each row that fills a role.
 
@@ -256,6 +280,7 @@ def hardpoints_of(
         at: positions by role [m], axes of the case.
         axes: of the table.
         mechanism_at: makes the mechanism from positions by role.
+        shims: derivatives of toe and camber by role and axes of the case.
     """
     rows = list(dict.fromkeys(named.values()))
     by_table = np.zeros((len(rows), 3, 3 * len(rows)))
@@ -278,5 +303,9 @@ def hardpoints_of(
         roles = tuple(role for role, filled in named.items() if filled == name)
         own = {place: each[:, 3 * row : 3 * row + 3] for place, each in slopes.items()}
         moves = {place: each for place, each in own.items() if each.any()}
-        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves))
+        shim: Array | None = None
+        if turned := [shims[role] for role in roles if role in shims]:
+            along, signs = zip(*axes, strict=True)
+            shim = np.sum(turned, axis=0)[:, along] * signs
+        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim))
     return tuple(hardpoints)

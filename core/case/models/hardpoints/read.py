@@ -25,8 +25,9 @@ from ...notes import SUSPENSIONS
 from ...quantity import with_markers
 from ...suspension import Side
 from ...units import plain
-from .axle import mechanism_of, read_travels
+from .axle import AxleMotion, mechanism_of, read_travels
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
+from .shims import shims
 from .table import Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
     TEMPLATE_NAMES,
@@ -121,16 +122,35 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     )
     if vehicle.wheel_radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
+    if lacking := _lacking(template, at, supplied):
+        source += f"; not computed: {', '.join(lacking)}"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit.name, assembly=(*told, *of_side))
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
+    turned = shims(template, at, vehicle.static_toe, vehicle.static_camber)
     hardpoints = hardpoints_of(
-        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs)
+        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned
     )
     return replace(case, hardpoints=hardpoints)
+
+
+def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
+    """Return the outputs of optional data that are not there, each with what to add."""
+    axle = supplied.axle is not None
+    across = {name: (role,) for name, role in template.across.items()} if axle else {}
+    wanted = {**template.springs, **template.twists, **across}
+    found = [
+        f"{name} (add {', '.join(role for role in roles if role not in at)})"
+        for name, roles in wanted.items()
+        if not {*roles} <= at.keys()
+    ]
+    steering = supplied.axle == AxleMotion.STEER
+    found += ["Ackermann and turning circle (--wheelbase)"] * (steering and not supplied.wheelbase)
+    found += ["steering_ratio (--rack-per-turn)"] * (steering and not supplied.rack_per_turn)
+    return found
 
 
 def _side(

@@ -33,6 +33,7 @@ from ...io.table import (
     trimmed,
 )
 from ...units import LENGTHS
+from .matlab import plain_lines
 from .table import (
     Hardpoint,
     HardpointTable,
@@ -60,6 +61,7 @@ _COLUMN = re.compile(
     r"(?:\s*[\[(_/,]\s*([a-z]+)\s*[\])]?|\s+(?:in\s+)?([a-z]+))?"
 )
 _CORNERS = ("corner", "wheel", "wheelposition", "axle", "side", "location")
+_REMARKS = ("meaning", "remark", "remarks", "comment", "comments", "note", "notes", "description")
 _SIGNS = re.compile(rf"[{DELIMITERS}]+")
 
 
@@ -114,6 +116,8 @@ def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoint
         for k, line in enumerate(table.lines, 1)
         if line.strip(f" \r{DELIMITERS}")
     ]
+    if file.suffix.lower() == ".m":
+        lines = plain_lines(text)
     if not lines:
         raise fault(
             file, "", f"is empty, expected a table of hardpoints; begin it with {','.join(HEAD)}"
@@ -352,12 +356,14 @@ def _require_complete(
 
     If commas separate the fields, a decimal comma splits a number into two fields. The second is
     indistinguishable from a value of a further column if rows may be shorter or longer than the
-    head.
+    head. A row may lack its remark.
     """
     filled = len(trimmed(cells))
     headed = {k for k, name in enumerate(head.names) if name} | set(head.columns)
     surplus = delimiter and any(cell != "" and k not in headed for k, cell in enumerate(cells))
     exact = delimiter != "," or not head.others or len(cells) == len(head.names)
+    lacking = [name.lower() for name in head.names[len(cells) :]]
+    exact = exact or (bool(lacking) and {*lacking} <= {*_REMARKS})
     if surplus or not exact or max(head.columns) >= filled:
         expected = [name or HEAD[0] for k, name in enumerate(head.names) if k in headed]
         comma = "; a decimal comma needs semicolons between the fields" if delimiter == "," else ""

@@ -121,6 +121,8 @@ class Template:
     watched: Sequence[str]
     sample: Mapping[str, Vector]
     springs: Mapping[str, tuple[str, str]]
+    twists: Mapping[str, tuple[str, ...]]
+    across: Mapping[str, str]
     bodies: Mapping[str, str]
     above: Sequence[tuple[str, str]]
     ahead: Sequence[tuple[str, str]]
@@ -131,6 +133,8 @@ class Template:
         """Return the joints for the places of the roles; they name the bodies."""
         joints: list[Joint] = []
         for name, (kind, i, j, role, *other) in self.joint_rows.items():
+            if "bar" in (i, j) and not at.keys() >= {*self.twists["bar_twist"]}:
+                continue
             cls: Any = Joint.registry[kind]
             given: list[Any] = [at[role]]
             if cls is Distance:
@@ -151,7 +155,9 @@ class Template:
                 for role in ([each] if isinstance(each, str) else each)
             ),
         ]
-        read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
+        twists = [roles[:3] for roles in self.twists.values() if at.keys() >= {*roles}]
+        several = (*self.springs.values(), *twists, *zip(self.across.values()))
+        read += [role for roles in several if all(map(at.get, roles)) for role in roles]
         read += [role for role in (WHEEL_CONTACT, WHEEL_AXIS) if role in at]
         return [
             Point(role, self.bodies.get(role, KNUCKLE), at[role]) for role in dict.fromkeys(read)
@@ -252,7 +258,10 @@ def _read_templates() -> dict[str, Template]:
     for name, own in written.items():
         like: dict[str, Any] = written.get(own.get("like"), {})
         both = {key: {**like.get(key, {}), **own.get(key, {})} for key in ("roles", "sample")}
-        keys: dict[str, Any] = {"springs": common["springs"], **like, **own, **both}
+        keys: dict[str, Any] = {"springs": common["springs"], "across": {}, **like, **own, **both}
+        keys["twists"] = {**common["twists"], **keys.get("twists", {})}
+        bar = [name if name != "BAR" else keys["bar"] for name in common["joints"]["bar_link"]]
+        keys["joints"] = {**keys["joints"], **common["joints"], "bar_link": bar}
         written[name] = keys
         wanted = roles(keys["roles"])
         optional = roles({**common["optional"], **keys.get("optional", {})})
@@ -264,6 +273,8 @@ def _read_templates() -> dict[str, Template]:
             *(name, own["also"], wanted, optional, keys["joints"], keys["watched"]),
             sample={role: place for role, place in keys["sample"].items() if role in known},
             springs=keys["springs"],
+            twists={name: tuple(roles) for name, roles in keys["twists"].items()},
+            across=keys["across"],
             bodies={**common["bodies"], **keys.get("bodies", {})},
             above=keys.get("above", ()),
             ahead=keys.get("ahead", ()),

@@ -131,7 +131,7 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
     left_out: list[str] = []
     leaves = [Leaf((key,), value, key) for key, value in _facts_of_comments(text)]
     try:
-        for each in ast.parse(text).body:
+        for each, above in _statements(ast.parse(text).body):
             targets = each.targets if isinstance(each, ast.Assign) else []
             if isinstance(each, ast.AnnAssign):
                 targets = [each.target]
@@ -140,7 +140,7 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
                 continue
             value = _literal(source) if (source := getattr(each, "value", None)) else ""
             for target in targets:
-                path = _KEY.sub(r".\1", ast.unparse(target)).split(".")
+                path = [*above, *_KEY.sub(r".\1", ast.unparse(target)).split(".")]
                 where = f"line {each.lineno} "
                 found = _leaves(value, tuple(path))
                 leaves += [replace(leaf, where=where + leaf.where) for leaf in found]
@@ -148,6 +148,15 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
         why = brief(f"{type(error).__name__}: {error}".replace("\n", " "))
         raise fault(file, "", f"is no Python script of points ({why}); correct it") from None
     return _table(file, "Python", leaves, supplied, left_out)
+
+
+def _statements(body: Iterable[ast.stmt], above: Keys = ()) -> Iterator[tuple[ast.stmt, Keys]]:
+    """Yield the statements of a script, and those of its classes below their names."""
+    for each in body:
+        if isinstance(each, ast.ClassDef):
+            yield from _statements(each.body, (*above, each.name))
+        else:
+            yield each, above
 
 
 def _literal(node: ast.AST) -> Any:

@@ -1,0 +1,105 @@
+"""Shims against the carrier's pose with links of given lengths, solved by Newton's method."""
+
+import math
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.cli.main import main
+
+from ..support.rods_of_templates import RODS
+
+STEP = 1e-5
+"""Half a difference [m]: its square, and round-off over it, are below the tolerance."""
+BALLS = {"mcpherson": (), "three_link": ("arm_pivot",), "semi_trailing_arm": ("arm_inner",)}
+INNER = {"lca_front", "lca_rear", "uca_front", "uca_rear", "strut_upper"}
+
+
+def turn(r):
+    angle = np.linalg.norm(r)
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = r / angle
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
+
+
+def toe_and_camber(name, role, shift, spin):
+    """Toe and camber with the joint of a role shifted: inner ends on the chassis, outer ones on the
+    carrier.
+    """
+    at = {each: np.array(place) for each, place in TEMPLATES[name].sample.items()}
+    outer = {end for _, end in RODS.get(name, ())}
+    on_body = {
+        each: place + (shift if each == role and each not in outer else 0.0)
+        for each, place in at.items()
+    }
+    on_carrier = {
+        each: place + (shift if each == role and each in outer else 0.0)
+        for each, place in at.items()
+    }
+    center = at["wheel_center"]
+
+    def misfit(pose):
+        moved = {
+            k: center + pose[:3] + turn(pose[3:]) @ (p - center) for k, p in on_carrier.items()
+        }
+        found = [pose[2]]
+        for a, b in RODS.get(name, ()):
+            found.append(np.linalg.norm(moved[b] - on_body[a]) - np.linalg.norm(at[b] - at[a]))
+        if name == "mcpherson":
+            lower = moved["strut_lower"]
+            axis = turn(pose[3:]) @ (at["strut_upper"] - at["strut_lower"])
+            found += np.cross(axis / np.linalg.norm(axis), on_body["strut_upper"] - lower).tolist()
+        for ball in BALLS.get(name, ()):
+            found += (moved[ball] - on_body[ball]).tolist()
+        if name == "semi_trailing_arm":
+            axis = on_body["arm_outer"] - on_body["arm_inner"]
+            away = moved["arm_outer"] - on_body["arm_outer"]
+            found += np.cross(axis / np.linalg.norm(axis), away).tolist()
+        return np.array(found)
+
+    pose = np.zeros(6)
+    for _ in range(6):
+        jacobian = np.array(
+            [(misfit(pose + d) - misfit(pose - d)) / 2e-6 for d in 1e-6 * np.eye(6)]
+        )
+        pose = pose - np.linalg.lstsq(jacobian.T, misfit(pose), rcond=None)[0]
+    s = turn(pose[3:]) @ spin
+    return np.array([np.arctan2(s[0], s[1]), -np.arcsin(s[2])])
+
+
+@pytest.mark.parametrize("name", [*RODS])
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (0.3, -2.0)])
+def test_shims_of_every_template(tmp_path, name, angles):
+    toe, camber = map(math.radians, angles)
+    spin = np.array(
+        [math.sin(toe) * math.cos(camber), math.cos(toe) * math.cos(camber), -math.sin(camber)]
+    )
+    sample = dict(TEMPLATES[name].sample)
+    sample["wheel_axis"] = tuple((np.array(sample["wheel_center"]) + 0.2 * spin).tolist())
+    lines = ["# units: m", "# axes: rearward,right,up", f"# template: {name}", "name,x,y,z"]
+    lines += [f"{role},{-x!r},{-y!r},{z!r}" for role, (x, y, z) in sample.items()]
+    (tmp_path / "car.csv").write_text("\n".join(lines) + "\n")
+    found = {each.roles[0]: each.shim for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
+    checked = [role for role, shim in found.items() if shim is not None]
+    ends = {end for rod in RODS[name] for end in rod}
+    assert ends <= {*checked}
+    for role in checked:
+        for k, sign in enumerate((-1.0, -1.0, 1.0)):
+            shift = STEP * sign * np.eye(3)[k]
+            up, down = (toe_and_camber(name, role, way * shift, spin) for way in (1, -1))
+            assert found[role][:, k] == pytest.approx((up - down) / (2 * STEP), abs=1e-6), (role, k)
+
+
+def test_explain_prints_shims_in_degrees(tmp_path, capsys):
+    main(["templates", "double_wishbone"])
+    (tmp_path / "car.csv").write_text(capsys.readouterr().out)
+    assert main(["explain", str(tmp_path / "car.csv"), "--samples", "2"]) == 0
+    printed = capsys.readouterr().out
+    assert "shims of 1 mm at design" in printed
+    (row,) = [line for line in printed.splitlines() if line.startswith("uca_outer  ")]
+    degrees = math.degrees(1e-3 * load(tmp_path / "car.csv").hardpoints[2].shim[1][1])
+    assert f"{degrees:+.4f}" in row.split()
