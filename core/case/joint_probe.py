@@ -114,6 +114,8 @@ def specimen(of: type[_Tested]) -> _Tested:
     between: dict[str, Any] = (
         {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
     )
+    if issubclass(of, Coupler) and of.count is None:  # a list for as many joints
+        between["factors"] = (1.0, NUMBER)
     try:
         return fitting(of, {"name": "tested", **between}, map(_made_of_pair, PAIRS))
     except MechanismError as refused:

@@ -115,7 +115,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
         errors = {(each.engine, each.run): each.errors.get(motion) for each in history}
         each = figure({where: _finite(error) for where, error in errors.items()})
         if _has_values(each) or (motion == "position" and any(past.bad for past in history)):
-            each = _floored(each, f"largest {motion} error [tolerances]", 1.0)
+            each = floored(each, f"largest {motion} error [tolerances]", 1.0)
             floor = each["layout"]["meta"]["floor"]
             each["layout"]["shapes"] = [*accepted(floor, 1.0), *lines]
             failures = (_failures(history, style, motion) for style in drawn)
@@ -219,10 +219,10 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
     times = [value for trace in traces for value in trace["x"] if value]
     side = ticked_axis(TIMES, times)
     layout = {"xaxis": side, "hovermode": "closest"}
-    return _floored({"data": traces, "layout": layout}, "largest position error [m]")
+    return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
-def _floored(figure: Figure, title: str, *within: float) -> Figure:
+def floored(figure: Figure, title: str, *within: float) -> Figure:
     """Return the figure with a vertical axis for errors, which holds these values too."""
     positive = [value for trace in figure["data"] for value in trace["y"] if value]
     positive += within
