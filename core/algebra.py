@@ -25,6 +25,16 @@ def root(a: Scalar) -> Scalar:
     return math.sqrt(a) if isinstance(a, int | float) else np.sqrt(a)
 
 
+def power(a: Scalar, n: float) -> Scalar:
+    """Return a whole positive power as products; the operator ** of numbers without one."""
+    if not isinstance(n, int) or n < 1:
+        raise TypeError(f"power {n!r}: only whole powers from 1; write / or root for others")
+    if n == 1:
+        return a
+    half = power(a, n // 2)
+    return half * half * a if n % 2 else half * half
+
+
 def is_literal_zero(a: Scalar) -> bool:
     """Return whether it is a Python zero, known before any computation: its products vanish from
     every program.

@@ -38,12 +38,14 @@ class Dataset:
         coords: labels of dimensions, by their names, and values along them.
         variables: results by name.
         x: the coordinate along the axis of curves; empty if there are no curves.
+        shown: variables that are drawn where none are named; empty: all.
     """
 
     rows: tuple[str, ...]
     coords: Mapping[str, Variable]
     variables: Mapping[str, Variable]
     x: str = ""
+    shown: Sequence[str] = ()
 
     @property
     def sizes(self) -> dict[str, int]:

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from .algebra import Scalar, Vec3
+from .algebra import Scalar, Vec3, power
 from .trajectory import Array
 
 
@@ -58,6 +58,8 @@ class Slope:
 
     def __rtruediv__(self, a: float) -> Slope:
         return Slope(a / self.x, (-a / (self.x * self.x)) * self.d)
+
+    __pow__ = power
 
     def __abs__(self) -> Slope:
         return -self if self.x < 0.0 else self

@@ -1,17 +1,17 @@
-"""Results in a notebook: a table and curves as HTML and SVG, without scripts, so that they are seen
-offline, in notebooks that are not trusted and in exports.
+"""Results and mechanisms in a notebook: tables, curves and views in three dimensions as HTML and
+SVG, without scripts, so that they are seen offline, in notebooks that are not trusted and in
+exports.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from html import escape
-from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .dataset import Dataset
 from .unit_text import with_unit
@@ -21,6 +21,20 @@ MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 WIDTH, HEIGHT, LEFT, BOTTOM = 320, 170, 58, 30
 # Okabe and Ito (https://jfly.uni-koeln.de/color): told apart by colour-blind readers
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+VIEW, MARGIN = 300.0, 28.0
+"""Larger side of a mechanism, and the room around it [px]."""
+_TURN, _TILT = math.radians(-55.0), math.radians(20.0)
+_CAMERA = np.array(
+    [
+        [-math.sin(_TURN), math.cos(_TURN), 0.0],
+        [
+            math.sin(_TILT) * math.cos(_TURN),
+            math.sin(_TILT) * math.sin(_TURN),
+            -math.cos(_TILT),
+        ],
+    ]
+)
+"""Directions to the right and downwards on the screen."""
 CELL = "text-align:right;padding:2px 8px;white-space:nowrap"
 
 
@@ -58,13 +72,15 @@ def _diagrams(data: Dataset) -> Iterator[str]:
     """Yield a diagram for each variable with curves."""
     across = data.coords[data.x]
     curves = data.curves()
-    for name, columns in islice(curves.items(), MOST_DIAGRAMS):
+    shown = data.shown or [*curves][:MOST_DIAGRAMS]
+    for name in shown:
+        columns = curves[name]
         label = with_unit(name, data.variables[name].unit)
         below = with_unit(data.x, across.unit)
         short = {column.removeprefix(f"{name}."): lines for column, lines in columns.items()}
         yield _diagram(label, below, across.values, short)
-    if len(curves) > MOST_DIAGRAMS:
-        yield f"<div>{len(curves) - MOST_DIAGRAMS} further curves</div>"
+    if len(curves) > len(shown):
+        yield f"<div>{len(curves) - len(shown)} further curves</div>"
 
 
 def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDArray[Any]]) -> str:
@@ -125,3 +141,62 @@ def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDAr
         f" fill='currentColor'>{''.join(parts)}</svg>"
         f"<div style='font-size:11px;max-width:{WIDTH}px'>{legend}{more}</div></div>"
     )
+
+
+def view(
+    title: str,
+    spots: Sequence[tuple[str, ArrayLike]],
+    rods: Sequence[tuple[ArrayLike, ArrayLike]],
+    fixed: Container[str],
+) -> str:
+    """Return a mechanism in parallel projection, z up; it moves there and back over its frames.
+
+    Args:
+        spots: points with their bodies, global in each frame, shape (frames, 3) [m].
+        rods: both ends of links between two bodies.
+        fixed: bodies that do not move; their points are squares.
+    """
+    ends = np.array([*(at for _, at in spots), *(at for rod in rods for at in rod)], np.float64)
+    if not ends.size:
+        return f"<div><b>{escape(title)}</b></div>"
+    seen = ends @ _CAMERA.T
+    low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
+    scale = VIEW / max(float((high - low).max()), 1e-9)
+    seen = MARGIN + scale * (seen - low)
+    at, of_rods = seen[: len(spots)], seen[len(spots) :].reshape(-1, 2, *seen.shape[1:])
+    names = [*dict.fromkeys(name for name, _ in spots)]
+    parts = [_moving(rod, "#777", " stroke-dasharray='7 4'") for rod in of_rods]
+    moving = [name for name in names if name not in fixed]
+    for name in names:
+        own = at[[k for k, (body, _) in enumerate(spots) if body == name]]
+        mine = np.unique(own.round(1), axis=0)
+        if name in fixed:
+            parts += [
+                f"<rect x='{x - 4:.1f}' y='{y - 4:.1f}' width='8' height='8' fill='none'"
+                " stroke='#777'/>"
+                for x, y in mine[:, 0]
+            ]
+            continue
+        colour = COLOURS[moving.index(name) % len(COLOURS)]
+        hub = mine.mean(axis=0)
+        parts += [_moving(np.array([hub, end]), colour, " stroke-width='2.5'") for end in mine]
+        x, y = hub[0]
+        parts.append(f"<text x='{x + 6:.1f}' y='{y - 6:.1f}' fill='{colour}'>{escape(name)}</text>")
+    width, height = (2 * MARGIN + scale * (high - low)).round().astype(int).tolist()
+    return (
+        "<div style='display:inline-block;margin:4px 24px 4px 0;vertical-align:top'>"
+        f"<b>{escape(title)}</b><div><svg width='{width}' height='{height}' font-size='11'"
+        f" font-family='sans-serif' overflow='visible'>{''.join(parts)}</svg></div></div>"
+    )
+
+
+def _moving(ends: NDArray[np.float64], colour: str, look: str) -> str:
+    """Return a line between two ends, shape (2, frames, 2) [px]."""
+    drawn = [f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in ends.swapaxes(0, 1)]
+    there_and_back = ";".join([*drawn, *drawn[::-1]])
+    motion = (
+        f"<animate attributeName='d' values='{there_and_back}' dur='4s' repeatCount='indefinite'/>"
+        if len(drawn) > 1
+        else ""
+    )
+    return f"<path d='{drawn[0]}' stroke='{colour}'{look}>{motion}</path>"

@@ -100,7 +100,7 @@ class Tabular:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
 
         Args:
-            names: variables to draw; all by default.
+            names: variables to draw; by default all, or of a record the six that tell most.
 
         Raises:
             KincheckError: matplotlib is not installed, or there are no such curves.
@@ -111,7 +111,7 @@ class Tabular:
             if name not in curves:
                 raise KincheckError(unknown("curve", name, curves))
         figures = library("plot", "matplotlib.figure", "matplotlib")
-        shown = names or tuple(curves)
+        shown = names or tuple(data.shown) or tuple(curves)
         figure = figures.Figure(figsize=(7.0, 2.4 * len(shown)), layout="constrained")
         axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
         x = data.coords[data.x]

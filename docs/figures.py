@@ -54,6 +54,7 @@ def FIGURES() -> dict[str, str | bytes]:  # noqa: N802
                 for name in ("report", "live")
             },
             "figures/strut-errors.svg": strut_errors(),
+            "examples/report.html": example_report(),
             "figures/car-scene.svg": scene(car, "car", frames=(0, 16, 32)),
             "figures/car-curves.svg": car_curves(car),
             "figures/car-envelope.svg": car_envelope(),
@@ -78,6 +79,16 @@ def svg(figure: Figure) -> str:
     text = io.StringIO()
     figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     return text.getvalue()
+
+
+def example_report() -> bytes:
+    """Return the report of two cases with forces, as a page to try."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        main(
+            ["run", "mcpherson_suspension", "rssr", "--engine", "native", "mujoco"]
+            + ["--out", "example"]
+        )
+    return Path("example/report.html").read_bytes()
 
 
 def strut_errors() -> str:

@@ -8,7 +8,9 @@ import sys
 import kincheck
 import numpy as np
 import pytest
+from kincheck.core.case.models.hardpoints.templates import sample_tables
 from kincheck.core.dataset import Dataset, Variable
+from kincheck.core.harness.scene_record import Scene, SceneBody, SceneJoint, ScenePoint
 from kincheck.core.tabular import Tabular
 
 
@@ -77,6 +79,54 @@ def test_pandas_and_xarray_hold_the_same_numbers(results, kind):
             arrays[name].values, each.values, equal_nan=each.values.dtype == float
         )
         assert arrays[name].attrs.get("units", "") == each.unit
+
+
+def test_plots_of_a_suspension_have_six_useful_axes(tmp_path):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "car.csv").write_text(sample_tables(["mcpherson"])[0])
+    supplied = kincheck.Supplied(travel="0.05:3")
+    record = kincheck.run(kincheck.load(tmp_path / "car.csv", supplied), "native").records[0]
+    useful = ["toe", "camber", "caster", "roll_center_height", "half_track_change", "scrub_radius"]
+    drawn = [each.get_ylabel().split(" [")[0] for each in record.plot().axes]
+    assert drawn == useful
+    assert len(record.plot("toe.velocity").axes) == 1
+    html = record.to_html()
+    assert html.count("<svg") == 6
+    assert re.search(r"\d\d further curves", html)
+
+
+def test_mechanisms_are_seen_in_three_dimensions(results):
+    html = rssr()._repr_html_()
+    assert html.count("<path") == 1 + 4  # the rod, and each body from its middle to its joints
+    assert html.count("<rect") == 2  # on the ground
+    assert ">crank</text>" in html
+    assert "<animate" not in html
+    moving = results["Results"]._repr_html_()
+    assert "<animate" in moving
+    assert "<script" not in html + moving
+    assert kincheck.Mechanism("a<b", [kincheck.Body("x")], [])._repr_html_().count("a&lt;b") == 1
+
+
+def test_views_move_as_the_bodies_do():
+    """A crank from its pin at the origin, half a turn about z: its end passes to the other side."""
+    half_turns = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    crank = SceneBody(
+        name="crank",
+        fixed=False,
+        origin=[0.5, 0.0, 0.0],
+        euler_parameters=half_turns[0],
+        r=[[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]],
+        p=half_turns,
+    )
+    pin = SceneJoint(name="pin", type="revolute", bodies=["ground", "crank"], points=[[0, 0, 0]])
+    end = ScenePoint(name="end", body="crank", position=[1.0, 0.0, 0.0], output=True)
+    html = Scene(bodies=[crank], joints=[pin], points=[end], frames=[0, 1]).view("crank")
+    paths = re.findall(r"values='(M[^']+)'", html)
+    first, last = (re.findall(r"[\d.]+", each) for each in paths[-1].split(";")[:2])
+    (x, y) = re.search(r"<rect x='([\d.]+)' y='([\d.]+)'", html).groups()
+    for a, b, at in zip(first[2:], last[2:], (x, y), strict=True):
+        assert float(a) + float(b) == pytest.approx(2.0 * (float(at) + 4.0), abs=0.3)
+    assert first != last
 
 
 def test_a_trajectory_knows_drivers_time_and_units(results):

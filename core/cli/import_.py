@@ -38,6 +38,7 @@ def _import(options: argparse.Namespace, registry: Registry) -> int:
     """
     from ..case.io.atomic_files import require_writable, to_standard_output, write
     from ..case.io.case_file import case_text
+    from ..case.io.schema import SCHEMA_FILE
 
     require_writable([("--out", options.out)])
     import_options.return_cases(options)
@@ -48,7 +49,8 @@ def _import(options: argparse.Namespace, registry: Registry) -> int:
     (file,) = options.case
     case = registry.find_case(file, import_options.supplied(options))
     import_options.tell_left_out([case])
-    text = case_text(case, comments=[f"Written by kincheck import from {Path(file).name}."])
+    text = f"#:schema {SCHEMA_FILE}\n"
+    text += case_text(case, comments=[f"Written by kincheck import from {Path(file).name}."])
     if options.out:
         write("--out", options.out, text.encode())
     else:

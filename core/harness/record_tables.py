@@ -7,10 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..case.case import PER_TRAVEL
 from ..dataset import Dataset, Variable
 from ..errors import UnknownNameError, number_of
 from ..tabular import Tabular
 from ..trajectory import PER_TIME, QUANTITIES
+
+USEFUL = ("toe", "camber", "caster", "roll_center_height", "half_track_change", "scrub_radius")
+"""Outputs of a suspension that are drawn first."""
+FEW, SHOWN = 9, 6
+"""Variables of a record that are all drawn, and outputs that are drawn of more."""
+
+
+VIEWS = 3
+"""Mechanisms that results show in a notebook."""
 
 
 class RecordTable(Tabular):
@@ -43,14 +53,29 @@ class RecordTable(Tabular):
                     key = name if quantity == QUANTITIES[0] else f"{name}.{quantity}"
                     numbers = np.array(values, dtype=np.float64)  # null becomes NaN
                     variables[key] = Variable("sample", numbers, f"{output.unit}{per_time}")
-        return Dataset(("sample",), coords, variables, next(iter(coords), ""))
+        return Dataset(
+            ("sample",), coords, variables, next(iter(coords), ""), self._shown([*variables])
+        )
+
+    def _shown(self, names: list[str]) -> list[str]:
+        """Return the variables that are drawn: all of a few; of more, the useful outputs of a
+        suspension, then other measures, then coordinates, without their rates.
+        """
+
+        def place(name: str) -> tuple[int, bool, bool]:
+            useful = USEFUL.index(name) if name in USEFUL else len(USEFUL)
+            return useful, name.endswith(PER_TRAVEL), "." in name
+
+        outputs = [name for name in names if name in self.outputs]
+        return names if len(names) <= FEW else sorted(outputs, key=place)[:SHOWN]
 
 
 class ResultsTable(Tabular):
     """The records of a run, one per row."""
 
-    if TYPE_CHECKING:  # the field of Results
+    if TYPE_CHECKING:  # the fields of Results
         records: Any
+        scenes: Any
 
     __slots__ = ()
 
@@ -62,6 +87,11 @@ class ResultsTable(Tabular):
         outcomes = [f"{count} {name}" for name, count in counts.items()]
         whole = [number_of(len(cases), "case"), number_of(len(engines), "engine")]
         return ", ".join([*whole, *outcomes])
+
+    def _repr_html_(self) -> str:
+        """Return the table, and the mechanisms of the first cases in motion, for a notebook."""
+        shown = [*self.scenes.items()][:VIEWS]
+        return super()._repr_html_() + "".join(scene.view(case) for case, scene in shown)
 
     def dataset(self) -> Dataset:
         """Return outcome, errors and time of every record. An error is the largest ratio of an

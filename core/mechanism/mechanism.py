@@ -190,6 +190,28 @@ class Mechanism:
         ]
         return f"<Mechanism: {'; '.join([self.name, *told])}>"
 
+    def _repr_html_(self) -> str:
+        """Return the design position for a notebook."""
+        from ..notebook_view import view
+
+        placed = [
+            (body, P)
+            for joint in self.joints
+            for body in joint.bodies
+            for P in joint.points_on(body)
+        ]
+        placed += [
+            (point.body, point.position)
+            for point in self.points
+            if not point.name.startswith(MARKER)
+        ]
+        spots = [(body, [P]) for body, P in placed]
+        pairs = [joint.points_on() for joint in self.joints if len(joint.points_on()) == 2]
+        rods = [([a], [b]) for a, b in pairs]
+        return view(
+            repr(self), spots, rods, {each.name for each in self.bodies if each.fixed} | {GROUND}
+        )
+
     def _check_loads(self, bodies: Mapping[str, None]) -> None:
         what = "gravity"
         object.__setattr__(self, what, triple(what, self.gravity, "three numbers [m/s^2]"))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
-from ..algebra import Scalar, root
+from ..algebra import Scalar, power, root
 from ..trajectory import Array
 
 if TYPE_CHECKING:
@@ -121,6 +121,8 @@ class Traced:
     def __neg__(self) -> Scalar:
         opposite = self.opposite
         return self.tape.node("neg", self.number) if opposite is None else opposite
+
+    __pow__ = power
 
     def sqrt(self) -> Scalar:
         """Return the square root."""

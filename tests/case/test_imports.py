@@ -156,7 +156,9 @@ def test_the_command_writes_a_file_that_runs(tmp_path: Path, capsys: pytest.Capt
     drive = ["--drive", "hinge:0:1:5"]
     assert main(["import", str(model), *drive]) == 0
     printed = capsys.readouterr()
-    assert printed.out.startswith("# Written by kincheck import from model.xml.\nschema =")
+    assert printed.out.startswith(
+        "#:schema kincheck-case.schema.json\n# Written by kincheck import from model.xml.\nschema ="
+    )
     assert "left out: nothing" in printed.err
     assert main(["import", *drive, "--out", str(out), str(model)]) == 0
     assert capsys.readouterr().out == ""

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 LANGUAGES = {
     "sh", "console", "python", "text", "toml", "csv", "xml", "yaml", "ini", "json",
-    "math", "markdown", "crontab",
+    "math", "markdown", "crontab", "powershell",
 }  # fmt: skip
 BLOCK = re.compile(
     r"^(?:<!-- (?P<key>not run|status): (?P<value>.+?) -->\n)?"

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kincheck.core.algebra import root
+from kincheck.core.dual_numbers import Slope
 from kincheck.core.program import (
     Tape,
     absolute,
@@ -259,3 +260,15 @@ def test_the_page_on_programs_names_every_module():
     }
     named = {name for name in re.findall(r"`([\w.]+)`", page) if name in modules}
     assert sorted(modules - named) == []
+
+
+def test_whole_powers_are_products():
+    tape = Tape()
+    x, block = tape.input(0), np.array([[1.5, -2.0]] + 7 * [[0.0, 0.0]])
+    run({n: x**n for n in range(1, 8)}, block)
+    assert np.array_equal(block[1:], [[1.5**n, (-2.0) ** n] for n in range(1, 8)])
+    slope = Slope(3.0, np.array([1.0])) ** 3
+    assert (slope.x, *slope.d) == (27.0, 27.0)
+    for n in (0.5, 0, -1):
+        with pytest.raises(TypeError, match=r"only whole powers from 1; write / or root"):
+            x**n

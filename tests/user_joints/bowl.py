@@ -21,7 +21,7 @@ class OnBowl(Primitive):
     def phi(self, i, j):
         d = (j.u + j.swing(self.s_j)) - (i.u + i.swing(self.s_i))
         x, y, z = (i.turn(axis) @ d for axis in self.axes)
-        return (z - (x * x + y * y) * (0.5 / self.R),)
+        return (z - (x**2 + y**2) * (0.5 / self.R),)
 
 
 @dataclass(frozen=True)

@@ -197,6 +197,8 @@ from ..quantity import own_keys
 from ..suspension import Axle, AxleOutput, Convention, Reaction, Side, SuspensionOutput
 
 SCHEMA = "kincheck-case/1"
+SCHEMA_FILE = "kincheck-case.schema.json"
+"""The output of `kincheck schema case` beside a case file, by which editors complete its keys."""
 CITATION = "a text that says where the true values come from: author, title, page or address"
 DIGEST = "sha256:"
 MOST_SAMPLES = 1_000_000

@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from ...algebra import Scalar, Vec3, quat
+from ...algebra import Scalar, Vec3, power, quat
 from ...errors import SolveError
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import Mechanism
@@ -106,6 +106,8 @@ class Exact:
         return Exact(_value(a) / self.value)
 
     __radd__, __rmul__ = __add__, __mul__
+
+    __pow__ = power
 
     def __neg__(self) -> Exact:
         return Exact(-self.value)

@@ -1,0 +1,51 @@
+"""The GitHub Action does in a shell what its page says."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from ..support.case_texts import BASE, INLINE
+from ..support.sources import ROOT
+
+ACTION = yaml.safe_load((ROOT / ".github/actions/kincheck/action.yml").read_text("utf-8"))
+STEPS = [each["run"] for each in ACTION["runs"]["steps"] if "run" in each][1:]
+
+
+@pytest.fixture
+def job(tmp_path):
+    """A night: its status, and what the job's page shows."""
+    command = tmp_path / "kincheck" / "bin" / "kincheck"
+    command.parent.mkdir(parents=True)
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m kincheck "$@"\n')
+    command.chmod(0o755)
+    given = {name: each["default"] for name, each in ACTION["inputs"].items()}
+
+    def job(**inputs):
+        outputs, summary = tmp_path / "outputs", tmp_path / "summary"
+        environment = {
+            **{name: x for name, x in os.environ.items() if not name.startswith("KINCHECK")},
+            **{name.upper(): x for name, x in {**given, **inputs}.items()},
+            "RUNNER_TEMP": str(tmp_path),
+            "GITHUB_OUTPUT": str(outputs),
+            "GITHUB_STEP_SUMMARY": str(summary),
+        }
+        status = 0
+        for step in STEPS:
+            run = subprocess.run(["bash", "-e", "-c", step], cwd=tmp_path, env=environment)
+            status = status or run.returncode
+        return status, outputs.read_text().split()[-1], summary.read_text()
+
+    return job
+
+
+def test_the_action_is_red_after_a_regression(job, tmp_path):
+    file = tmp_path / "slider.toml"
+    file.write_text(BASE + INLINE)
+    assert job(cases="slider.toml")[:2] == (0, "status=0")
+    file.write_text(BASE + INLINE.replace("1.6", "1.7"))
+    status, output, summary = job(cases="slider.toml", engines="", options="--engine native -q")
+    assert (status, output) == (1, "status=1")
+    assert "1 new failure" in summary
