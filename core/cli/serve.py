@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
+from ..report.progress import complain
 from . import import_options
 from .option_types import whole
 from .registry import Registry, Status
-from .run_options import TOL
+from .run_options import TOL, add_curve_options, curve_options, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..harness.record import Record
-    from ..live.server import Live
+    from ..harness.record import Record, Results
+    from ..live.server import Judge, Live
 
 
 def add(commands: Any) -> None:
@@ -51,7 +52,23 @@ def add(commands: Any) -> None:
         metavar="N",
         help="serve nothing: make N edits of a table, print how long each step takes, and end",
     )
+    serving.add_argument(
+        "--reference",
+        type=Path,
+        metavar="FILE",
+        help=(
+            "measured curve (.csv, .xlsx, ...) or proved reference (.json) to lay over the curves,"
+            " with its tolerance"
+        ),
+    )
+    serving.add_argument(
+        "--vary",
+        type=Path,
+        metavar="FILE",
+        help="tolerances of a table, as of kincheck sweep: histograms, and limits in the curves",
+    )
     import_options.add_options(serving)
+    add_curve_options(serving)
 
 
 def _serve(options: argparse.Namespace, registry: Registry) -> int:
@@ -69,12 +86,28 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
     from ..live.table import LiveTable
 
     file, supplied = Path(options.file), import_options.supplied(options)
+    curve = curve_options(options)
+    if not options.reference and curve != type(curve)():
+        raise KincheckError("options for measured curves need a curve: give --reference FILE")
+
+    def referenced(case: Case) -> Case:
+        if not options.reference:
+            return case
+        (case,), notes = judged([case], [options.reference], curve, None)
+        if told != notes:
+            told[:] = notes
+            complain(notes)
+        return case
 
     def opened() -> Live:
         named = options.file not in registry.cases() and file.is_file()
         if named and is_table(file, supplied):
-            return LiveTable(file, supplied)
-        return LiveModel(file, registry.find_case(options.file, supplied))
+            return LiveTable(file, supplied, referenced, options.vary)
+        if options.vary:
+            raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
+        return LiveModel(file, referenced(registry.find_case(options.file, supplied)))
+
+    told = list[str]()
 
     if options.measure is not None:
         return _measured(opened(), options.measure)
@@ -124,16 +157,16 @@ def _measured(live: Live, count: int) -> int:
     return Status.WITHIN
 
 
-def judge_by(registry: Registry) -> Callable[[Case, Sequence[str], Callable[[Record], None]], None]:
+def judge_by(registry: Registry) -> Judge:
     """Return the function that solves a case by engines in worker processes."""
 
-    def judge(case: Case, names: Sequence[str], tell: Callable[[Record], None]) -> None:
+    def judge(case: Case, names: Sequence[str], tell: Callable[[Record], None]) -> Results:
         from ..harness.resource_limits import Limits
         from ..harness.run import run
         from ..harness.workers.pool import in_workers
 
         engines = registry.find_engines(names, [])
-        run(
+        return run(
             [case],
             engines,
             tol=TOL,

@@ -19,7 +19,15 @@ from ..mechanism.motions import Path as Way
 from ..mechanism.motions import Ramp
 from ..report.drawing import drawing
 from .protocol import VERSION, Answer, LiveDriver, Opening, Pose, Reached, Refused
-from .table import FRAMES, TOL, as_values, live_axis, live_outputs, sweep_axis
+from .table import (
+    FRAMES,
+    TOL,
+    as_values,
+    live_axis,
+    live_outputs,
+    live_reference,
+    sweep_axis,
+)
 
 WAY = 33
 """Samples on the way from the design to a pose; longer steps are divided by the solver."""
@@ -59,6 +67,9 @@ class LiveModel:
             drivers=[*self.drivers.values()],
             engines=[*engines],
             save="",
+            reference=live_reference(self.case),
+            limits={},
+            varied=False,
         )
 
     def answer(self, number: int) -> Answer | Refused:

@@ -5,7 +5,7 @@ Lengths of points are in the unit and along the axes of the file; everything els
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
@@ -38,9 +38,14 @@ class _Message(
 
 
 class Solve(_Message, frozen=True):
-    """Solve a table with these points."""
+    """Solve a table with these points.
+
+    Attributes:
+        whole: whether outputs that need another solution, which takes longer, are wanted.
+    """
 
     points: Rows
+    whole: bool = True
 
 
 class Rank(_Message, frozen=True):
@@ -74,6 +79,21 @@ class Check(_Message, frozen=True):
     points: Rows | None = None
 
 
+class Vary(_Message, frozen=True):
+    """Find the spread of an output over the variants of the file of tolerances."""
+
+    points: Rows
+    output: Name
+
+
+class Export(_Message, frozen=True):
+    """Solve by engines in worker processes, and hand out the file of `kincheck run`."""
+
+    kind: Literal["csv", "xlsx", "report"]
+    engines: Annotated[list[Name], msgspec.Meta(min_length=1, max_length=20)]
+    points: Rows | None = None
+
+
 class Save(_Message, frozen=True):
     """Write a table with these points to a new file beside the user's own."""
 
@@ -81,7 +101,7 @@ class Save(_Message, frozen=True):
     name: Name
 
 
-Asked: TypeAlias = Solve | Rank | Move | Reach | Check | Save
+Asked: TypeAlias = Solve | Rank | Vary | Move | Reach | Check | Export | Save
 
 
 class LivePoint(msgspec.Struct, frozen=True):
@@ -107,6 +127,13 @@ class LiveOutput(msgspec.Struct, frozen=True):
     shown_unit: str
     scale: float
     group: str
+
+
+class LiveReference(msgspec.Struct, frozen=True):
+    """Values of an output over the sweep to compare with; null without one; and their tolerance."""
+
+    values: Values
+    tolerance: float
 
 
 class LiveDriver(msgspec.Struct, frozen=True):
@@ -139,6 +166,9 @@ class Opening(_Message, frozen=True):
         kind: "table" or "model".
         unit, axes: of the points.
         save: a free name for a new file.
+        reference: values to compare with, by output.
+        limits: smallest and largest value by output; null without one.
+        varied: whether there is a file of tolerances.
     """
 
     protocol: int
@@ -153,13 +183,16 @@ class Opening(_Message, frozen=True):
     drivers: list[LiveDriver]
     engines: list[str]
     save: str
+    reference: dict[str, LiveReference]
+    limits: dict[str, tuple[float | None, float | None]]
+    varied: bool
 
 
 class Answer(_Message, frozen=True):
     """The motion over the sweep.
 
     Attributes:
-        outputs: values by output; null without a value.
+        outputs: values by output; null without a value. Some may be missing if not all were wanted.
         solved: whether each sample was reached.
         drawing: the scene, as in reports; its frames are the samples in `frames`.
         message: why samples are missing; empty if none are.
@@ -234,6 +267,28 @@ class Ranking(_Message, frozen=True):
     effects: list[Effect]
 
 
+class Bins(msgspec.Struct, frozen=True):
+    """Numbers of variants between edges of an output's value."""
+
+    edges: list[float]
+    counts: list[int]
+
+
+class Spread(_Message, frozen=True):
+    """The variants of an output at the samples of rebound, design and jounce.
+
+    Attributes:
+        bins: null where all variants are equal.
+        failed: number of variants that do not reach all samples.
+    """
+
+    output: str
+    samples: list[int]
+    bins: list[Bins | None]
+    variants: int
+    failed: int
+
+
 class Verdict(_Message, frozen=True):
     """An engine's result.
 
@@ -256,6 +311,13 @@ class Saved(_Message, frozen=True):
     name: str
 
 
+class Exported(_Message, frozen=True):
+    """A file to keep, as base64."""
+
+    name: str
+    content: bytes
+
+
 class Invalid(_Message, frozen=True):
     """A message without an answer, and the reason."""
 
@@ -269,7 +331,18 @@ class Changed(_Message, frozen=True):
 
 
 Told: TypeAlias = (
-    Opening | Answer | Pose | Reached | Refused | Ranking | Verdict | Saved | Invalid | Changed
+    Opening
+    | Answer
+    | Pose
+    | Reached
+    | Refused
+    | Ranking
+    | Spread
+    | Verdict
+    | Saved
+    | Exported
+    | Invalid
+    | Changed
 )
 
 _DECODER = msgspec.json.Decoder(Asked)

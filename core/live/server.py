@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Condition, Event, Lock, Thread
 from typing import Any, TypeAlias
 from urllib.parse import parse_qs, urlsplit
@@ -26,15 +27,20 @@ from ..case.case import Case
 from ..case.io.reference_file import sha256
 from ..errors import KincheckError
 from ..extras import library
-from ..harness.record import Record
+from ..harness.record import Record, Results
+from ..harness.scene import with_scenes
+from ..report.curves import write_curves
 from ..report.page_model import judged, worst
 from ..report.page_parts import SCENE_SCRIPTS, script_of, style_sheet
+from ..report.report import write_report
 from .model import LiveModel
 from .protocol import (
     LARGEST_MESSAGE,
     Asked,
     Changed,
     Check,
+    Export,
+    Exported,
     Invalid,
     Move,
     Rank,
@@ -43,6 +49,7 @@ from .protocol import (
     Saved,
     Solve,
     Told,
+    Vary,
     Verdict,
     encode,
     read,
@@ -70,7 +77,7 @@ GRACE = 2.0
 """Time for a page to load again [s]."""
 
 Live: TypeAlias = LiveTable | LiveModel
-Judge: TypeAlias = Callable[[Case, Sequence[str], Callable[[Record], None]], None]
+Judge: TypeAlias = Callable[[Case, Sequence[str], Callable[[Record], None]], Results]
 """Solves a case with engines of these names, and tells each record."""
 
 
@@ -226,7 +233,7 @@ class Conversation:
             return
         threads = [
             Thread(target=self._work, args=(kinds, closed), daemon=True)
-            for kinds in ((Solve, Move, Save, Rank, Reach), (Check,))
+            for kinds in ((Solve, Move, Save, Rank, Vary, Reach), (Check, Export))
         ]
         with suppress(closed):
             self.tell(self.live.opening(self.server.engines))
@@ -279,8 +286,8 @@ class Conversation:
                 )
             )
         try:
-            if isinstance(message, Check):
-                self._check(message)
+            if isinstance(message, Check | Export):
+                self._judge(message)
             else:
                 with self.server.lock:
                     answer = self._found(message)
@@ -296,9 +303,11 @@ class Conversation:
         live = self.live
         match live, message:
             case LiveTable(), Solve():
-                return live.answer(message.id, message.points)
+                return live.answer(message.id, message.points, whole=message.whole)
             case LiveTable(), Rank():
                 return live.ranking(message.id, message.points, message.output)
+            case LiveTable(), Vary():
+                return live.spread(message.id, message.points, message.output)
             case LiveTable(), Save():
                 return Saved(id=message.id, name=live.save(message.points, message.name))
             case LiveModel(), Solve():
@@ -310,8 +319,8 @@ class Conversation:
             case _:
                 raise KincheckError(f"a {live.kind} has no answer to {type(message).__name__}")
 
-    def _check(self, message: Check) -> None:
-        """Tell the verdict of each engine as it ends."""
+    def _judge(self, message: Check | Export) -> None:
+        """Tell the verdict of each engine as it ends, or hand out a file of the results."""
         live, names = self.live, [*dict.fromkeys(message.engines)]
         for name in names:
             if name not in self.server.engines:
@@ -319,15 +328,31 @@ class Conversation:
         case = live.case
         if isinstance(live, LiveTable) and message.points is not None:
             with self.server.lock:
-                case = live.edited(message.points)
+                case = live.referenced(live.edited(message.points))
         done = 0
 
         def tell(record: Record) -> None:
             nonlocal done
             done += 1
-            self.tell(_verdict(message.id, record, last=done == len(names)))
+            if isinstance(message, Check):
+                self.tell(_verdict(message.id, record, last=done == len(names)))
 
-        self.server.judge(case, names, tell)
+        results = self.server.judge(case, names, tell)
+        if isinstance(message, Export):
+            ending = "html" if message.kind == "report" else message.kind
+            name = f"{live.file.stem}.{ending}"
+            self.tell(Exported(id=message.id, name=name, content=_file(results, case, name)))
+
+
+def _file(results: Results, case: Case, name: str) -> bytes:
+    """Return the report or the curves of results."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        if path.suffix == ".html":
+            write_report(with_scenes(results, [case]), path)
+        else:
+            write_curves(results, path, kind=path.suffix[1:], long=False)
+        return path.read_bytes()
 
 
 def _verdict(number: int, record: Record, *, last: bool) -> Verdict:

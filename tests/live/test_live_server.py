@@ -1,5 +1,6 @@
 """The server of the live page: who gets in, what it answers, and how it ends."""
 
+import base64
 import http.client
 import json
 import os
@@ -10,9 +11,11 @@ import sys
 from dataclasses import replace
 
 import jsonschema
+import numpy as np
 import pytest
-from kincheck import load, run
+from kincheck import load, run, sweep
 from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.live.model import LiveModel
 from kincheck.core.live.protocol import LARGEST_MESSAGE, live_schema
 from kincheck.core.live.table import LiveTable
@@ -330,6 +333,83 @@ def test_axle_answers_for_both_wheels(car):
     points = [each.position for each in live.opening([]).points]
     outputs = live.answer(1, points).outputs
     assert outputs["left_camber"] == pytest.approx(outputs["right_camber"][::-1], abs=1e-12)
+
+
+@pytest.mark.parametrize("axle", ["heave", "roll", "steer"])
+def test_axle_answers_all_outputs_as_run(car, axle):
+    """Derivatives by travel with the steering held too."""
+    supplied = Supplied(travel="0.01:5", axle=axle)
+    live = LiveTable(car, supplied)
+    (record,) = run(load(car, supplied), "native").records
+    outputs = live.answer(1, live.positions).outputs
+    assert {*outputs} == {*record.outputs}
+    for name, expected in record.outputs.items():
+        values = [np.nan if each is None else each for each in outputs[name]]
+        wanted = [np.nan if each is None else each for each in expected.position]
+        assert values == pytest.approx(wanted, rel=1e-9, abs=1e-11, nan_ok=True), name
+    soon = live.answer(2, live.positions, whole=False).outputs
+    assert ("left_roll_center_height" in soon) == (axle == "heave")
+
+
+RIG = "# signs: iso8855\ntravel [mm],Toe Angle [deg]\n-30,0.22\n0,0.01\n30,-0.18\n"
+VARY = """\
+schema = "kincheck-vary/1"
+mode = "monte_carlo"
+
+[units]
+length = "mm"
+angle = "deg"
+
+[hardpoints.tie]
+at = "tierod_outer"
+sigma = 0.5
+
+[limits.toe]
+high = 0.3
+"""
+
+
+def test_reference_has_its_tolerance_and_judges(car, tmp_path):
+    (tmp_path / "rig.csv").write_text(RIG, "utf-8")
+    options = CurveOptions(accuracy=["toe=0.02 deg"])
+    live = LiveTable(car, TRAVEL, lambda case: with_curve(case, tmp_path / "rig.csv", options)[0])
+    found = live.opening([]).reference["toe"]
+    assert found.tolerance == pytest.approx(np.radians(0.02 + 0.005))  # and half a digit
+    known = [each for each in found.values if each is not None]
+    assert np.degrees(known) == pytest.approx([0.22, 0.01, -0.18])
+    judged = live.referenced(live.edited(live.positions))
+    (record,) = run(judged, "native").records
+    assert record.errors["toe"].position.tolerance == pytest.approx(found.tolerance)
+
+
+def test_spread_is_that_of_the_sweep(car, tmp_path):
+    (tmp_path / "vary.toml").write_text(VARY, "utf-8")
+    live = LiveTable(car, TRAVEL, vary=tmp_path / "vary.toml")
+    opening = live.opening([])
+    assert opening.varied
+    assert opening.limits == {"toe": (None, pytest.approx(np.radians(0.3)))}
+    found = live.spread(3, live.positions, "toe")
+    assert found.samples == [0, 10, 20]
+    assert found.bins[1] is None  # toe at design is a number of the table
+    case = load(car, TRAVEL)
+    envelope = sweep(case, tmp_path / "vary.toml", samples=found.variants).outputs["toe"]
+    for sample in (0, 20):
+        bins = found.bins[found.samples.index(sample)]
+        assert bins is not None
+        assert sum(bins.counts) == found.variants
+        assert bins.edges[0] == pytest.approx(envelope.min[sample], rel=1e-9)
+        assert bins.edges[-1] == pytest.approx(envelope.max[sample], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "start"), [("csv", b"stroke"), ("xlsx", b"PK"), ("report", b"<!")]
+)
+def test_export_is_the_file_of_run(page, kind, start):
+    points = page.moved("uca_outer", 1, 2.0)
+    page.say(type="export", kind=kind, engines=["native"], points=points)
+    found = page.told("exported")
+    assert found["name"] == f"car.{'html' if kind == 'report' else kind}"
+    assert base64.b64decode(found["content"]).startswith(start)
 
 
 @pytest.mark.parametrize("axle", [None, "heave"])
