@@ -50,7 +50,10 @@ def add(commands: Any) -> None:
         "--measure",
         type=whole(1),
         metavar="N",
-        help="serve nothing: make N edits of a table, print how long each step takes, and end",
+        help=(
+            "make N edits of a table, print how long each step takes, in the browser too unless"
+            " --no-browser, and end"
+        ),
     )
     serving.add_argument(
         "--reference",
@@ -109,22 +112,34 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
 
     told = list[str]()
 
-    if options.measure is not None:
-        return _measured(opened(), options.measure)
+    wanted: int = options.measure or 0
+    if wanted:
+        _measured(opened(), wanted)
+        if options.no_browser:
+            return Status.WITHIN
     server = LiveServer(
         file, opened, registry.engines, judge_by(registry), port=options.port, once=options.once
     )
     try:
-        print(server.address, flush=True)
-        if not options.no_browser:
-            webbrowser.open(server.address)
+        address = server.address + f"&measure={wanted}" * bool(wanted)
+        print(address, flush=True)
+        if not options.no_browser and not webbrowser.open(address) and wanted:
+            raise KincheckError("--measure: no browser is found; give --no-browser, or set BROWSER")
         server.ended.wait()
     finally:
         server.close()
+    if wanted:
+        _print_times("browser", server.measured)
     return Status.WITHIN
 
 
-def _measured(live: Live, count: int) -> int:
+def _print_times(name: str, times: Sequence[float]) -> None:
+    from statistics import median
+
+    print(f"  {name:<9} median {median(times):8.2f} ms, most {max(times):8.2f} ms")
+
+
+def _measured(live: Live, count: int) -> None:
     """Print the times of edits: of each step and of a whole answer as JSON, and the processor's
     share of it, free of other programs.
     """
@@ -153,8 +168,7 @@ def _measured(live: Live, count: int) -> int:
     samples = len(live.case.sweep.values)
     print(f"{live.file.name}: {count} edits, {samples} samples, {size_sent:.0f} bytes each")
     for name, each in steps.items():
-        print(f"  {name:<9} median {statistics.median(each):8.2f} ms, most {max(each):8.2f} ms")
-    return Status.WITHIN
+        _print_times(name, each)
 
 
 def judge_by(registry: Registry) -> Judge:

@@ -4,7 +4,7 @@
 // The figures of a group of outputs.
 //   axis: of the sweep; state: `answer`, `ghost`, and by output `limits` and `reference`; `fresh`
 //   are the outputs of the last answer.
-// Returns `group` (draw the outputs of a group) and `draw`.
+// Returns `group` (draw the outputs of a group) and `draw` (those in view, or all).
 function figures(box, outputs, axis, state) {
   const driver = axis.values.map((value) => value * axis.scale);
   const [along, across] = axis.up ? ["y", "x"] : ["x", "y"];
@@ -77,8 +77,13 @@ function figures(box, outputs, axis, state) {
       box.replaceChildren();
       drawn = outputs.filter(({ group }) => group === name).map(start);
     },
-    draw() {
-      for (const { output, plotBox, figure } of drawn) {
+    // Draw the figures in view, or all.
+    draw(all = false) {
+      const isSeen = ({ plotBox }) => {
+        const { top, bottom } = plotBox.getBoundingClientRect();
+        return bottom > 0 && top < innerHeight;
+      };
+      for (const { output, plotBox, figure } of drawn.filter((each) => all || isSeen(each))) {
         plotBox.classList.toggle("late", !state.fresh.has(output.name));
         figure.change(traces(output), bands(output));
       }

@@ -132,7 +132,14 @@ const DIRECTIONS = {
       else design.undo();
     });
     parts.table.show();
-    solve();
+    if (!kept()) solve();
+  }
+  // The numbers before the page was loaded again, if the file is the same; undone by one step.
+  const numbers = () => `kincheck ${opening.source} ${JSON.stringify(opening.points)}`;
+  function kept() {
+    const rows = JSON.parse(sessionStorage.getItem(numbers()) || "null");
+    if (rows) parts.design.all(rows);
+    return rows;
   }
 
   function openModel() {
@@ -160,6 +167,7 @@ const DIRECTIONS = {
     one("#verdicts tbody").replaceChildren();
     edited = true;
     parts.whole = false;
+    sessionStorage.setItem(numbers(), JSON.stringify(parts.design.rows()));
     trouble("");
     parts.table.show();
     parts.planes.draw();
@@ -182,9 +190,10 @@ const DIRECTIONS = {
     if (!message.drawing.bodies.length) return;
     if (parts.first) start(message);
     else {
-      parts.scene.change(message.drawing);
+      const motion = motionOf(message.drawing);
+      parts.scene.change(message.drawing, motion);
       parts.figures.draw();
-      if (parts.planes) parts.planes.change(message.drawing);
+      if (parts.planes) parts.planes.change(message.drawing, motion);
     }
     parts.numbers.show();
     const lost = message.solved.filter((each) => !each).length;
@@ -196,6 +205,7 @@ const DIRECTIONS = {
   }
   function settled() {
     if (link.isDue("solve")) return;
+    parts.figures.draw(true);
     const late = opening.outputs.some(({ name }) => !state.fresh.has(name));
     if (late && !parts.whole) {
       parts.whole = true;
@@ -210,7 +220,7 @@ const DIRECTIONS = {
     const stem = opening.file.replace(/\.[^.]*$/, "");
     parts.scene = mechanism(one("#scene"), message.drawing, `${stem}_scene`, trouble);
     if (parts.planes) {
-      parts.planes.change(message.drawing);
+      parts.planes.change(message.drawing, motionOf(message.drawing));
       parts.planes.ghost(message.drawing);
     }
     parts.figures = figures(one("#figures"), outputs, axis, state);
@@ -219,6 +229,8 @@ const DIRECTIONS = {
     parts.figures.group(one("#group").value);
     one("#group").onchange = () => parts.figures.group(one("#group").value);
     document.documentElement.dataset.ready = "";
+    const count = Number(new URLSearchParams(location.search).get("measure"));
+    if (count && parts.design) measureEdits(count);
   }
 
   // The words of the key samples.
@@ -247,6 +259,29 @@ const DIRECTIONS = {
       const text = `server ${server.toFixed(0)} ms, edit to screen ${whole.toFixed(0)} ms`;
       one("#cost").textContent = text;
     });
+  }
+
+  // Make edits one after the other, tell the server their times, and end.
+  async function measureEdits(count) {
+    const pause = (wait) => new Promise((done) => setTimeout(done, wait));
+    async function edited(change) {
+      while (link.isDue("solve")) await pause(20);
+      const before = state.latest;
+      change();
+      while (state.latest === before) await pause(1);
+      return state.times.at(-1);
+    }
+    await pause(1000); // what follows an opening is over
+    const { design } = parts;
+    const by = 1e-4 / METRES[opening.unit];
+    const milliseconds = [];
+    for (let k = 0; k < count; k++) {
+      const at = k % opening.points.length;
+      const moved = design.rows()[at].map((value) => value + by);
+      milliseconds.push(await edited(() => design.set(at, moved)));
+      await edited(() => design.all(design.start));
+    }
+    link.tell({ type: "measured", milliseconds });
   }
 
   function rank() {

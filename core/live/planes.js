@@ -117,7 +117,16 @@ function planes(box, points, { metres, file, step }, design, choose) {
     return { figure, draw, spots };
   }
 
-  const draw = () => views.forEach((view) => view.draw());
+  // Several changes before the next picture are drawn once.
+  let due = 0;
+  function draw() {
+    due = due || requestAnimationFrame(drawNow);
+  }
+  function drawNow() {
+    cancelAnimationFrame(due);
+    due = 0;
+    views.forEach((view) => view.draw());
+  }
   const lines = (drawing) => {
     const { places } = motionOf(drawing);
     const at = places[drawing.start];
@@ -127,12 +136,12 @@ function planes(box, points, { metres, file, step }, design, choose) {
   return {
     draw,
     spots: (view) => views[view].spots(),
-    change(drawing) {
+    change(drawing, motion) {
       state.drawing = drawing;
-      state.motion = motionOf(drawing);
+      state.motion = motion;
       const places = [...state.motion.places, design.start.map(metres)];
       state.bounds = state.bounds || boundsOf({ places, wheels: [], forces: [] });
-      draw();
+      drawNow();
     },
     ghost(drawing) {
       state.ghost = lines(drawing);

@@ -12,6 +12,8 @@ import msgspec
 VERSION = 1
 LARGEST_MESSAGE = 64_000
 """Largest message of a page [bytes]: hundreds of points take less."""
+MOST_MESSAGES = 1_000
+"""Most messages of a page in a second: a page asks again after an answer, and a hand makes 100."""
 MOST_POINTS = 1_000
 
 Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
@@ -101,7 +103,13 @@ class Save(_Message, frozen=True):
     name: Name
 
 
-Asked: TypeAlias = Solve | Rank | Vary | Move | Reach | Check | Export | Save
+class Measured(_Message, frozen=True):
+    """Tell how long edits took from the page's event to the drawn curves [ms]."""
+
+    milliseconds: Annotated[list[Number], msgspec.Meta(min_length=1, max_length=10_000)]
+
+
+Asked: TypeAlias = Solve | Rank | Vary | Move | Reach | Check | Export | Save | Measured
 
 
 class LivePoint(msgspec.Struct, frozen=True):

@@ -18,6 +18,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Condition, Event, Lock, Thread
+from time import monotonic
 from typing import Any, TypeAlias
 from urllib.parse import parse_qs, urlsplit
 
@@ -36,12 +37,14 @@ from ..report.report import write_report
 from .model import LiveModel
 from .protocol import (
     LARGEST_MESSAGE,
+    MOST_MESSAGES,
     Asked,
     Changed,
     Check,
     Export,
     Exported,
     Invalid,
+    Measured,
     Move,
     Rank,
     Reach,
@@ -73,6 +76,8 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
+POLICY = 1008
+"""Code of a socket that is closed for its behaviour (RFC 6455, section 7.4.1)."""
 GRACE = 2.0
 """Time for a page to load again [s]."""
 
@@ -94,6 +99,7 @@ class LiveServer:
     Attributes:
         address: with the token.
         ended: is set when the server has no more to do.
+        measured: times of edits that a page was asked to measure [ms].
 
     Raises:
         KincheckError: the file cannot be read, the port cannot be used, or a library is missing.
@@ -113,6 +119,7 @@ class LiveServer:
         self.file, self.open_file, self.built_in = file, open_file, not file.exists()
         self.engines, self.judge, self.once = engines, judge, once
         self.lock, self.pages, self.ended = Lock(), 0, Event()
+        self.measured = list[float]()
         self.live, self.digest = open_file(), self._sha256()
         self.token = secrets.token_urlsafe(32)
         silent = logging.Logger("kincheck.live")  # a refused handshake is no news for the terminal
@@ -239,8 +246,14 @@ class Conversation:
             self.tell(self.live.opening(self.server.engines))
             for thread in threads:
                 thread.start()
-            while True:
+            began, count = monotonic(), 0
+            while count < MOST_MESSAGES:
                 self._receive(self.socket.recv())
+                count += 1
+                if monotonic() - began > 1.0:
+                    began, count = monotonic(), 0
+            self.tell(Invalid(message=f"found more than {MOST_MESSAGES} messages in a second"))
+            self.socket.close(POLICY)
         with self.news:
             self.closed = True
             self.news.notify_all()
@@ -254,6 +267,10 @@ class Conversation:
             message = read(text)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             self.tell(Invalid(message=f"message: {error}"))
+            return
+        if isinstance(message, Measured):
+            self.server.measured += message.milliseconds
+            self.server.ended.set()
             return
         with self.news:
             self.waiting[type(message)] = message

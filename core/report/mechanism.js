@@ -56,9 +56,9 @@ function mechanism(box, drawing, name, trouble) {
     ({ shiftKey }) =>
       shiftKey ? move(24 * right, -24 * up) : turn(-0.1 * right, 0.1 * up);
 
-  function change(next) {
+  function change(next, moved = motionOf(next)) {
     drawing = next;
-    motion = motionOf(next);
+    motion = moved;
     if (slider) slider.max = last();
     show(camera.frame);
   }

@@ -8,7 +8,10 @@ import signal
 import stat
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
+from time import monotonic
 
 import jsonschema
 import numpy as np
@@ -17,7 +20,7 @@ from kincheck import load, run, sweep
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.live.model import LiveModel
-from kincheck.core.live.protocol import LARGEST_MESSAGE, live_schema
+from kincheck.core.live.protocol import LARGEST_MESSAGE, MOST_MESSAGES, live_schema
 from kincheck.core.live.table import LiveTable
 from kincheck.core.program.llvm import jit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -115,6 +118,49 @@ def test_bad_message_is_told_and_the_next_answered(page, text):
     assert page.told("invalid")["message"].startswith("message: ")
     page.say(type="solve", points=page.points, id=4)
     assert page.told("answer")["id"] == 4
+
+
+def test_flood_of_messages_ends_the_page_alone(page, open_page):
+    for _ in range(2 * MOST_MESSAGES):
+        with suppress(ConnectionClosed):
+            page.socket.send("{}")
+    with suppress(ConnectionClosed):
+        while True:
+            page.socket.recv(timeout=20)
+    assert page.socket.close_code == 1008
+    other = open_page()
+    other.say(type="solve", points=other.points, id=1)
+    assert other.told("answer")["id"] == 1
+
+
+def test_slow_page_holds_up_no_other(page, open_page):
+    """A page that reads nothing: its answers wait in its socket, and the newest comes last."""
+    for k in range(300):
+        page.say(type="solve", points=page.moved("uca_outer", 1, 0.01 * k), id=k)
+    other = open_page()
+    for k in range(3):
+        other.say(type="solve", points=other.points, id=k)
+        assert other.told("answer")["id"] == k
+    while page.told("answer")["id"] != 299:
+        pass
+
+
+def test_killed_worker_is_a_verdict_and_the_server_lives(page):
+    page.say(type="check", engines=["native", "mujoco"], points=page.points)
+    children = Path(f"/proc/{os.getpid()}/task")
+    killed = set[int]()
+    end = monotonic() + 60
+    while not killed and monotonic() < end:
+        for task in children.glob("*/children"):
+            for child in map(int, task.read_text().split()):
+                if b"-P" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0"):
+                    os.kill(child, signal.SIGKILL)
+                    killed.add(child)
+    verdicts = [page.told("verdict") for _ in range(2)]
+    assert "crashed" in {each["outcome"] for each in verdicts}
+    assert [each["last"] for each in verdicts] == [False, True]
+    page.say(type="solve", points=page.points, id=9)
+    assert page.told("answer")["id"] == 9
 
 
 def test_message_beyond_the_limit_ends_the_page(page):
