@@ -105,7 +105,9 @@ function planes(box, points, { metres, file, step }, design, choose) {
       const old = file(held.at);
       const fine = event.altKey ? 0.1 * step : step;
       const rounded = file(to).map((value, i) =>
-        Math.abs(value - old[i]) < 1e-9 ? old[i] : Math.round(value / fine) * fine,
+        design.locked[i] || Math.abs(value - old[i]) < 1e-9
+          ? old[i]
+          : Math.round(value / fine) * fine,
       );
       design.set(held.k, rounded);
     });

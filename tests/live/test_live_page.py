@@ -95,6 +95,15 @@ def test_ball_joint_dragged_ten_millimetres(opened, car):
     assert shown == pytest.approx(record.outputs["toe"].position, rel=1e-13, abs=1e-15)
 
 
+def test_locked_axis_stays_under_drag_and_keys(opened):
+    opened.click("[aria-label='lock y of all points']")
+    moved = drag(opened, (9.0, -3.0))
+    assert moved[1] == 0.0 != moved[2]
+    opened.click(FIELD)
+    opened.key("ArrowUp")
+    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+
+
 def test_numbers_survive_a_reload(opened):
     opened.click(FIELD)
     opened.key("ArrowUp")
