@@ -143,6 +143,7 @@ const DIRECTIONS = {
   }
 
   function openModel() {
+    Object.assign(one("#scene").dataset, { forces: "", off: "names frames forces" });
     parts.sliders = sliders(one("#sliders"), opening.drivers, (drivers, rests) => {
       state.asked = performance.now();
       link.ask("move", { type: "move", drivers, measured: rests });
@@ -312,7 +313,14 @@ const DIRECTIONS = {
     const whole = message.share === 1;
     const far = `${shown(100 * message.share, ".3g")} % of the way`;
     const steps = [whole ? "pose of the sliders" : `the way ends at ${far}`];
-    parts.scene.change({ ...drawing, bodies, steps, start: 0, paths: [], arrows: [] });
+    const { labels, nodes } = drawing;
+    const arrows = labels.flatMap(([, node, text]) =>
+      text
+        .split(" · ")
+        .filter((name) => message.reactions[name])
+        .map((name) => [nodes[node][0], nodes[node].slice(1), name, [message.reactions[name]]]),
+    );
+    parts.scene.change({ ...drawing, bodies, steps, start: 0, paths: [], arrows });
     parts.sliders.show(message);
     parts.numbers.show();
     trouble(message.message);

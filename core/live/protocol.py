@@ -61,7 +61,8 @@ class Move(_Message, frozen=True):
     """Move a mechanism straight from its design to these values of its drivers [m or rad].
 
     Attributes:
-        measured: whether the distance from a singular pose is wanted, which takes longer.
+        measured: whether reactions and the distance from a singular pose are wanted, which takes
+            longer.
     """
 
     drivers: Annotated[dict[Name, Number], msgspec.Meta(max_length=100)]
@@ -224,6 +225,8 @@ class Pose(_Message, frozen=True):
         bodies: origin and Euler parameters, seven numbers, by body.
         distance: smallest singular value of the rows over the one at design: 0 is a singular pose;
             null if it was not asked for.
+        reactions: force of a joint's first body on its second at rest [N], by joint; zero along
+            axes that rigid bodies leave undetermined; empty without loads, or if not asked for.
         message: why the way ends before; empty if it does not.
     """
 
@@ -232,6 +235,7 @@ class Pose(_Message, frozen=True):
     bodies: dict[str, list[float]]
     outputs: dict[str, float | None]
     distance: float | None
+    reactions: dict[str, list[float]]
     message: str
     milliseconds: dict[str, float]
 

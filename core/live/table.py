@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -321,25 +321,43 @@ class LiveTable:
         self, case: Case, designs: PreparedDesigns, found: Variants
     ) -> tuple[dict[str, Any], list[int]]:
         """Return the scene of reports at some of the solved samples, and these samples."""
-        count = len(found.solved)
-        taken = {*np.linspace(0, count - 1, min(FRAMES, count)).round().astype(int).tolist()}
-        taken |= {*key_samples(case)}
-        frames = [k for k in sorted(taken) if found.solved[k, 0]]
+        frames = drawn_frames(found.solved[:, 0], key_samples(case))
         poses = {
             body.name: designs.pose(found, body.name)[:, frames, 0].T
             for body in case.mechanism.moving
         }
-        stands = scene(case, poses=False)
-        bodies = [
-            body
-            if body.name not in poses
-            else msgspec.structs.replace(
-                body, r=poses[body.name][:, :3].tolist(), p=poses[body.name][:, 3:].tolist()
-            )
-            for body in stands.bodies
-        ]
-        posed = msgspec.structs.replace(stands, frames=frames, bodies=bodies, message="")
-        return asdict(drawing(posed, self.axis)), frames
+        return drawn(case, self.axis, frames, poses, {}), frames
+
+
+def drawn_frames(solved: NDArray[np.bool_], always: Sequence[int] = ()) -> list[int]:
+    """Return some of the solved samples to draw, among them those of `always`."""
+    count = len(solved)
+    evenly: list[int] = np.linspace(0, count - 1, min(FRAMES, count)).round().astype(int).tolist()
+    return [k for k in sorted({*evenly, *always}) if solved[k]]
+
+
+def drawn(
+    case: Case,
+    axis: Axis,
+    frames: list[int],
+    poses: Mapping[str, Array],
+    values: Mapping[str, Values],
+) -> dict[str, Any]:
+    """Return the scene of reports.
+
+    Args:
+        poses: origin and Euler parameters by body, shape (frames, 7).
+        values: of outputs, for the arrows of forces.
+    """
+    stands = scene(case, poses=False)
+    bodies = [
+        msgspec.structs.replace(body, r=at[:, :3].tolist(), p=at[:, 3:].tolist())
+        if (at := poses.get(body.name)) is not None
+        else body
+        for body in stands.bodies
+    ]
+    posed = msgspec.structs.replace(stands, frames=frames, bodies=bodies, message="")
+    return asdict(drawing(posed, axis, values))
 
 
 def sweep_axis(case: Case) -> Axis:

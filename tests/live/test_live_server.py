@@ -26,6 +26,7 @@ from kincheck.core.program.llvm import jit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from ..oracles.naive import A
 from .conftest import CAR, TRAVEL
 
 
@@ -319,6 +320,26 @@ def test_model_closes_its_loops_at_every_slider_value(tmp_path):
     assert found.distance is not None
     assert found.distance > 0.0
     assert found.drivers[driver.name] == pytest.approx(driver.design + 0.3, abs=1e-12)
+
+
+def test_model_at_rest_has_the_reactions_of_run(tmp_path):
+    case = load("mcpherson_strut_loaded")
+    live = LiveModel(tmp_path / "strut", case)
+    (driver,) = live.drivers.values()
+    found = live.pose(1, {driver.name: driver.design + 0.02}, measured=True)
+    force = np.array(found.reactions["tie_rod"])
+    sweep = replace(case.sweep, values=np.array([0.0, 0.02]), rate=0.0)
+    (record,) = run(replace(case, sweep=sweep, reference={}), "native").records
+    assert force[1] == pytest.approx(record.outputs["tie_rod_force_y"].position[-1], rel=1e-9)
+    # a rod pulls along itself
+    r, p = np.array(found.bodies["knuckle"][:3]), np.array(found.bodies["knuckle"][3:])
+    (knuckle,) = (body for body in case.mechanism.moving if body.name == "knuckle")
+    joint = case.mechanism.joint("tie_rod")
+    ends = dict(zip(joint.bodies, joint.points, strict=True))
+    arm = A(np.array(knuckle.euler_parameters)).T @ (np.array(ends["knuckle"]) - knuckle.origin)
+    rod = r + A(p) @ arm - np.array(ends["rack"])
+    assert np.cross(force, rod) == pytest.approx([0.0] * 3, abs=1e-9 * np.abs(force).max())
+    assert live.pose(2, {}, measured=False).reactions == {}
 
 
 def test_model_out_of_reach_shows_the_last_pose(tmp_path):
