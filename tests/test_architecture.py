@@ -118,7 +118,7 @@ IMPORTS = {
     ),
     "live": (
         ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "
-        "harness report"
+        "harness report studies/variation studies/tolerance"
     ),
     "cli": (
         ". program program/llvm joints kinematics case "

@@ -20,11 +20,10 @@ from ..report.progress import complain, lacking, progress, uncompared
 from . import execution_options, history_options, import_options, recorded_options
 from .engine_loading import WHERE
 from .registry import Registry, Status
-from .run_options import HISTORY, add_options, curve_options
+from .run_options import HISTORY, add_options, curve_options, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..case.io.reference_curve import CurveOptions
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
     from ..history.run_recorder import Keeping
@@ -168,7 +167,8 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
     if options.reference and not problems:
         try:
             # a reference may name an unreadable case, which does not stop the others
-            cases = _judged(cases, options.reference, curve, unused if unread else None)
+            cases, notes = judged(cases, options.reference, curve, unused if unread else None)
+            complain(notes)
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
@@ -200,32 +200,6 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )
-
-
-def _judged(
-    cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
-) -> list[Case]:
-    """Return the cases with the references in these files. Print how a curve was read.
-
-    Raises:
-        KincheckError: a file cannot be used, or a curve does not belong to one case.
-    """
-    from ..case.io.reference import PROVED
-    from ..case.io.reference_curve import with_curve
-    from ..case.io.reference_file import judged_by
-
-    curves = [file for file in files if file.suffix.lower() != PROVED]
-    proved = [file for file in files if file not in curves]
-    if len(curves) > 1 or (curves and (proved or len(cases) != 1)):
-        raise KincheckError(
-            f"{curves[0]}: found {len(files)} references and {len(cases)} cases, expected a"
-            " measured curve and its case alone; run them one by one"
-        )
-    if not curves:
-        return judged_by(cases, proved, unused)
-    case, notes = with_curve(cases[0], curves[0], curve)
-    complain(notes)
-    return [case]
 
 
 def _solved(

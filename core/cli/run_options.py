@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import KincheckError
 from . import execution_options, import_options, recorded_options
 from .option_types import positive
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..case.io.reference_curve import CurveOptions
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of coordinates of
@@ -117,7 +120,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
         verbose="print the errors of every output and their tolerances",
     )
     import_options.add_options(run)
-    _add_curve_options(run)
+    add_curve_options(run)
     recorded_options.add_options(run)
     execution_options.add_options(run, positive)
     run.add_argument(
@@ -159,7 +162,7 @@ def add_curve_files(command: argparse.ArgumentParser, what: str) -> None:
         command.add_argument(f"--{kind}", type=Path, metavar="FILE", help=f"write {what} as {form}")
 
 
-def _add_curve_options(run: argparse.ArgumentParser) -> None:
+def add_curve_options(run: argparse.ArgumentParser) -> None:
     """Add the options for a measured curve, see --reference."""
     curve = run.add_argument_group(
         "measured curves", "Facts that the file of --reference does not state; for one case."
@@ -216,3 +219,28 @@ def curve_options(options: argparse.Namespace) -> CurveOptions:
         options.reference_sheet,
         options.at_reference,
     )
+
+
+def judged(
+    cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
+) -> tuple[list[Case], list[str]]:
+    """Return the cases with the references in these files, and notes on how a curve was read.
+
+    Raises:
+        KincheckError: a file cannot be used, or a curve does not belong to one case.
+    """
+    from ..case.io.reference import PROVED
+    from ..case.io.reference_curve import with_curve
+    from ..case.io.reference_file import judged_by
+
+    curves = [file for file in files if file.suffix.lower() != PROVED]
+    proved = [file for file in files if file not in curves]
+    if len(curves) > 1 or (curves and (proved or len(cases) != 1)):
+        raise KincheckError(
+            f"{curves[0]}: found {len(files)} references and {len(cases)} cases, expected a"
+            " measured curve and its case alone; run them one by one"
+        )
+    if not curves:
+        return judged_by(cases, proved, unused), []
+    case, notes = with_curve(cases[0], curves[0], curve)
+    return [case], notes

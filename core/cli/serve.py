@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
+from ..report.progress import complain
 from . import import_options
 from .option_types import whole
 from .registry import Registry, Status
-from .run_options import TOL
+from .run_options import TOL, add_curve_options, curve_options, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..harness.record import Record
-    from ..live.server import Live
+    from ..harness.record import Record, Results
+    from ..live.server import Judge, Live
 
 
 def add(commands: Any) -> None:
@@ -49,9 +50,28 @@ def add(commands: Any) -> None:
         "--measure",
         type=whole(1),
         metavar="N",
-        help="serve nothing: make N edits of a table, print how long each step takes, and end",
+        help=(
+            "make N edits of a table, print how long each step takes, in the browser too unless"
+            " --no-browser, and end"
+        ),
+    )
+    serving.add_argument(
+        "--reference",
+        type=Path,
+        metavar="FILE",
+        help=(
+            "measured curve (.csv, .xlsx, ...) or proved reference (.json) to lay over the curves,"
+            " with its tolerance"
+        ),
+    )
+    serving.add_argument(
+        "--vary",
+        type=Path,
+        metavar="FILE",
+        help="tolerances of a table, as of kincheck sweep: histograms, and limits in the curves",
     )
     import_options.add_options(serving)
+    add_curve_options(serving)
 
 
 def _serve(options: argparse.Namespace, registry: Registry) -> int:
@@ -69,29 +89,57 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
     from ..live.table import LiveTable
 
     file, supplied = Path(options.file), import_options.supplied(options)
+    curve = curve_options(options)
+    if not options.reference and curve != type(curve)():
+        raise KincheckError("options for measured curves need a curve: give --reference FILE")
+
+    def referenced(case: Case) -> Case:
+        if not options.reference:
+            return case
+        (case,), notes = judged([case], [options.reference], curve, None)
+        if told != notes:
+            told[:] = notes
+            complain(notes)
+        return case
 
     def opened() -> Live:
         named = options.file not in registry.cases() and file.is_file()
         if named and is_table(file, supplied):
-            return LiveTable(file, supplied)
-        return LiveModel(file, registry.find_case(options.file, supplied))
+            return LiveTable(file, supplied, referenced, options.vary)
+        if options.vary:
+            raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
+        return LiveModel(file, referenced(registry.find_case(options.file, supplied)))
 
-    if options.measure is not None:
-        return _measured(opened(), options.measure)
+    told = list[str]()
+
+    wanted: int = options.measure or 0
+    if wanted:
+        _measured(opened(), wanted)
+        if options.no_browser:
+            return Status.WITHIN
     server = LiveServer(
         file, opened, registry.engines, judge_by(registry), port=options.port, once=options.once
     )
     try:
-        print(server.address, flush=True)
-        if not options.no_browser:
-            webbrowser.open(server.address)
+        address = server.address + f"&measure={wanted}" * bool(wanted)
+        print(address, flush=True)
+        if not options.no_browser and not webbrowser.open(address) and wanted:
+            raise KincheckError("--measure: no browser is found; give --no-browser, or set BROWSER")
         server.ended.wait()
     finally:
         server.close()
+    if wanted:
+        _print_times("browser", server.measured)
     return Status.WITHIN
 
 
-def _measured(live: Live, count: int) -> int:
+def _print_times(name: str, times: Sequence[float]) -> None:
+    from statistics import median
+
+    print(f"  {name:<9} median {median(times):8.2f} ms, most {max(times):8.2f} ms")
+
+
+def _measured(live: Live, count: int) -> None:
     """Print the times of edits: of each step and of a whole answer as JSON, and the processor's
     share of it, free of other programs.
     """
@@ -120,20 +168,19 @@ def _measured(live: Live, count: int) -> int:
     samples = len(live.case.sweep.values)
     print(f"{live.file.name}: {count} edits, {samples} samples, {size_sent:.0f} bytes each")
     for name, each in steps.items():
-        print(f"  {name:<9} median {statistics.median(each):8.2f} ms, most {max(each):8.2f} ms")
-    return Status.WITHIN
+        _print_times(name, each)
 
 
-def judge_by(registry: Registry) -> Callable[[Case, Sequence[str], Callable[[Record], None]], None]:
+def judge_by(registry: Registry) -> Judge:
     """Return the function that solves a case by engines in worker processes."""
 
-    def judge(case: Case, names: Sequence[str], tell: Callable[[Record], None]) -> None:
+    def judge(case: Case, names: Sequence[str], tell: Callable[[Record], None]) -> Results:
         from ..harness.resource_limits import Limits
         from ..harness.run import run
         from ..harness.workers.pool import in_workers
 
         engines = registry.find_engines(names, [])
-        run(
+        return run(
             [case],
             engines,
             tol=TOL,

@@ -2,8 +2,9 @@
 // Curves of the outputs over the sweep, with a ghost and limits, and their key numbers.
 
 // The figures of a group of outputs.
-//   axis: of the sweep; state: `answer`, `ghost` and `limits` by output.
-// Returns `group` (draw the outputs of a group) and `draw`.
+//   axis: of the sweep; state: `answer`, `ghost`, and by output `limits` and `reference`; `fresh`
+//   are the outputs of the last answer.
+// Returns `group` (draw the outputs of a group) and `draw` (those in view, or all).
 function figures(box, outputs, axis, state) {
   const driver = axis.values.map((value) => value * axis.scale);
   const [along, across] = axis.up ? ["y", "x"] : ["x", "y"];
@@ -14,7 +15,23 @@ function figures(box, outputs, axis, state) {
     const places = { [along]: driver, [across]: values };
     return { type: "scatter", mode: "lines", ...places, name, meta: name, line };
   }
+  // The reference, and the band of its tolerance.
+  function compared(output) {
+    const { values, tolerance } = (state.reference || {})[output.name] || {};
+    if (!values) return [];
+    const known = values.flatMap((value, k) => (value === null ? [] : [[value, driver[k]]]));
+    const side = (sign) => known.map(([value, at]) => [(value + sign * tolerance) * output.scale, at]);
+    const ring = [...side(1), ...side(-1).reverse()];
+    const band = { [across]: ring.map(([value]) => value), [along]: ring.map(([, at]) => at) };
+    const look = { fill: "toself", fillcolor: "rgba(128, 128, 128, 0.25)", hoverinfo: "skip" };
+    const line = { width: 5, color: "rgba(128, 128, 128, 0.6)" };
+    return [
+      { type: "scatter", mode: "lines", ...band, ...look, meta: "band" },
+      trace(output, { [output.name]: values }, "reference", line),
+    ];
+  }
   const traces = (output) => [
+    ...compared(output),
     ...(state.ghost && state.ghost !== state.answer
       ? [trace(output, state.ghost.outputs, "ghost", { width: 2, dash: "dash", color: "#D55E00" })]
       : []),
@@ -23,12 +40,16 @@ function figures(box, outputs, axis, state) {
   function bands({ name }) {
     const [low, high] = state.limits.get(name) || [];
     const whole = { [`${along}0`]: 0, [`${along}1`]: 1, [`${along}ref`]: "paper", type: "line" };
-    return [low, high].filter(Number.isFinite).map((value) => ({
+    const ends = [low, high].filter(Number.isFinite);
+    const inside = { ...whole, type: "rect", fillcolor: "rgba(0, 158, 115, 0.1)" };
+    const band = { ...inside, [`${across}0`]: low, [`${across}1`]: high };
+    const lines = ends.map((value) => ({
       ...whole,
       [`${across}0`]: value,
       [`${across}1`]: value,
       line: { color: "#009E73", width: 2, dash: "dot" },
     }));
+    return ends.length === 2 ? [band, ...lines] : lines;
   }
   function start(output) {
     const figure = document.createElement("figure");
@@ -49,15 +70,23 @@ function figures(box, outputs, axis, state) {
       hovermode: `${along} unified`,
       shapes: bands(output),
     };
-    return { output, figure: plot(plotBox, { data: traces(output), layout }) };
+    return { output, plotBox, figure: plot(plotBox, { data: traces(output), layout }) };
   }
   return {
     group(name) {
       box.replaceChildren();
       drawn = outputs.filter(({ group }) => group === name).map(start);
     },
-    draw() {
-      for (const { output, figure } of drawn) figure.change(traces(output), bands(output));
+    // Draw the figures in view, or all.
+    draw(all = false) {
+      const isSeen = ({ plotBox }) => {
+        const { top, bottom } = plotBox.getBoundingClientRect();
+        return bottom > 0 && top < innerHeight;
+      };
+      for (const { output, plotBox, figure } of drawn.filter((each) => all || isSeen(each))) {
+        plotBox.classList.toggle("late", !state.fresh.has(output.name));
+        figure.change(traces(output), bands(output));
+      }
     },
   };
 }
@@ -90,6 +119,8 @@ function keyNumbers(table, outputs, columns, state, changed) {
     const ends = ["low", "high"].map((end, k) => {
       const input = Object.assign(document.createElement("input"), { autocomplete: "off" });
       input.setAttribute("aria-label", `${end} limit of ${output.label} [${output.shown_unit}]`);
+      const given = (state.limits.get(output.name) || [])[k];
+      if (Number.isFinite(given)) input.value = shown(given, ".6g");
       input.addEventListener("change", () => {
         const both = state.limits.get(output.name) || [NaN, NaN];
         both[k] = typed(input.value);
@@ -119,6 +150,7 @@ function keyNumbers(table, outputs, columns, state, changed) {
         cells[k].textContent = known ? shown(scaled, ".4g") : "–";
         cells[k].dataset.value = known ? String(value) : "";
         cells[k].classList.toggle("over", scaled < low || scaled > high);
+        cells[k].classList.toggle("late", !state.fresh.has(output.name));
         const each = rate && valueOf(rate.name);
         const gradient = typeof each === "number" ? shown(each * rate.scale, ".4g") : "";
         if (gradient) cells[k].append(smallText(`${gradient} ${rate.shown_unit}`));
@@ -126,6 +158,34 @@ function keyNumbers(table, outputs, columns, state, changed) {
     }
   }
   return { show };
+}
+
+// Histograms of an output over the variants, at the key samples.
+function showSpread(box, { bins, variants, failed }, output, words, limits) {
+  const lost = failed ? `; ${failed} do not reach all samples` : "";
+  box.querySelector("p").textContent = `${output.label} of ${variants} variants${lost}`;
+  const title = (word) => `${word} [${output.shown_unit || "1"}]`;
+  const made = bins.flatMap((each, k) => {
+    if (!each) return [];
+    const edges = each.edges.map((edge) => edge * output.scale);
+    const middles = edges.slice(1).map((edge, i) => (edge + edges[i]) / 2);
+    const plotBox = Object.assign(document.createElement("div"), { className: "plot" });
+    plotBox.setAttribute("role", "img");
+    plotBox.setAttribute("aria-label", `Variants by ${output.label} at ${words[k]}`);
+    const ends = (limits || []).filter(Number.isFinite);
+    const shapes = ends.map((x) => ({
+      ...{ type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper" },
+      line: { color: "#009E73", width: 2, dash: "dot" },
+    }));
+    const layout = {
+      ...{ xaxis: { title: { text: title(words[k]) } }, yaxis: { title: { text: "variants" } } },
+      shapes,
+    };
+    const bars = { type: "bar", x: middles, y: each.counts, marker: { color: "#0072B2" } };
+    return [[plotBox, { data: [{ ...bars, hoverinfo: "skip" }], layout }]];
+  });
+  box.querySelector(".figures").replaceChildren(...made.map(([plotBox]) => plotBox));
+  for (const [plotBox, figure] of made) plot(plotBox, figure);
 }
 
 // The numbers of the table that move an output most, with bars.

@@ -38,7 +38,9 @@ const DIRECTIONS = {
       state.latest += 1;
     },
     ranking: (message) => ranked(message),
+    spread: (message) => spread(message),
     verdict: (message) => verdict(message),
+    exported: (message) => exported(message),
     saved: (message) => say(`saved as ${message.name}`),
     invalid: (message) => trouble(message.message),
     changed: (message) => trouble(message.message, "#changed"),
@@ -58,6 +60,11 @@ const DIRECTIONS = {
     one("#group").replaceChildren(...groups.map((name) => new Option(name, name)));
     one("#engines").replaceChildren(...message.engines.map(engineBox));
     state.upwards = message.axis.up;
+    state.reference = message.reference;
+    for (const { name, scale } of message.outputs) {
+      const ends = message.limits[name];
+      if (ends) state.limits.set(name, ends.map((end) => (end === null ? NaN : end * scale)));
+    }
     parts = { first: true };
     if (message.kind === "table") openTable();
     else openModel();
@@ -125,10 +132,18 @@ const DIRECTIONS = {
       else design.undo();
     });
     parts.table.show();
-    solve();
+    if (!kept()) solve();
+  }
+  // The numbers before the page was loaded again, if the file is the same; undone by one step.
+  const numbers = () => `kincheck ${opening.source} ${JSON.stringify(opening.points)}`;
+  function kept() {
+    const rows = JSON.parse(sessionStorage.getItem(numbers()) || "null");
+    if (rows) parts.design.all(rows);
+    return rows;
   }
 
   function openModel() {
+    Object.assign(one("#scene").dataset, { forces: "", off: "names frames forces" });
     parts.sliders = sliders(one("#sliders"), opening.drivers, (drivers, rests) => {
       state.asked = performance.now();
       link.ask("move", { type: "move", drivers, measured: rests });
@@ -152,25 +167,34 @@ const DIRECTIONS = {
     one("#redo").disabled = !redo;
     one("#verdicts tbody").replaceChildren();
     edited = true;
+    parts.whole = false;
+    sessionStorage.setItem(numbers(), JSON.stringify(parts.design.rows()));
     trouble("");
     parts.table.show();
     parts.planes.draw();
+    ask(false);
+  }
+  // Ask for the motion: at once for what one solution gives, and for the rest when a gesture rests.
+  function ask(whole) {
     state.asked = performance.now();
-    link.ask("solve", { type: "solve", points: parts.design.rows() });
+    link.ask("solve", { type: "solve", points: parts.design.rows(), whole });
   }
 
   function answered(message) {
-    state.answer = message;
-    state.ghost = state.ghost || message;
+    state.fresh = new Set(Object.keys(message.outputs));
+    const before = state.answer ? state.answer.outputs : {};
+    state.answer = { ...message, outputs: { ...before, ...message.outputs } };
+    state.ghost = state.ghost || state.answer;
     document.body.classList.remove("stale");
     trouble(message.message);
     if (parts.table) parts.table.mark("");
     if (!message.drawing.bodies.length) return;
     if (parts.first) start(message);
     else {
-      parts.scene.change(message.drawing);
+      const motion = motionOf(message.drawing);
+      parts.scene.change(message.drawing, motion);
       parts.figures.draw();
-      if (parts.planes) parts.planes.change(message.drawing);
+      if (parts.planes) parts.planes.change(message.drawing, motion);
     }
     parts.numbers.show();
     const lost = message.solved.filter((each) => !each).length;
@@ -178,7 +202,17 @@ const DIRECTIONS = {
     say(lost ? `${count - lost} of ${count} samples reached` : `${count} samples`);
     measure(message.milliseconds);
     clearTimeout(parts.settling);
-    if (parts.design) parts.settling = setTimeout(rank, 250);
+    if (parts.design) parts.settling = setTimeout(settled, 250);
+  }
+  function settled() {
+    if (link.isDue("solve")) return;
+    parts.figures.draw(true);
+    const late = opening.outputs.some(({ name }) => !state.fresh.has(name));
+    if (late && !parts.whole) {
+      parts.whole = true;
+      return ask(true);
+    }
+    rank();
   }
 
   function start(message) {
@@ -187,7 +221,7 @@ const DIRECTIONS = {
     const stem = opening.file.replace(/\.[^.]*$/, "");
     parts.scene = mechanism(one("#scene"), message.drawing, `${stem}_scene`, trouble);
     if (parts.planes) {
-      parts.planes.change(message.drawing);
+      parts.planes.change(message.drawing, motionOf(message.drawing));
       parts.planes.ghost(message.drawing);
     }
     parts.figures = figures(one("#figures"), outputs, axis, state);
@@ -196,6 +230,8 @@ const DIRECTIONS = {
     parts.figures.group(one("#group").value);
     one("#group").onchange = () => parts.figures.group(one("#group").value);
     document.documentElement.dataset.ready = "";
+    const count = Number(new URLSearchParams(location.search).get("measure"));
+    if (count && parts.design) measureEdits(count);
   }
 
   // The words of the key samples.
@@ -226,9 +262,39 @@ const DIRECTIONS = {
     });
   }
 
+  // Make edits one after the other, tell the server their times, and end.
+  async function measureEdits(count) {
+    const pause = (wait) => new Promise((done) => setTimeout(done, wait));
+    async function edited(change) {
+      while (link.isDue("solve")) await pause(20);
+      const before = state.latest;
+      change();
+      while (state.latest === before) await pause(1);
+      return state.times.at(-1);
+    }
+    await pause(1000); // what follows an opening is over
+    const { design } = parts;
+    const by = 1e-4 / METRES[opening.unit];
+    const milliseconds = [];
+    for (let k = 0; k < count; k++) {
+      const at = k % opening.points.length;
+      const moved = design.rows()[at].map((value) => value + by);
+      milliseconds.push(await edited(() => design.set(at, moved)));
+      await edited(() => design.all(design.start));
+    }
+    link.tell({ type: "measured", milliseconds });
+  }
+
   function rank() {
     if (!one("#ranked").value || link.isDue("solve")) return;
-    link.ask("rank", { type: "rank", points: parts.design.rows(), output: one("#ranked").value });
+    const wanted = { points: parts.design.rows(), output: one("#ranked").value };
+    link.ask("rank", { type: "rank", ...wanted });
+    if (opening.varied) link.ask("vary", { type: "vary", ...wanted });
+  }
+  function spread(message) {
+    const output = opening.outputs.find(({ name }) => name === message.output);
+    one("#spread").hidden = false;
+    showSpread(one("#spread"), message, output, words(), state.limits.get(output.name));
   }
   function ranked(message) {
     const output = opening.outputs.find(({ name }) => name === message.output);
@@ -247,7 +313,14 @@ const DIRECTIONS = {
     const whole = message.share === 1;
     const far = `${shown(100 * message.share, ".3g")} % of the way`;
     const steps = [whole ? "pose of the sliders" : `the way ends at ${far}`];
-    parts.scene.change({ ...drawing, bodies, steps, start: 0, paths: [], arrows: [] });
+    const { labels, nodes } = drawing;
+    const arrows = labels.flatMap(([, node, text]) =>
+      text
+        .split(" · ")
+        .filter((name) => message.reactions[name])
+        .map((name) => [nodes[node][0], nodes[node].slice(1), name, [message.reactions[name]]]),
+    );
+    parts.scene.change({ ...drawing, bodies, steps, start: 0, paths: [], arrows });
     parts.sliders.show(message);
     parts.numbers.show();
     trouble(message.message);
@@ -255,16 +328,16 @@ const DIRECTIONS = {
     measure(message.milliseconds);
   }
 
+  const ticked = () =>
+    [...document.querySelectorAll("#engines input:checked")].map(({ value }) => value);
+  const rows = () => (parts.design ? { points: parts.design.rows() } : {});
   one("#check").onclick = () => {
-    const engines = [...document.querySelectorAll("#engines input:checked")].map(
-      ({ value }) => value,
-    );
+    const engines = ticked();
     if (!engines.length) return trouble("check: tick an engine");
     one("#verdicts tbody").replaceChildren();
     edited = false;
     say("the engines are solving");
-    const points = parts.design ? { points: parts.design.rows() } : {};
-    link.tell({ type: "check", engines, ...points });
+    link.tell({ type: "check", engines, ...rows() });
   };
   function verdict({ engine, outcome, worst, output, message, last }) {
     if (edited) return; // it is of numbers that are no more
@@ -281,15 +354,18 @@ const DIRECTIONS = {
     if (last) say("checked");
   }
 
-  one("#csv").onclick = () => {
-    const { outputs, axis } = opening;
-    const known = outputs.filter(({ name }) => state.answer.outputs[name]);
-    const head = ["driver [SI]", ...known.map(({ name, unit }) => `${name} [${unit}]`)];
-    const cell = (value) => (value === null ? "" : String(value));
-    const rows = axis.values.map((value, k) =>
-      [value, ...known.map(({ name }) => state.answer.outputs[name][k])].map(cell).join(","),
-    );
-    const stem = opening.file.replace(/\.[^.]*$/, "");
-    save([head.join(","), ...rows, ""].join("\n"), "text/csv", `${stem}_curves.csv`);
-  };
+  for (const button of document.querySelectorAll("[data-export]")) {
+    button.onclick = () => {
+      const kind = button.dataset.export;
+      say("the engines are solving");
+      // curves are those of the native engine; a report compares the ticked ones
+      const engines = kind === "report" ? ticked() : [];
+      link.tell({ type: "export", kind, engines: engines.length ? engines : ["native"], ...rows() });
+    };
+  }
+  function exported({ name, content }) {
+    const bytes = Uint8Array.from(atob(content), (sign) => sign.charCodeAt(0));
+    save(bytes, "application/octet-stream", name);
+    say(`${name} is in the folder of your downloads`);
+  }
 })();

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-import msgspec
 import numpy as np
 
-from ..case.case import HELD_BUT, Case, size
+from ..case.case import HELD_BUT, SLOW, Case, size
 from ..errors import KincheckError, SolveError, unknown
 from ..harness.compare import output_series
-from ..harness.scene import scene
 from ..kinematics import NativeSolver, conditioning
 from ..mechanism.motions import Path as Way
-from ..mechanism.motions import Ramp
-from ..report.drawing import drawing
+from ..mechanism.motions import Ramp, Slowed
 from .protocol import VERSION, Answer, LiveDriver, Opening, Pose, Reached, Refused
-from .table import FRAMES, TOL, as_values, live_axis, live_outputs, sweep_axis
+from .table import (
+    TOL,
+    as_values,
+    drawn,
+    drawn_frames,
+    live_axis,
+    live_outputs,
+    live_reference,
+    sweep_axis,
+)
 
 WAY = 33
 """Samples on the way from the design to a pose; longer steps are divided by the solver."""
@@ -59,6 +65,9 @@ class LiveModel:
             drivers=[*self.drivers.values()],
             engines=[*engines],
             save="",
+            reference=live_reference(self.case),
+            limits={},
+            varied=False,
         )
 
     def answer(self, number: int) -> Answer | Refused:
@@ -76,22 +85,16 @@ class LiveModel:
             for each in case.outputs
             if HELD_BUT not in each.facts
         }
-        count = len(found.solved)
-        taken = {*np.linspace(0, count - 1, min(FRAMES, count)).round().astype(int).tolist()}
-        frames = [k for k in sorted(taken) if found.solved[k]]
-        stands = scene(case, poses=False)
-        bodies = [
-            msgspec.structs.replace(body, r=motion.r[frames].tolist(), p=motion.p[frames].tolist())
-            if (motion := found.bodies.get(body.name))
-            else body
-            for body in stands.bodies
-        ]
-        posed = msgspec.structs.replace(stands, frames=frames, bodies=bodies, message="")
+        frames = drawn_frames(found.solved)
+        poses = {
+            name: np.concatenate([motion.r, motion.p], axis=1)[frames]
+            for name, motion in found.bodies.items()
+        }
         return Answer(
             id=number,
             outputs=values,
             solved=found.solved.tolist(),
-            drawing=asdict(drawing(posed, self.axis, values)),
+            drawing=drawn(case, self.axis, frames, poses, values),
             frames=frames,
             message=found.message,
             milliseconds={"solve": 1e3 * (solved - begin), "rest": 1e3 * (perf_counter() - solved)},
@@ -102,7 +105,8 @@ class LiveModel:
         before a lock-up.
 
         Args:
-            measured: whether the distance from a singular pose is wanted, which takes longer.
+            measured: whether reactions and the distance from a singular pose are wanted, which
+                takes longer.
 
         Raises:
             KincheckError: there is no such driver.
@@ -124,6 +128,7 @@ class LiveModel:
             if HELD_BUT not in each.facts and not each.forces
         }
         distance = self._distance(changes, share) if measured else None
+        reactions = self._reactions(changes, share) if measured else {}
         return Pose(
             id=number,
             drivers={
@@ -137,6 +142,7 @@ class LiveModel:
             },
             outputs=outputs,
             distance=distance,
+            reactions=reactions,
             message=found.message,
             milliseconds={"solve": 1e3 * (solved - begin), "rest": 1e3 * (perf_counter() - solved)},
         )
@@ -156,6 +162,30 @@ class LiveModel:
         way = self._way(changes, np.array([0.0, share]))
         poses = conditioning(self.case.mechanism, way, way.times, (), {}, 2, TOL).poses
         return poses[-1].smallest / poses[0].smallest
+
+    def _reactions(self, changes: Mapping[str, float], share: float) -> dict[str, list[float]]:
+        """Return the force of each joint at rest at a place of a way, of the global components that
+        rigid bodies determine; none without loads.
+        """
+        mechanism = self.case.mechanism
+        if not mechanism.forces and not any(body.mass for body in mechanism.moving):
+            return {}
+        way = self._way(changes, np.linspace(0.0, share, WAY))
+        slow = {name: Slowed(motion, SLOW) for name, motion in way.motions.items()}
+        joints = [joint.name for joint in mechanism.joints]
+        still = Way(slow, way.times * SLOW, way.design)
+        found = self.solver.prepare(mechanism, still, (), self.bodies, joints)(TOL).forces
+        if found is None:
+            return {}
+        forces = {
+            name: np.array([each.along(axis)[-1] for axis in np.eye(3)])
+            for name, each in found.joints.items()
+        }
+        return {
+            name: np.nan_to_num(each).tolist()
+            for name, each in forces.items()
+            if np.isfinite(each).any()
+        }
 
     def reach(self, number: int, name: str) -> Reached:
         """Return the travel of a driver while the others rest.

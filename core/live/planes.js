@@ -105,7 +105,9 @@ function planes(box, points, { metres, file, step }, design, choose) {
       const old = file(held.at);
       const fine = event.altKey ? 0.1 * step : step;
       const rounded = file(to).map((value, i) =>
-        Math.abs(value - old[i]) < 1e-9 ? old[i] : Math.round(value / fine) * fine,
+        design.locked[i] || Math.abs(value - old[i]) < 1e-9
+          ? old[i]
+          : Math.round(value / fine) * fine,
       );
       design.set(held.k, rounded);
     });
@@ -117,7 +119,16 @@ function planes(box, points, { metres, file, step }, design, choose) {
     return { figure, draw, spots };
   }
 
-  const draw = () => views.forEach((view) => view.draw());
+  // Several changes before the next picture are drawn once.
+  let due = 0;
+  function draw() {
+    due = due || requestAnimationFrame(drawNow);
+  }
+  function drawNow() {
+    cancelAnimationFrame(due);
+    due = 0;
+    views.forEach((view) => view.draw());
+  }
   const lines = (drawing) => {
     const { places } = motionOf(drawing);
     const at = places[drawing.start];
@@ -127,12 +138,12 @@ function planes(box, points, { metres, file, step }, design, choose) {
   return {
     draw,
     spots: (view) => views[view].spots(),
-    change(drawing) {
+    change(drawing, motion) {
       state.drawing = drawing;
-      state.motion = motionOf(drawing);
+      state.motion = motion;
       const places = [...state.motion.places, design.start.map(metres)];
       state.bounds = state.bounds || boundsOf({ places, wheels: [], forces: [] });
-      draw();
+      drawNow();
     },
     ghost(drawing) {
       state.ghost = lines(drawing);

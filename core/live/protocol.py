@@ -5,13 +5,15 @@ Lengths of points are in the unit and along the axes of the file; everything els
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
 VERSION = 1
 LARGEST_MESSAGE = 64_000
 """Largest message of a page [bytes]: hundreds of points take less."""
+MOST_MESSAGES = 1_000
+"""Most messages of a page in a second: a page asks again after an answer, and a hand makes 100."""
 MOST_POINTS = 1_000
 
 Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
@@ -38,9 +40,14 @@ class _Message(
 
 
 class Solve(_Message, frozen=True):
-    """Solve a table with these points."""
+    """Solve a table with these points.
+
+    Attributes:
+        whole: whether outputs that need another solution, which takes longer, are wanted.
+    """
 
     points: Rows
+    whole: bool = True
 
 
 class Rank(_Message, frozen=True):
@@ -54,7 +61,8 @@ class Move(_Message, frozen=True):
     """Move a mechanism straight from its design to these values of its drivers [m or rad].
 
     Attributes:
-        measured: whether the distance from a singular pose is wanted, which takes longer.
+        measured: whether reactions and the distance from a singular pose are wanted, which takes
+            longer.
     """
 
     drivers: Annotated[dict[Name, Number], msgspec.Meta(max_length=100)]
@@ -74,6 +82,21 @@ class Check(_Message, frozen=True):
     points: Rows | None = None
 
 
+class Vary(_Message, frozen=True):
+    """Find the spread of an output over the variants of the file of tolerances."""
+
+    points: Rows
+    output: Name
+
+
+class Export(_Message, frozen=True):
+    """Solve by engines in worker processes, and hand out the file of `kincheck run`."""
+
+    kind: Literal["csv", "xlsx", "report"]
+    engines: Annotated[list[Name], msgspec.Meta(min_length=1, max_length=20)]
+    points: Rows | None = None
+
+
 class Save(_Message, frozen=True):
     """Write a table with these points to a new file beside the user's own."""
 
@@ -81,7 +104,13 @@ class Save(_Message, frozen=True):
     name: Name
 
 
-Asked: TypeAlias = Solve | Rank | Move | Reach | Check | Save
+class Measured(_Message, frozen=True):
+    """Tell how long edits took from the page's event to the drawn curves [ms]."""
+
+    milliseconds: Annotated[list[Number], msgspec.Meta(min_length=1, max_length=10_000)]
+
+
+Asked: TypeAlias = Solve | Rank | Vary | Move | Reach | Check | Export | Save | Measured
 
 
 class LivePoint(msgspec.Struct, frozen=True):
@@ -107,6 +136,13 @@ class LiveOutput(msgspec.Struct, frozen=True):
     shown_unit: str
     scale: float
     group: str
+
+
+class LiveReference(msgspec.Struct, frozen=True):
+    """Values of an output over the sweep to compare with; null without one; and their tolerance."""
+
+    values: Values
+    tolerance: float
 
 
 class LiveDriver(msgspec.Struct, frozen=True):
@@ -139,6 +175,9 @@ class Opening(_Message, frozen=True):
         kind: "table" or "model".
         unit, axes: of the points.
         save: a free name for a new file.
+        reference: values to compare with, by output.
+        limits: smallest and largest value by output; null without one.
+        varied: whether there is a file of tolerances.
     """
 
     protocol: int
@@ -153,13 +192,16 @@ class Opening(_Message, frozen=True):
     drivers: list[LiveDriver]
     engines: list[str]
     save: str
+    reference: dict[str, LiveReference]
+    limits: dict[str, tuple[float | None, float | None]]
+    varied: bool
 
 
 class Answer(_Message, frozen=True):
     """The motion over the sweep.
 
     Attributes:
-        outputs: values by output; null without a value.
+        outputs: values by output; null without a value. Some may be missing if not all were wanted.
         solved: whether each sample was reached.
         drawing: the scene, as in reports; its frames are the samples in `frames`.
         message: why samples are missing; empty if none are.
@@ -183,6 +225,8 @@ class Pose(_Message, frozen=True):
         bodies: origin and Euler parameters, seven numbers, by body.
         distance: smallest singular value of the rows over the one at design: 0 is a singular pose;
             null if it was not asked for.
+        reactions: force of a joint's first body on its second at rest [N], by joint; zero along
+            axes that rigid bodies leave undetermined; empty without loads, or if not asked for.
         message: why the way ends before; empty if it does not.
     """
 
@@ -191,6 +235,7 @@ class Pose(_Message, frozen=True):
     bodies: dict[str, list[float]]
     outputs: dict[str, float | None]
     distance: float | None
+    reactions: dict[str, list[float]]
     message: str
     milliseconds: dict[str, float]
 
@@ -234,6 +279,28 @@ class Ranking(_Message, frozen=True):
     effects: list[Effect]
 
 
+class Bins(msgspec.Struct, frozen=True):
+    """Numbers of variants between edges of an output's value."""
+
+    edges: list[float]
+    counts: list[int]
+
+
+class Spread(_Message, frozen=True):
+    """The variants of an output at the samples of rebound, design and jounce.
+
+    Attributes:
+        bins: null where all variants are equal.
+        failed: number of variants that do not reach all samples.
+    """
+
+    output: str
+    samples: list[int]
+    bins: list[Bins | None]
+    variants: int
+    failed: int
+
+
 class Verdict(_Message, frozen=True):
     """An engine's result.
 
@@ -256,6 +323,13 @@ class Saved(_Message, frozen=True):
     name: str
 
 
+class Exported(_Message, frozen=True):
+    """A file to keep, as base64."""
+
+    name: str
+    content: bytes
+
+
 class Invalid(_Message, frozen=True):
     """A message without an answer, and the reason."""
 
@@ -269,7 +343,18 @@ class Changed(_Message, frozen=True):
 
 
 Told: TypeAlias = (
-    Opening | Answer | Pose | Reached | Refused | Ranking | Verdict | Saved | Invalid | Changed
+    Opening
+    | Answer
+    | Pose
+    | Reached
+    | Refused
+    | Ranking
+    | Spread
+    | Verdict
+    | Saved
+    | Exported
+    | Invalid
+    | Changed
 )
 
 _DECODER = msgspec.json.Decoder(Asked)

@@ -16,7 +16,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Condition, Event, Lock, Thread
+from time import monotonic
 from typing import Any, TypeAlias
 from urllib.parse import parse_qs, urlsplit
 
@@ -26,16 +28,23 @@ from ..case.case import Case
 from ..case.io.reference_file import sha256
 from ..errors import KincheckError
 from ..extras import library
-from ..harness.record import Record
+from ..harness.record import Record, Results
+from ..harness.scene import with_scenes
+from ..report.curves import write_curves
 from ..report.page_model import judged, worst
 from ..report.page_parts import SCENE_SCRIPTS, script_of, style_sheet
+from ..report.report import write_report
 from .model import LiveModel
 from .protocol import (
     LARGEST_MESSAGE,
+    MOST_MESSAGES,
     Asked,
     Changed,
     Check,
+    Export,
+    Exported,
     Invalid,
+    Measured,
     Move,
     Rank,
     Reach,
@@ -43,6 +52,7 @@ from .protocol import (
     Saved,
     Solve,
     Told,
+    Vary,
     Verdict,
     encode,
     read,
@@ -66,11 +76,13 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
+POLICY = 1008
+"""Code of a socket that is closed for its behaviour (RFC 6455, section 7.4.1)."""
 GRACE = 2.0
 """Time for a page to load again [s]."""
 
 Live: TypeAlias = LiveTable | LiveModel
-Judge: TypeAlias = Callable[[Case, Sequence[str], Callable[[Record], None]], None]
+Judge: TypeAlias = Callable[[Case, Sequence[str], Callable[[Record], None]], Results]
 """Solves a case with engines of these names, and tells each record."""
 
 
@@ -87,6 +99,7 @@ class LiveServer:
     Attributes:
         address: with the token.
         ended: is set when the server has no more to do.
+        measured: times of edits that a page was asked to measure [ms].
 
     Raises:
         KincheckError: the file cannot be read, the port cannot be used, or a library is missing.
@@ -106,6 +119,7 @@ class LiveServer:
         self.file, self.open_file, self.built_in = file, open_file, not file.exists()
         self.engines, self.judge, self.once = engines, judge, once
         self.lock, self.pages, self.ended = Lock(), 0, Event()
+        self.measured = list[float]()
         self.live, self.digest = open_file(), self._sha256()
         self.token = secrets.token_urlsafe(32)
         silent = logging.Logger("kincheck.live")  # a refused handshake is no news for the terminal
@@ -226,14 +240,20 @@ class Conversation:
             return
         threads = [
             Thread(target=self._work, args=(kinds, closed), daemon=True)
-            for kinds in ((Solve, Move, Save, Rank, Reach), (Check,))
+            for kinds in ((Solve, Move, Save, Rank, Vary, Reach), (Check, Export))
         ]
         with suppress(closed):
             self.tell(self.live.opening(self.server.engines))
             for thread in threads:
                 thread.start()
-            while True:
+            began, count = monotonic(), 0
+            while count < MOST_MESSAGES:
                 self._receive(self.socket.recv())
+                count += 1
+                if monotonic() - began > 1.0:
+                    began, count = monotonic(), 0
+            self.tell(Invalid(message=f"found more than {MOST_MESSAGES} messages in a second"))
+            self.socket.close(POLICY)
         with self.news:
             self.closed = True
             self.news.notify_all()
@@ -247,6 +267,10 @@ class Conversation:
             message = read(text)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             self.tell(Invalid(message=f"message: {error}"))
+            return
+        if isinstance(message, Measured):
+            self.server.measured += message.milliseconds
+            self.server.ended.set()
             return
         with self.news:
             self.waiting[type(message)] = message
@@ -279,8 +303,8 @@ class Conversation:
                 )
             )
         try:
-            if isinstance(message, Check):
-                self._check(message)
+            if isinstance(message, Check | Export):
+                self._judge(message)
             else:
                 with self.server.lock:
                     answer = self._found(message)
@@ -296,9 +320,11 @@ class Conversation:
         live = self.live
         match live, message:
             case LiveTable(), Solve():
-                return live.answer(message.id, message.points)
+                return live.answer(message.id, message.points, whole=message.whole)
             case LiveTable(), Rank():
                 return live.ranking(message.id, message.points, message.output)
+            case LiveTable(), Vary():
+                return live.spread(message.id, message.points, message.output)
             case LiveTable(), Save():
                 return Saved(id=message.id, name=live.save(message.points, message.name))
             case LiveModel(), Solve():
@@ -310,8 +336,8 @@ class Conversation:
             case _:
                 raise KincheckError(f"a {live.kind} has no answer to {type(message).__name__}")
 
-    def _check(self, message: Check) -> None:
-        """Tell the verdict of each engine as it ends."""
+    def _judge(self, message: Check | Export) -> None:
+        """Tell the verdict of each engine as it ends, or hand out a file of the results."""
         live, names = self.live, [*dict.fromkeys(message.engines)]
         for name in names:
             if name not in self.server.engines:
@@ -319,15 +345,31 @@ class Conversation:
         case = live.case
         if isinstance(live, LiveTable) and message.points is not None:
             with self.server.lock:
-                case = live.edited(message.points)
+                case = live.referenced(live.edited(message.points))
         done = 0
 
         def tell(record: Record) -> None:
             nonlocal done
             done += 1
-            self.tell(_verdict(message.id, record, last=done == len(names)))
+            if isinstance(message, Check):
+                self.tell(_verdict(message.id, record, last=done == len(names)))
 
-        self.server.judge(case, names, tell)
+        results = self.server.judge(case, names, tell)
+        if isinstance(message, Export):
+            ending = "html" if message.kind == "report" else message.kind
+            name = f"{live.file.stem}.{ending}"
+            self.tell(Exported(id=message.id, name=name, content=_file(results, case, name)))
+
+
+def _file(results: Results, case: Case, name: str) -> bytes:
+    """Return the report or the curves of results."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        if path.suffix == ".html":
+            write_report(with_scenes(results, [case]), path)
+        else:
+            write_curves(results, path, kind=path.suffix[1:], long=False)
+        return path.read_bytes()
 
 
 def _verdict(number: int, record: Record, *, last: bool) -> Verdict:

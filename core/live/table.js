@@ -27,6 +27,7 @@ function designOf(points, changed) {
   }
   return {
     start,
+    locked: [false, false, false], // whether x, y and z stay
     rows: () => rows,
     can: () => [before.length > 0, after.length > 0],
     // Begin a gesture: everything up to the next one is undone together.
@@ -90,12 +91,24 @@ function pointTable(table, points, unit, design, { choose, refuse }) {
       below.focus();
       below.select();
     }
-    if (!by) return;
+    if (!by || design.locked[i]) return;
     event.preventDefault();
     const value = typed(event.target.value);
     const from = Number.isFinite(value) ? value : design.rows()[k][i];
     put(k, i, from + by * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1));
   }
+  // A column can be locked against keys, typing and dragging.
+  table.querySelectorAll("thead .number").forEach((head, i) => {
+    const lock = Object.assign(document.createElement("input"), { type: "checkbox" });
+    const text = `lock ${head.textContent} of all points`;
+    lock.setAttribute("aria-label", text);
+    lock.title = text;
+    lock.addEventListener("change", () => {
+      design.locked[i] = lock.checked;
+      inputs.forEach((row) => (row[i].readOnly = lock.checked));
+    });
+    head.append(" ", lock);
+  });
   const body = table.querySelector("tbody");
   const rows = points.map(({ name, roles }, k) => {
     const head = Object.assign(document.createElement("th"), { scope: "row", textContent: name });

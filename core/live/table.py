@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -12,9 +12,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from ..algebra import Vec3
-from ..case.case import HELD_BUT, PER_TRAVEL, Case, without_forces
+from ..case.case import HELD_BUT, PER_TRAVEL, Case, size, without_forces
+from ..case.closing import held_case
 from ..case.io.reader_options import Supplied
 from ..case.models.files import read_hardpoints
 from ..case.models.hardpoints.read import case_of_hardpoints
@@ -22,26 +24,34 @@ from ..case.models.hardpoints.table import Hardpoint, axes_of, unit_of
 from ..case.quantity import Output, Quantity
 from ..case.turns import counted
 from ..errors import KincheckError, unknown
+from ..harness.held_trajectory import SAME_POSE
 from ..harness.labels import output_label
 from ..harness.scene import scene
 from ..jet import Jet
 from ..kinematics import NativeSolver, PreparedDesigns, Variants, places, require_driven
+from ..mechanism.motions import Path as Way
 from ..program.llvm.compiler import available
 from ..report.axis import DISPLAY, Axis, driver_axis
 from ..report.drawing import drawing
+from ..studies.tolerance.conformance import histogram
+from ..studies.variation.variation import Variation
+from ..studies.variation.variation_file import read_variation
 from ..trajectory import Array
 from ..unit_text import unit_text
 from .protocol import (
     VERSION,
     Answer,
+    Bins,
     Effect,
     LiveAxis,
     LiveOutput,
     LivePoint,
+    LiveReference,
     Opening,
     Ranking,
     Refused,
     Rows,
+    Spread,
     Values,
 )
 from .saving import free_name, save_table
@@ -50,6 +60,8 @@ TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
 FRAMES = 41
 """Most drawn samples: as many as a hand can tell apart on the slider."""
+VARIANTS = 512
+"""Variants of a histogram: its bins hold some tens of them."""
 MOVED = 2e-5
 """Half of the difference for derivatives [m]: its square times a third derivative is far below the
 three digits shown, and rounding of 1e-15 m over it too."""
@@ -61,6 +73,8 @@ class LiveTable:
     Args:
         file: the table.
         supplied: facts missing in it.
+        referenced: returns the case with what it is compared with.
+        vary: file of tolerances of the case; None without one.
 
     Raises:
         KincheckError: the file is no table of a suspension.
@@ -68,13 +82,21 @@ class LiveTable:
 
     kind = "table"
 
-    def __init__(self, file: Path, supplied: Supplied) -> None:
+    def __init__(
+        self,
+        file: Path,
+        supplied: Supplied,
+        referenced: Callable[[Case], Case] = lambda case: case,
+        vary: Path | None = None,
+    ) -> None:
         self.file, self.supplied = file, supplied
+        self.referenced, self.vary = referenced, vary
         self.table = read_hardpoints(file, supplied)
         self.names = [*self.table.points]
-        self.case = case_of_hardpoints(self.table, supplied)
+        self.case = referenced(case_of_hardpoints(self.table, supplied))
         require_driven(self.case.mechanism)
         self.axis = sweep_axis(self.case)
+        self.variation = read_variation(vary, self.case) if vary else None
         self._structure, self._designs = self._prepare(self.case)
 
     @property
@@ -103,6 +125,9 @@ class LiveTable:
             drivers=[],
             engines=[*engines],
             save=free_name(self.file),
+            reference=live_reference(self.case),
+            limits=live_limits(self.variation),
+            varied=self.variation is not None,
         )
 
     def edited(self, points: Rows) -> Case:
@@ -117,10 +142,14 @@ class LiveTable:
             name: Hardpoint(row, self.table.points[name].where)
             for name, row in zip(self.names, points, strict=True)
         }
-        return case_of_hardpoints(replace(self.table, points=moved), self.supplied)
+        case = case_of_hardpoints(replace(self.table, points=moved), self.supplied)
+        # those of the reference, if they were asked for
+        return replace(case, sweep=replace(case.sweep, values=self.case.sweep.values))
 
-    def answer(self, number: int, points: Rows) -> Answer | Refused:
-        """Return the motion of an edited table, or why there is none."""
+    def answer(self, number: int, points: Rows, *, whole: bool = True) -> Answer | Refused:
+        """Return the motion of an edited table, or why there is none; if it is not to be whole,
+        without the outputs that need another solution.
+        """
         begin = perf_counter()
         try:
             case = self.edited(points)
@@ -130,9 +159,10 @@ class LiveTable:
         designs, geometry = self._prepared(case), _numbers(case)
         found = designs.solve(geometry, TOL)
         solved = perf_counter()
+        outputs = [each for each in case.outputs if whole or _alone(each) not in self._held]
         values = {
             name: as_values(each[:, 0])
-            for name, each in self._outputs(case, designs, found, geometry, case.outputs).items()
+            for name, each in self._outputs(case, designs, found, geometry, outputs).items()
         }
         evaluated = perf_counter()
         drawn, frames = self._drawing(case, designs, found)
@@ -165,9 +195,7 @@ class LiveTable:
             KincheckError: the reader refuses the points, or there is no such output.
         """
         case = self.edited(points)
-        known = {each.name: each for each in _computed(case)}
-        if output not in known:
-            raise KincheckError(unknown("output", output, known))
+        wanted = _output(case, output)
         names = [each.name for each in case.hardpoints]
         designs, steps = self._prepared(case), np.repeat(np.eye(3), 2, axis=0) * MOVED
         steps[1::2] *= -1.0
@@ -185,7 +213,7 @@ class LiveTable:
             ]
         )
         found = designs.solve(geometry, TOL)
-        values = self._outputs(case, designs, found, geometry, [known[output]])[output]
+        values = self._outputs(case, designs, found, geometry, [wanted])[output]
         samples = key_samples(self.case)
         slopes = ((values[:, ::2] - values[:, 1::2]) / (2 * MOVED))[samples]
         order: list[int] = np.argsort(
@@ -193,6 +221,38 @@ class LiveTable:
         ).tolist()
         effects = [Effect(names[k // 3], "xyz"[k % 3], as_values(slopes[:, k])) for k in order]
         return Ranking(id=number, output=output, samples=samples, effects=effects)
+
+    def spread(self, number: int, points: Rows, output: str) -> Spread:
+        """Return histograms of an output over the variants of the file of tolerances.
+
+        Raises:
+            KincheckError: the reader or the file of tolerances refuses the points, or there is no
+                such output or file.
+        """
+        if self.vary is None:
+            raise KincheckError("tolerances: there is no file of them; start kincheck with --vary")
+        case = self.edited(points)
+        wanted, variation = _output(case, output), read_variation(self.vary, case)
+        count = min(variation.count or VARIANTS, VARIANTS)
+        geometry = np.repeat(_numbers(case), count, axis=1)
+        varied, rows = variation.geometry(variation.offsets(0, 0, count)), _rows(case)
+        first = 0
+        for place, numbers in variation.places.items():
+            geometry[rows[place]] = varied[first : first + numbers]
+            first += numbers
+        designs = self._prepared(case)
+        found = designs.solve(geometry, TOL)
+        values = self._outputs(case, designs, found, geometry, [wanted])[output]
+        samples = key_samples(case)
+        bins = [histogram([values], sample) for sample in samples]
+        return Spread(
+            id=number,
+            output=output,
+            samples=samples,
+            bins=[each and Bins(each.edges, each.counts) for each in bins],
+            variants=count,
+            failed=int((~found.solved.all(axis=0)).sum()),
+        )
 
     def save(self, points: Rows, name: str) -> str:
         """Write the table with other numbers to a new file; return its name.
@@ -205,16 +265,22 @@ class LiveTable:
 
     def _prepare(self, case: Case) -> tuple[list[str], PreparedDesigns]:
         """Return the key of a program, and the program, compiled."""
+        path = case.sweep.path
         bodies = [body.name for body in case.mechanism.moving]
-        with _at_once():  # otherwise an edit in between waits for the compiler
-            designs = NativeSolver().prepare_designs(
-                case.mechanism,
-                case.sweep.path,
-                [*places(case.mechanism)],
-                without_forces(case).points,
-                bodies=bodies,
-            )
+
+        def prepared(path: Way) -> PreparedDesigns:
+            wanted = [*places(case.mechanism)], without_forces(case).points
+            designs = NativeSolver().prepare_designs(case.mechanism, path, *wanted, bodies=bodies)
             designs.solve(_numbers(case), TOL)
+            return designs
+
+        with _at_once():  # otherwise an edit in between waits for the compiler
+            designs = prepared(path)
+            self._held = {
+                alone: prepared(held_case(case, alone).sweep.path)
+                for alone in dict.fromkeys(map(_alone, case.outputs))
+                if alone and not _moves_alone(path, alone)
+            }
         return _structure(case), designs
 
     def _prepared(self, case: Case) -> PreparedDesigns:
@@ -232,55 +298,66 @@ class LiveTable:
         outputs: Sequence[Quantity],
     ) -> dict[str, Array]:
         """Return outputs over the samples of V variants, shape (n, V)."""
-        first, rows = 0, dict[str, slice]()
-        for place, value in places(case.mechanism).items():
-            rows[place] = slice(first, first + len(value))
-            first += len(value)
-        at, design = dict[str, Vec3](), dict[str, Vec3]()
-        for name in without_forces(case).points:
-            motion = designs.motion(found, name)
-            at[name] = Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
-            stands = geometry[rows[f"points.{name}.position"]]
-            design[name] = Vec3(*(Jet(a, np.zeros(()), np.zeros(())) for a in stands))
+        rows, names, values = _rows(case), without_forces(case).points, dict[str, Array]()
+        design = {
+            name: Vec3(*(Jet(a, np.zeros(()), np.zeros(())) for a in geometry[rows[place]]))
+            for name in names
+            if (place := f"points.{name}.position") in rows
+        }
+        computed = [(each, _alone(each)) for each in outputs if not each.forces]
         with np.errstate(all="ignore"):
-            return {
-                each.name: np.broadcast_to(
-                    counted(
-                        case.mechanism,
-                        case.sweep.path,
-                        each,
-                        {name: at[name] for name in each.points},
-                        design,
-                    ).x,
-                    found.solved.shape,
-                )
-                for each in _computed(case)
-                if each in outputs
-            }
+            for alone in dict.fromkeys(by for _, by in computed):
+                # the same poses, with velocities by some drivers while the others rest
+                held = self._held[alone].solve(geometry, TOL) if alone in self._held else found
+                at = {name: _moving(designs.motion(held, name)) for name in names}
+                known = held.solved & _same_place(case, designs, found, held)
+                for each in (each for each, by in computed if by == alone):
+                    moved = {name: at[name] for name in each.points}
+                    jet = counted(case.mechanism, case.sweep.path, each, moved, design)
+                    values[each.name] = np.where(known, jet.x, np.nan)
+        return values
 
     def _drawing(
         self, case: Case, designs: PreparedDesigns, found: Variants
     ) -> tuple[dict[str, Any], list[int]]:
         """Return the scene of reports at some of the solved samples, and these samples."""
-        count = len(found.solved)
-        taken = {*np.linspace(0, count - 1, min(FRAMES, count)).round().astype(int).tolist()}
-        taken |= {*key_samples(case)}
-        frames = [k for k in sorted(taken) if found.solved[k, 0]]
+        frames = drawn_frames(found.solved[:, 0], key_samples(case))
         poses = {
             body.name: designs.pose(found, body.name)[:, frames, 0].T
             for body in case.mechanism.moving
         }
-        stands = scene(case, poses=False)
-        bodies = [
-            body
-            if body.name not in poses
-            else msgspec.structs.replace(
-                body, r=poses[body.name][:, :3].tolist(), p=poses[body.name][:, 3:].tolist()
-            )
-            for body in stands.bodies
-        ]
-        posed = msgspec.structs.replace(stands, frames=frames, bodies=bodies, message="")
-        return asdict(drawing(posed, self.axis)), frames
+        return drawn(case, self.axis, frames, poses, {}), frames
+
+
+def drawn_frames(solved: NDArray[np.bool_], always: Sequence[int] = ()) -> list[int]:
+    """Return some of the solved samples to draw, among them those of `always`."""
+    count = len(solved)
+    evenly: list[int] = np.linspace(0, count - 1, min(FRAMES, count)).round().astype(int).tolist()
+    return [k for k in sorted({*evenly, *always}) if solved[k]]
+
+
+def drawn(
+    case: Case,
+    axis: Axis,
+    frames: list[int],
+    poses: Mapping[str, Array],
+    values: Mapping[str, Values],
+) -> dict[str, Any]:
+    """Return the scene of reports.
+
+    Args:
+        poses: origin and Euler parameters by body, shape (frames, 7).
+        values: of outputs, for the arrows of forces.
+    """
+    stands = scene(case, poses=False)
+    bodies = [
+        msgspec.structs.replace(body, r=at[:, :3].tolist(), p=at[:, 3:].tolist())
+        if (at := poses.get(body.name)) is not None
+        else body
+        for body in stands.bodies
+    ]
+    posed = msgspec.structs.replace(stands, frames=frames, bodies=bodies, message="")
+    return asdict(drawing(posed, axis, values))
 
 
 def sweep_axis(case: Case) -> Axis:
@@ -324,9 +401,69 @@ def as_values(values: Array) -> Values:
     ]
 
 
-def _computed(case: Case) -> list[Quantity]:
-    """Return the outputs of motion from one solution; see `HELD_BUT` for the others."""
-    return [each for each in case.outputs if not each.forces and HELD_BUT not in each.facts]
+def live_reference(case: Case) -> dict[str, LiveReference]:
+    """Return the reference of a case with the tolerances of a run."""
+    found = dict[str, LiveReference]()
+    for each in case.outputs:
+        if each.name in case.reference:
+            series = case.reference[each.name]
+            known = series.position[np.isfinite(series.position)]
+            extent = float(np.ptp(known)) if len(known) else 0.0
+            within = float(np.max((series.uncertainty or {}).get("position", 0.0)))
+            tolerance = each.atol + each.rtol * extent + within
+            found[each.name] = LiveReference(as_values(series.position), tolerance)
+    return found
+
+
+def live_limits(variation: Variation | None) -> dict[str, tuple[float | None, float | None]]:
+    """Return the limits of a file of tolerances, by output."""
+    found = dict[str, tuple[float | None, float | None]]()
+    for each in variation.limits if variation else ():
+        low, high = as_values(np.array([each.low, each.high]))
+        found[each.output] = low, high
+    return found
+
+
+def _output(case: Case, name: str) -> Quantity:
+    """Return an output of motion by its name.
+
+    Raises:
+        KincheckError: there is none.
+    """
+    known = {each.name: each for each in case.outputs if not each.forces}
+    if name not in known:
+        raise KincheckError(unknown("output", name, known))
+    return known[name]
+
+
+def _alone(output: Quantity) -> tuple[str, ...]:
+    """Return the drivers by which an output is differentiated while the others rest."""
+    return tuple(output.facts.get(HELD_BUT, ()))
+
+
+def _moves_alone(path: Way, drivers: Sequence[str]) -> bool:
+    """Return whether these drivers move at one rate along a path, and all others rest."""
+    rates = {name: motion.at(path.times)[1] for name, motion in path.motions.items()}
+    first = rates.get(drivers[0], 0.0)
+    names = {*rates, *drivers}
+    return all(
+        np.all(rates.get(name, 0.0) == (first if name in drivers else 0.0)) for name in names
+    )
+
+
+def _moving(motion: Sequence[Array]) -> Vec3:
+    return Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
+
+
+def _same_place(
+    case: Case, designs: PreparedDesigns, found: Variants, held: Variants
+) -> NDArray[np.bool_]:
+    """Return whether two solutions have the points at one place: not in another assembly."""
+    off = [
+        np.abs(designs.motion(found, name)[0] - designs.motion(held, name)[0]).max(axis=0)
+        for name in without_forces(case).points
+    ]
+    return np.max(off, axis=0) <= SAME_POSE * size(case)
 
 
 def _at_once() -> AbstractContextManager[None]:
@@ -335,6 +472,14 @@ def _at_once() -> AbstractContextManager[None]:
     from ..program.llvm.jit import compiled_at_once
 
     return compiled_at_once()
+
+
+def _rows(case: Case) -> dict[str, slice]:
+    """Return the rows of each place among the numbers of the geometry."""
+    first, rows = 0, dict[str, slice]()
+    for place, value in places(case.mechanism).items():
+        rows[place] = slice(first, first := first + len(value))
+    return rows
 
 
 def _numbers(case: Case) -> Array:

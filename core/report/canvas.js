@@ -42,9 +42,9 @@ function brush(pen) {
     points.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y)));
     const round = { lineCap: "round", lineJoin: "round" };
     Object.assign(pen, { strokeStyle: stroke, lineWidth: thick, globalAlpha: alpha, ...round });
-    pen.setLineDash(dash);
+    if (dash.length) pen.setLineDash(dash);
     pen.stroke();
-    pen.setLineDash([]);
+    if (dash.length) pen.setLineDash([]);
     pen.globalAlpha = 1;
   };
   // edged: with an edge that closes the seam between two areas

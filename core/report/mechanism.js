@@ -56,9 +56,10 @@ function mechanism(box, drawing, name, trouble) {
     ({ shiftKey }) =>
       shiftKey ? move(24 * right, -24 * up) : turn(-0.1 * right, 0.1 * up);
 
-  function change(next) {
+  function change(next, moved = motionOf(next)) {
     drawing = next;
-    motion = motionOf(next);
+    motion = moved;
+    explainArrows(box, motion);
     if (slider) slider.max = last();
     show(camera.frame);
   }
@@ -133,7 +134,7 @@ function mechanism(box, drawing, name, trouble) {
 }
 
 // The controls of a scene: the player of several samples; views, layers and pictures. Layers named
-// in the box's `data-off` begin hidden.
+// in the box's `data-off` begin hidden; with `data-forces`, arrows may follow.
 function controlsOf(box, { steps, wheels, arrows }) {
   const make = (kind, given, ...content) => {
     const made = document.createElement(kind);
@@ -155,7 +156,7 @@ function controlsOf(box, { steps, wheels, arrows }) {
     button("+", { "data-act": "in", "aria-label": "larger" }),
     button("−", { "data-act": "out", "aria-label": "smaller" }),
   ];
-  const there = { wheels: wheels.length, centres: wheels.length, forces: arrows.length };
+  const there = { wheels: wheels.length, centres: wheels.length, forces: arrows.length || "forces" in box.dataset };
   const off = ["centres", ...(box.dataset.off || "").split(" ")];
   const layers = ["names", "frames", "paths", ...Object.keys(there).filter((name) => there[name])];
   const checks = layers.map((name) => {
@@ -205,9 +206,11 @@ function player(box, current, show, last, closed) {
 
 // The scale of the arrows as text, for a round force.
 function explainArrows(box, { perMetre, places }) {
+  const place = box.querySelector("[data-scale]");
+  if (place) place.textContent = "";
   if (!perMetre) return;
   const length = niceStep(span(places.flat()) / 20);
   const [millimetres, newtons] = [shown(1000 * length), shown(perMetre * length)];
   const scale = `${millimetres} mm of arrow are ${newtons} N.`;
-  box.querySelector("[data-scale]").textContent = scale;
+  place.textContent = scale;
 }

@@ -15,16 +15,19 @@ function plot(box, { data, layout }) {
   let frame = null;
   let view = null;
   let size = null;
+  // read when the box changes: a question for it makes the browser lay out all figures before
+  let room = [0, 0];
+  let family = "";
 
   const seen = () => data.filter((trace) => !hidden.has(trace.meta));
   const hasValues = ({ name, hoverinfo, type }) => name && hoverinfo !== "skip" && type !== "bar";
   const values = readout(box, layout, () => ({ frame, traces: seen().filter(hasValues) }));
 
   function draw() {
-    const [width, height] = size || [box.clientWidth, box.clientHeight];
+    const [width, height] = size || room;
     if (!width) return;
     values.clear();
-    frame = frameOf(seen(), layout, [width, height], view, getComputedStyle(box).fontFamily);
+    frame = frameOf(seen(), layout, [width, height], view, family);
     const { left, right, top, bottom } = frame;
     const whole = { viewBox: `0 0 ${width} ${height}`, width, height, "aria-hidden": "true" };
     const inside = svgElement("rect", rectangle([left, top], [right, bottom]));
@@ -94,8 +97,13 @@ function plot(box, { data, layout }) {
     ArrowUp: () => values.step(1),
     Escape: () => (view ? reset() : values.clear()),
   });
-  new ResizeObserver(draw).observe(box);
-  draw();
+  function fill() {
+    room = [box.clientWidth, box.clientHeight];
+    family = getComputedStyle(box).fontFamily;
+    draw();
+  }
+  new ResizeObserver(fill).observe(box);
+  fill();
   return {
     reset,
     show(series, on) {

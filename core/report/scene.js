@@ -104,10 +104,10 @@ function putWheel({ stage, seen, turn, colour, line, scale }, wheel) {
   const place = seen(wheel.center);
   const radius = scale * wheel.radius;
   const sized = (profile) => profile.map((row) => row.map((value) => radius * value));
-  stage.solid(place, axis, sized(TYRE), colour("soft"), { alpha: 0.2, sides: 32 });
+  stage.solid(place, axis, sized(TYRE), colour("soft"), { alpha: 0.2, sides: 24 });
   stage.solid(place, axis, sized(HUB), colour("axis"));
   const ring = ([along, far]) => {
-    const rays = raysAbout(axis, 48);
+    const rays = raysAbout(axis, 40);
     const middle = sum(place, axis, radius * along);
     return [...rays, rays[0]].map((ray) => sum(middle, ray, radius * far));
   };
@@ -115,7 +115,7 @@ function putWheel({ stage, seen, turn, colour, line, scale }, wheel) {
   const rim = ring([0.2, 0.64]);
   const hub = ring([0.16, 0.16]);
   for (let k = 0; k < 5; k++) {
-    const at = Math.round((48 * k) / 5);
+    const at = 8 * k;
     stage.thread([hub[at], rim[at]], colour("soft"), 2, 0.6);
   }
   line(wheel.axis.map(seen), colour("soft"), 1.4, [9, 3, 2, 3]);

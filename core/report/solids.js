@@ -3,7 +3,7 @@
 // [px] to the right, down and towards the eye.
 
 const LIGHT = direction([-0.35, -0.75, 0.6]);
-const SIDES = 12;
+const SIDES = 10;
 
 // Red, green and blue of a colour of the style sheet, such as #fa0 or #ffaa00.
 function rgbOf(text) {
@@ -74,7 +74,7 @@ function stageOf({ line, area, disc }, r) {
     const arm = sum(to, from, -1);
     const length = Math.hypot(...arm);
     if (length < 1e-6) return;
-    const [radius, pieces] = [r * thick, Math.max(1, Math.min(12, Math.round(length / (8 * r))))];
+    const [radius, pieces] = [r * thick, Math.max(1, Math.min(8, Math.round(length / (10 * r))))];
     const profile = Array.from({ length: pieces + 1 }, (_, k) => [(length * k) / pieces, radius]);
     const whole = capped ? [[0, 0], ...profile, [length, 0]] : profile;
     solid(from, direction(arm), whole, colour);
@@ -101,7 +101,7 @@ function stageOf({ line, area, disc }, r) {
     const arm = sum(to, from, -1);
     const length = Math.hypot(...arm);
     if (length < 1e-6) return;
-    const [turns, count] = [8, 96];
+    const [turns, count] = [8, 72];
     const rays = raysAbout(direction(arm), count, turns);
     const wire = rays.map((ray, k) => sum(sum(from, arm, k / (count - 1)), ray, r * size));
     thread(wire, colour, Math.max(1.2, 0.9 * r));

@@ -11,7 +11,7 @@ from kincheck.core.cli.serve import judge_by
 from kincheck.core.live.model import LiveModel
 from kincheck.core.live.server import LiveServer
 
-from ..support.browser import CHROMIUM, Browser
+from ..support.browser import AXE, CHROMIUM, Browser
 from .conftest import CAR, TRAVEL
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
@@ -77,6 +77,87 @@ def test_dragged_point_gives_what_run_gives(opened, car):
     expected = record.outputs["toe"].position[-1]
     assert toe(opened) == pytest.approx(expected, rel=1e-12, abs=1e-15)
     assert car.read_text("utf-8") == CAR
+
+
+def test_ball_joint_dragged_ten_millimetres(opened, car):
+    """What the page shows, and what `run` gives for the saved table, agree in all digits but the
+    last three, which the order of sums decides.
+    """
+    middle = "return [0, 1].map((k) => kincheckLive.spots(0)[k * 5 + 3][0])"  # lca_front, wheel
+    inner, outer = opened.run(middle)
+    millimetre = (outer - inner) / (612 - 210)
+    moved = drag(opened, (10.0 * millimetre, 0.0))
+    assert moved == pytest.approx([0.0, 10.0, 0.0], abs=0.051)  # tenths of millimetres
+    opened.click("#saving button")
+    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
+    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
+    shown = opened.run("return kincheckLive.answer.outputs.toe")
+    assert shown == pytest.approx(record.outputs["toe"].position, rel=1e-13, abs=1e-15)
+
+
+def test_locked_axis_stays_under_drag_and_keys(opened):
+    opened.click("[aria-label='lock y of all points']")
+    moved = drag(opened, (9.0, -3.0))
+    assert moved[1] == 0.0 != moved[2]
+    opened.click(FIELD)
+    opened.key("ArrowUp")
+    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+
+
+def test_numbers_survive_a_reload(opened):
+    opened.click(FIELD)
+    opened.key("ArrowUp")
+    answered(opened)
+    moved = toe(opened)
+    opened("Page.reload")
+    opened.until("'ready' in document.documentElement.dataset && !kincheckLive.isDue()")
+    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541
+    assert toe(opened) == moved
+    opened.key("z", ctrl=True)
+    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+
+
+def test_page_is_used_by_keys_alone(opened, car):
+    """Every control has a name and a mark of its focus, in the order of the page."""
+    seen = []
+    for _ in range(100):
+        opened.key("Tab")
+        kind, name, mark = opened.run(
+            "const at = document.activeElement;"
+            "const name = at.getAttribute('aria-label') || (at.labels || [])[0]?.textContent"
+            " || at.textContent;"
+            "return [at.tagName, name.trim(), getComputedStyle(at).outlineStyle];"
+        )
+        if kind == "BODY":
+            break
+        assert name
+        assert mark == "solid", name
+        seen.append(name)
+        if name == "uca_outer y [mm]":
+            opened.key("ArrowUp")
+    answered(opened)
+    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541
+    order = ["CSV", "save", "play", "front", "centres", "film", "uca_front x [mm]", "check"]
+    assert [name for name in seen if name in order] == order
+    opened.run("document.querySelector('#name').focus()")
+    opened.key("Tab")
+    opened.key("Enter")
+    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
+    assert "uca_outer,-15,541,312" in car.with_name("car_2.csv").read_text("utf-8")
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="axe is not installed: npm install axe-core")
+def test_axe_finds_nothing_on_the_live_page(opened):
+    opened.run("for (const each of document.querySelectorAll('[data-layer]')) each.checked = true")
+    assert opened.violations() == []
+
+
+def test_figures_out_of_view_follow_at_rest(opened):
+    last = "[...document.querySelectorAll('#figures .curve')].at(-1).getAttribute('d')"
+    before = opened.run(f"return {last}")
+    opened.click(FIELD)
+    opened.key("ArrowUp", shift=True)
+    opened.until(f"{last} !== {before!r}")
 
 
 def test_gesture_is_undone_and_redone_whole(opened):
@@ -161,6 +242,13 @@ def test_page_fits_a_narrow_window(served, browser):
     browser.visit(served.address)
     answered(browser)
     assert browser.run("return document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_page_measures_its_edits(served, browser):
+    browser.visit(f"{served.address}&measure=3")
+    assert served.ended.wait(60)
+    assert len(served.measured) == 3
+    assert min(served.measured) > 0.0
 
 
 def test_scene_shows_the_roll_centre_of_the_outputs(opened):

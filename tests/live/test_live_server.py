@@ -1,5 +1,6 @@
 """The server of the live page: who gets in, what it answers, and how it ends."""
 
+import base64
 import http.client
 import json
 import os
@@ -7,19 +8,25 @@ import signal
 import stat
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
+from time import monotonic
 
 import jsonschema
+import numpy as np
 import pytest
-from kincheck import load, run
+from kincheck import load, run, sweep
 from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.live.model import LiveModel
-from kincheck.core.live.protocol import LARGEST_MESSAGE, live_schema
+from kincheck.core.live.protocol import LARGEST_MESSAGE, MOST_MESSAGES, live_schema
 from kincheck.core.live.table import LiveTable
 from kincheck.core.program.llvm import jit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from ..oracles.naive import A
 from .conftest import CAR, TRAVEL
 
 
@@ -112,6 +119,49 @@ def test_bad_message_is_told_and_the_next_answered(page, text):
     assert page.told("invalid")["message"].startswith("message: ")
     page.say(type="solve", points=page.points, id=4)
     assert page.told("answer")["id"] == 4
+
+
+def test_flood_of_messages_ends_the_page_alone(page, open_page):
+    for _ in range(2 * MOST_MESSAGES):
+        with suppress(ConnectionClosed):
+            page.socket.send("{}")
+    with suppress(ConnectionClosed):
+        while True:
+            page.socket.recv(timeout=20)
+    assert page.socket.close_code == 1008
+    other = open_page()
+    other.say(type="solve", points=other.points, id=1)
+    assert other.told("answer")["id"] == 1
+
+
+def test_slow_page_holds_up_no_other(page, open_page):
+    """A page that reads nothing: its answers wait in its socket, and the newest comes last."""
+    for k in range(300):
+        page.say(type="solve", points=page.moved("uca_outer", 1, 0.01 * k), id=k)
+    other = open_page()
+    for k in range(3):
+        other.say(type="solve", points=other.points, id=k)
+        assert other.told("answer")["id"] == k
+    while page.told("answer")["id"] != 299:
+        pass
+
+
+def test_killed_worker_is_a_verdict_and_the_server_lives(page):
+    page.say(type="check", engines=["native", "mujoco"], points=page.points)
+    children = Path(f"/proc/{os.getpid()}/task")
+    killed = set[int]()
+    end = monotonic() + 60
+    while not killed and monotonic() < end:
+        for task in children.glob("*/children"):
+            for child in map(int, task.read_text().split()):
+                if b"-P" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0"):
+                    os.kill(child, signal.SIGKILL)
+                    killed.add(child)
+    verdicts = [page.told("verdict") for _ in range(2)]
+    assert "crashed" in {each["outcome"] for each in verdicts}
+    assert [each["last"] for each in verdicts] == [False, True]
+    page.say(type="solve", points=page.points, id=9)
+    assert page.told("answer")["id"] == 9
 
 
 def test_message_beyond_the_limit_ends_the_page(page):
@@ -272,6 +322,26 @@ def test_model_closes_its_loops_at_every_slider_value(tmp_path):
     assert found.drivers[driver.name] == pytest.approx(driver.design + 0.3, abs=1e-12)
 
 
+def test_model_at_rest_has_the_reactions_of_run(tmp_path):
+    case = load("mcpherson_strut_loaded")
+    live = LiveModel(tmp_path / "strut", case)
+    (driver,) = live.drivers.values()
+    found = live.pose(1, {driver.name: driver.design + 0.02}, measured=True)
+    force = np.array(found.reactions["tie_rod"])
+    sweep = replace(case.sweep, values=np.array([0.0, 0.02]), rate=0.0)
+    (record,) = run(replace(case, sweep=sweep, reference={}), "native").records
+    assert force[1] == pytest.approx(record.outputs["tie_rod_force_y"].position[-1], rel=1e-9)
+    # a rod pulls along itself
+    r, p = np.array(found.bodies["knuckle"][:3]), np.array(found.bodies["knuckle"][3:])
+    (knuckle,) = (body for body in case.mechanism.moving if body.name == "knuckle")
+    joint = case.mechanism.joint("tie_rod")
+    ends = dict(zip(joint.bodies, joint.points, strict=True))
+    arm = A(np.array(knuckle.euler_parameters)).T @ (np.array(ends["knuckle"]) - knuckle.origin)
+    rod = r + A(p) @ arm - np.array(ends["rack"])
+    assert np.cross(force, rod) == pytest.approx([0.0] * 3, abs=1e-9 * np.abs(force).max())
+    assert live.pose(2, {}, measured=False).reactions == {}
+
+
 def test_model_out_of_reach_shows_the_last_pose(tmp_path):
     live = LiveModel(tmp_path / "strut", load("mcpherson_strut"))
     (driver,) = live.drivers.values()
@@ -330,6 +400,83 @@ def test_axle_answers_for_both_wheels(car):
     points = [each.position for each in live.opening([]).points]
     outputs = live.answer(1, points).outputs
     assert outputs["left_camber"] == pytest.approx(outputs["right_camber"][::-1], abs=1e-12)
+
+
+@pytest.mark.parametrize("axle", ["heave", "roll", "steer"])
+def test_axle_answers_all_outputs_as_run(car, axle):
+    """Derivatives by travel with the steering held too."""
+    supplied = Supplied(travel="0.01:5", axle=axle)
+    live = LiveTable(car, supplied)
+    (record,) = run(load(car, supplied), "native").records
+    outputs = live.answer(1, live.positions).outputs
+    assert {*outputs} == {*record.outputs}
+    for name, expected in record.outputs.items():
+        values = [np.nan if each is None else each for each in outputs[name]]
+        wanted = [np.nan if each is None else each for each in expected.position]
+        assert values == pytest.approx(wanted, rel=1e-9, abs=1e-11, nan_ok=True), name
+    soon = live.answer(2, live.positions, whole=False).outputs
+    assert ("left_roll_center_height" in soon) == (axle == "heave")
+
+
+RIG = "# signs: iso8855\ntravel [mm],Toe Angle [deg]\n-30,0.22\n0,0.01\n30,-0.18\n"
+VARY = """\
+schema = "kincheck-vary/1"
+mode = "monte_carlo"
+
+[units]
+length = "mm"
+angle = "deg"
+
+[hardpoints.tie]
+at = "tierod_outer"
+sigma = 0.5
+
+[limits.toe]
+high = 0.3
+"""
+
+
+def test_reference_has_its_tolerance_and_judges(car, tmp_path):
+    (tmp_path / "rig.csv").write_text(RIG, "utf-8")
+    options = CurveOptions(accuracy=["toe=0.02 deg"])
+    live = LiveTable(car, TRAVEL, lambda case: with_curve(case, tmp_path / "rig.csv", options)[0])
+    found = live.opening([]).reference["toe"]
+    assert found.tolerance == pytest.approx(np.radians(0.02 + 0.005))  # and half a digit
+    known = [each for each in found.values if each is not None]
+    assert np.degrees(known) == pytest.approx([0.22, 0.01, -0.18])
+    judged = live.referenced(live.edited(live.positions))
+    (record,) = run(judged, "native").records
+    assert record.errors["toe"].position.tolerance == pytest.approx(found.tolerance)
+
+
+def test_spread_is_that_of_the_sweep(car, tmp_path):
+    (tmp_path / "vary.toml").write_text(VARY, "utf-8")
+    live = LiveTable(car, TRAVEL, vary=tmp_path / "vary.toml")
+    opening = live.opening([])
+    assert opening.varied
+    assert opening.limits == {"toe": (None, pytest.approx(np.radians(0.3)))}
+    found = live.spread(3, live.positions, "toe")
+    assert found.samples == [0, 10, 20]
+    assert found.bins[1] is None  # toe at design is a number of the table
+    case = load(car, TRAVEL)
+    envelope = sweep(case, tmp_path / "vary.toml", samples=found.variants).outputs["toe"]
+    for sample in (0, 20):
+        bins = found.bins[found.samples.index(sample)]
+        assert bins is not None
+        assert sum(bins.counts) == found.variants
+        assert bins.edges[0] == pytest.approx(envelope.min[sample], rel=1e-9)
+        assert bins.edges[-1] == pytest.approx(envelope.max[sample], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "start"), [("csv", b"stroke"), ("xlsx", b"PK"), ("report", b"<!")]
+)
+def test_export_is_the_file_of_run(page, kind, start):
+    points = page.moved("uca_outer", 1, 2.0)
+    page.say(type="export", kind=kind, engines=["native"], points=points)
+    found = page.told("exported")
+    assert found["name"] == f"car.{'html' if kind == 'report' else kind}"
+    assert base64.b64decode(found["content"]).startswith(start)
 
 
 @pytest.mark.parametrize("axle", [None, "heave"])

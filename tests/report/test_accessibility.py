@@ -1,12 +1,9 @@
-"""Pages in a browser under axe (https://github.com/dequelabs/axe-core, MPL-2.0), where it is there:
-`npm install axe-core`, or the path of axe.min.js in the environment variable KINCHECK_AXE.
-"""
+"""Pages in a browser under axe, where it is installed."""
 
 from __future__ import annotations
 
 import html
 import json
-import os
 import re
 import subprocess
 from pathlib import Path
@@ -19,10 +16,8 @@ from kincheck.core.report.page_model import Plot
 from kincheck.core.report.report import write_report
 from kincheck.core.report.sections import Diagram, Report, Section, page
 
-from ..support.browser import ACT, CHROMIUM, FLAGS
+from ..support.browser import ACT, AXE, CHROMIUM, FLAGS
 from .test_report_browser import several, strut
-
-AXE = Path(os.environ.get("KINCHECK_AXE", "node_modules/axe-core/axe.min.js"))
 
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed"),

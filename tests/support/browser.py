@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -16,6 +17,8 @@ from websockets.sync.client import connect
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 )
+AXE = Path(os.environ.get("KINCHECK_AXE", "node_modules/axe-core/axe.min.js"))
+"""https://github.com/dequelabs/axe-core, MPL-2.0: `npm install axe-core`, or the path here."""
 FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -99,6 +102,14 @@ class Browser:
                 return message["result"]
             self.events.append(message)
 
+    def violations(self) -> list[list[str]]:
+        """Return what axe finds on the page."""
+        self("Runtime.evaluate", expression=AXE.read_text("utf-8"))
+        return self.run(
+            "const { violations } = await axe.run();"
+            "return violations.map(({ id, nodes }) => [id, ...nodes.map(({ html }) => html)]);"
+        )
+
     def run(self, script: str) -> Any:
         """Return what a script returns in the page."""
         text = f"(async () => {{ {script} }})()"
@@ -160,11 +171,13 @@ class Browser:
         codes |= {"Enter": 13, "Tab": 9, "Escape": 27}
         code = codes.get(key, ord(key[0].upper()))
         modifiers = alt + 2 * ctrl + 8 * shift
-        for kind in ("rawKeyDown", "keyUp"):
+        text = {"text": "\r"} if key == "Enter" else {}  # without it, Enter presses no button
+        for kind in ("keyDown" if text else "rawKeyDown", "keyUp"):
             self(
                 "Input.dispatchKeyEvent",
                 type=kind,
                 key=key,
+                **text,
                 windowsVirtualKeyCode=code,
                 modifiers=modifiers,
             )
