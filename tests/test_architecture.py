@@ -109,7 +109,7 @@ IMPORTS = {
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/compliance": (". mechanism kinematics case case/suspension report"),
-    "studies/same": ". joints mechanism kinematics case/models",
+    "studies/same": ". joints mechanism kinematics case/models case/models/trees",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
