@@ -1,6 +1,7 @@
 """Coordinates of models whose zero is not their start: outputs from both, and what says which."""
 
 import csv
+import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
@@ -111,3 +112,24 @@ def test_models_that_start_at_zero_have_no_further_heads(model):
     heads, found = curves(model, "--drive", "crank:-0.1:0.1:3")
     assert heads[-1] == "acceleration"
     assert not any(name.endswith(".qpos") for name in found)
+
+
+def test_exported_mjcf_keeps_zeros_of_model(model, tmp_path, capsys):
+    """A spring of the model counts from its zero too."""
+    text = LOOP.replace('ref="-15"', 'ref="-15" stiffness="2" springref="10"')
+    model.write_text(text)
+    out = tmp_path / "again.xml"
+    assert main(["export", str(model), *DRIVE, "--to", "mjcf", "--out", str(out)]) == 0
+    assert main(["same", str(model), str(out)]) == 0
+    assert "zero of" not in capsys.readouterr().out
+    (pin,) = (each for each in ET.parse(out).iter("joint") if each.get("name") == "pin")
+    assert float(pin.get("ref")) == pytest.approx(np.radians(-15), abs=EXACT)
+    assert float(pin.get("springref")) == pytest.approx(np.radians(10), abs=EXACT)
+
+
+@pytest.mark.parametrize("to", ["urdf", "sdf", "osim", "exudyn"])
+def test_exports_with_another_zero_say_it(to, model, tmp_path):
+    out = tmp_path / "again"
+    assert main(["export", str(model), *DRIVE, "--to", to, "--out", str(out)]) == 0
+    (text,) = (each.read_text() for each in tmp_path.iterdir() if each.name == "again")
+    assert "those of the case are crank rotation 0.698131700798, pin rotation -0.26" in text
