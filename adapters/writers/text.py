@@ -51,7 +51,7 @@ def link_between(name: str, point: Vector, mechanism: Mechanism) -> Body:
 
 
 def weighs_all(frames: Iterable[Body]) -> bool:
-    """Return whether every link that moves has a mass."""
+    """Return whether every moving link has a mass."""
     return all(body.mass or body.fixed or body.name == GROUND for body in frames)
 
 
@@ -169,8 +169,8 @@ def inertia_at_origin(body: Body) -> Array:
 
 
 def zeros_of(zeros: Zeros) -> str:
-    """Return a sentence on coordinates of the case that are not zero where those of the file are,
-    to a picometre.
+    """Return a sentence on coordinates of the case with another zero than the file's, to a
+    picometre.
     """
     told = ", ".join(
         f"{joint} {freedom} {value:.12g}"

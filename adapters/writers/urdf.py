@@ -4,8 +4,8 @@ Every link is parallel to the global axes at design, so axes and arms are the nu
 its origin is the point of its joint. A joint is a chain of URDF's revolute and prismatic joints
 (see `tree_plan`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
 body that every chain connects by a ball floats, and its joints are conditions (see
-`constraints`). In a file with masses every link that moves has one, because some simulators take
-1 kg for none; for the same reason points are no links, but stand in the JSON file. Hinges are
+`constraints`). In a file with masses every moving link has one, because some simulators take 1 kg
+for none; for the same reason points are no links, but stand in the JSON file. Hinges are
 "revolute" with very large limits, not "continuous": their coordinate is then the angle including
 full turns.
 """
