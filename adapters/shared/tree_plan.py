@@ -185,7 +185,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class Relation:
-    """A weighted sum of two coordinates that stays zero, with a polynomial of the second added.
+    """A weighted sum of coordinates that stays zero; of two, with a polynomial of the second added.
 
     Attributes:
         name: of the coupler, or of the joint whose own relation it is.
@@ -200,7 +200,7 @@ class Relation:
 
     def follower(self, *, signed: bool) -> tuple[tuple[str, str], tuple[str, str], list[float]]:
         """Return the coordinate that follows another, the other, by joint and freedom, and the
-        coefficients of the polynomial that it follows, the constant first.
+        coefficients of the polynomial that it follows, the constant first; of two coordinates.
 
         Without a curve the factor is at most one.
 
@@ -300,7 +300,7 @@ def plan_tree(
         tied = Spherical if turns else Fixed
         yield Closure(joint, (first, joint.j), (point, point), tied, [each.move for each in links])
     for coupler in mechanism.couplers:
-        named = signs[coupler.joints[0]], signs[coupler.joints[1]]
+        named = tuple(signs[name] for name in coupler.joints)
         yield Relation(coupler.name, coupler.terms, named, coupler.curve)
 
 

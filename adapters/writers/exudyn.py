@@ -214,8 +214,11 @@ def write(
         KincheckError: a joint or coupler has no counterpart in Exudyn.
     """
     require_known(mechanism, "Exudyn")
-    if curved := next((each for each in mechanism.couplers if each.curve), None):
-        raise KincheckError(f"{curved} has no counterpart in Exudyn; export MJCF or URDF instead")
+    strange = [each for each in mechanism.couplers if each.curve or len(each.joints) > 2]
+    if strange:
+        raise KincheckError(
+            f"{strange[0]} has no counterpart in Exudyn; export MJCF or URDF instead"
+        )
     note = text.zeros_of(zeros)
     script = _Script(*_spelled_out(mechanism, way)).text(start)
     return {".py": f"#{note}\n{script}" if note else script}

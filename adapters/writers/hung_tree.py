@@ -15,6 +15,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ...core.algebra import triple
+from ...core.errors import KincheckError
 from ...core.joints import Distance, Fixed, Joint, Revolute, Spherical
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -192,6 +193,11 @@ def hung(mechanism: Mechanism) -> Tree:
             case Closure():
                 tree.ties.extend(ties(part, mechanism))
             case Relation():
+                if (count := len(part.terms)) > 2:
+                    raise KincheckError(
+                        f"joint {part.name!r} couples {count} joints, which has no counterpart"
+                        " here; write MJCF or URDF instead"
+                    )
                 one, other, curve = part.follower(signed=False)
                 names = tree.coordinates[one], tree.coordinates[other]
                 found = tree.curves if part.curve else tree.relations

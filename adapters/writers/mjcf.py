@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
-from ...core.case.models.trees.mjcf import STAND_INS
+from ...core.case.models.trees.mjcf_mass import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion
@@ -124,7 +124,14 @@ class _Model:
         ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="start", qpos=qpos)
         return document(
             self.root,
-            (["body"], ["joint", "freejoint"], ["site"], ["spatial"], ["numeric"], [*KINDS]),
+            (
+                ["body"],
+                ["joint", "freejoint"],
+                ["site"],
+                ["spatial", "fixed"],
+                ["numeric"],
+                [*KINDS],
+            ),
             reserved=["world"],
         )
 
@@ -249,7 +256,15 @@ class _Model:
         ]
 
     def relate(self, relation: Relation) -> None:
-        """Keep a coordinate at a polynomial of another."""
+        """Keep a coordinate at a polynomial of another, or a sum of more at zero."""
+        if len(relation.terms) > 2:
+            name = f"{relation.name}.sum"
+            tendon = ET.SubElement(self.tendons, "fixed", name=name)
+            for joint, freedom, weight in relation.terms:
+                own = self.coordinates[joint, freedom]
+                ET.SubElement(tendon, "joint", joint=own, coef=numbers([weight]))
+            ET.SubElement(self.equalities, "tendon", tendon1=name)
+            return
         one, other, curve = relation.follower(signed=False)
         names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
         polynomial = numbers([*curve, 0, 0, 0, 0][:5])

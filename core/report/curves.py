@@ -52,11 +52,11 @@ def write_curves(results: Results, path: Path, kind: str, *, long: bool) -> int:
     Args:
         long: whether curves of hardpoint tables are long too.
     """
-    columns, rows = (None if long else wide(results)) or (columns_of(results), curves(results))
+    columns, rows = (None if long else wide(results)) or (long_columns(results), curves(results))
     return WRITERS[kind](path, columns, rows)
 
 
-def columns_of(results: Results) -> Mapping[str, Kind]:
+def long_columns(results: Results) -> Mapping[str, Kind]:
     """Return the columns of long curves."""
     return {**COLUMNS, **COUNTED} if _counts_otherwise(results) else COLUMNS
 
@@ -88,8 +88,8 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
         if record.case not in known:
             known.add(record.case)
             if reference := results.references.get(record.case):
-                tables.append((record.case, REFERENCE, _columns(about, record, reference)))
-        tables.append((record.case, record.engine, _columns(about, record, record.outputs)))
+                tables.append((record.case, REFERENCE, columns_of(about, record, reference)))
+        tables.append((record.case, record.engine, columns_of(about, record, record.outputs)))
     several = {"case": {case for case, *_ in tables}, "engine": {name for _, name, _ in tables}}
     labels = [name for name, among in several.items() if len(among) > 1]
     heads = dict.fromkeys(head for *_, columns in tables for head in columns)
@@ -99,10 +99,14 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
     return dict.fromkeys(labels, Kind.TEXT) | dict.fromkeys(heads, Kind.NUMBER), rows
 
 
-def _columns(
+def columns_of(
     about: Mapping[str, Any], record: Record, outputs: Mapping[str, OutputSeries]
 ) -> dict[str, list[float | None]]:
-    """Return the values of drivers and outputs in the units of the table, by their heads."""
+    """Return the values of drivers and outputs in the units of the table, by their heads.
+
+    Args:
+        about: facts of the case, with these units.
+    """
     drivers = {about["driver"]["name"]: about["driver"], **about["motions"]}
     found = dict[str, list[float | None]]()
 
@@ -151,7 +155,7 @@ def downloads(results: Results, cases: Mapping[str, str]) -> dict[str, str]:
 def csv_of(results: Results, case: str) -> str:
     """Return the curves of a case as the text of a CSV file."""
     text = io.StringIO()
-    put_csv(text, columns_of(results), curves(results, case))
+    put_csv(text, long_columns(results), curves(results, case))
     return text.getvalue()
 
 

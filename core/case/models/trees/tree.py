@@ -56,6 +56,18 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class BushingLaw:
+    """Stiffness and damping along and about the axes of a bushing's first frame, three each [N/m,
+    N m/rad, N s/m, N m s/rad].
+    """
+
+    stiffness: Vector
+    turning_stiffness: Vector
+    damping: Vector
+    turning_damping: Vector
+
+
+@dataclass(frozen=True)
 class Move:
     """A hinge, a slide, a ball, or the six freedoms of a link that nothing holds; global in the
     pose of the tree [m].
@@ -150,7 +162,8 @@ Keyframe: TypeAlias = tuple[Element, Sequence[str] | None]
 
 @dataclass(frozen=True)
 class Strut:
-    """A spring and damper between points of two links, global in the pose of the tree [m].
+    """A spring and damper, or a bushing, between frames of two links, global in the pose of the
+    tree [m].
 
     Attributes:
         described: its name in the list of parts left out.
@@ -158,8 +171,8 @@ class Strut:
 
     name: str
     links: tuple[str, str]
-    points: tuple[Vec3, Vec3]
-    spring: Spring
+    places: tuple[Place, Place]
+    spring: Spring | BushingLaw
     element: Element
     described: str
 
@@ -231,6 +244,8 @@ class Tree:
         actuated: moves with a motor.
         keyframes: by name.
         left_out: numbers of parts without a meaning for kinematics, by name.
+        notes: of its reader, beside every verdict.
+        without: names by which the user leaves out elements.
         dialect: root element of its file.
         degrees, limited: of MJCF, limits are in degrees, and ranges are limits unless said.
     """
@@ -256,6 +271,8 @@ class Tree:
     actuated: set[str] = field(default_factory=set[str])
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
+    notes: list[str] = field(default_factory=list[str])
+    without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
     dialect: str = ""
     degrees: bool = False
@@ -360,7 +377,8 @@ class Tree:
         Raises:
             CaseError: there are too many.
         """
-        if not (strut.spring.stiffness or strut.spring.damping):
+        law = strut.spring
+        if isinstance(law, Spring) and not (law.stiffness or law.damping):
             self.count(strut.described)
             return
         _require_few(strut.element, MOST_TIES, len(self.struts) + 1, f"springs; {_TAKE_OUT}")
