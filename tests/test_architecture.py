@@ -111,7 +111,7 @@ IMPORTS = {
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/compliance": (". mechanism kinematics case case/suspension harness report"),
     "studies/board": ". mechanism kinematics case case/io harness report",
-    "studies/same": ". joints mechanism kinematics case/models",
+    "studies/same": ". joints mechanism kinematics case/models case/models/trees",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"

@@ -177,6 +177,22 @@ def direction(body: Body, a: Sequence[float]) -> Vector:
     return x, y, z
 
 
+def joint_coordinates(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion]
+) -> dict[tuple[str, str], float]:
+    """Return the rotations and translations of joints at the end of a way [rad or m], by joint and
+    freedom.
+    """
+    placed, found = displacements(mechanism, way), dict[tuple[str, str], float]()
+    for joint in mechanism.joints:
+        if {"rotation", "translation"}.isdisjoint(joint.freedoms):
+            continue
+        links = CHAINS[type(joint)](joint, ends_of(mechanism, joint)[0])
+        for link, value in zip(links, link_coordinates(joint, links, placed), strict=True):
+            found[joint.name, link.name] = value[0]
+    return found
+
+
 def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
     """Return the mechanism with the end of the way as its design position.
 
@@ -185,19 +201,12 @@ def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
     Coordinates of polynomials and of torsional springs count from the start. Drivers, forces and
     torques are left out.
     """
-    placed = displacements(mechanism, way)
-
-    def coordinate(joint: Joint, freedom: str) -> float:
-        links = CHAINS[type(joint)](joint, ends_of(mechanism, joint)[0])
-        values = link_coordinates(joint, links, placed)
-        found = {link.name: value[0] for link, value in zip(links, values, strict=True)}
-        return found[freedom]
+    placed, coordinates = displacements(mechanism, way), joint_coordinates(mechanism, way)
 
     def coupler(each: Coupler) -> Coupler:
         if not isinstance(each, Polynomial):
             return each
-        named = zip(each.joints, each.freedoms, strict=True)
-        y, x = (coordinate(mechanism.joint(name), freedom) for name, freedom in named)
+        y, x = (coordinates[named] for named in zip(each.joints, each.freedoms, strict=True))
         moved = Powers(each.coefficients)(Powers((x, 1.0))) - y
         return replace(each, coefficients=(*moved.coef.tolist(),))
 
@@ -208,7 +217,8 @@ def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
                 P, Q = (_last(placed[body].of(vec(point))) for body, point in ends)
                 yield replace(each, points=(P, Q))
             elif isinstance(each, TorsionSpringDamper):
-                angle = coordinate(mechanism.joint(each.joint), "rotation")
+                # a joint between fixed bodies does not turn
+                angle = coordinates.get((each.joint, "rotation"), 0.0)
                 yield replace(each, free_angle=each.free_angle - angle)
 
     return mechanism.with_joints(

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...core import joints as j
 from ...core.algebra import triple, vec
+from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -202,7 +203,10 @@ RIGHT_ANGLE = 1e-15
 
 
 def write(
-    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+    mechanism: Mechanism,
+    way: Mapping[str, BodyMotion],
+    start: Mapping[str, float],
+    zeros: Zeros = NO_ZEROS,
 ) -> Mapping[str, str]:
     """Return a .py file; see `Writer`. Initial coordinates are the end of the way.
 
@@ -215,7 +219,9 @@ def write(
         raise KincheckError(
             f"{strange[0]} has no counterpart in Exudyn; export MJCF or URDF instead"
         )
-    return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
+    note = text.zeros_of(zeros)
+    script = _Script(*_spelled_out(mechanism, way)).text(start)
+    return {".py": f"#{note}\n{script}" if note else script}
 
 
 class _Script:

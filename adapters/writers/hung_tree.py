@@ -84,7 +84,7 @@ class Tree:
 def plan(
     mechanism: Mechanism, auxiliary: str = "{joint}.auxiliary"
 ) -> Iterator[Chain | Relation | Closure]:
-    """Yield the parts of a mechanism, with loops cut where points can close them; see `plan_tree`.
+    """Yield the parts of a mechanism, with loops cut at joints of points; see `plan_tree`.
 
     Joints whose coordinates others use, by a coupling or a spring, keep them.
     """
@@ -103,7 +103,7 @@ def plan(
 
     def from_ground(joint: Joint | None) -> bool:
         """Return whether its links end on the ground with a whole frame: they begin there instead,
-        so that the tie is to a body with a mass.
+        and the tie is to a body with a mass.
         """
         if joint is None or mechanism.is_fixed(joint.i) or not mechanism.is_fixed(joint.j):
             return False

@@ -16,6 +16,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
+from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.case.models.trees.mjcf_mass import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
@@ -43,7 +44,10 @@ KINDS = ("connect", "weld", "tendon")
 
 
 def write(
-    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+    mechanism: Mechanism,
+    way: Mapping[str, BodyMotion],
+    start: Mapping[str, float],
+    zeros: Zeros = NO_ZEROS,
 ) -> Mapping[str, str]:
     """Return an .xml file; see `Writer`. The keyframe "start" is the end of the way.
 
@@ -51,13 +55,14 @@ def write(
         KincheckError: a joint has no counterpart in MJCF, or a name cannot be used there.
     """
     require_known(mechanism, "MJCF")
-    return {".xml": _Model(mechanism, way).text(start)}
+    return {".xml": _Model(mechanism, way, zeros).text(start)}
 
 
 class _Model:
     """The document during its construction."""
 
-    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
+    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion], zeros: Zeros) -> None:
+        self.zeros = zeros
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("mujoco", model=mechanism.name)
         self.loaded = mechanism.has_loads
@@ -187,8 +192,10 @@ class _Model:
         for (name, link, _, _), value in zip(chain.each(), values, strict=True):
             along = {} if link.move == "ball" else {"axis": numbers(direction(frame, link.axis))}
             at = {"pos": numbers(local(frame, link.point)), **along}
+            if zero := self.zeros.get((joint.name, link.name), 0.0):
+                at["ref"] = numbers([zero])
             ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
-            self.qpos[name] = value
+            self.qpos[name] = value if link.move == "ball" else (value[0] + zero,)
             if link.move == "ball":  # in the axes of the body that it carries
                 turn = chain.sign * rotated(attitude(frame).conjugate(), vec(value[1:]))
                 self.qpos[name] = value[0], *turn
@@ -221,7 +228,8 @@ class _Model:
             )
             if tendon is None or "stiffness" in tendon.attrib:  # between fixed bodies, or a second
                 return False
-            tendon.set("springref", numbers([force.free_angle]))
+            zero = self.zeros.get((force.joint, "rotation"), 0.0)
+            tendon.set("springref", numbers([force.free_angle + zero]))
         else:
             return False
         tendon.set("stiffness", numbers([force.stiffness]))

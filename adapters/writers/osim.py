@@ -16,11 +16,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...core.algebra import IDENTITY, Quat, vec
+from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.poses import about, at_start, attitude, euler_angles, local, orientation
+from ..shared.poses import (
+    about,
+    at_start,
+    attitude,
+    euler_angles,
+    joint_coordinates,
+    local,
+    orientation,
+)
 from . import text
 from .hung_tree import Hung, Tie, hung, loops
 from .text import add_note, add_text, document, numbers, require_known
@@ -48,7 +57,10 @@ COORDINATES = {
 
 
 def write(
-    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+    mechanism: Mechanism,
+    way: Mapping[str, BodyMotion],
+    start: Mapping[str, float],
+    zeros: Zeros = NO_ZEROS,
 ) -> Mapping[str, str]:
     """Return an .osim file in the pose at the end of the way; see `Writer`.
 
@@ -58,9 +70,11 @@ def write(
     require_known(mechanism, "OpenSim")
     model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
+    values = joint_coordinates(mechanism, way)
+    zero = text.zeros_of({key: x + zeros.get(key, 0.0) for key, x in values.items()})
     masses, left_out = text.facts(mechanism, model.sprung, True, model.tree.frames.values())
     closed = loops(model.tree.ties, TIES[:3])
-    add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, left_out))
+    add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, zero + left_out))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
     return {".osim": document(model.root, sets, reserved=[GROUND])}
 

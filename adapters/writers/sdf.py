@@ -15,6 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core.algebra import triple
+from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -22,7 +23,7 @@ from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDam
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.equivalents import cross_of
-from ..shared.poses import at_start, attitude, local
+from ..shared.poses import at_start, attitude, joint_coordinates, local
 from . import text
 from .hung_tree import Hung, Tie, extent, hung, loops
 from .text import add_note, add_text, document, numbers, require_known
@@ -41,7 +42,10 @@ DRAKE = "http://drake.mit.edu"
 
 
 def write(
-    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+    mechanism: Mechanism,
+    way: Mapping[str, BodyMotion],
+    start: Mapping[str, float],
+    zeros: Zeros = NO_ZEROS,
 ) -> Mapping[str, str]:
     """Return an .sdf file in the pose at the end of the way; see `Writer`.
 
@@ -57,8 +61,10 @@ def write(
             )
     model = _Model(at_start(mechanism, way))
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
+    values = joint_coordinates(mechanism, way)
+    zero = text.zeros_of({key: x + zeros.get(key, 0.0) for key, x in values.items()})
     masses, left_out = text.facts(mechanism, model.sprung, False, model.tree.frames.values())
-    note = NOTE.format(masses, at and f" ({at})", model.loops, left_out)
+    note = NOTE.format(masses, at and f" ({at})", model.loops, zero + left_out)
     add_note(model.root, note)
     kinds = (["link", "frame", "joint", "drake:ball_constraint"], [SPRING])
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}

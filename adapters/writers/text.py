@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.case.io.model_writer import Zeros
 from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
 from ...core.joints import Distance
@@ -50,7 +51,7 @@ def link_between(name: str, point: Vector, mechanism: Mechanism) -> Body:
 
 
 def weighs_all(frames: Iterable[Body]) -> bool:
-    """Return whether every link that moves has a mass."""
+    """Return whether every moving link has a mass."""
     return all(body.mass or body.fixed or body.name == GROUND for body in frames)
 
 
@@ -165,6 +166,18 @@ def inertia_at_origin(body: Body) -> Array:
     arm = np.subtract(center_of(body), body.origin)
     moved = arm @ arm * np.eye(3) - np.outer(arm, arm)
     return inertia_of(body) + mass_of(body) * moved
+
+
+def zeros_of(zeros: Zeros) -> str:
+    """Return a sentence on coordinates of the case with another zero than the file's, to a
+    picometre.
+    """
+    told = ", ".join(
+        f"{joint} {freedom} {value:.12g}"
+        for (joint, freedom), value in zeros.items()
+        if round(value, 12)
+    )
+    return f" Where coordinates are zero, those of the case are {told}." if told else ""
 
 
 def left_out(mechanism: Mechanism, names: Collection[str], gravity: bool) -> str:

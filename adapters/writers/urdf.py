@@ -4,8 +4,8 @@ Every link is parallel to the global axes at design, so axes and arms are the nu
 its origin is the point of its joint. A joint is a chain of URDF's revolute and prismatic joints
 (see `tree_plan`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
 body that every chain connects by a ball floats, and its joints are conditions (see
-`constraints`). In a file with masses every link that moves has one, because some simulators take
-1 kg for none; for the same reason points are no links, but stand in the JSON file. Hinges are
+`constraints`). In a file with masses every moving link has one, because some simulators take 1 kg
+for none; for the same reason points are no links, but stand in the JSON file. Hinges are
 "revolute" with very large limits, not "continuous": their coordinate is then the angle including
 full turns.
 """
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from ...core.algebra import vec
+from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.joints import Joint
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.trajectory import BodyMotion
@@ -64,7 +65,10 @@ FAR = {"lower": "-1e9", "upper": "1e9", "effort": "1e9", "velocity": "1e9"}
 
 
 def write(
-    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+    mechanism: Mechanism,
+    way: Mapping[str, BodyMotion],
+    start: Mapping[str, float],
+    zeros: Zeros = NO_ZEROS,
 ) -> Mapping[str, str]:
     """Return a .urdf file and a .constraints.json file, with a consistent start at the end of the
     way; see `Writer`.
@@ -76,7 +80,7 @@ def write(
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
     require_known(mechanism, "URDF")
-    model = _Model(mechanism, way)
+    model = _Model(mechanism, way, text.zeros_of(zeros))
     beside = {
         "schema": SCHEMA,
         "mechanism": mechanism.name,
@@ -154,7 +158,7 @@ def _as_data(condition: Condition) -> Iterator[dict[str, Any]]:
 class _Model:
     """The document and the constraints file during their construction."""
 
-    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
+    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion], zero: str) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("robot", name=mechanism.name)
         self.origin: dict[str, Vector] = {}  # origins of links, global at design
@@ -190,7 +194,7 @@ class _Model:
             masses, left_out = text.facts(mechanism, (), False, frames)
         closed = dict.fromkeys(each["joint"] for each in self.constraints)
         closed = f": {', '.join(closed)}" if closed else ""
-        add_note(self.root, NOTE.format(masses, closed, left_out))
+        add_note(self.root, NOTE.format(masses, closed, zero + left_out))
 
     def add_link(self, name: str, origin: Vector) -> ET.Element:
         """Add a link with its origin at a position, global at design."""

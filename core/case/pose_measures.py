@@ -191,6 +191,8 @@ class _JointCoordinate(Measure):
     freedom: ClassVar[str]
 
     joint: str
+    at_design: float = field(default=0.0, metadata={"unless": 0.0})
+    """Its value at the design position: that of a model's coordinate, whose zero is elsewhere."""
 
     def check(self, mechanism: Mechanism) -> None:
         super().check(mechanism)
@@ -223,10 +225,14 @@ class _JointCoordinate(Measure):
         ]
         return [point for point in every if point.name in self.points]
 
+    def _from_design(self, gone: Jet) -> Jet:
+        return gone + self.at_design if self.at_design else gone
+
 
 @dataclass(frozen=True)
 class JointAngle(_JointCoordinate):
-    """Rotation of a joint's second body relative to its first, zero at design; turns count.
+    """Rotation of a joint's second body relative to its first, from its value at design, or zero;
+    turns count.
 
     If a study varies the axis, the measured axis stays nominal: the error is of second order.
     """
@@ -249,12 +255,13 @@ class JointAngle(_JointCoordinate):
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         first, f, g, second, turned = (at[name] for name in self.points)
         arm = turned - second
-        return arctan2((g - first) @ arm, (f - first) @ arm)
+        return self._from_design(arctan2((g - first) @ arm, (f - first) @ arm))
 
 
 @dataclass(frozen=True)
 class JointDisplacement(_JointCoordinate):
-    """Displacement of a joint's second body relative to its first along the axis, zero at design.
+    """Displacement of a joint's second body relative to its first along the axis, from its value at
+    design, or zero.
 
     If a study varies the axis, the measured axis stays nominal: the error is of second order.
     """
@@ -271,7 +278,8 @@ class JointDisplacement(_JointCoordinate):
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         first, tip, second = (at[name] for name in self.points)
-        return ((tip - first) @ (second - first)) / length(design, *self.points[:2])
+        gone = ((tip - first) @ (second - first)) / length(design, *self.points[:2])
+        return self._from_design(gone)
 
 
 @dataclass(frozen=True)

@@ -67,9 +67,9 @@ def turns_of(
         x, v: value and rate, samples along the first axis; NaN if unknown.
         samples: indices of these among the samples of the path.
     """
-    part = replace(path, times=path.times[samples])
-    count = turns(x, v, output.period, part)
     assert isinstance(output, JointAngle)
+    part, x = replace(path, times=path.times[samples]), x - output.at_design
+    count = turns(x, v, output.period, part)
     if near_design(mechanism, path) and not in_doubt(x + output.period * count, v, part.times):
         return count
     near = _reached(followed_angle(mechanism, path, output.joint), samples, part.times)

@@ -32,6 +32,11 @@ COLUMNS: Mapping[str, Kind] = {
 cell.
 """
 
+COUNTED: Mapping[str, Kind] = {"counts_from": Kind.TEXT, "driver_counts_from": Kind.TEXT}
+"""Further columns of a run with a model whose zero is not its start: what the angle or displacement
+of a joint in the row, and the driver's value, count from, "model" or "design".
+"""
+
 MOST = 3_000_000
 """Largest size of the curves that a page offers as files [characters]; compressed, some 40 % of the
 page.
@@ -47,8 +52,21 @@ def write_curves(results: Results, path: Path, kind: str, *, long: bool) -> int:
     Args:
         long: whether curves of hardpoint tables are long too.
     """
-    columns, rows = (None if long else wide(results)) or (COLUMNS, curves(results))
+    columns, rows = (None if long else wide(results)) or (long_columns(results), curves(results))
     return WRITERS[kind](path, columns, rows)
+
+
+def long_columns(results: Results) -> Mapping[str, Kind]:
+    """Return the columns of long curves."""
+    return {**COLUMNS, **COUNTED} if _counts_otherwise(results) else COLUMNS
+
+
+def _counts_otherwise(results: Results) -> bool:
+    return any(
+        each.get("at_design")
+        for facts in results.run.get("cases", {}).values()
+        for each in facts.get("outputs", {}).values()
+    )
 
 
 def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
@@ -137,7 +155,7 @@ def downloads(results: Results, cases: Mapping[str, str]) -> dict[str, str]:
 def csv_of(results: Results, case: str) -> str:
     """Return the curves of a case as the text of a CSV file."""
     text = io.StringIO()
-    put_csv(text, COLUMNS, curves(results, case))
+    put_csv(text, long_columns(results), curves(results, case))
     return text.getvalue()
 
 
@@ -163,12 +181,17 @@ def _rows(
     results: Results, record: Record, engine: str, mode: str, output: str, series: OutputSeries
 ) -> Rows:
     driver, values = next(iter(record.driver.items()))
-    facts: Mapping[str, Any] = results.run.get("cases", {}).get(record.case, {}).get("driver", {})
+    about: Mapping[str, Any] = results.run.get("cases", {}).get(record.case, {})
+    facts: Mapping[str, Any] = about.get("driver", {})
     head = record.case, engine, mode, output, series.unit
     unit = DRIVER_UNITS.get(facts.get("type", ""))
     unknown = [None] * len(values)
     motions = (each or unknown for each in (series.position, series.velocity, series.acceleration))
+    counted: list[str] = []
+    if _counts_otherwise(results):
+        zeros = about.get("outputs", {}).get(output, {}).get("at_design"), facts.get("design")
+        counted = ["" if zero is None else "model" if zero else "design" for zero in zeros]
     return [
-        (*head, k, driver, unit, value, *motion)
+        (*head, k, driver, unit, value, *motion, *counted)
         for k, (value, *motion) in enumerate(zip(values, *motions, strict=True))
     ]

@@ -100,7 +100,8 @@ def parallelogram(gap, digits="0.5123456"):
 def test_an_open_start_is_assembled_and_said(tmp_path):
     file = written(tmp_path, parallelogram(0.01))
     case = load(file, Supplied(drive=("crank:0:0.2:5",)))
-    (note,) = case.assembly
+    note, zeros = case.assembly
+    assert "are at the start knee 9.66" in zeros
     assert "open by 0.01 m" in note
     assert "moved were rocker by" in note
     assert "crank by" not in note  # it is driven, and stays

@@ -1,14 +1,18 @@
 """kincheck same: files of one mechanism in several formats, and planted differences by hand."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from kincheck import adapters, cases
+from kincheck.core import Body, JointDisplacement, Mechanism, Translational
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.models.undriven import undriven_case, undriven_file
 from kincheck.core.cli.main import main
 from kincheck.core.studies.same import compare
+
+from ..support.written_mechanisms import CASES, case
 
 LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
 MIMIC = '<mimic joint="left" multiplier="-1" offset="0.02"/>'
@@ -115,17 +119,35 @@ def test_unmatched_links_are_not_judged(tmp_path):
     assert against(tmp_path, twins, *options, first=first)["verdict"] == "differs"
 
 
-@pytest.mark.parametrize("name", ["four_bar", "five_bar", "hooke_joint_cross", "mcpherson_arm"])
+def wedges():
+    """Slides alone: in MJCF and SDF a body shares its mass with a link that is welded to it."""
+    solid = {"mass": 2.0, "center_of_mass": (0.1, 0.2, 0.3), "inertia": (1, 2, 2.5, 0, 0.1, 0)}
+    slides = [
+        Translational("across", "low", "ground", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Translational("up", "ground", "high", (0.4, 0.5, 0.0), (0.0, 1.0, 0.0)),
+        Translational("slope", "high", "low", (0.2, 0.3, 0.0), (2.0, 1.0, 0.0)),
+    ]
+    driver = JointDisplacement("push", "across")
+    mechanism = Mechanism("wedges", [Body("low", **solid), Body("high", **solid)], slides)
+    return case(replace(mechanism, drivers=[driver], gravity=(0.0, 0.0, -9.8)), 0.1)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["four_bar", "five_bar", "hooke_joint_cross", "mcpherson_arm", "strut_swapped", "wedges"],
+)
 @pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf"])
 def test_written_case_is_the_same_mechanism(name, form, tmp_path):
-    case = cases.load(name)
-    for suffix, text in written(case, adapters.writer(form), None).items():
+    own = {"strut_swapped": lambda: CASES[name], "wedges": wedges}
+    given = own.get(name, lambda: cases.load(name))()
+    for suffix, text in written(given, adapters.writer(form), None).items():
         (tmp_path / f"{name}{suffix}").write_text(text)
     (file,) = (each for each in tmp_path.iterdir() if not each.name.endswith(".json"))
-    found = compare(undriven_case(case, name), undriven_file(file), {})
+    found = compare(undriven_case(given, name), undriven_file(file), {})
     assert found.verdict == "same", found.reason
     assert found.largest is not None
     assert found.largest < 1e-14
+    assert found.lost == []
 
 
 def test_converted_file_is_within_its_digits(tmp_path, capsys):

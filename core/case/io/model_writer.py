@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ...kinematics import NativeSolver, start_of
 from ...mechanism.mechanism import Mechanism, with_equivalents
 from ...trajectory import Array, BodyMotion
 from ..case import Case
+from ..measures import JointAngle, JointDisplacement
 
 # Largest constraint residual of a start, relative to the mechanism's size: a thousand times the
 # round-off of its coordinates.
@@ -26,11 +27,20 @@ SAMPLES = (33, 513, 8193)
 LARGEST_TURN = math.pi / 3.0
 
 
+Zeros: TypeAlias = Mapping[tuple[str, str], float]
+"""Coordinates by joint and freedom [m or rad]."""
+NO_ZEROS: Zeros = {}
+
+
 class Writer(Protocol):
     """Writes a mechanism in a simulator's own format."""
 
     def __call__(
-        self, mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+        self,
+        mechanism: Mechanism,
+        way: Mapping[str, BodyMotion],
+        start: Mapping[str, float],
+        zeros: Zeros = NO_ZEROS,
     ) -> Mapping[str, str]:
         """Return the texts of the files, by their endings.
 
@@ -39,6 +49,7 @@ class Writer(Protocol):
                 between two samples no body turns by more than 60 degrees, so no joint turns by
                 half a turn.
             start: values of the drivers at the end of the way, as information [m or rad].
+            zeros: coordinates at design where they are not zero.
 
         Raises:
             KincheckError: the format cannot express a part; the message names the part.
@@ -66,6 +77,11 @@ def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, 
         case.mechanism,
         way_to(case, stop),
         held | {name: float(values[0]) for name, values in start.items()},
+        {
+            (output.joint, output.freedom): output.at_design
+            for output in case.outputs
+            if isinstance(output, JointAngle | JointDisplacement) and output.at_design
+        },
     )
 
 

@@ -128,11 +128,15 @@ def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Cas
     return replace(case, outputs=tuple(outputs))
 
 
-def with_all_motions(case: Case) -> Case:
+def with_all_motions(case: Case, at_design: Mapping[str, float] | None = None) -> Case:
     """Return the case with the motion of every part as outputs, with default tolerances.
 
     The outputs are the coordinates of all points, the angle or displacement of every joint with
     such a freedom, and the Euler parameters of every moving body.
+
+    Args:
+        at_design: coordinates of a model's joints where they are not zero; their outputs are named
+            JOINT.qpos [m or rad].
     """
     mechanism, extent = case.mechanism, size(case)
     outputs: list[Quantity] = [*with_all_coordinates(case).outputs]
@@ -141,6 +145,9 @@ def with_all_motions(case: Case) -> Case:
             if cls.freedom in joint.freedoms:
                 given = default(extent, cls.measure)
                 outputs.append(cls(f"{joint.name}.{what}", *given, joint=joint.name))
+                if value := (at_design or {}).get(joint.name):
+                    name = f"{joint.name}.qpos"
+                    outputs.append(cls(name, *given, joint=joint.name, at_design=value))
     outputs += [
         Orientation(f"{body.name}.{each}", *default(extent, "1"), body=body.name, component=each)
         for body in mechanism.moving
@@ -215,6 +222,8 @@ def _measure(
         scale = loads * scale if output.turns else loads
     _, convert = units.of(output.unit)
     atol, rtol, why = _tolerance(section, keys, convert, scale, output.unit)
+    if isinstance(output, JointAngle | JointDisplacement):
+        output = replace(output, at_design=convert(output.at_design))
     return replace(output, atol=atol, rtol=rtol, why=why)
 
 
@@ -337,7 +346,8 @@ def _keys(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
         if isinstance(output, WheelOutput) and len(wheels_of(case)) > 1:
             yield "side", output.vehicle.side
         for each in own_keys(type(output)):
-            if (value := getattr(output, each.name)) is not None:
+            value = getattr(output, each.name)
+            if value is not None and value != each.metadata.get("unless"):
                 yield key_of(each), value
     elif isinstance(output, Output):
         component = next((name for name, axis in AXES.items() if axis == output.direction), None)

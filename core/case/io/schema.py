@@ -74,7 +74,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (notes) = [...]: on the closure of the start before the file was written
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "distance": points = [A, B]
-                         type = "joint_angle" or "joint_displacement": joint
+                         type = "joint_angle" or "joint_displacement": joint; (at_design) = 0: its
+                         value at the design position, as that of a model's coordinate
                          type = "orientation": body, component of its rotation since design, global
                          axes: "x", "y" or "z" of the rotation vector of the smallest rotation, at
                          most pi, or Euler parameter "e0" to "e3", whose sign is continuous

@@ -5,14 +5,18 @@ coordinates, masses, gravity.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from ...algebra import triple, vec
+from ...case.models.trees.tree import Mass, together
 from ...case.models.undriven import Coordinate, Undriven
+from ...joints import Fixed
 from ...kinematics import Poses
 from ...mechanism.body import Body, inertia_matrix
+from ...mechanism.mechanism import GROUND
 from ...trajectory import Array
 from .links import Match
 from .motion import SIDES, Placement, joints_of_both, measurable, times, turned, values
@@ -41,7 +45,7 @@ def lost_items(
     """
     lost: dict[str, list[str]] = {}
     changed: list[str] = []
-    for joint, other in joints_of_both(a, b, match) if a.is_model and b.is_model else ():
+    for joint, other in joints_of_both(a, b, match):
         first, second = a.coordinates.get(joint.name), b.coordinates.get(other.name)
         if first is None or second is None:
             continue
@@ -55,6 +59,8 @@ def lost_items(
                 unit = "rad" if first.turns else "m"
                 changed.append(f"zero of {joint.name}: moved by {zero:.4g} {unit} in {b.name}")
             second = _seen(second, sense, zero)
+        if not (a.is_model and b.is_model):
+            continue
         for what, where, text in _of_joint(first, second):
             if text:
                 changed.append(f"{what} of {joint.name}: {text}")
@@ -123,7 +129,7 @@ def _masses(
     """Yield the links whose masses differ."""
     lost: dict[str, list[str]] = {}
     for x, y in match.partner.items():
-        body, other = a.mechanism.body(x), b.mechanism.body(y)
+        body, other = _whole(a, x, match.partner), _whole(b, y, match.partner.values())
         if not body.mass or not other.mass:
             if body.mass != other.mass:
                 lost.setdefault((a, b)[bool(body.mass)].name, []).append(x)
@@ -141,6 +147,25 @@ def _masses(
             yield f"inertia of {x}: {off:.2g} kg m^2 apart"
     for file, names in lost.items():
         yield f"lost in {file}: masses of {', '.join(names)}"
+
+
+def _whole(file: Undriven, link: str, matched: Collection[str]) -> Body:
+    """Return a link with the masses of others that are fixed to it, and are links of no other file:
+    some models close a loop between two halves of a body.
+    """
+    mechanism, found = file.mechanism, [file.mechanism.body(link)]
+    for joint in mechanism.joints:
+        for one, other in (joint.bodies, joint.bodies[::-1]):
+            if isinstance(joint, Fixed) and one == link and other not in (GROUND, *matched):
+                found.append(mechanism.body(other))
+    if not all(body.mass for body in found):
+        return found[0]
+    whole = together(
+        [Mass(body.mass, vec(body.center_of_mass or body.origin), _inertia(body)) for body in found]
+    )
+    xx, yy, zz, xy, xz, yz = whole.inertia[np.triu_indices(3)][[0, 3, 5, 1, 2, 4]].tolist()
+    six = (xx, yy, zz, xy, yz, xz)
+    return replace(found[0], mass=whole.mass, center_of_mass=triple(whole.center), inertia=six)
 
 
 def _arm(body: Body) -> float:

@@ -160,9 +160,23 @@ class _Parts:
         heavy = ", with the masses of its bodies" * weighed
         others = ", ".join(left_out) or "nothing"
         source = f"{tree.described}, from {model.start}{heavy}{LEFT_OUT}{others}"
-        sweep, notes = self._sweep(), (*tree.notes, *model.notes)
+        digits = {"hinge": closing.tolerance / closing.size, "slide": closing.tolerance}
+        zeros = {
+            name: move.value
+            for name, move in tree.joints.items()
+            if isinstance(self.joints.get(name), Revolute | Translational)
+            and abs(move.value) > digits[move.kind]
+        }
+        sweep, notes = self._sweep(), [*tree.notes, *model.notes]
+        if zeros:
+            values = [f"{name} {value:.9g}" for name, value in zeros.items()]
+            notes.append(
+                "angles and displacements of joints count from the start; JOINT.qpos, --drive and"
+                f" --start count from the model's zero, and are at the start"
+                f" {shortened(values, MOST_NAMED)}"
+            )
         case = Case(
-            tree.file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=notes
+            tree.file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=(*notes,)
         )
         dof = degrees_of_freedom(mechanism)
         if dof != len(drivers) or not model.is_exact:
@@ -178,7 +192,7 @@ class _Parts:
                 " many; start farther from a singular pose by --start, or give another tolerance by"
                 " --closure",
             )
-        return with_all_motions(case)
+        return with_all_motions(case, zeros)
 
     def mechanism(self, drivers: Sequence[Driver] = ()) -> Mechanism:
         """Return the mechanism with all its rows."""
