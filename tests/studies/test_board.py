@@ -120,6 +120,21 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
+def test_board_keeps_the_date_of_an_unchanged_row(tmp_path):
+    given = ["--engine", "mujoco", "--case", str(short(tmp_path, 0.02, 3)), "--steps", "2"]
+    file = tmp_path / "site" / "board.json"
+    assert main(["board", *given, "--out", str(file.parent)]) == 0
+    found = json.loads(file.read_text("utf-8"))
+    first, second, *_ = found["rows"]
+    first["since"], second["since"], second["version"] = "2025-01-01", "2025-01-01", "3.9"
+    file.write_text(json.dumps(found), "utf-8")
+    assert main(["board", *given, "--out", str(file.parent)]) == 0
+    dates = [row["since"] for row in json.loads(file.read_text("utf-8"))["rows"]]
+    assert dates[0] == "2025-01-01" < dates[1]
+    file.write_text("{}", "utf-8")
+    assert main(["board", *given, "--out", str(file.parent)]) == 2
+
+
 def test_reproducer_runs_alone_and_repeats_the_row(site, rows):
     row = rows["mujoco", "RK4", "best"]
     folder = site / row["folder"]
