@@ -143,7 +143,6 @@ def rows_of(
 def _write(folder: Path, texts: Mapping[str, str]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "result.json").unlink(missing_ok=True)
         for name, text in texts.items():
             (folder / name).write_text(text, "utf-8")
     except OSError as error:
@@ -155,7 +154,8 @@ def _write(folder: Path, texts: Mapping[str, str]) -> None:
 def measured(row: Row, place: Path, timeout: float) -> Row:
     """Run the reproducer in a folder, and return the row with its runs."""
     state: State | None = None
-    message = ""
+    message, result = "", place / "result.json"
+    result.unlink(missing_ok=True)
     environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
     try:
         done = subprocess.run(
@@ -173,7 +173,7 @@ def measured(row: Row, place: Path, timeout: float) -> Row:
             message = f"its process ended with status {done.returncode}; {' '.join(last)[:300]}"
     except subprocess.TimeoutExpired:
         state, message = "timeout", f"its runs take more than {timeout:g} s together"
-    result, found = place / "result.json", dict[str, Any]()
+    found = dict[str, Any]()
     if result.is_file():
         found = json.loads(result.read_text("utf-8"))
     runs = [msgspec.convert(each, Run) for each in found.get("runs", ())]
@@ -211,7 +211,7 @@ def order_and_floor(runs: Sequence[Run]) -> tuple[float | None, float | None]:
         return None, None
     steps, errors = np.log2(np.array(pairs)).T
     falling = [bool(each) for each in np.diff(errors) / np.diff(steps) >= FLOOR]
-    floor = None if falling[-1] else float(2.0 ** errors.min())
+    floor = None if falling[-1] else min(error for _, error in pairs)
     if True not in falling:
         return None, floor
     # the last steps that lower the error, one after the other
