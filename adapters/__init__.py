@@ -25,7 +25,7 @@ SIMULATIONS = {
     "pinocchio": ("pinocchio.pinocchio", "Dynamics"),
     "exudyn": ("exudyn.solvers", "trapezoidal"),
     "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
-    "exudyn-static": ("exudyn.solvers", "static"),
+    "exudyn-static": ("exudyn.statics", "static"),
     "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
     "drake": ("drake.drake", "Steps"),
     "dart": ("dart.dart", "Steps"),

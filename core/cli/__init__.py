@@ -19,6 +19,7 @@ COMMANDS = (
     "explain",
     "assemblies",
     "same",
+    "compare",
     "trace",
     "kc",
     "serve",

@@ -145,7 +145,8 @@ def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
         hover = {"text": efforts, "hovertemplate": "%{text}: %{x:.3~g} s/s, %{customdata:.3~g} m"}
         traces.append(curve | hover)
     axis = ticked_axis("cost: wall time for a simulated second [s/s]", costs)
-    return floored({"data": traces, "layout": {"xaxis": axis, "hovermode": "closest"}})
+    layout = {"xaxis": axis, "hovermode": "closest"}
+    return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
 def _settings(rows: Sequence[Row]) -> Section:
