@@ -19,6 +19,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     """Return the functions that advance to a sample and read the bodies' states there."""
     o: Any = import_module("opensim")
     made = o.Model()
+    joints: list[Any] = []
     bodies, origin = {"ground": made.getGround()}, {"ground": np.zeros(3)}
 
     def vector(x: Any) -> Any:
@@ -58,6 +59,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         parent = bodies[body["parent"]], vector(P - origin[body["parent"]]), angles
         joint = getattr(o, kind)(f"joint_{number}", *parent, child, vector(np.zeros(3)), angles)
         made.addJoint(joint)
+        joints.append(joint)
         bodies[body["name"]], origin[body["name"]] = child, P
 
     def ends(each: Any) -> list[Any]:
@@ -73,10 +75,10 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         else:
             made.addConstraint(o.PointConstraint(*first, *second))
     for each in model["springs"]:
-        first, second = ends(each)
-        if each["damping"]:
-            raise NotImplementedError("this script gives OpenSim no damper between two points")
-        made.addForce(o.PointToPointSpring(*first, *second, each["stiffness"], each["free_length"]))
+        (first, start), (second, end) = ends(each)
+        paths = first.getAbsolutePathString(), start, second.getAbsolutePathString(), end
+        tension = f"{each['stiffness']!r}*(d-{each['free_length']!r})+{each['damping']!r}*ddot"
+        made.addForce(o.ExpressionBasedPointToPointForce(*paths, tension))
     for k, load in enumerate(model["loads"]):
         given = o.PrescribedForce(f"load_{k}", bodies[load["body"]])
         given.setPointIsInGlobalFrame(False)
@@ -92,9 +94,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         made.addForce(given)
     made.finalizeConnections()
     state = made.initSystem()
-    rates = np.concatenate([body["rates"] for body in model["bodies"]])
-    if rates.any():
-        state.setU(o.Vector.createFromMat(rates))
+    for joint, body in zip(joints, model["bodies"], strict=True):
+        for k, rate in enumerate(body["rates"]):
+            joint.get_coordinates(k).setSpeedValue(state, rate)
     manager = o.Manager(made)
     manager.setIntegratorAccuracy(effort["accuracy"])
     state.setTime(0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,6 @@ from .option_types import positive, whole
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
-    from ..case.case import Case
     from ..studies.board.truth import Truth
 
 STEPS = 1000
@@ -75,74 +75,49 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
     the truth. An engine that is missing, lacks a joint, diverges or crashes is a row too. Exit
     status: 0 the site is written; 2 the tool could not do all of its work.
     """
+    from msgspec.structs import replace
+
     from ..case.io.atomic_files import write_all
     from ..harness.record import to_json
     from ..report.sections import page, print_report
     from ..studies.board import run
     from ..studies.board.page import report
-    from ..studies.board.results import Board, Row, TruthFacts
+    from ..studies.board.results import Board, earlier_rows
     from ..studies.board.truth import truth_of
+    from .destinations import Destinations
 
     assert registry.stepper_files is not None
-    wanted = run.steppers(options.engine)
-    cases, problems = _cases(options, registry)
-    _require_folder(options.out)
-    make = registry.stepper_files
+    wanted, to = run.steppers(options.engine), Destinations.of(options)
+    if unwritable := to.problems(["board.json", "index.html"]):
+        raise KincheckError("\n".join(unwritable))
+    unread = dict[str, str]()
+    cases = registry.find_cases(options.case, unread, driven=False)
+    if not options.case:
+        every = map(registry.case, registry.cases())
+        cases = [case for case in every if case.free is not None]
+    problems = [*unread.values()]
+    make, file = registry.stepper_files, options.out / "board.json"
 
-    def files(engine: str, truth: Truth) -> Any:
+    def files(engine: str, truth: Truth) -> Mapping[str, str]:
         return make(engine, truth.case.mechanism, truth.twists)
 
-    started, truths, rows = datetime.now().astimezone(), list[TruthFacts](), list[Row]()
+    found, earlier = Board.begun(datetime.now().astimezone()), earlier_rows(file)
+    given = {name: getattr(options, name) for name in ("out", "steps", "timeout")}
     for case in cases:
         try:
             truth = truth_of(case)
+            found = replace(found, truths=[*found.truths, truth.facts])
+            for row in run.rows_of(truth, wanted, files, earlier, **given):
+                found = replace(found, rows=[*found.rows, row])
+                print(f"{row.case}: {row.name}: {row.state}", file=sys.stderr)
         except KincheckError as error:
             problems.append(str(error))
-            continue
-        truths.append(truth.facts)
-        for row in run.rows_of(
-            truth, wanted, files, out=options.out, steps=options.steps, timeout=options.timeout
-        ):
-            rows.append(row)
-            print(f"{row.case}: {row.name}: {row.state}", file=sys.stderr)
-    if not rows:
-        raise KincheckError("\n".join(problems))
-    found = Board.of(truths, rows, started)
-    shown = report(found)
-    contents = [
-        *((options.out / row.folder / "row.json", to_json(row)) for row in rows if row.folder),
-        (options.out / "board.json", to_json(found)),
-        (options.out / "index.html", page(shown).encode()),
-    ]
-    problems += write_all(contents)
-    print_report(shown, sys.stdout)
+        # after each case, so that an interrupt loses only the last one
+        if found.rows:
+            text = page(report(found)).encode()
+            problems += write_all([(file, to_json(found)), (options.out / "index.html", text)])
+    if found.rows:
+        print_report(report(found), sys.stdout)
     if problems:
-        raise KincheckError("\n".join(problems))
+        raise KincheckError("\n".join(dict.fromkeys(problems)))
     return Status.WITHIN
-
-
-def _cases(options: argparse.Namespace, registry: Registry) -> tuple[list[Case], list[str]]:
-    """Return the cases, and messages on unreadable ones."""
-    if not options.case:
-        every = [registry.case(name) for name in registry.cases()]
-        return [case for case in every if case.free is not None], []
-    found: dict[str, Case] = {}
-    problems: list[str] = []
-    for name in options.case:
-        try:
-            for each in registry.matching(name):
-                case = registry.find_case(each, driven=False)
-                if found.setdefault(case.name, case) is not case:
-                    problems.append(f"{each}: there are two cases named {case.name!r}; rename one")
-        except KincheckError as error:
-            problems.append(str(error))
-    return [*found.values()], problems
-
-
-def _require_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise KincheckError(
-            f"--out {out}: cannot be made a folder ({error.strerror}); give another one"
-        ) from None

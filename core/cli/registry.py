@@ -135,11 +135,14 @@ class Registry:
         unread: dict[str, str],
         found: Sequence[Case] = (),
         supplied: Supplied = NOTHING,
+        *,
+        driven: bool = True,
     ) -> list[Case]:
         """Return the cases already found, and the cases of names, files and patterns.
 
         Args:
             unread: receives the messages of unreadable cases, by the given names.
+            driven: see `find_case`.
         """
         cases = {case.name: case for case in found}
         wanted: dict[str, None] = {}
@@ -150,7 +153,7 @@ class Registry:
                 unread[name] = str(error)
         for name in wanted:
             try:
-                case = self.find_case(name, supplied)
+                case = self.find_case(name, supplied, driven=driven)
             except KincheckError as error:
                 unread[name] = str(error)
                 continue

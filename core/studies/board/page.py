@@ -26,7 +26,7 @@ COLUMNS = (
     "cost [s/s]",
     "order",
     "floor [m]",
-    "loop",
+    "since",
 )
 LABELS = 4
 NOTES = (
@@ -35,7 +35,7 @@ NOTES = (
     " the same time: what loads and dampers took is in both.",
     "Errors are those of the shortest step, cost is wall time for a simulated second there, in one"
     " process and one run on a machine that also does other things: costs within a factor of two"
-    " are alike. Loop: in the engine, or in Python, whose time is then in the cost.",
+    " are alike. Where the loop over the steps is in Python, its time is in the cost.",
     "Order: by least squares over steps that lower the error. Floor: an error that the last halving"
     " does not lower, by softness or because steps are still too long. Default: the engine's"
     " settings at these steps; best: best known ones.",
@@ -126,7 +126,7 @@ def _cells(row: Row) -> list[str]:
         *(number(each) for each in (last.error, last.gap, last.energy, last.cost)),
         "–" if row.order is None else f"{row.order:.2f}",
         number(row.floor),
-        row.loop,
+        row.since,
     ]
 
 
@@ -160,18 +160,29 @@ def _settings(rows: Sequence[Row]) -> Section:
             " of their own.",
         ],
         NOTES,
-        ("engine", "version", "integrator", "settings", "closed loops", "values", "by", "since"),
-        8,
+        (
+            "engine",
+            "version",
+            "integrator",
+            "settings",
+            "loop over steps",
+            "closed loops",
+            "values",
+            "by",
+            "on",
+        ),
+        9,
         [
             [
                 row.engine,
                 row.version,
                 row.integrator,
                 row.column,
+                row.loop,
                 row.ties,
                 ", ".join(f"{name} {value}" for name, value in row.settings.items()) or "–",
                 row.by or "–",
-                row.date or "–",
+                row.on or "–",
             ]
             for row in named.values()
         ],

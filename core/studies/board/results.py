@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import platform
-from datetime import datetime
+from collections.abc import Mapping
+from datetime import date, datetime
+from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 
+from ...errors import KincheckError
 from ...harness.provenance import processor
 from ...version import VERSION
 
@@ -52,12 +56,13 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
         column: "default" for the engine's settings, or "best" for the best known ones.
         group: of the integrator.
         design_order: order of the method for smooth motions; None if steps are controlled.
-        by, date: who gave the settings, and when; empty for defaults.
+        by, on: who gave the settings, and when; empty for defaults.
         loop: where the loop over the steps runs: the engine or Python.
         ties: form of the closed loops.
         order: by least squares over the runs above the floor; None with fewer than two.
         floor: error that smaller steps do not lower [m]; None if none is reached.
         folder: of the reproducer, below the board; empty without one.
+        since: date of the first board in the same folder with this version and these settings.
     """
 
     schema: str = SCHEMA
@@ -70,7 +75,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
     column: str
     settings: dict[str, Any] = {}
     by: str = ""
-    date: str = ""
+    on: str = ""
     loop: str
     ties: str
     precision: str = "float64"
@@ -81,11 +86,26 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
     order: float | None = None
     floor: float | None = None
     folder: str = ""
+    since: str = ""
 
     @property
     def name(self) -> str:
         """Engine, integrator and column."""
         return f"{self.engine} {self.integrator}, {self.column}"
+
+    @property
+    def key(self) -> str:
+        """Case and name."""
+        return f"{self.case}: {self.name}"
+
+    def dated(self, earlier: Mapping[str, Row]) -> Row:
+        """Return the row with today's date, or an earlier one's if version and settings are the
+        same.
+        """
+        before, since = earlier.get(self.key), date.today().isoformat()
+        if before and (before.version, before.settings) == (self.version, self.settings):
+            since = before.since
+        return replace(self, since=since)
 
     @property
     def measured(self) -> list[Run]:
@@ -127,17 +147,30 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     started: str
     processor: str
     platform: str
-    truths: list[TruthFacts]
-    rows: list[Row]
+    truths: list[TruthFacts] = []
+    rows: list[Row] = []
 
     @classmethod
-    def of(cls, truths: list[TruthFacts], rows: list[Row], started: datetime) -> Board:
-        """Return the board measured on this machine since a time."""
+    def begun(cls, started: datetime) -> Board:
+        """Return the board of this machine, without rows."""
         return cls(
             kincheck=VERSION,
             started=started.isoformat(timespec="seconds"),
             processor=processor(),
             platform=platform.platform(),
-            truths=truths,
-            rows=rows,
         )
+
+
+def earlier_rows(file: Path) -> dict[str, Row]:
+    """Return the rows of an earlier board by their keys; none without a file.
+
+    Raises:
+        KincheckError: the file is no board.
+    """
+    if not file.is_file():
+        return {}
+    try:
+        found = msgspec.json.decode(file.read_bytes(), type=Board)
+    except msgspec.DecodeError as error:
+        raise KincheckError(f"{file}: is no board ({error}); give another folder") from None
+    return {row.key: row for row in found.rows}

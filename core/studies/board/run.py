@@ -19,6 +19,7 @@ import numpy as np
 from ...case.io.escape import file_name
 from ...errors import KincheckError, UnsupportedError, unknown
 from ...extras import THREADS
+from ...harness.record import to_json
 from .results import Row, Run, State
 from .truth import Truth
 
@@ -85,6 +86,7 @@ def rows_of(
     truth: Truth,
     wanted: Sequence[Stepper],
     files: Files,
+    earlier: Mapping[str, Row],
     *,
     out: Path,
     steps: int,
@@ -93,6 +95,7 @@ def rows_of(
     """Yield the rows of a case; write the reproducer of each below a folder, and run it.
 
     Args:
+        earlier: rows of an earlier board in this folder, by their keys.
         steps: least number of the longest steps in the whole motion.
         timeout: of all runs of a row [s].
     """
@@ -107,7 +110,7 @@ def rows_of(
                 column=column,
                 settings=dict(settings),
                 by=stepper.by if settings else "",
-                date=str(stepper.date) if settings else "",
+                on=str(stepper.date) if settings else "",
                 loop=stepper.loop,
                 ties=stepper.ties,
                 state="unsupported",
@@ -115,7 +118,7 @@ def rows_of(
             try:
                 texts = files(stepper.engine, truth)
             except UnsupportedError as error:
-                yield msgspec.structs.replace(row, message=str(error))
+                yield msgspec.structs.replace(row, message=str(error)).dated(earlier)
                 continue
             name = f"{stepper.engine}-{stepper.integrator}-{column}"
             folder = Path(file_name(truth.case.name)) / file_name(name)
@@ -130,18 +133,29 @@ def rows_of(
                 "settings.json": json.dumps(given, indent=1) + "\n",
                 "truth.csv": truth.table(points),
             }
-            place = out / folder
-            place.mkdir(parents=True, exist_ok=True)
-            (place / "result.json").unlink(missing_ok=True)
-            for file, text in texts.items():
-                (place / file).write_text(text, "utf-8")
-            yield measured(msgspec.structs.replace(row, folder=str(folder)), place, timeout)
+            _write(out / folder, texts)
+            row = msgspec.structs.replace(row, folder=str(folder))
+            done = measured(row, out / folder, timeout).dated(earlier)
+            _write(out / folder, {"row.json": to_json(done).decode()})
+            yield done
+
+
+def _write(folder: Path, texts: Mapping[str, str]) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            (folder / name).write_text(text, "utf-8")
+    except OSError as error:
+        raise KincheckError(
+            f"--out: {folder} cannot be written ({error.strerror}); give another folder"
+        ) from None
 
 
 def measured(row: Row, place: Path, timeout: float) -> Row:
     """Run the reproducer in a folder, and return the row with its runs."""
     state: State | None = None
-    message = ""
+    message, result = "", place / "result.json"
+    result.unlink(missing_ok=True)
     environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
     try:
         done = subprocess.run(
@@ -159,8 +173,7 @@ def measured(row: Row, place: Path, timeout: float) -> Row:
             message = f"its process ended with status {done.returncode}; {' '.join(last)[:300]}"
     except subprocess.TimeoutExpired:
         state, message = "timeout", f"its runs take more than {timeout:g} s together"
-    result = place / "result.json"
-    found: dict[str, Any] = {}
+    found = dict[str, Any]()
     if result.is_file():
         found = json.loads(result.read_text("utf-8"))
     runs = [msgspec.convert(each, Run) for each in found.get("runs", ())]
@@ -198,7 +211,7 @@ def order_and_floor(runs: Sequence[Run]) -> tuple[float | None, float | None]:
         return None, None
     steps, errors = np.log2(np.array(pairs)).T
     falling = [bool(each) for each in np.diff(errors) / np.diff(steps) >= FLOOR]
-    floor = None if falling[-1] else float(2.0 ** errors.min())
+    floor = None if falling[-1] else min(error for _, error in pairs)
     if True not in falling:
         return None, floor
     # the last steps that lower the error, one after the other
