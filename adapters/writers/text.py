@@ -13,6 +13,7 @@ import numpy as np
 from ...core.errors import KincheckError
 from ...core.joints import Distance
 from ...core.mechanism.body import Body, inertia_matrix
+from ...core.mechanism.loads import Bushing
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
 from ..shared.poses import direction
@@ -50,6 +51,20 @@ def facts(mechanism: Mechanism, sprung: Collection[str], gravity: bool) -> tuple
     if not mechanism.has_loads:
         return PLAIN, ""
     return LOADED, left_out(mechanism, sprung, gravity)
+
+
+def own_law(mechanism: Mechanism, sprung: Collection[str], title: str) -> str:
+    """Return a sentence on the bushings in a file whose law is the format's own."""
+    names = [str(f) for f in mechanism.forces if isinstance(f, Bushing) and f.name in sprung]
+    if not names:
+        return ""
+    law = f"By {title}'s own law, equal to first order in displacement and angle"
+    return f" {law}: {', '.join(names)}."
+
+
+def plain_bushing(each: Bushing) -> bool:
+    """Return whether a bushing has neither curve nor preload, which formats lack."""
+    return not each.curve and not any(each.preload)
 
 
 def add_text(
@@ -139,6 +154,7 @@ def left_out(mechanism: Mechanism, names: Collection[str], gravity: bool) -> str
         gravity: whether the file has gravity.
     """
     missing = [str(each) for each in mechanism.forces if each.name not in names]
+    missing += [f"{each}, a joint in its place" for each in mechanism.bushings]
     if any(mechanism.gravity) and not gravity:
         missing.insert(0, f"gravity {[*mechanism.gravity]} m/s^2")
     return f" Left out: {', '.join(missing)}." if missing else ""
