@@ -429,3 +429,14 @@ def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     options = ["--travel=0:20mm:2", "--jobs=0", "--engine", "mujoco-default"]
     assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 0
     assert "finds no equilibria" in capsys.readouterr().out
+
+
+def test_bench_gives_times_of_samples_and_matrices(tmp_path, capsys):
+    (tmp_path / "strut.toml").write_text(strut_text())
+    out = tmp_path / "bench.json"
+    command = ["bench", "compliance", str(tmp_path / "strut.toml"), "--rounds=1", f"--json={out}"]
+    assert main(command) == 0
+    found = json.loads(out.read_text())
+    assert found["reached"] == found["samples"]
+    assert found["us_per_sample"]["median"] > found["us_per_matrix"]["median"] > 0.0
+    assert "us a matrix at least" in capsys.readouterr().out
