@@ -126,8 +126,8 @@ def torsion(name, first, second, turn, **options):
 
 def bushing(name, first, second, stiffness, damping, preload, turning, law):
     """Springs and dampers along and about the axes of the first marker. The force is at the second
-    one; the elastic torque is the gradient of an energy in Euler parameters or Cardan angles,
-    which is not Exudyn's own law.
+    one, so that a couple is on the first; the elastic torque is the gradient of an energy in Euler
+    parameters or Cardan angles. Exudyn's own law has neither.
     """
     ends = [marker(*first), marker(*second)]
     kinds = exu.OutputVariableType
@@ -142,6 +142,9 @@ def bushing(name, first, second, stiffness, damping, preload, turning, law):
         A, B = (each.reshape(3, 3) for each in of(kinds.RotationMatrix))
         R, d = A.T @ B, r1 - r0
         x, rates = A.T @ d, A.T @ (v1 - v0 - np.cross(w0, d))
+        force = np.multiply(stiffness, x) + preload + np.multiply(damping, rates)
+        if item is None:
+            return [*np.cross(d, A @ force)]
         if law == "cardan":
             a, b = np.arctan2(-R[1, 2], R[2, 2]), np.arcsin(R[0, 2])
             c = np.arctan2(-R[0, 1], R[0, 0])
@@ -156,13 +159,17 @@ def bushing(name, first, second, stiffness, damping, preload, turning, law):
             e = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4 * e0)
             twice = 2 * np.multiply(turning[0], e)
             torque = e0 * twice + np.cross(e, twice)
-        force = np.multiply(stiffness, x) + preload + np.multiply(damping, rates)
         return [*force, *(torque + np.multiply(turning[1], A.T @ (w1 - w0)))]
 
     item = ObjectConnectorRigidBodySpringDamper(
         name=name, markerNumbers=ends, springForceTorqueUserFunction=wrench
     )
     forces[name] = mbs.AddObject(item)
+    if bodies[first[0]] != ground:
+        couple = LoadTorqueVector(
+            markerNumber=ends[0], loadVectorUserFunction=lambda mbs, t, load: wrench(mbs, t, None)
+        )
+        mbs.AddLoad(couple)
 
 
 def force(name, at, **options):

@@ -68,15 +68,19 @@ LOADS = [
 ]
 
 
-def rubber(law, turning=(10.0, 20.0, 30.0), stiffness=(100.0, 200.0, 300.0), **more):
-    """Return a bushing of the arm with oblique axes; ground carries them."""
+def rubber(
+    law, turning=(10.0, 20.0, 30.0), stiffness=(100.0, 200.0, 300.0), bodies=("ground", "arm")
+):
+    """Return a bushing of the arm with oblique axes; the first body carries them."""
     axes = ((1.0, 2.0, 1.0), (2.0, -1.0, 0.0))
     sizes = {"stiffness": stiffness, "turning_stiffness": turning, "law": law}
-    return Bushing("rubber", "ground", "arm", (0.3, 0.1, -0.2), axes, **sizes, **more)
+    return Bushing("rubber", *bodies, (0.3, 0.1, -0.2), axes, **sizes)
 
 
 def energy(each, angle):
-    """Return the energy of a bushing whose second body turns about the axis."""
+    """Return the energy of a bushing on an arm that turns about the axis."""
+    if each.i == "arm":  # ground turns the other way
+        angle = -angle
     axes, R = np.array(each.triad), Rotation.from_rotvec(angle * AXIS)
     x, turn = axes @ (R.apply(each.point) - each.point), axes @ R.as_matrix() @ axes.T
     angles = Rotation.from_matrix(turn).as_euler("XYZ")
@@ -151,12 +155,13 @@ def test_mujoco_begins_to_turn():
     assert "Left out: force 'push' (force), force 'pull' (force), force 'twist' (torque)." in text
 
 
+@pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
 @pytest.mark.parametrize("law", ["euler_parameters", "cardan"])
-def test_exudyn_begins_to_turn(tmp_path, law):
+def test_exudyn_begins_to_turn(tmp_path, law, bodies):
     exu = pytest.importorskip("exudyn")
     exu.config.printToConsole = False
     script = tmp_path / "model.py"
-    soft = rubber(law)
+    soft = rubber(law, bodies=bodies)
     found = texts("exudyn", arm(forces=[*SPRINGS, *LOADS, soft]))[".py"]
     script.write_text(found, encoding="utf-8")
     model = runpy.run_path(str(script))
@@ -229,10 +234,11 @@ def test_drake_begins_to_turn():
     assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'push' (force), f" in found
 
 
-def test_simbody_begins_to_turn(tmp_path):
+@pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
+def test_simbody_begins_to_turn(tmp_path, bodies):
     o = pytest.importorskip("opensim", reason="opensim is not installed")
     o.Logger.setLevelString("Off")
-    soft = rubber("cardan")
+    soft = rubber("cardan", bodies=bodies)
     found = texts("osim", arm(forces=[*SPRINGS, *LOADS, soft]))[".osim"]
     file = tmp_path / "arm.osim"
     file.write_text(found, encoding="utf-8")
