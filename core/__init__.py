@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         Inline,
         InPlane,
         Joint,
+        LinearCoupler,
         OrientationLock,
         ParallelAxes,
         PerpendicularAxes,
@@ -80,6 +81,7 @@ __all__ = [
     "JointAngle",
     "JointDisplacement",
     "KincheckError",
+    "LinearCoupler",
     "Mechanism",
     "MechanismError",
     "OrientationLock",
@@ -127,8 +129,8 @@ _NAMES = {
     "mechanism.motions": "JointAngle JointDisplacement PointCoordinate Ramp Sine Table",
     "joints": (
         "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
-        "Joint OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial RackPinion "
-        "Revolute RevoluteSpherical Screw Spherical Translational Universal"
+        "Joint LinearCoupler OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial "
+        "RackPinion Revolute RevoluteSpherical Screw Spherical Translational Universal"
     ),
     "case.case": "Case",
     "case.io.reader_options": "Supplied",

@@ -225,6 +225,8 @@ class DrakePlant(SteppedTree, DrakeModel):
 
     def relate(self, relation: Relation) -> None:
         super().relate(relation)
+        if len(relation.terms) > 2:  # a row of the projection; steps refuse it
+            return
         one, other, (_, factor) = relation.follower(signed=True)
         self.couplings.append((self.coordinates[one][0], self.coordinates[other][0], factor))
 

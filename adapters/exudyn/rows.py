@@ -226,11 +226,20 @@ class Rows:
         self.bent.append((self.coordinate(first, freedom), value, bent))
 
     def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
-        """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        (first, freedom, weight), (second, other_freedom, other) = terms
-        value, size = self.unknown(), math.hypot(weight, other)
-        self.follow(self.coordinate(first, freedom), value, other / size)
-        self.follow(self.coordinate(second, other_freedom), value, -weight / size)
+        """Keep the weighted sum of coordinates (joint, freedom, weight) at zero: they follow as
+        many unknowns less one.
+        """
+        weights = [weight for *_, weight in terms]
+        if len(terms) == 2:
+            (a, b), size = weights, math.hypot(*weights)
+            free = [[b / size], [-a / size]]
+        else:
+            free = np.linalg.svd(np.array([weights]))[2][1:].T.tolist()
+        values = [self.unknown() for _ in terms[1:]]
+        for (joint, freedom, _), row in zip(terms, free, strict=True):
+            number = self.coordinate(joint, freedom)
+            for value, weight in zip(values, row, strict=True):
+                self.follow(number, value, weight)
 
 
 def turned(angle: float) -> Array:

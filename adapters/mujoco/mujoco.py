@@ -225,6 +225,9 @@ class MuJoCoModel(TreeModel):
         self.equalities.append(Equality(kind, joint.name, bodies, sites, length))
 
     def relate(self, relation: Relation) -> None:
+        if len(relation.terms) > 2:
+            self._sum(relation)
+            return
         *ends, curve = relation.follower(signed=True)
         names = [self.coordinates[end][0] for end in ends]
         one, other = map(" ".join, ends)
@@ -242,6 +245,17 @@ class MuJoCoModel(TreeModel):
             self.relations.append(f"joint equality: {one} = {curve[1]:.9g} {other}")
             found = Equality("joint", relation)
         self.equalities.append(found)
+
+    def _sum(self, relation: Relation) -> None:
+        """Keep the length of a fixed tendon, the weighted sum of coordinates."""
+        name = f"{relation.name}.sum{len(self.equalities)}"
+        tendon = self.spec.add_tendon(name=name)
+        for (joint, freedom, weight), sign in zip(relation.terms, relation.signs, strict=True):
+            tendon.wrap_joint(self.coordinates[joint, freedom][0], sign * weight)
+        equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_TENDON, name1=name)
+        equality.data = [0.0] * len(equality.data)
+        self.relations.append(f"tendon equality: a sum of {len(relation.terms)} coordinates")
+        self.equalities.append(Equality("joint", relation))
 
     def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
         self.spec.option.gravity, self.masses = list(gravity), masses

@@ -321,6 +321,8 @@ class Stepping(Simulation):
                 return self._without(coupler, "that couples coordinates")
             if coupler.curve:
                 return self._without(coupler, "that keeps a polynomial")
+            if len(coupler.joints) > 2:
+                return self._without(coupler, "that couples more than two coordinates")
         return uneven(case, engine.title) if self.equal else None
 
     def _without(self, joint: Joint | Coupler, what: str) -> str:

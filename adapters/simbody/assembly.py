@@ -51,8 +51,11 @@ class Assembly(Simulation):
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint or driver that is not supported here, or None."""
         for coupler in case.mechanism.couplers:
-            if coupler.curve:
-                return f"{coupler}: this adapter gives OpenSim's assembler no polynomial relations"
+            if coupler.curve or len(coupler.joints) > 2:
+                return (
+                    f"{coupler}: this adapter gives OpenSim's assembler relations of two"
+                    " coordinates by a factor alone"
+                )
         return Simbody().unsupported(case)
 
     def efforts(self) -> Mapping[str, Assembly]:

@@ -205,7 +205,7 @@ class ConstrainedTree(TreeModel):
         self.closures[joint.name] = name + (moved if closure.links else "")
 
     def relate(self, relation: Relation) -> None:
-        if relation.curve:
+        if relation.curve or len(relation.terms) > 2:
             super().relate(relation)
             return
         o, coupler = self.o, self.o.CoordinateCouplerConstraint()

@@ -19,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 
 from ...core import joints as j
-from ...core.algebra import vec
+from ...core.algebra import triple, vec
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -73,9 +73,11 @@ def load_options(element: ForceElement) -> dict[str, Any]:
     return {"stiffness": element.stiffness, "damping": element.damping, **own}
 
 
-def beginning(loaded: bool) -> str:
-    """Return the functions that the lines call; with masses and force elements if loaded."""
-    masses, body = (text.LOADED, LOADED_BODY) if loaded else (text.PLAIN, PLAIN_BODY)
+def beginning(mechanism: Mechanism) -> str:
+    """Return the functions that the lines call; with masses and force elements if it has loads."""
+    masses, body = text.PLAIN, PLAIN_BODY
+    if mechanism.has_loads:
+        masses, body = text.weights(mechanism.bodies), LOADED_BODY
     return BEGINNING.replace("MASSES", masses).replace("BODY", body)
 
 
@@ -257,8 +259,11 @@ def write(
         KincheckError: a joint or coupler has no counterpart in Exudyn.
     """
     require_known(mechanism, "Exudyn")
-    if curved := next((each for each in mechanism.couplers if each.curve), None):
-        raise KincheckError(f"{curved} has no counterpart in Exudyn; export MJCF or URDF instead")
+    strange = [each for each in mechanism.couplers if each.curve or len(each.joints) > 2]
+    if strange:
+        raise KincheckError(
+            f"{strange[0]} has no counterpart in Exudyn; export MJCF or URDF instead"
+        )
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
 
 
@@ -301,7 +306,7 @@ class _Script:
                 f"points[{point.name!r}] = bodies[{point.body!r}],"
                 f" {self.arm(point.body, point.position)}"
             )
-        return beginning(self.loaded) + "\n".join(self.lines) + "\n" + END
+        return beginning(self.mechanism) + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
         """Add a line with a call."""
@@ -421,7 +426,7 @@ def _spelled_out(
         )
         for name, (link, angle) in zip(names[:-1], hinges, strict=False):
             swing = swing.then_about(vec(link.axis), vec(P), angle)
-            bodies.append(Body(name, P))
+            bodies.append(text.link_between(name, triple(P), mechanism))
             way[name] = _motion(swing, P)
             joints.append(j.Revolute(name, before, name, P, link.axis))
             before = name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -32,12 +32,17 @@ class Hardpoint:
     Attributes:
         name: as in the table.
         roles: names in the template of the suspension.
+        position: x forward, y left and z up of the left wheel's point, or of the mirror image of a
+            right one's [m].
+        axes: axis among these, and its sign, along each of x, y and z of the table.
         moves: derivatives of the numbers of each following place, see `kinematics.places`, by x, y
             and z of the table [m/m], shape (numbers, 3). They are constant.
     """
 
     name: str
     roles: tuple[str, ...]
+    position: tuple[float, float, float]
+    axes: Sequence[tuple[int, float]]
     moves: Mapping[str, Array]
 
 

@@ -53,6 +53,7 @@ RODS: Sequence[tuple[Vector, Vector]] = (
     ((0.55, 0.24, 0.51), (0.4, -0.62, 1.12)),
     ((0.12, -0.21, 0.36), (-0.22, -0.1, 1.22)),
     ((0.43, -0.42, 0.1), (-0.03, -0.81, 0.14)),
+    ((0.4, 0.1, 0.0), (0.9, 0.6, -0.2)),
 )
 TIPS: Sequence[Vector] = ((0.35, -0.05, 0.4), (0.1, 0.15, 0.15))
 
@@ -113,6 +114,8 @@ def specimen(of: type[_Tested]) -> _Tested:
     between: dict[str, Any] = (
         {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
     )
+    if issubclass(of, Coupler) and of.count is None:  # a list for as many joints
+        between["factors"] = (1.0, NUMBER)
     try:
         return fitting(of, {"name": "tested", **between}, map(_made_of_pair, PAIRS))
     except MechanismError as refused:

@@ -169,7 +169,10 @@ def add_options(command: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NAME",
-        help="statements of a dataset of Adams to leave out, as BUSHING or BUSHING/3",
+        help=(
+            "elements of a model to leave out, by tag, name or TAG/NAME, or statements of a dataset"
+            " of Adams, as BUSHING or BUSHING/3; a note beside every verdict says so"
+        ),
     )
     model.add_argument(
         "--start",

@@ -55,6 +55,13 @@ def add(commands: Any) -> None:
         help="compare with what a simulator makes of the first file: it loads and saves the file",
     )
     same.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="elements to leave out of all models, by tag, name or TAG/NAME; a note says so",
+    )
+    same.add_argument(
         "--json", metavar="FILE", help="write the verdict as JSON; - for standard output"
     )
 
@@ -70,6 +77,7 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
     for name in THREADS:  # many small matrices: threads would wait for each other
         os.environ.setdefault(name, "1")
     from ..case.io.atomic_files import require_writable
+    from ..case.models.files import require_used
     from ..report.terminal import page, with_json
     from ..studies.same import compare
 
@@ -81,7 +89,9 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
             f"same: found one file, expected two or more, or --converted-by"
             f" {', '.join(CONVERTERS)}; add one"
         )
-    first, *others = (_read(name, registry) for name in names)
+    first, *others = (_read(name, registry, options.without) for name in names)
+    used = {name for each in (first, *others) for name in each.without}
+    require_used(Path(names[0]), options.without, used)
     others += [_converted(name, Path(names[0]), registry) for name in options.converted_by]
     found = [compare(first, other, given) for other in others]
     with with_json(_report(found), options.json):
@@ -101,13 +111,13 @@ def _pair(text: str) -> tuple[str, str]:
     return first, second
 
 
-def _read(name: str, registry: Registry) -> Undriven:
+def _read(name: str, registry: Registry, without: Sequence[str]) -> Undriven:
     from ..case.models.files import MODEL, kind_of
     from ..case.models.undriven import undriven_case, undriven_file
 
     file = Path(name)
     if file.is_file() and kind_of(file) == MODEL:
-        return undriven_file(file)
+        return undriven_file(file, without)
     return undriven_case(registry.find_case(name, driven=False), name)
 
 

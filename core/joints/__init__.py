@@ -14,6 +14,7 @@ from .fixed import Fixed
 from .gear import Gear
 from .in_plane import InPlane
 from .inline import Inline
+from .linear_coupler import LinearCoupler, linear_relation
 from .orientation_lock import OrientationLock
 from .parallel_axes import ParallelAxes
 from .perpendicular_axes import PerpendicularAxes
@@ -43,6 +44,7 @@ __all__ = [
     "Inline",
     "Joint",
     "Kind",
+    "LinearCoupler",
     "OrientationLock",
     "ParallelAxes",
     "PerpendicularAxes",
@@ -55,4 +57,5 @@ __all__ = [
     "Spherical",
     "Translational",
     "Universal",
+    "linear_relation",
 ]

@@ -20,10 +20,12 @@ NUMBERS = (float, int, "float", "int")
 
 @dataclass(frozen=True)
 class Coupler(ABC):
-    """A relation between one coordinate each of two axial joints, which are zero at design.
+    """A relation between one coordinate each of axial joints, most often of two, which are zero at
+    design.
 
     Attributes:
-        joints: names of the two joints.
+        count: number of its joints; None for two or more.
+        joints: names of the joints.
         freedoms: which coordinate of each: "rotation" or "translation".
 
     Raises:
@@ -31,11 +33,12 @@ class Coupler(ABC):
     """
 
     type: ClassVar[str]
-    freedoms: ClassVar[tuple[str, str]]
+    count: ClassVar[int | None] = 2
+    freedoms: ClassVar[tuple[str, ...]]
     registry: ClassVar[dict[str, type[Coupler]]] = {}
 
     name: str
-    joints: tuple[str, str]
+    joints: tuple[str, ...]
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -43,11 +46,13 @@ class Coupler(ABC):
             register(Coupler.registry, cls)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", held(f"{self}: joints", self.joints, 2, "two names"))
-        if self.joints[0] == self.joints[1]:
-            raise MechanismError(
-                f"{self}: couples {self.joints[0]!r} with itself; give two different joints"
-            )
+        what = "two names" if self.count else "two names or more"
+        joints = held(f"{self}: joints", self.joints, self.count, what)
+        object.__setattr__(self, "joints", tuple(joints))
+        if len(joints) < 2:
+            raise MechanismError(f"{self}: joints: found {len(joints)}, expected {what}")
+        if again := next((each for each in joints if joints.count(each) > 1), None):
+            raise MechanismError(f"{self}: couples {again!r} with itself; give different joints")
         for each in fields(self):
             if each.type in NUMBERS:
                 object.__setattr__(self, each.name, plain(getattr(self, each.name)))
@@ -90,7 +95,7 @@ class Coupler(ABC):
 
     @property
     def terms(self) -> tuple[tuple[str, str, float], ...]:
-        """Joint, freedom and weight of the two coordinates."""
+        """Joint, freedom and weight of the coordinates."""
         return tuple(zip(self.joints, self.freedoms, self.weights, strict=True))
 
     @property
@@ -102,5 +107,5 @@ class Coupler(ABC):
 
     @property
     @abstractmethod
-    def weights(self) -> tuple[float, float]:
-        """Weights of the two coordinates [m, rad]; the sum, with that of `curve`, stays zero."""
+    def weights(self) -> tuple[float, ...]:
+        """Weights of the coordinates [m, rad]; the sum, with that of `curve`, stays zero."""

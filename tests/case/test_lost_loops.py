@@ -1,15 +1,20 @@
 """What joins links and is not read stops a model by name; extensions that join nothing do not."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from kincheck import adapters
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.trees.element import parse_xml
 from kincheck.core.case.models.trees.mjcf_language import require_known_attributes
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
+from kincheck.core.harness.compare import output_series
 
 from ..support.model_poses import coordinate, solution
 
@@ -76,6 +81,11 @@ LOOPS = {
     "ball on a frame": '<gazebo><frame name="end" attached_to="follower">'
     '<pose relative_to="pivot">-0.1 0 0.45 0 0 0</pose></frame>'
     '<joint name="c" type="ball"><parent>strut</parent><child>end</child></joint></gazebo>',
+    "loop_joint with an axis": '<loop_joint name="c" type="continuous"><axis xyz="0 1 0"/>'
+    '<link1 link="strut" xyz="0.3 0 0.2"/><link2 link="follower" xyz="-0.1 0 0.45"/></loop_joint>',
+    "loop_joint of Isaac Sim": '<loop_joint name="c" type="spherical">'
+    '<link1 link="strut" rpy="0 0 0" xyz="0.3 0 0.2"/>'
+    '<link2 link="follower" rpy="0.1 0 0" xyz="-0.1 0 0.45"/></loop_joint>',
     "Drake's ball": BALL,
     "Drake's balls on an axis": BALL
     + BALL.replace('"0.3 0 0.2"', '"0.3 1 0.2"').replace('"-0.1 0 0.45"', '"-0.1 1 0.45"'),
@@ -97,7 +107,7 @@ TWO = "names the links 'strut' and 'follower', which it may join, and is not rea
 COUPLED = "couples the joints 'drive' and 'pivot', and is not read, expected <mimic>"
 JOINING = {
     "attributes": ('<tie a="strut" b="follower"/>', TWO),
-    "children": ('<loop_joint><parent link="strut"/><child link="follower"/></loop_joint>', TWO),
+    "children": ('<tie><parent link="strut"/><child link="follower"/></tie>', TWO),
     "texts": ("<x><a>strut</a><b>follower</b></x>", TWO),
     "a list": ('<tie links="strut, follower"/>', TWO),
     "depth": ('<x><y><z><a name="strut"/><b name="follower"/></z></y></x>', TWO),
@@ -109,9 +119,8 @@ JOINING = {
         TWO,
     ),
     "frames": (
-        '<frame name="f" link="strut"/><frame name="g" link="follower"/><drake:linear_bushing_rpy>'
-        '<drake:bushing_frameA name="f"/><drake:bushing_frameC name="g"/>'
-        "</drake:linear_bushing_rpy>",
+        '<frame name="f" link="strut"/><frame name="g" link="follower"/><drake:damper>'
+        '<drake:frameA name="f"/><drake:frameC name="g"/></drake:damper>',
         TWO,
     ),
     "the world": ('<close link="strut" to="world"/>', "names the links 'strut' and 'world'"),
@@ -144,6 +153,23 @@ JOINING = {
         '<gazebo><joint name="w" type="revolute"><parent>world</parent><child>base</child><axis/>'
         "</joint></gazebo>",
         "'w' moves 'base', the base, which stands still",
+    ),
+    "a loop_joint without its axis": (
+        '<loop_joint type="revolute"><link1 link="strut"/><link2 link="follower"/></loop_joint>',
+        "<axis>: missing for 'revolute', expected one axis",
+    ),
+    "a bushing of another kind": (
+        '<drake:linear_bushing_rpy><drake:bushing_frameA name="strut"/>'
+        '<drake:bushing_frameC name="follower"/></drake:linear_bushing_rpy>',
+        "<drake:bushing_force_stiffness>: missing, expected three numbers",
+    ),
+    "an unknown element": (
+        '<cam_plan a="1"/>',
+        "unknown in <robot> (--without cam_plan leaves it out)",
+    ),
+    "a mistyped reference": (
+        '<gazebo refrence="strut"><mu1>1</mu1></gazebo>',
+        "did you mean 'reference'?",
     ),
     "a link of SDF": ('<gazebo><link name="z"/></gazebo>', "is of SDF, expected links of URDF"),
 }
@@ -221,6 +247,85 @@ def test_a_plugin_that_repeats_a_mimic_is_left_out(tmp_path: Path):
         tmp_path, text.replace('<origin xyz="0.4', '<mimic joint="drive"/><origin xyz="0.4')
     )
     assert [coupler.name for coupler in case.mechanism.couplers] == ["pivot.mimic"]
+
+
+BUSHING = """<drake:linear_bushing_rpy name="rubber">
+<drake:bushing_frameA{0}f{1}bushing_frameA>
+<drake:bushing_frameC{0}g{1}bushing_frameC>
+<drake:bushing_torque_stiffness{2}1 2 3{3}bushing_torque_stiffness>
+<drake:bushing_torque_damping{2}0.1 0.2 0.3{3}bushing_torque_damping>
+<drake:bushing_force_stiffness{2}100 200 300{3}bushing_force_stiffness>
+<drake:bushing_force_damping{2}4 5 6{3}bushing_force_damping></drake:linear_bushing_rpy>"""
+OF_URDF = ' name="', '"></drake:', ' value="', '"></drake:'
+OF_SDF = ">", "</drake:", ">", "</drake:"
+FRAMES_OF_URDF = (
+    '<frame name="f" link="strut" xyz="0.3 0 0.2" rpy="0 0 {0}"/>'
+    '<frame name="g" link="follower" xyz="-0.1 0.01 0.45" rpy="0 0 {1}"/>'
+)
+FRAMES_OF_SDF = (
+    '<frame name="f" attached_to="strut"><pose>0.3 0 0.2 0 0 {0}</pose></frame>'
+    '<frame name="g" attached_to="follower"><pose>-0.1 0.01 0.45 0 0 {1}</pose></frame>'
+)
+QUARTER = f"{np.pi / 2!r}"
+
+
+def rubber(folder: Path, form: str, turned: str = QUARTER):
+    """The bushing between strut and follower; all joints of the open chain are driven or held."""
+    frames = (FRAMES_OF_URDF if form == "urdf" else FRAMES_OF_SDF).format(QUARTER, turned)
+    text = frames + BUSHING.format(*(OF_URDF if form == "urdf" else OF_SDF))
+    whole = GATE.format(text) if form == "urdf" else IN_SDF.format(text)
+    return read(folder, whole, f"gate.{form}")
+
+
+@pytest.mark.parametrize("form", ["urdf", "sdf"])
+def test_a_bushing_of_drake_is_read(form: str, tmp_path: Path):
+    case = rubber(tmp_path, form)
+    (bushing,) = case.mechanism.forces
+    # frames turned by a quarter about z: their x is global y; C is 0.01 along it from A
+    assert np.array(bushing.axes) == pytest.approx(np.array([[0, 1, 0], [-1, 0, 0]]), abs=1e-15)
+    assert bushing.point == pytest.approx((0.3, 0.01, 0.45))
+    assert bushing.preload == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
+    assert bushing.stiffness == (100.0, 200.0, 300.0)
+    assert bushing.turning_damping == (0.1, 0.2, 0.3)
+    assert any("halfway between both frames" in note for note in case.assembly)
+
+
+def test_a_twisted_bushing_of_drake_is_refused(tmp_path: Path):
+    with pytest.raises(CaseError, match=r"turned against each other by 0\.4"):
+        rubber(tmp_path, "urdf", f"{np.pi / 2 + 0.4!r}")
+
+
+# Generalized forces on both slides by Drake 1.51 (CalcGeneralizedForces, rates 1, 0).
+BY_DRAKE = {
+    "drive": (62.991102249156285, 53.76723589616181, 44.54336954316733),
+    "held": (-135.0, -135.0, -135.0),
+}
+
+
+def test_a_bushing_of_drake_has_its_forces(tmp_path: Path):
+    slide = (
+        '<link name="{1}"><inertial><mass value="1"/></inertial></link><joint name="{0}"'
+        ' type="prismatic"><parent link="base"/><child link="{1}"/><origin xyz="{2}"/>'
+        '<axis xyz="{3}"/></joint>'
+    )
+    text = (
+        '<robot name="r" xmlns:drake="http://drake.mit.edu"><link name="base"/>'
+        + slide.format("drive", "strut", "0 0 0", "1 0 0")
+        + slide.format("held", "follower", "1 0 0.2", "0 0 1")
+        + FRAMES_OF_URDF.format("0.5", "0.5")
+        + BUSHING.format(*OF_URDF)
+        + "</robot>"
+    )
+    drive = Supplied(drive=("drive:0.05:0.2:3",), hold=("held",))
+    case = read(tmp_path, text, supplied=drive)
+    mechanism = replace(case.mechanism, gravity=(0.0, 0.0, 0.0))
+    native = adapters.engine("native")
+    for name, expected in BY_DRAKE.items():
+        effort = DriverEffort(name, 1e-9, 0.0, "", driver=name).bound(mechanism)
+        with_effort = with_markers(mechanism, [effort])
+        one = replace(case, mechanism=with_effort, outputs=(effort,), reference={})
+        found = output_series(one, effort, native.solve(native.build(one), one, 1e-13)).position
+        assert found == pytest.approx(-np.array(expected), abs=1e-7)
 
 
 IN_SDF_JOINING = {
@@ -427,3 +532,51 @@ def test_a_joint_of_drake_moves_as_drake_moves_it(kind, inside, freedoms, tmp_pa
     pose = plant.GetFrameByName("tip").CalcPoseInWorld(context)
     assert found.r[-1] == pytest.approx(pose.translation(), abs=EXACT)
     assert np.abs(found.p[-1] @ pose.rotation().ToQuaternion().wxyz()) == pytest.approx(1.0)
+
+
+WITHOUT = {
+    "a tag": ('<tie a="strut" b="follower"/>', "tie", "line 1: <tie>"),
+    "a name": (f'<gazebo><plugin name="p" filename="f">{ENDS}</plugin></gazebo>', "p", "'p'"),
+    "a tag and a name": ('<tie name="k" a="strut" b="follower"/>', "tie/k", "<tie> 'k'"),
+    "what is read": (BALL, "drake:ball_constraint", "<drake:ball_constraint>"),
+}
+
+
+@pytest.mark.parametrize(("text", "name", "said"), WITHOUT.values(), ids=WITHOUT)
+def test_without_leaves_an_element_out_and_says_so(text: str, name: str, said: str, tmp_path: Path):
+    supplied = replace(DRIVE, without=(name,))
+    case = read(tmp_path, GATE.format(text), supplied=supplied)
+    assert [joint.name for joint in case.mechanism.joints] == ["drive", "pin", "pivot"]
+    assert case.assembly[0].startswith("left out by --without: ")
+    assert said in case.assembly[0]
+
+
+def test_without_refuses_what_the_file_does_not_have(tmp_path: Path):
+    with pytest.raises(CaseError, match="did you mean 'mujoco'"):
+        read(tmp_path, GATE.format("<mujoco/>"), supplied=replace(DRIVE, without=("mujcoo",)))
+
+
+def test_without_leaves_out_an_equality_of_mjcf(tmp_path: Path):
+    tied = IN_MJCF.format('<equality><joint name="t" joint1="drive" joint2="pin"/></equality>')
+    assert read(tmp_path, tied, "model.xml").mechanism.couplers
+    case = read(tmp_path, tied, "model.xml", replace(DRIVE, without=("t",)))
+    assert not case.mechanism.couplers
+
+
+@pytest.mark.parametrize(
+    "motor", ["", '<transmission name="t{0}"><joint name="j{0}"/></transmission>']
+)
+def test_many_held_joints_without_motors_are_a_question(motor: str, tmp_path: Path):
+    links = '<link name="l0"/>' + "".join(
+        f'<link name="l{k}"/>' + HINGE.format(f"j{k}", f"l{k - 1}", f"l{k}", "") + motor.format(k)
+        for k in range(1, 41)
+    )
+    text, supplied = (
+        f'<robot name="r">{links}</robot>',
+        Supplied(drive=("j1:0:1:2",), hold_rest=True),
+    )
+    if motor:
+        assert len(read(tmp_path, text, supplied=supplied).mechanism.drivers) == 40
+    else:
+        with pytest.raises(CaseError, match=r"39 joints without a motor, of 40 .* --hold j2 j3 "):
+            read(tmp_path, text, supplied=supplied)

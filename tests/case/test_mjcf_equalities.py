@@ -27,6 +27,7 @@ def linkage(equality, more=""):
       <tendon><fixed name="sum"><joint joint="crank" coef="2"/><joint joint="lever" coef="-0.5"/></fixed>
         <spatial name="length"><site site="pin"/><site site="side"/></spatial>
         <fixed name="one"><joint joint="lever" coef="3"/></fixed>
+        <fixed name="three"><joint joint="crank" coef="2"/><joint joint="lever" coef="-0.5"/><joint joint="out" coef="1.5"/></fixed>
         <fixed name="both"><joint joint="reach" coef="3"/><joint joint="out" coef="0.5"/></fixed></tendon>
       <equality>{equality}</equality>{more}
     </mujoco>"""  # noqa: E501
@@ -47,6 +48,11 @@ EQUALITIES = {
     "tendon": ('<tendon tendon1="sum"/>', "lever"),
     "tendon of one": ('<tendon tendon1="one"/>', "lever"),
     "two tendons": ('<tendon tendon1="sum" tendon2="one" polycoef="0 0.5"/>', "lever"),
+    "tendon of three": ('<tendon tendon1="three"/>', "lever"),
+    "tendons of four": (
+        '<tendon tendon1="three" tendon2="both" polycoef="0 0.4"/>',
+        "lever",
+    ),
     "rod": ('<tendon tendon1="length"/>', "lever"),
     "locked, whatever the coefficients of nothing": (
         '<joint joint1="lever" polycoef="0 1 2"/>',

@@ -185,10 +185,6 @@ FAULTS = {
         ("<fixed", '<spatial name="rope"/><fixed'),
         ["tendon2", "'rope' is a spatial tendon"],
     ),
-    "three in a tendon": (
-        ('coef="0.5"/>', 'coef="0.5"/><joint joint="right_coupler_joint" coef="1"/>'),
-        ["couples 3 joints"],
-    ),
     "flex": ((FIRST, '<flex flex="cloth"/>' + FIRST), ["<flex>", "no joint for it"]),
 }
 
@@ -199,7 +195,6 @@ ALSO = {
     "tendon nowhere": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
     "tendon of a body": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
     "spatial tendon": (FIRST, '<tendon tendon1="split" tendon2="rope"/>' + FIRST),
-    "three in a tendon": (FIRST, '<tendon tendon1="split"/>' + FIRST),
     "weld turned": (
         '<body name="right_pad" ',
         '<site name="turned" pos="0 -0.0215 0.03202" euler="0.1 0 0"/><body name="right_pad" ',

@@ -169,7 +169,7 @@ FAULTS = {
     "include": (
         "</model>",
         "<include><uri>x</uri></include></model>",
-        "takes a model from elsewhere.*; write it out",
+        "expected a model in the folder of the file.*; put it there, or write",
     ),
     "twice": ('<frame name="B2"', '<frame name="a"', "found 'a' again"),
     "version": ('version="1.9"', 'version="1.x"', "version: found '1.x'"),
@@ -188,4 +188,62 @@ def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
 @pytest.mark.parametrize("text", ['<sdf version="1.7"/>', '<sdf><model name="m"/></sdf>'])
 def test_a_document_without_a_mechanism_is_told(text: str, tmp_path: Path):
     with pytest.raises(CaseError, match=r"has no (model|link), expected"):
+        load(model(tmp_path, text), DRIVE)
+
+
+CONFIG = "<model><sdf version='1.4'>old.sdf</sdf><sdf version='1.9'>four bar.sdf</sdf></model>"
+INCLUDED = {
+    "folder with its description": "model://bars",
+    "folder of that name alone": "../other",
+    "file": "../bars/four bar.sdf",
+    "file of a scheme": "file://../bars/four bar.sdf",
+}
+
+
+def including(folder: Path, uri: str, more: str = "", version: str = "1.9") -> Path:
+    """A world of a four-bar in a folder beside, 2 m along x and turned a quarter about z."""
+    for name, file in (("bars", "four bar.sdf"), ("other", "model.sdf")):
+        (folder / name).mkdir()
+        (folder / name / file).write_text(FOUR_BAR)
+    (folder / "bars" / "model.config").write_text(CONFIG)
+    (folder / "worlds").mkdir()
+    return model(
+        folder / "worlds",
+        f'<sdf version="{version}"><world name="w"><include><uri>{uri}</uri><name>two</name>'
+        f"<pose>2 0 0 0 0 {np.pi / 2!r}</pose>{more}</include></world></sdf>",
+    )
+
+
+@pytest.mark.parametrize("uri", INCLUDED.values(), ids=INCLUDED)
+def test_an_included_model_stands_where_it_is_put(uri: str, tmp_path: Path):
+    case = load(including(tmp_path, uri), DRIVE)
+    found = solution(case)
+    # the pose of the include takes the place of the model's own, 1 m up and turned by 30 degrees
+    pin = 2.0 * np.sin(case.sweep.values)
+    expected = [np.full(5, 2.0), pin, 2.0 * np.cos(case.sweep.values)]
+    assert np.allclose(found.points["B"].position, np.transpose(expected), rtol=0, atol=EXACT)
+
+
+NOT_INCLUDED = {
+    "web": ("https://fuel.gazebosim.org/x", "", "expected a model in the folder"),
+    "far away": ("../../../etc/x.sdf", "", "expected a model in the folder"),
+    "itself": ("model.sdf", "", "with 0 models, expected <sdf> with one"),
+    "merged": ("model://bars", "<placement_frame>a</placement_frame>", "which are not read"),
+}
+
+
+@pytest.mark.parametrize(("uri", "more", "said"), NOT_INCLUDED.values(), ids=NOT_INCLUDED)
+def test_a_model_that_cannot_be_included_is_refused(uri: str, more: str, said: str, tmp_path: Path):
+    with pytest.raises(CaseError, match=said):
+        load(including(tmp_path, uri, more), DRIVE)
+
+
+def test_an_included_model_of_another_age_is_refused(tmp_path: Path):
+    with pytest.raises(CaseError, match=r"is of SDF 1\.9, whose axes have another meaning"):
+        load(including(tmp_path, "model://bars", version="1.4"), DRIVE)
+
+
+def test_a_ring_of_included_models_is_refused(tmp_path: Path):
+    text = FOUR_BAR.replace("</model>", "<include><uri>model.sdf</uri></include></model>")
+    with pytest.raises(CaseError, match="found more than 100 includes, or a ring of them"):
         load(model(tmp_path, text), DRIVE)

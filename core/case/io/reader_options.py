@@ -33,8 +33,8 @@ class Supplied:
         hold: joints or free bodies of a model to hold in place.
         hold_rest: whether to hold further joints of a model as needed.
         start: start of a model: "keyframe:NAME", "JOINT=VALUE" [rad, m].
-        without: statements of a dataset of Adams to leave out, although they force the motion: KIND
-            or KIND/id.
+        without: elements of a model to leave out, by tag, name or TAG/NAME, or statements of a
+            dataset of Adams that force the motion: KIND or KIND/id.
         recorded: whether a recording is there, whose motion a dataset without its own follows.
         bushings: file of the bushings of hardpoints.
         closure: tolerance of rows redundant but for the digits of a file [m].
@@ -82,5 +82,7 @@ OF_HARDPOINTS, OF_SEVERAL = _NAMES[:_CORNER], _NAMES[_CORNER : _CORNER + 2]
 """Options of all hardpoints, and of files with those of several wheels."""
 NOTHING = Supplied()
 
+WITHOUT = "left out by --without: "
+"""Begin of the note on what the user leaves out of a model."""
 LEFT_OUT = "; left out: "
 """Separator in the source of a case, before the list of omitted content of its file."""

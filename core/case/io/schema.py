@@ -27,7 +27,9 @@ left out. `kincheck list --joints` prints all types with their keys.
     [couplers.NAME]      the same couplers; polynomial: joints = [driven, driving], coefficients =
                          [c0, c1, c2, c3, c4], driven = c0 + c1 driving + c2 driving^2 + ...
                          [units of driven by powers of units of driving]; (freedoms), if a joint
-                         has several: ["rotation", "translation"], of driven and driving
+                         has several: ["rotation", "translation"], of driven and driving;
+                         linear_coupler: joints = [first, second, third, ...], factors = [...], one
+                         for each: the sum of factors times coordinates stays zero
                          a joint's rotation and displacement: its second body relative to its
                          first, about and along its axis by the right-hand rule, zero at design
     [points.NAME]        body, position: a point to compare or to drive
@@ -213,6 +215,7 @@ Numbers6 = Annotated[Inertia, Meta(description=SIX_NUMBERS)]
 Table = Annotated[dict[str, Any], Meta(description="a table")]
 Bodies = Annotated[tuple[str, str], Meta(description='two names ["first body", "second body"]')]
 Joints = Annotated[tuple[str, str], Meta(description='two names ["first joint", "second joint"]')]
+Several = Annotated[tuple[str, ...], Meta(description="a list of names of joints")]
 Points = Annotated[tuple[str, str], Meta(description='two names ["first point", "second point"]')]
 Rods = Annotated[
     tuple[tuple[str, str], tuple[str, str], tuple[str, str], tuple[str, str]],
@@ -444,6 +447,10 @@ _OF_JOINTS: Mapping[Any, Any] = {
         tuple[Literal["rotation", "translation"], Literal["rotation", "translation"]],
         Meta(description='two of "rotation", "translation", of the first and second joint'),
     ],
+    "tuple[str, ...]": Annotated[
+        tuple[Literal["rotation", "translation"], ...],
+        Meta(description='a list of "rotation" and "translation", of each joint'),
+    ],
 }
 """Shape of a coupler's field with several values, by its annotation."""
 _OF_FIELDS: Mapping[Any, Any] = {
@@ -487,7 +494,7 @@ def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.S
     keys: list[Any] = [("type", Text)]
     quantity = issubclass(cls, Measure | SuspensionOutput)
     if issubclass(cls, Coupler):
-        keys.append(("joints", Joints))
+        keys.append(("joints", Joints if cls.count else Several))
     elif issubclass(cls, Joint | SpringDamper | Bushing):
         keys.append(("bodies", Bodies))
     elif issubclass(cls, SuspensionOutput) and not issubclass(cls, AxleOutput):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
-from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_SEVERAL, Supplied
+from ..io.document import fault, parse, read_text, unknown_name
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_SEVERAL, WITHOUT, Supplied
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ UNREAD = {
 _OF_CASE = re.compile(r"^\s*(?:schema\s*=|\[+\s*(?:bodies|joints|drivers|sweep)\b)", re.MULTILINE)
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
+    MODEL: ("drive", "hold", "hold-rest", "start", "without", "closure"),
     DATASET: ("drive", "hold", "hold-rest", "without", "closure"),
     **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
     **dict.fromkeys((WORKBOOK, TREE, TABLE, ASSETTO), (*OF_HARDPOINTS, *OF_SEVERAL)),
@@ -115,7 +116,9 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     if kind == MODEL:
         from .trees.case import case_of
 
-        return case_of(read_tree(file), supplied)
+        tree = read_tree(file, supplied.without)
+        require_used(file, supplied.without, tree.without)
+        return case_of(tree, supplied)
     from .hardpoints.read import case_of_hardpoints
 
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
@@ -137,8 +140,11 @@ def is_table(file: Path, supplied: Supplied = NOTHING) -> bool:
     return kind_of(file, supplied) in (CHRONO, ADAMS, ASSETTO, TABLE, WORKBOOK, TREE)
 
 
-def read_tree(file: Path) -> Tree:
+def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
     """Return the links of a model in XML: MJCF, URDF or SDF, whatever the file is called.
+
+    Args:
+        without: elements to leave out, by tag, name or TAG/NAME; the tree has those it found.
 
     Raises:
         CaseError: it is no such model, or something in it makes no sense.
@@ -149,11 +155,34 @@ def read_tree(file: Path) -> Tree:
             from .trees.urdf import read_urdf as read
         case "sdf":
             from .trees.sdf import read_sdf as read
+            from .trees.sdf import whole_sdf
+
+            root = whole_sdf(file, root)
         case _:
             from .trees.mjcf import read_mjcf as read
-    tree = read(file, root)
-    tree.dialect = root.tag
+            from .trees.mjcf import whole_mjcf
+
+            root = whole_mjcf(file, root)
+    omitted: list[tuple[str, Element]] = []
+    tree = read(file, root.pruned(without, omitted))
+    tree.dialect, tree.without = root.tag, {name for name, _ in omitted}
+    if omitted:
+        tree.notes.append(f"{WITHOUT}{', '.join(str(each) for _, each in omitted)}")
     return tree
+
+
+def require_used(file: Path, without: Collection[str], used: Collection[str]) -> None:
+    """Refuse names of elements to leave out that a model does not have.
+
+    Raises:
+        CaseError: there is one.
+    """
+    for name in without:
+        if name not in used:
+            elements = [*root_of(file).below()]
+            known = {each.tag for each in elements}
+            known |= {each.attributes.get("name", each.tag) for each in elements}
+            raise unknown_name(file, "--without", name, known, "an element of the file")
 
 
 def root_of(file: Path) -> Element:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -52,6 +52,8 @@ class Undriven:
         angle_error: error of angles in few digits [rad].
         is_model: whether the file is a model, with limits, motors and frames of links.
         says_gravity: whether the file can say it.
+        notes: of its reader.
+        without: names by which the user leaves out elements of the file.
     """
 
     name: str
@@ -63,6 +65,8 @@ class Undriven:
     angle_error: float = 0.0
     is_model: bool = False
     says_gravity: bool = True
+    notes: Sequence[str] = ()
+    without: Collection[str] = ()
 
     @property
     def chain(self) -> int:
@@ -87,8 +91,11 @@ def undriven_case(case: Case, name: str) -> Undriven:
     return Undriven(name, mechanism, coordinates, [body.name for body in mechanism.moving])
 
 
-def undriven_file(file: Path) -> Undriven:
+def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     """Return the mechanism of a model or case file.
+
+    Args:
+        without: see `read_tree`.
 
     Raises:
         CaseError: it cannot be read.
@@ -96,7 +103,7 @@ def undriven_file(file: Path) -> Undriven:
     if kind_of(file) != MODEL:
         return undriven_case(load(file), file.name)
     root = root_of(file)
-    mechanism, tree, spinning = undriven(read_tree(file))
+    mechanism, tree, spinning = undriven(read_tree(file, without))
     coordinates = {
         name: Coordinate(
             move.kind == "hinge", move.value, limit_of(tree, move), name in tree.actuated
@@ -115,6 +122,8 @@ def undriven_file(file: Path) -> Undriven:
         max(map(_angle_error, root.below()), default=0.0),
         is_model=True,
         says_gravity=tree.dialect == "mujoco" or any(root.only("world")),
+        notes=[f"{file.name}: {note}" for note in tree.notes],
+        without=tree.without,
     )
 
 

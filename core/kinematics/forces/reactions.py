@@ -135,10 +135,14 @@ class MotionLanes:
             for coupler in self.mechanism.couplers:
                 if coupler.curve:  # not linear: the rates give the angles of its joints
                     continue
-                terms = coupler.terms
-                for (one, freedom, a), (other, its, b) in (terms, terms[::-1]):
-                    if (one, freedom) in found:
-                        found.setdefault((other, its), -a / b * found[one, freedom])
+                weights = {(one, freedom): k for one, freedom, k in coupler.terms}
+                unknown = weights.keys() - found.keys()
+                if len(unknown) == 1:
+                    (other,) = unknown
+                    b = weights.pop(other)
+                    found[other] = sum(
+                        (-a / b * found[one] for one, a in weights.items()), np.zeros(self.n)
+                    )
         return found
 
 

@@ -185,7 +185,8 @@ def placement(
 ) -> Placement:
     """Return the placement in which most joints of the second file hold.
 
-    Couplings do not count: starts that differ by their offsets are no other placement.
+    Couplings of models do not count: starts that differ by their offsets are no other placement. A
+    case file has no start beside its design, and its frames may be turned along with a joint.
 
     Args:
         poses: of the first file.
@@ -193,7 +194,8 @@ def placement(
         enough: residual of a joint that holds [m].
     """
     few = {name: each[:FEW_POSES] for name, each in poses.items()}
-    couplers = {each.name for each in b.mechanism.couplers}
+    models = a.is_model and b.is_model
+    couplers = {each.name for each in b.mechanism.couplers if models}
     best: tuple[int, Placement] | None = None
     for each in candidates(a, b, match):
         found = left_in(b, free, each.all(few, a, b, match))

@@ -55,6 +55,7 @@ class Comparison:
         lost: facts beside motion that one file lacks or has otherwise.
         poses: number of compared poses.
         placement: place of the first file in the second one; None if it is not known.
+        remarks: of the readers of the files.
     """
 
     files: tuple[str, str]
@@ -67,6 +68,7 @@ class Comparison:
     poses: int
     match: Match
     placement: Placement | None
+    remarks: Sequence[str] = ()
 
     @property
     def text(self) -> str:
@@ -81,9 +83,10 @@ class Comparison:
 
     @property
     def notes(self) -> Sequence[str]:
-        """How links and places of both files were brought together."""
+        """Remarks, and how links and places of both files were brought together."""
         pairs = [f"{x} = {y}" for x, y in self.match.partner.items() if x != y]
-        found = [f"links are matched {self.match.how}: {', '.join(pairs)}"] if pairs else []
+        found = [*self.remarks]
+        found += [f"links are matched {self.match.how}: {', '.join(pairs)}"] * bool(pairs)
         if self.placement is not None:
             far, angle = float(np.linalg.norm(self.placement.shift)), self.placement.angle
             if far > ROUNDING or angle > ROUNDING:
@@ -160,6 +163,7 @@ class _Pair:
             poses=sum(each.reached for each in walked),
             match=match,
             placement=None,
+            remarks=(*a.notes, *b.notes),
         )
         if found.reason:
             differ = [*self._freedoms(walked)]

@@ -12,7 +12,6 @@ from ....joints import (
     Cylindrical,
     Distance,
     Fixed,
-    Gear,
     Inline,
     InPlane,
     Joint,
@@ -20,13 +19,12 @@ from ....joints import (
     ParallelAxes,
     PerpendicularAxes,
     Planar,
-    Polynomial,
-    RackPinion,
     Revolute,
     Screw,
     Spherical,
     Translational,
     Universal,
+    linear_relation,
 )
 from ....joints.base import AxialJoint
 from ...io.document import explained
@@ -142,14 +140,15 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
     for each in model.dataset.of("COUPLER"):
         pair = _coupled(each, driven)
         scales = each.numbers("SCALES") if "SCALES" in each.values else []
-        if len(scales) not in (1, 2) or not all(scales):
+        if len(scales) not in (len(pair) - 1, len(pair)) or not all(scales):
             raise each.fault(
-                f"SCALES: found {scales or 'none'}, expected one or two numbers for two joints, not"
-                " zero; a subroutine cannot be read: leave it out by --without COUPLER"
+                f"SCALES: found {scales or 'none'}, expected {len(pair) - 1} or {len(pair)} numbers"
+                f" for {len(pair)} joints, not zero; a subroutine cannot be read: leave it out by"
+                " --without COUPLER"
             )
         weights = [
             scale * (1.0 if one.turns else 1.0 / model.units.length)
-            for scale, one in zip([1.0, *scales][-2:], pair, strict=True)
+            for scale, one in zip([1.0, *scales][-len(pair) :], pair, strict=True)
         ]
         found.append(_coupler(each, pair, weights))
         off = sum(w * one.value for w, one in zip(weights, pair, strict=True))
@@ -168,14 +167,11 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
 
 
 def _coupled(statement: Statement, driven: Sequence[Coordinate]) -> list[Coordinate]:
-    """Return the two coordinates of a coupler, named by its joints."""
+    """Return the two coordinates of a gear, two or three of a coupler, named by its joints."""
     names = statement.ids("JOINTS")
     types = statement.values.get("TYPE", "").upper().replace(",", ":").split(":")
-    if len(names) != 2:
-        raise statement.fault(
-            f"JOINTS: found {len(names)}, expected two; a coupler of three cannot be read; leave it"
-            f" out by --without {statement.kind}"
-        )
+    if not 2 <= len(names) <= 2 + (statement.kind == "COUPLER"):
+        raise statement.fault(f"JOINTS: found {len(names)}, expected two; correct it")
     found: list[Coordinate] = []
     for k, name in enumerate(names):
         wanted = {"T": "translation", "R": "rotation"}.get(
@@ -199,17 +195,12 @@ def _coupled(statement: Statement, driven: Sequence[Coordinate]) -> list[Coordin
 
 
 def _coupler(statement: Statement, pair: Sequence[Coordinate], weights: Sequence[float]) -> Coupler:
-    """Return the coupler for a constant weighted sum of two coordinates [rad, m]."""
-    name, (one, other), (a, b) = statement.name, pair, weights
-    joints = one.joint.name, other.joint.name
+    """Return the coupler for a constant weighted sum of coordinates [rad, m]."""
+    named = {one.joint.name: weight for one, weight in zip(pair, weights, strict=True)}
+    if len(named) < len(pair):
+        raise statement.fault("JOINTS: found a joint twice, expected different ones; correct it")
     with explained(statement.file, statement.label):
-        if one.turns and other.turns:
-            return Gear(name, joints, -b / a)
-        if one.turns:
-            return RackPinion(name, joints, -a / b)
-        if other.turns:
-            return RackPinion(name, (joints[1], joints[0]), -b / a)
-        return Polynomial(name, joints, (0.0, -b / a), freedoms=("translation", "translation"))
+        return linear_relation(statement.name, named, [one.freedom for one in pair])
 
 
 def _gear_weights(

@@ -13,7 +13,7 @@ from ...case import Case, Truth
 from ...closing import within_digits
 from ...io.document import explained, fault
 from ...io.outputs import with_all_motions
-from ...io.reader_options import LEFT_OUT, Supplied
+from ...io.reader_options import LEFT_OUT, WITHOUT, Supplied
 from .assembly import ADDED_UP, CLOSED, WEAK, assembled, size_of, tolerance_of
 from .constraints import coordinates_of, joint_of, read_couplers, read_links
 from .dataset import Dataset, read_dataset
@@ -34,6 +34,8 @@ def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
             together, or freedoms are left without a drive.
     """
     dataset = read_dataset(file, text, supplied.without)
+    if dataset.without:
+        dataset.notes.append(f"{WITHOUT}{', '.join(dataset.without)}")
     units = read_units(dataset)
     places, ground = read_places(dataset, units)
     markers = read_markers(dataset, units)
@@ -102,7 +104,6 @@ def _gravity(dataset: Dataset, units: Units) -> Vector:
 def _source(dataset: Dataset) -> str:
     """Return the source of the case, with all omissions."""
     counted = [f"{kind} ({count})" for kind, count in sorted(dataset.left_out.items())]
-    forcing = [f"{name}, which forces the motion" for name in dataset.without]
-    left_out = shortened([*forcing, *counted], _MOST_NAMED) or "nothing"
+    left_out = shortened(counted, _MOST_NAMED) or "nothing"
     title = dataset.title[:_LONGEST_TITLE]
     return f"Adams dataset {title!r} of {dataset.file.name}{LEFT_OUT}{left_out}"

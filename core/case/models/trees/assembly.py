@@ -22,7 +22,7 @@ from ....mechanism.mechanism import GROUND
 from ....trajectory import Array
 from ...io.document import fault
 from .place import ORIGIN, Place, rotation_vector, turn_about, turn_by
-from .tree import UNKNOWNS, Closure, Coupling, Move, Tie, Tree
+from .tree import UNKNOWNS, Closure, Coupling, Move, Strut, Tie, Tree
 
 MAX_ITERATIONS = 100
 # Below this residual, or that of the file's digits, Newton's steps end the assembly: damped ones
@@ -172,18 +172,12 @@ class Pose:
                 replace(each, places=self.ends(each)) if isinstance(each, Closure) else each
                 for each in tree.ties
             ],
-            struts=[
-                replace(each, points=self._points(each.links, each.points)) for each in tree.struts
-            ],
+            struts=[replace(each, places=self.ends(each)) for each in tree.struts],
         )
 
-    def _points(self, links: tuple[str, str], points: tuple[Vec3, Vec3]) -> tuple[Vec3, Vec3]:
-        (i, j), (p, q) = links, points
-        return self.displacements[i].point(p), self.displacements[j].point(q)
-
-    def ends(self, closure: Closure) -> tuple[Place, Place]:
-        """Return the present places of the frames of a closure."""
-        first, second = map(self._end, closure.links, closure.places)
+    def ends(self, joining: Closure | Strut) -> tuple[Place, Place]:
+        """Return the present places of the frames of what joins two links."""
+        first, second = map(self._end, joining.links, joining.places)
         return first, second
 
     def _end(self, link: str, place: Place) -> Place:

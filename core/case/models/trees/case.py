@@ -10,25 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from ....algebra import Vec3, cross
+from ....algebra import Vec3, X, Y, cross, vec
 from ....errors import MechanismError, shortened
 from ....joints import (
     Coupler,
     Distance,
     Fixed,
-    Gear,
     Joint,
     PerpendicularAxes,
     Polynomial,
-    RackPinion,
     Revolute,
     Spherical,
     Translational,
+    linear_relation,
 )
 from ....joints.base import triad
 from ....kinematics import degrees_of_freedom, reduce_rows
 from ....mechanism.body import Body, Inertia, checked_inertia
-from ....mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
+from ....mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ....mechanism.mechanism import GROUND, Mechanism, Point
 from ....mechanism.motions import Absolute, Driver, JointAngle, JointDisplacement, Motion, Table
 from ....trajectory import Array
@@ -41,14 +40,16 @@ from .assembly import Assembled, assemble
 from .driving import Driving, Freedom, choose_held, read_driving, read_start
 from .element import Names
 from .limits import motor_ranges
-from .place import Place, coordinates
-from .tree import Closure, Coupling, Mass, Move, Spring, Tree, together
+from .place import Place, coordinates, rotation_vector
+from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, together
 
 FREEDOMS = {"hinge": "rotation", "slide": "translation"}
 NO_GRAVITY = (0.0, 0.0, 0.0)
 MOST_NAMED = 8
 # Of a rod's length, what the digits of a file leave between its centre of mass and its end.
 AT_END = 1e-5
+# Turns of frames against each other that rounding leaves [rad].
+PARALLEL = 1e-9
 # The spring of a slide acts on a point of its line so far behind it, in sizes of the model, that
 # the slide never gets there: the distance less this is the displacement.
 BEHIND = 100.0
@@ -102,24 +103,24 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
                 " limits, as the file has motors there; other motions by --drive"
             )
             model = replace(model, notes=(*model.notes, note))
-    return model, choose_held(model, driving, axes, hold_rest=supplied.hold_rest), spins
+    chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
+    rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
+    if passive := [name for name in rest if name not in model.tree.actuated]:
+        note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
+        model = replace(model, notes=(*model.notes, note))
+    return model, chosen, spins
 
 
 def _require_coupled(tree: Tree) -> None:
-    """Refuse couplings of more than two moves, and curves between sums of moves."""
+    """Refuse curves between sums of moves."""
     for each in tree.ties:
-        if not isinstance(each, Coupling):
+        if not isinstance(each, Coupling) or each.is_linear:
             continue
-        if len(each.moves) > 2:
+        if not len(each.driven) == len(each.driving) == len(each.moves) - 1:
+            own = each.element.attributes.get("name")
             raise each.element.fault(
-                f"couples {len(each.moves)} joints ({', '.join(sorted(each.moves))}), expected"
-                " two; kincheck has no joint for more: remove the equality, and --hold or drive its"
-                " joints"
-            )
-        if not each.is_linear and not len(each.driven) == len(each.driving) == len(each.moves) - 1:
-            raise each.element.fault(
-                "polycoef: is a curve between sums of joints, expected one joint on either side;"
-                " there is no joint for others"
+                "polycoef: is a curve between sums of joints, expected one joint on either side, or"
+                f" a line; leave it out by --without {own or each.element.tag}"
             )
 
 
@@ -159,7 +160,7 @@ class _Parts:
         heavy = ", with the masses of its bodies" * weighed
         others = ", ".join(left_out) or "nothing"
         source = f"{tree.described}, from {model.start}{heavy}{LEFT_OUT}{others}"
-        sweep, notes = self._sweep(), model.notes
+        sweep, notes = self._sweep(), (*tree.notes, *model.notes)
         case = Case(
             tree.file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=notes
         )
@@ -237,27 +238,17 @@ class _Parts:
                 )
 
     def _couple(self, coupling: Coupling) -> None:
-        pair, moves = coupling.moves, self.tree.joints
-        # one is locked, none says nothing
-        if len(pair) < 2 or all(isinstance(self.joints[each], Fixed) for each in pair):
+        free = [x for x in coupling.moves if not isinstance(self.joints[x], Fixed)]
+        if len(coupling.moves) < 2 or not free:  # one is locked, none says nothing
             return
         name = self._unused(coupling.name)
         if not coupling.is_linear:
             self.couplers[name] = self._polynomial(coupling, name)
             return
-        (first, a), (second, b) = coupling.weights.items()
-        # a x + b y = 0, for x and y the changes of the two coordinates
-        match moves[first].kind, moves[second].kind:
-            case "hinge", "hinge":
-                found: Coupler = Gear(name, (first, second), -b / a)
-            case "hinge", _:
-                found = RackPinion(name, (first, second), -a / b)
-            case _, "hinge":
-                found = RackPinion(name, (second, first), -b / a)
-            case _:
-                freedoms = "translation", "translation"
-                found = Polynomial(name, (first, second), (0.0, -b / a), freedoms=freedoms)
-        self.couplers[name] = found
+        # the weighted sum of the changes of coordinates is zero
+        weights = {x: weight for x, weight in coupling.weights.items() if x in free}
+        freedoms = [FREEDOMS[self.tree.joints[x].kind] for x in weights]
+        self.couplers[name] = linear_relation(name, weights, freedoms)
 
     def _polynomial(self, coupling: Coupling, name: str) -> Polynomial:
         """Return a curve between two moves, by their changes since the pose of the tree."""
@@ -334,13 +325,10 @@ class _Parts:
                     if law[key]:
                         self.tree.count(f"{what} of joints")
         for strut in self.tree.struts:
-            spring, (p, q) = strut.spring, map(coordinates, strut.points)
-            i, j = strut.links
             try:
-                if i == j or not {i, j} <= {GROUND, *self.bodies}:
+                if len({*strut.links} & {GROUND, *self.bodies}) < 2:
                     raise MechanismError("it joins no two bodies of the mechanism")
-                name, law = names.new(strut.name), (spring.stiffness, spring.damping)
-                yield SpringDamper(name, i, j, (p, q), *law, free_length=spring.rest)
+                yield _between(strut, names.new(strut.name))
             except MechanismError:
                 self.tree.count(strut.described)
 
@@ -378,6 +366,30 @@ class _Parts:
             times, others = zip(*sorted((float(t), float(x)) for t, x in ends), strict=True)
             motions[name] = Absolute(Table(times, others), self.tree.joints[name].value)
         return Sweep(swept, values, design=design, motions=motions)
+
+
+def _between(strut: Strut, name: str) -> ForceElement:
+    """Return the force element between two links.
+
+    Raises:
+        CaseError: the frames of a bushing that resists turns are not parallel.
+    """
+    law, (first, second) = strut.spring, strut.places
+    p, q = coordinates(first.at), coordinates(second.at)
+    if isinstance(law, Spring):
+        stiffness = law.stiffness, law.damping
+        return SpringDamper(name, *strut.links, (p, q), *stiffness, free_length=law.rest)
+    apart = second.seen_from(first)
+    turned = float(np.linalg.norm([*rotation_vector(apart.turn)]))
+    if turned > PARALLEL and any((*law.turning_stiffness, *law.turning_damping)):
+        raise strut.element.fault(
+            f"its frames are turned against each other by {turned:.3g} rad in the start, expected"
+            " parallel ones; there is no preload of its torques: turn one of them, or leave it out"
+            f" by --without {strut.element.tag}"
+        )
+    x, y = (coordinates(first.direction(axis)) for axis in (X, Y))
+    preload = coordinates(vec([k * r for k, r in zip(law.stiffness, apart.at, strict=True)]))
+    return Bushing(name, *strut.links, q, (x, y), **vars(law), preload=preload)
 
 
 def _locked(tree: Tree) -> set[str]:

@@ -35,6 +35,9 @@ AT_REST = 1e-6
 # A move that has less of them may have it by the file's digits alone, which lead the mechanism
 # anywhere when it is held. It is held if no other one can be.
 CLEARLY = 0.01
+# Joints without a motor that --hold-rest holds unasked: the largest public model without motors, an
+# arm with a hand (MyoSuite), has 27. More are most often the loops that a file has lost.
+MOST_HELD = 30
 
 
 def read_start(tree: Tree, said: Sequence[str]) -> Start:
@@ -294,9 +297,10 @@ def choose_held(
     actuator, then others, then balls.
 
     Raises:
-        CaseError: freedoms are left, or more are driven and held than there are.
+        CaseError: freedoms are left, more are driven and held than there are, or --hold-rest would
+            hold many joints that no motor moves.
     """
-    freedom, tree = Freedom(model, spins), model.tree
+    freedom, tree, named = Freedom(model, spins), model.tree, driving.held
     free = {link: move.name for move in tree.moves.values() for link in (move.name, move.inner)}
     for option, names in (("--drive", driving.driven), ("--hold", driving.held + driving.fixed)):
         for name in names:
@@ -326,6 +330,15 @@ def choose_held(
                     )
     if freedom.left or freedom.taken != freedom.dof or not driving.driven:
         raise _undriven(tree, driving, freedom)
+    passive = [each for each in driving.held if each not in (*named, *tree.actuated)]
+    if len(passive) > MOST_HELD:
+        raise fault(
+            tree.file,
+            "--hold-rest",
+            f"would hold {len(passive)} joints without a motor, of {freedom.dof} freedoms: does the"
+            " file lack loops? If they are meant to stand still, name them: --hold"
+            f" {' '.join(passive)}",
+        )
     return driving
 
 

@@ -11,8 +11,8 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
 
@@ -25,6 +25,8 @@ DEEPEST = 200
 MOST_ELEMENTS = 200_000
 # Two words are alike if a typing error makes one of the other.
 ALIKE = 0.75
+EXTENDED = ("robot", "link", "model", "world")
+"""Elements in which programs put their own ones."""
 
 
 def words(text: str) -> tuple[str, ...]:
@@ -102,6 +104,20 @@ class Element:
             yield child
             yield from child.below()
 
+    def pruned(self, names: Collection[str], found: list[tuple[str, Element]]) -> Element:
+        """Return the element without those in it of a tag, a name or TAG/NAME; add the names that
+        are used, with their elements.
+        """
+        kept: list[Element] = []
+        for child in self.children:
+            own = child.attributes.get("name", "")
+            called = next((x for x in (child.tag, own, f"{child.tag}/{own}") if x in names), None)
+            if called is None:
+                kept.append(child.pruned(names, found))
+            else:
+                found.append((called, child))
+        return replace(self, children=kept)
+
     def require_known(
         self, known: Sequence[str], format_name: str = "MJCF", *, closed: bool = True
     ) -> None:
@@ -138,8 +154,11 @@ class Element:
                 for each in known
                 if each.startswith(prefix + colon) and (colon or ":" not in each)
             ]
-            if (closed and not colon) or similar(name, alike, ALIKE):
-                raise child.fault(f"unknown in <{self.tag}>; {remedy(name, alike)}")
+            mistyped = similar(name, alike, ALIKE)
+            if mistyped or (closed and not colon):
+                can_leave = self.tag in EXTENDED and not mistyped
+                leave = f" (--without {child.tag} leaves it out)" * can_leave
+                raise child.fault(f"unknown in <{self.tag}>{leave}; {remedy(name, alike)}")
 
     def numbers(
         self, name: str, *counts: int, default: Sequence[float] | None = None
@@ -300,6 +319,20 @@ def parse_xml(file: Path, text: str) -> Element:
             f"not valid XML: {expat.ErrorString(error.code)}; correct the syntax",
         ) from None
     return roots[0]
+
+
+def file_near(folder: Path, name: str, suffixes: Collection[str]) -> Path | None:
+    """Return a file that a model in a folder names: in this folder or below, or with one of these
+    suffixes in the folder above or below; None of any other place, whether it is there or not.
+    """
+    try:
+        file = (folder / name).resolve()
+    except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
+        return None
+    around = folder.parent
+    beside = file.suffix.lower() in suffixes and around != around.parent
+    near = file.is_relative_to(folder) or (beside and file.is_relative_to(around))
+    return file if name and near and not Path(name).is_absolute() else None
 
 
 def _without_declaration(text: str) -> str:

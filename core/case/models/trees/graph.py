@@ -241,7 +241,7 @@ class _Hanging:
     def _mark_strut(self, strut: Strut) -> str:
         """Mark the ends of a strut; return a name of its own."""
         name = self.tree.names.new(strut.name)
-        self._mark_ends(strut.name, strut.links, [*map(Place, strut.points)], strut.element)
+        self._mark_ends(strut.name, strut.links, strut.places, strut.element)
         return name
 
     def _close(self, loop: Loop) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
-from .element import DEEPEST, MOST_ELEMENTS, Element, parse_xml, words
+from .element import DEEPEST, MOST_ELEMENTS, Element, file_near, parse_xml, words
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion, unit_vector
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")
@@ -365,14 +365,9 @@ class _Expansion:
     def _include(self, element: Element) -> Element:
         element.require_known(("file",))
         name = element.attributes.get("file", "")
-        folder = self.root.parent.resolve()
-        try:
-            file = (folder / name).resolve()
-            inside = bool(name) and not Path(name).is_absolute() and _near(file, folder)
-        except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
-            file, inside = folder, False
+        file = file_near(self.root.parent.resolve(), name, _MODELS)
         problem = ""
-        if not inside:
+        if file is None:
             problem = (
                 f"found {shown(name)}, expected a file in the folder of the model, in one beside it"
                 f" or below, and no other is opened; put it there, or {WRITE_OUT}"
@@ -383,7 +378,7 @@ class _Expansion:
             problem = f"found more than {MOST_INCLUDES} includes, expected fewer; {WRITE_OUT}"
         elif not isfile(file):
             problem = f"found {shown(name)}, but there is no such file; check it"
-        if problem:
+        if problem or file is None:
             raise element.fault(f"file: {problem}")
         self.taken.add(file)
         text = read_text(file, LARGEST_FILE - self.bytes, "take out what is not the mechanism")
@@ -419,13 +414,6 @@ class _Expansion:
             attributes = {"pos": _text(place.at), "quat": _text(place.turn), **own}
             yield replace(element, tag="frame", attributes=attributes, children=named)
             at = place.point(offset)
-
-
-def _near(file: Path, folder: Path) -> bool:
-    """Return whether a file is in a folder or below, or a model below the folder above."""
-    around = folder.parent
-    beside = file.suffix.lower() in _MODELS and around != around.parent
-    return file.is_relative_to(folder) or (beside and file.is_relative_to(around))
 
 
 def _text(values: Iterable[float]) -> str:

@@ -24,10 +24,11 @@ from ....errors import CaseError
 from ...io.document import decimal, shown, usable
 from .element import Element, Names, words
 from .graph import Freedom, Graph, Joint, Loop
-from .place import Place, turn_of_axes, unit_vector
-from .tree import Coupling, Mass, Spring, Strut
+from .place import Place, coordinates, turn_of_axes, unit_vector
+from .tree import BushingLaw, Coupling, Mass, Spring, Strut
 
 BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
+BUSHING = "drake:linear_bushing_rpy"
 # Of the distance of two points, what lies on the line through both.
 ON_LINE = 1e-6
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -38,6 +39,12 @@ LAW = ("damping", "spring_stiffness", "spring_reference")
 """Those that have one."""
 STRUT_LAW = ("stiffness", "damping", "free_length")
 """Own keys of Drake's element between two points."""
+BUSHING_LAW = ("force_stiffness", "torque_stiffness", "force_damping", "torque_damping")
+"""Own keys of Drake's bushing."""
+HALFWAY = (
+    "its axes are those of its first frame, and its torque that of Euler parameters; Drake has the"
+    " axes halfway between both frames, and angles of roll, pitch and yaw: equal for small turns"
+)
 
 # What is seen, touched or measured joins nothing.
 _APART = words(
@@ -54,6 +61,8 @@ _SEPARATOR = re.compile(r"[\s,;]+")
 
 LinkOf: TypeAlias = Callable[[Element, str], str]
 """Name of the link that an element names."""
+FrameOf: TypeAlias = Callable[[Element, str], tuple[str, Place]]
+"""Link of the frame that an element names, and the frame's global place."""
 
 
 def direction(element: Element, numbers: Sequence[float]) -> Vec3:
@@ -117,14 +126,14 @@ def mimic(move: str, leader: str, offset: float, factor: float, element: Element
     return Coupling(f"{move}.mimic", {move: 1.0}, {leader: 1.0}, (offset, factor), element)
 
 
-def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf]]) -> None:
-    """Add Drake's ball constraints and spring-dampers.
+def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) -> None:
+    """Add Drake's ball constraints, spring-dampers and bushings.
 
     Raises:
-        CaseError: a link is unknown, or a point is not three numbers.
+        CaseError: a link or frame is unknown, or a point or stiffness is not three numbers.
     """
     found: dict[tuple[str, str], list[tuple[Element, Vec3, Vec3]]] = {}
-    for element, link_of in elements:
+    for element, link_of, frame_of in elements:
         if element.tag == BALL:
             links, points = _ends(element, link_of)
             found.setdefault(links, []).append((element, *points))
@@ -133,6 +142,9 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf]]) -> None:
                 graph.struts.append(_strut(graph, element, link_of))
             except CaseError:
                 graph.tree.count(STRUT)
+        elif element.tag == BUSHING:
+            graph.struts.append(_bushing(element, frame_of))
+            graph.tree.notes.append(f"{element}: {HALFWAY}")
     names = Names()
 
     def add(
@@ -167,14 +179,50 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf]]) -> None:
 
 def _strut(graph: Graph, element: Element, link_of: LinkOf) -> Strut:
     links, points = _ends(element, link_of)
-    p, q = (graph.places[link].point(point) for link, point in zip(links, points, strict=True))
+    first, second = (
+        graph.places[link].then(Place(point)) for link, point in zip(links, points, strict=True)
+    )
     stiffness, damping, length = (
         element.value(f"{element.tag}_{each}", 1)[0] for each in STRUT_LAW
     )
     if min(stiffness, damping, length) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     spring = Spring(stiffness, damping, length)
-    return Strut(_name(element, links), links, (p, q), spring, element, STRUT)
+    return Strut(_name(element, links), links, (first, second), spring, element, STRUT)
+
+
+def _bushing(element: Element, frame_of: FrameOf) -> Strut:
+    frames = [f"drake:bushing_frame{side}" for side in "AC"]
+    laws = [f"drake:bushing_{each}" for each in BUSHING_LAW]
+    element.require_children((*frames, *laws), closed=True)
+    (first, place), (second, other) = (
+        frame_of(child, name) for child, name in (_named_child(element, part) for part in frames)
+    )
+    for part in laws:
+        if element.child(part) is None:
+            raise element.fault(f"<{part}>: missing, expected three numbers; add it")
+    values = [coordinates(vec(element.value(part, 3))) for part in laws]
+    if min(map(min, values)) < 0.0:
+        raise element.fault("has a negative number, expected positive ones; correct it")
+    if first == second:
+        raise element.fault(f"ties {first!r} to itself, expected two links; correct a frame")
+    links = first, second
+    return Strut(
+        _name(element, links), links, (place, other), BushingLaw(*values), element, BUSHING
+    )
+
+
+def _named_child(element: Element, part: str) -> tuple[Element, str]:
+    """Return a child and the name in it.
+
+    Raises:
+        CaseError: it is missing, or has no name.
+    """
+    child = element.child(part)
+    name = child and (child.text or child.attributes.get("name", ""))
+    if child is None or not name:
+        raise element.fault(f"<{part}>: missing, expected a name; add it")
+    return child, name
 
 
 def _ends(element: Element, link_of: LinkOf) -> tuple[tuple[str, str], tuple[Vec3, Vec3]]:
@@ -182,15 +230,9 @@ def _ends(element: Element, link_of: LinkOf) -> tuple[tuple[str, str], tuple[Vec
     tag = element.tag
     parts = [*(f"{tag}_body_{side}" for side in "AB"), f"{tag}_p_AP", f"{tag}_p_BQ"]
     element.require_children((*parts, *(f"{tag}_{each}" for each in STRUT_LAW)), closed=True)
-    links: list[str] = []
-    for part in parts[:2]:
-        child = element.child(part)
-        name = child and (child.text or child.attributes.get("name", ""))
-        if child is None or not name:
-            raise element.fault(f"<{part}>: missing, expected a name; add it")
-        links.append(link_of(child, name))
+    first, second = (link_of(*_named_child(element, part)) for part in parts[:2])
     p, q = (vec(element.value(part, 3)) for part in parts[2:])
-    return (links[0], links[1]), (p, q)
+    return (first, second), (p, q)
 
 
 def _name(element: Element, links: Sequence[str]) -> str:
@@ -250,12 +292,13 @@ class Unread:
             others = f" and {len(more)} more" if more else ""
             raise element.fault(
                 f"names the links {shown(first)} and {shown(second)}{others}, which it may join,"
-                f" and is not read, expected {self.advice}; write what joins them so, or remove it"
+                f" and is not read, expected {self.advice}; write what joins them so, or leave it"
+                f" out by --without {element.tag}"
             )
         if any(word in _bare(element.tag) for word in _CLOSING) and not _apart(element):
             raise element.fault(
-                f"may close a loop, and is not read, expected {self.advice}; write it so, or"
-                " remove it"
+                f"may close a loop, and is not read, expected {self.advice}; write it so, or leave"
+                f" it out by --without {element.tag}"
             )
         self._uncoupled(element)
 
@@ -276,7 +319,7 @@ class Unread:
         if why:
             raise element.fault(
                 f"{why} {' and '.join(map(shown, sorted(joints)))}, and is not read, expected"
-                " <mimic> in one of them; write it so, or remove it"
+                f" <mimic> in one of them; write it so, or leave it out by --without {element.tag}"
             )
         return joints
 

@@ -28,10 +28,12 @@ WORLD = "world"
 # of all is counted at once, in a time that grows with the cube of their number: some seconds for as
 # many as these. The rows of ties are solved together, in some seconds.
 MOST_LINKS, MOST_MOVING, MOST_TIES = 2_000, 150, 6_000
-STAND_IN = 1e-6
+STAND_IN = 1e-6, 1e-6
 """Mass and moments written by kincheck for a body without a mass [kg, kg m^2]."""
-# Of the stand-in's moments, turned into the axes of a body [kg m^2].
-_ROUND_OFF = 1e-9 * STAND_IN
+BETWEEN = 1e-9, 1e-12
+"""Those for a link between the freedoms of a joint, in a file with masses: no simulator sees them
+in the motion of what it carries.
+"""
 
 Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
 UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}
@@ -51,6 +53,18 @@ class Spring:
     stiffness: float
     damping: float
     rest: float
+
+
+@dataclass(frozen=True)
+class BushingLaw:
+    """Stiffness and damping along and about the axes of a bushing's first frame, three each [N/m,
+    N m/rad, N s/m, N m s/rad].
+    """
+
+    stiffness: Vector
+    turning_stiffness: Vector
+    damping: Vector
+    turning_damping: Vector
 
 
 @dataclass(frozen=True)
@@ -148,7 +162,8 @@ Keyframe: TypeAlias = tuple[Element, Sequence[str] | None]
 
 @dataclass(frozen=True)
 class Strut:
-    """A spring and damper between points of two links, global in the pose of the tree [m].
+    """A spring and damper, or a bushing, between frames of two links, global in the pose of the
+    tree [m].
 
     Attributes:
         described: its name in the list of parts left out.
@@ -156,8 +171,8 @@ class Strut:
 
     name: str
     links: tuple[str, str]
-    points: tuple[Vec3, Vec3]
-    spring: Spring
+    places: tuple[Place, Place]
+    spring: Spring | BushingLaw
     element: Element
     described: str
 
@@ -179,8 +194,12 @@ class Mass:
     @property
     def is_stand_in(self) -> bool:
         """Whether it is what kincheck itself writes for none."""
-        alike = np.allclose(self.inertia, STAND_IN * np.eye(3), rtol=0, atol=_ROUND_OFF)
-        return self.mass == STAND_IN and alike
+        return any(
+            self.mass == mass
+            # moments that were turned into the axes of a body
+            and np.allclose(self.inertia, moment * np.eye(3), rtol=0, atol=1e-9 * moment)
+            for mass, moment in (STAND_IN, BETWEEN)
+        )
 
     def seen_in(self, place: Place) -> Mass:
         """Return the mass in another frame, in which the place of its own one is given."""
@@ -225,6 +244,8 @@ class Tree:
         actuated: moves with a motor.
         keyframes: by name.
         left_out: numbers of parts without a meaning for kinematics, by name.
+        notes: of its reader, beside every verdict.
+        without: names by which the user leaves out elements.
         dialect: root element of its file.
         degrees, limited: of MJCF, limits are in degrees, and ranges are limits unless said.
     """
@@ -250,6 +271,8 @@ class Tree:
     actuated: set[str] = field(default_factory=set[str])
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
+    notes: list[str] = field(default_factory=list[str])
+    without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
     dialect: str = ""
     degrees: bool = False
@@ -354,7 +377,8 @@ class Tree:
         Raises:
             CaseError: there are too many.
         """
-        if not (strut.spring.stiffness or strut.spring.damping):
+        law = strut.spring
+        if isinstance(law, Spring) and not (law.stiffness or law.damping):
             self.count(strut.described)
             return
         _require_few(strut.element, MOST_TIES, len(self.struts) + 1, f"springs; {_TAKE_OUT}")

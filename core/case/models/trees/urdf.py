@@ -4,7 +4,8 @@ ball constraints, or a file beside it.
 Two forms of <constraint> are read, which are no part of URDF yet: the one proposed to urdfdom
 (github.com/ros/urdfdom/pull/264), with parent, child, parent_origin, child_origin and parent_axis,
 and the one of generalized rigid-body dynamics (github.com/mit-biomimetics/URDF-Parser), with
-predecessor, successor and an origin in each.
+predecessor, successor and an origin in each. <loop_joint> is that of Isaac Sim and of the old
+Drake, with link1, link2, their places, and axis.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from .graph import Freedom, Graph, Joint, Loop
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
+    BUSHING,
     ENTRIES,
     FRICTION,
     LAW,
@@ -40,10 +42,21 @@ from .sdf import Frames, joints_of
 from .tree import WORLD, Kind, Mass, Move, Tree
 
 GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
-JOINTS = ("joint", DRAKE_JOINT)
-READ = ("link", *JOINTS, "constraint", BALL, STRUT)
-IN_ROBOT = (*READ, "material", "transmission", "gazebo")
+JOINTS, CONSTRAINTS = ("joint", DRAKE_JOINT), ("constraint", "loop_joint")
+READ = ("link", *JOINTS, *CONSTRAINTS, BALL, STRUT, BUSHING)
+IN_ROBOT = (
+    *(*READ, GAZEBO),
+    *words(
+        "material transmission ros2_control frame fixed_frame sensor mujoco author version"
+        " disable_collisions enable_collisions disable_default_collisions group group_state"
+        " end_effector virtual_joint passive_joint capability speed_limit"
+    ),
+)
+"""Elements of a robot, of its planners and simulators; others without a prefix are unknown."""
 IN_LINK = ("inertial", "visual", "collision")
+LOOKS = words("material sensor contact audio_source self_collision_checking")
+"""Elements of links without a meaning for motion."""
+IN_LIMIT = words("lower upper effort velocity acceleration deceleration jerk drake:acceleration")
 IN_GAZEBO = ("joint", "frame")
 IN_JOINT = (
     *words("origin parent child axis mimic limit"),
@@ -52,6 +65,7 @@ IN_JOINT = (
 IN_CONSTRAINT = words(
     "parent child parent_origin child_origin parent_axis child_axis predecessor successor"
 )
+IN_LOOP = ("link1", "link2")
 POSE = ("xyz", "rpy")
 TYPES = words("revolute continuous prismatic fixed floating planar spherical ball")
 """Types of joints; balls are no part of URDF, and several simulators read them."""
@@ -107,6 +121,7 @@ class _Robot:
                 )
             if child.tag not in READ and not any(_joints_of_sdf(child)):
                 graph.tree.count(child.tag)
+        root.require_known(("name", "version"), "URDF", closed=False)
         root.require_children(IN_ROBOT)
         self._links()
         self._hang()
@@ -120,10 +135,14 @@ class _Robot:
                     raise each.unknown_name("joint", leader, self.joints, "a joint")
                 offset, factor = each.number("offset", 0.0), each.number("multiplier", 1.0)
                 graph.couplings.append(mimic(name, leader, offset, factor, each))
-        for k, element in enumerate(root.only("constraint"), 1):
-            graph.loops.append(self._constraint(element, f"constraint{k}"))
-        add_ties(graph, ((each, self._named) for each in root.children))
+        for k, element in enumerate(root.only(*CONSTRAINTS), 1):
+            graph.loops.append(self._constraint(element, f"{element.tag}{k}"))
         frames = self._gazebo()
+
+        def framed(element: Element, name: str) -> tuple[str, Place]:
+            return frames.link(element, name), frames.place(element, name)
+
+        add_ties(graph, ((each, self._named, framed) for each in root.children))
         self.beside.add(graph)
         self._require_apart(frames)
         for each in root.only("transmission"):
@@ -138,7 +157,7 @@ class _Robot:
                 raise element.repeated_name(name, "the links")
             graph.elements[name] = element
             element.require_known(("name", "type"), "URDF", closed=False)
-            element.require_children(IN_LINK)
+            element.require_children((*IN_LINK, *LOOKS))
             for each in [*element.only("inertial")][:1]:
                 graph.masses[name] = _mass(each)
             for child in element.children:
@@ -170,6 +189,8 @@ class _Robot:
                 )
             above[child], self.joints[name] = name, element
             self._damper(name, element)
+            for limit in element.only("limit"):
+                limit.require_known(IN_LIMIT, "URDF")
             for each in ("limit", "calibration", "safety_controller", "joint_properties"):
                 if any(element.only(each)):
                     graph.tree.count(f"{each} of joints")
@@ -212,7 +233,7 @@ class _Robot:
         """Return the link named by a child element."""
         for each in (tag, *more):
             if (child := element.child(each)) is not None:
-                child.require_known(("link",), "URDF")
+                child.require_known(("link", *POSE) if each in IN_LOOP else ("link",), "URDF")
                 return self._named(child, child.required("link"), "link")
         raise element.fault(f"<{tag}>: missing, expected a link; add it")
 
@@ -256,26 +277,35 @@ class _Robot:
         return Joint.of(name, links, place.at, freedoms, element)
 
     def _constraint(self, element: Element, default: str) -> Loop:
-        """Return the joint of a <constraint>."""
+        """Return the joint of a <constraint> or <loop_joint>."""
         element.require_known(("name", "type"), "URDF")
-        element.require_children(IN_CONSTRAINT, closed=True)
+        loop = element.tag == "loop_joint"
+        element.require_children((*IN_LOOP, "axis") if loop else IN_CONSTRAINT, closed=True)
         name = element.attributes.get("name", default)
         kind = element.attributes.get("type", "").lower()
         if kind not in CLOSING:
             raise element.unknown_name("type", kind, CLOSING, f"one of {', '.join(CLOSING)}")
         links: list[str] = []
         places: list[Place] = []
-        for tag, other in (("parent", "predecessor"), ("child", "successor")):
-            link = self._link(element, tag, other)
-            origin, within = element.child(f"{tag}_origin"), element.child(other)
-            if origin is None and within is not None:
+        for tag, *others in (("parent", "predecessor"), ("child", "successor")):
+            if loop:
+                tag, *others = (IN_LOOP[len(links)],)
+            link = self._link(element, tag, *others)
+            origin = element.child(tag if loop else f"{tag}_origin")
+            for within in filter(None, map(element.child, others if origin is None else ())):
                 origin = within.child("origin")
+            place = _pose(origin) if loop and origin else _origin(origin)
             links.append(link)
-            places.append(self.graph.places[link].then(_origin(origin)))
+            places.append(self.graph.places[link].then(place))
         first, second = places
         kinds = CLOSING[kind]
         ball = "ball" in kinds
-        axes = [_axis(element, "parent_axis", first)] if kinds and not ball else [X]
+        axis = "axis" if loop else "parent_axis"
+        if loop and kinds and (kind == "universal" or (not ball and not element.child(axis))):
+            raise element.fault(
+                f"<axis>: missing for {kind!r}, expected one axis; add it, or write <constraint>"
+            )
+        axes = [_axis(element, axis, first)] if kinds and not ball else [X]
         if kind == "universal":
             axes.append(_axis(element, "child_axis", second))
         freedoms: list[Freedom] = [
@@ -305,6 +335,7 @@ class _Robot:
             if link in graph.places and name and name not in frames.found:
                 frames.put(name, element, graph.places[link].then(_pose(element)), link)
         for gazebo in root.only(GAZEBO):
+            gazebo.require_known(("reference",), "URDF")
             for element in gazebo.only("link", "model"):
                 raise element.fault("is of SDF, expected links of URDF; write it as <link>")
             if any(_joints_of_sdf(gazebo)):
@@ -333,6 +364,7 @@ class _Robot:
             if link:
                 unread.require_apart(replace(element, children=[]), link)
             unread.require_all_apart(element.children, (*READ, *IN_LINK, GAZEBO), link)
+            element.require_children((*IN_LINK, *LOOKS) if link else IN_ROBOT, closed=True)
         for gazebo in self.root.only(GAZEBO):
             read = IN_GAZEBO if any(_joints_of_sdf(gazebo)) else ()
             link = gazebo.attributes.get("reference", "")
