@@ -114,7 +114,7 @@ IMPORTS = {
     "studies/same": ". joints mechanism kinematics case/models case/models/trees",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
-        "studies/variation studies studies/tolerance studies/paper"
+        "studies/variation studies studies/tolerance studies/paper studies/compliance"
     ),
     "live": (
         ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "

@@ -47,6 +47,11 @@ class StaticLoads(Loads):
                     springForceTorqueUserFunction=self._law(each, markers),
                 )
             )
+            if not self.mechanism.is_fixed(each.i):
+                couple = items.LoadTorqueVector(
+                    markerNumber=markers[0], loadVectorUserFunction=self._couple(each, markers)
+                )
+                self.mbs.AddLoad(couple)
         elif isinstance(each, SpringDamper) and each.curve:
             self.mbs.AddObject(
                 items.ObjectConnectorSpringDamper(
@@ -78,18 +83,33 @@ class StaticLoads(Loads):
         """Return force and torque on the first body, as a user function of Exudyn."""
 
         def law(mbs: Any, t: float, item: int, displacement: Any, *others: Any) -> list[float]:
-            x = np.array(displacement)
-            force = np.array(each.stiffness) * x + np.array(each.preload)
-            if each.curve:
-                pairs = zip(each.curve, x.tolist(), strict=True)
-                force += [curve_force(table, s) for table, s in pairs]
             i, j = (
                 np.array(mbs.GetMarkerOutput(marker, self.kinds.RotationMatrix)).reshape(3, 3)
                 for marker in markers
             )
-            return [*force, *elastic_torque(each, i.T @ j)]
+            return [*_force(each, np.array(displacement)), *elastic_torque(each, i.T @ j)]
 
         return law
+
+    def _couple(self, each: Bushing, markers: Sequence[int]) -> Any:
+        """Return the torque of the force on the first body, which acts at the second one's point;
+        Exudyn lets it act at the first one's.
+        """
+
+        def couple(mbs: Any, t: float, load: Any) -> list[float]:
+            i, j = (np.array(mbs.GetMarkerOutput(k, self.kinds.Position)) for k in markers)
+            turned = mbs.GetMarkerOutput(markers[0], self.kinds.RotationMatrix)
+            axes = np.array(turned).reshape(3, 3)
+            return [*np.cross(j - i, axes @ _force(each, axes.T @ (j - i)))]
+
+        return couple
+
+
+def _force(each: Bushing, x: Array) -> Array:
+    """Return the force along the axes at a displacement along them."""
+    tables = each.curve or ((), (), ())
+    curves = [curve_force(table, s) for table, s in zip(tables, x.tolist(), strict=True)]
+    return np.array(each.stiffness) * x + np.array(each.preload) + np.array(curves)
 
 
 def _tension(each: SpringDamper) -> Any:

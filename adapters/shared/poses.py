@@ -11,7 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from math import atan2, hypot
+from operator import mul
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,7 @@ from ...core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cro
 from ...core.joints import Coupler, Distance, Joint, Polynomial
 from ...core.joints.base import Kind, triad
 from ...core.mechanism.body import Body, inertia_matrix
-from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
+from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array, BodyMotion
 from .tree_plan import CHAINS, Link, ends_of
@@ -191,6 +193,22 @@ def joint_coordinates(
         for link, value in zip(links, link_coordinates(joint, links, placed), strict=True):
             found[joint.name, link.name] = value[0]
     return found
+
+
+def bushing_ends(mechanism: Mechanism, each: Bushing) -> list[tuple[str, Vector, Quat]]:
+    """Return the bodies of a bushing, and its point and axes in their frames, which no motion
+    changes.
+    """
+    R = np.array(each.triad).T
+    # turns about x, then y, then z; where y is a quarter turn, z is none
+    upright = hypot(R[0, 0], R[0, 1]) < np.finfo(float).eps
+    first = atan2(R[2, 1], R[1, 1]) if upright else atan2(-R[1, 2], R[2, 2])
+    angles = first, atan2(R[0, 2], hypot(R[0, 0], R[0, 1])), atan2(-R[0, 1], R[0, 0])
+    turns = zip(np.eye(3).tolist(), angles[: 2 if upright else 3], strict=False)
+    turn = reduce(mul, (about(vec(axis), angle) for axis, angle in turns))
+    known = {body.name: body for body in mechanism.bodies} | {GROUND: Body(GROUND)}
+    ends = ((known[name], each.point) for name in each.bodies)
+    return [(b.name, local(b, at), attitude(b).conjugate() * turn) for b, at in ends]
 
 
 def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:

@@ -52,10 +52,8 @@ def inertial(body: Body) -> tuple[float, list[float], list[float]]:
 
 
 def known(element: ForceElement) -> bool:
-    """Return whether a script has the element: Exudyn's own bushing has a law of other angles, and
-    its springs have no curve.
-    """
-    return not isinstance(element, Bushing) and not getattr(element, "curve", None)
+    """Return whether a script has the element: it has no curves."""
+    return not getattr(element, "curve", None)
 
 
 def load_options(element: ForceElement) -> dict[str, Any]:
@@ -68,6 +66,9 @@ def load_options(element: ForceElement) -> dict[str, Any]:
             own = {"referenceLength": element.free_length}
         case TorsionSpringDamper():
             own = {"offset": element.free_angle}
+        case Bushing():
+            turning = (element.turning_stiffness, element.turning_damping)
+            own = {"preload": element.preload, "turning": turning, "law": str(element.law)}
         case _:
             raise NotImplementedError(f"{element}: give its options in Exudyn here")
     return {"stiffness": element.stiffness, "damping": element.damping, **own}
@@ -124,6 +125,54 @@ def torsion(name, first, second, turn, **options):
         name=name, markerNumbers=[marker(*first), marker(*second)], nodeNumber=turns, **options
     )
     forces[name] = mbs.AddObject(item)
+
+
+def bushing(name, first, second, stiffness, damping, preload, turning, law):
+    """Springs and dampers along and about the axes of the first marker. The force is at the second
+    one, so that a couple is on the first; the elastic torque is the gradient of an energy in Euler
+    parameters or Cardan angles. Exudyn's own law has neither.
+    """
+    ends = [marker(*first), marker(*second)]
+    kinds = exu.OutputVariableType
+
+    def wrench(mbs, t, item, *measured):
+        def of(kind):
+            return [np.array(mbs.GetMarkerOutput(end, kind)) for end in ends]
+
+        r0, r1 = of(kinds.Position)
+        v0, v1 = of(kinds.Velocity)
+        w0, w1 = of(kinds.AngularVelocity)
+        A, B = (each.reshape(3, 3) for each in of(kinds.RotationMatrix))
+        R, d = A.T @ B, r1 - r0
+        x, rates = A.T @ d, A.T @ (v1 - v0 - np.cross(w0, d))
+        force = np.multiply(stiffness, x) + preload + np.multiply(damping, rates)
+        if item is None:
+            return [*np.cross(d, A @ force)]
+        if law == "cardan":
+            a, b = np.arctan2(-R[1, 2], R[2, 2]), np.arcsin(R[0, 2])
+            c = np.arctan2(-R[0, 1], R[0, 0])
+            turns = [
+                [1, 0, 0],
+                [0, np.cos(a), np.sin(a)],
+                [np.sin(b), -np.sin(a) * np.cos(b), np.cos(a) * np.cos(b)],
+            ]
+            torque = np.linalg.solve(turns, np.multiply(turning[0], [a, b, c]))
+        else:
+            e0 = 0.5 * np.sqrt(1 + np.trace(R))
+            e = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4 * e0)
+            twice = 2 * np.multiply(turning[0], e)
+            torque = e0 * twice + np.cross(e, twice)
+        return [*force, *(torque + np.multiply(turning[1], A.T @ (w1 - w0)))]
+
+    item = ObjectConnectorRigidBodySpringDamper(
+        name=name, markerNumbers=ends, springForceTorqueUserFunction=wrench
+    )
+    forces[name] = mbs.AddObject(item)
+    if bodies[first[0]] != ground:
+        couple = LoadTorqueVector(
+            markerNumber=ends[0], loadVectorUserFunction=lambda mbs, t, load: wrench(mbs, t, None)
+        )
+        mbs.AddLoad(couple)
 
 
 def force(name, at, **options):
@@ -253,8 +302,9 @@ class _Script:
                 self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
-        if strange := [str(f) for f in self.mechanism.forces if not known(f)]:
-            self.lines.append(f"# Left out: {', '.join(strange)}")
+        forces = [each.name for each in self.mechanism.forces if known(each)]
+        if strange := text.left_out(self.mechanism, forces, True).strip():
+            self.lines.append(f"# {strange}")
         for force in filter(known, self.mechanism.forces):
             self.load(force)
         for point in self.mechanism.points:
@@ -311,6 +361,10 @@ class _Script:
             axes = frame_along(joint.axis, 2)
             ends = [self.marker(body, joint.point, axes) for body in joint.bodies]
             self.call("torsion", force.name, *ends, *self.values(joint)["rotation"], **options)
+        elif isinstance(force, Bushing):
+            axes = np.array(force.triad).T
+            ends = [self.marker(body, force.point, axes) for body in force.bodies]
+            self.call("bushing", force.name, *ends, **options)
         elif isinstance(force, Force | Torque):
             at = force.point if isinstance(force, Force) else (0.0, 0.0, 0.0)
             self.call(force.type, force.name, self.marker(force.body, at), **options)

@@ -18,13 +18,14 @@ import numpy as np
 from ...core.algebra import IDENTITY, Quat, vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.mechanism.body import Body
-from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
+from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.poses import (
     about,
     at_start,
     attitude,
+    bushing_ends,
     euler_angles,
     joint_coordinates,
     local,
@@ -69,10 +70,13 @@ def write(
     """
     require_known(mechanism, "OpenSim")
     model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
+    model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     values = joint_coordinates(mechanism, way)
     zero = text.zeros_of({key: x + zeros.get(key, 0.0) for key, x in values.items()})
     masses, left_out = text.facts(mechanism, model.sprung, True, model.tree.frames.values())
+    others = [f.name for f in mechanism.forces if getattr(f, "law", "") != Law.CARDAN]
+    left_out += text.own_law(mechanism, model.sprung.intersection(others), "OpenSim")
     closed = loops(model.tree.ties, TIES[:3])
     add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, zero + left_out))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
@@ -87,7 +91,7 @@ TIES = (
 )
 
 
-SPRINGS = ("ExpressionBasedPointToPointForce", "SpringGeneralizedForce")
+SPRINGS = ("ExpressionBasedPointToPointForce", "SpringGeneralizedForce", "BushingForce")
 
 
 class _Model:
@@ -118,11 +122,37 @@ class _Model:
             add_text(marker, "socket_parent_frame", _path(point.body))
             add_text(marker, "location", numbers(self.local(point.body, point.position)))
 
-        self.sprung = set[str]()
+        self.model, self.sprung = model, set[str]()
         if mechanism.forces:
-            forces = ET.SubElement(model, "ForceSet", name="forceset")
-            forces = ET.SubElement(forces, "objects")
+            forces = self.forces()
             self.sprung = {f.name for f in mechanism.forces if self.add_spring(forces, f)}
+
+    def forces(self) -> ET.Element:
+        """Return the place of force elements."""
+        found = self.model.find("ForceSet/objects")
+        if found is None:
+            found = ET.SubElement(ET.SubElement(self.model, "ForceSet", name="forceset"), "objects")
+        return found
+
+    def add_bushings(self, design: Mechanism) -> None:
+        """Add the bushings of the mechanism at design; OpenSim's torque is that of `Law.CARDAN`."""
+        for each in design.forces:
+            if not (isinstance(each, Bushing) and text.plain_bushing(each)):
+                continue
+            element = ET.SubElement(self.forces(), SPRINGS[2], name=_name(each.name))
+            for k in (1, 2):
+                add_text(element, f"socket_frame{k}", f"end{k}")
+            frames = ET.SubElement(element, "frames")
+            for k, (body, at, turn) in enumerate(bushing_ends(design, each), 1):
+                frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=f"end{k}")
+                add_text(frame, "socket_parent", _path(body))
+                add_text(frame, "translation", numbers(at))
+                add_text(frame, "orientation", numbers(euler_angles([float(x) for x in turn])))
+            add_text(element, "rotational_stiffness", numbers(each.turning_stiffness))
+            add_text(element, "translational_stiffness", numbers(each.stiffness))
+            add_text(element, "rotational_damping", numbers(each.turning_damping))
+            add_text(element, "translational_damping", numbers(each.damping))
+            self.sprung.add(each.name)
 
     def frame(self, body: str) -> Body:
         """Return the frame of a link at design."""

@@ -19,11 +19,11 @@ from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
-from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
+from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.equivalents import cross_of
-from ..shared.poses import at_start, attitude, joint_coordinates, local
+from ..shared.poses import at_start, attitude, bushing_ends, joint_coordinates, local
 from . import text
 from .hung_tree import Hung, Tie, extent, hung, loops
 from .text import add_note, add_text, document, numbers, require_known
@@ -37,7 +37,7 @@ TIES = ("a ball constraint", "three ball constraints", "a link on a cross and a 
 KINDS = {"slide": "prismatic", "hinge": "revolute", "ball": "ball", "fixed": "fixed"}
 WORLD = "world"
 MIMIC = "drake:mimic"
-SPRING = "drake:linear_spring_damper"
+SPRING, BUSHING = "drake:linear_spring_damper", "drake:linear_bushing_rpy"
 DRAKE = "http://drake.mit.edu"
 
 
@@ -60,10 +60,12 @@ def write(
                 " MJCF, URDF or OpenSim instead"
             )
     model = _Model(at_start(mechanism, way))
+    model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     values = joint_coordinates(mechanism, way)
     zero = text.zeros_of({key: x + zeros.get(key, 0.0) for key, x in values.items()})
     masses, left_out = text.facts(mechanism, model.sprung, False, model.tree.frames.values())
+    left_out += text.own_law(mechanism, model.sprung, "Drake")
     note = NOTE.format(masses, at and f" ({at})", model.loops, zero + left_out)
     add_note(model.root, note)
     kinds = (["link", "frame", "joint", "drake:ball_constraint"], [SPRING])
@@ -167,10 +169,33 @@ class _Model:
                 name = f"drake:ball_constraint_p_{side}{end}"
                 add_text(element, name, numbers(self.local(link, point)))
 
-    def add_spring(self, force: ForceElement) -> bool:
-        """Add a spring-damper; return whether Drake has it. Its bushing has another law: forces
-        along half-way axes, at half-way points.
+    def add_bushings(self, design: Mechanism) -> None:
+        """Add the bushings of the mechanism at design. Drake's law has forces along half-way axes,
+        at half-way points, and angles of roll, pitch and yaw.
         """
+        for each in design.forces:
+            if not (isinstance(each, Bushing) and text.plain_bushing(each)):
+                continue
+            element = ET.Element(BUSHING)
+            for side, (body, at, turn) in zip("AC", bushing_ends(design, each), strict=True):
+                name = f"{each.name}.{side}"
+                frame = ET.SubElement(self.model, "frame", name=name, attached_to=body)
+                e0, e1, e2, e3 = turn
+                options = {"relative_to": body, "rotation_format": "quat_xyzw"}
+                add_text(frame, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
+                add_text(element, f"drake:bushing_frame{side}", name)
+            for what, values in (
+                ("torque_stiffness", each.turning_stiffness),
+                ("torque_damping", each.turning_damping),
+                ("force_stiffness", each.stiffness),
+                ("force_damping", each.damping),
+            ):
+                add_text(element, f"drake:bushing_{what}", numbers(values))
+            self.model.append(element)
+            self.sprung.add(each.name)
+
+    def add_spring(self, force: ForceElement) -> bool:
+        """Add a spring-damper; return whether Drake has it."""
         if getattr(force, "curve", None):
             return False
         if isinstance(force, SpringDamper):

@@ -15,6 +15,7 @@ from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
 from ...core.joints import Distance
 from ...core.mechanism.body import Body, inertia_matrix
+from ...core.mechanism.loads import Bushing
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array
 from ..shared.poses import direction
@@ -85,6 +86,20 @@ def weights(frames: Iterable[Body]) -> str:
 def add_note(root: ET.Element, text: str) -> None:
     """Begin a document with a comment, in which XML has no two hyphens in line."""
     root.insert(0, ET.Comment(text.replace("--", "- -")))
+
+
+def own_law(mechanism: Mechanism, sprung: Collection[str], title: str) -> str:
+    """Return a sentence on the bushings in a file whose law is the format's own."""
+    names = [str(f) for f in mechanism.forces if isinstance(f, Bushing) and f.name in sprung]
+    if not names:
+        return ""
+    law = f"By {title}'s own law, equal to first order in displacement and angle"
+    return f" {law}: {', '.join(names)}."
+
+
+def plain_bushing(each: Bushing) -> bool:
+    """Return whether a bushing has neither curve nor preload, which formats lack."""
+    return not each.curve and not any(each.preload)
 
 
 def add_text(
@@ -188,6 +203,7 @@ def left_out(mechanism: Mechanism, names: Collection[str], gravity: bool) -> str
         gravity: whether the file has gravity.
     """
     missing = [str(each) for each in mechanism.forces if each.name not in names]
+    missing += [f"{each}, a joint in its place" for each in mechanism.bushings]
     if any(mechanism.gravity) and not gravity:
         missing.insert(0, f"gravity {[*mechanism.gravity]} m/s^2")
     return f" Left out: {', '.join(missing)}." if missing else ""

@@ -104,6 +104,22 @@ def add(commands: Any) -> None:
         metavar="N",
         help="seed of the random states; default %(default)s",
     )
+    statics = benchmarks.add_parser(
+        "compliance",
+        help="equilibria and compliance matrices of a suspension, many samples together",
+        description=_compliance.__doc__,
+    )
+    statics.set_defaults(do=_compliance)
+    statics.add_argument("case", metavar="CASE", help="case file of kincheck kc")
+    statics.add_argument(
+        "--rounds", type=whole(1), default=ROUNDS, metavar="N", help="rounds; default %(default)s"
+    )
+    statics.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write the results as JSON; - for standard output",
+        default=argparse.SUPPRESS,
+    )
     for each, names in ((engines, "bench"), (formulation, "bench_formulation")):
         # No defaults: they would overwrite the options before the benchmark's name.
         given: dict[str, Any] = {"default": argparse.SUPPRESS}
@@ -228,4 +244,17 @@ def _formulation(options: argparse.Namespace, registry: Registry) -> int:
         raise KincheckError("\n".join(problems))
     found = bench_formulation.measure(registry.case(STRUT), options.seed, bench_formulation.STATES)
     bench.deliver(bench_formulation.report(found), found, out=options.out, json=options.json)
+    return Status.WITHIN
+
+
+def _compliance(options: argparse.Namespace, registry: Registry) -> int:
+    """Measure the time of an equilibrium of a suspension, and of its compliance matrix, in a study
+    of many samples: travel and lateral force on a grid.
+    """
+    from ..report.terminal import with_json
+    from ..studies.bench.compliance import lines, measure
+
+    found = measure(registry.find_case(options.case, driven=False), options.rounds)
+    with with_json(found, options.json):
+        print(*lines(found), sep="\n", file=sys.stderr if options.json == "-" else sys.stdout)
     return Status.WITHIN

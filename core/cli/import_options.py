@@ -208,7 +208,7 @@ def return_cases(options: argparse.Namespace) -> None:
 def supplied(options: argparse.Namespace) -> Supplied:
     """Return the facts supplied by options."""
     given: dict[str, Any] = {
-        each.name: getattr(options, each.name)
+        each.name: getattr(options, each.name, None)  # few commands have bushings
         for each in fields(Supplied)
         if each.name != "recorded"
     }

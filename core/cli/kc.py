@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import re
 import sys
 from collections.abc import Sequence
@@ -57,8 +58,9 @@ def add(commands: Any) -> None:
         type=Path,
         metavar="FILE",
         help=(
-            "bushings of the joints, for a table of hardpoints: TOML, tables"
-            " [joints.NAME.bushings.X] as in case files, in SI"
+            "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
+            " [bushings.ROLE], as kincheck templates NAME --bushings prints; else tables"
+            " [joints.NAME.bushings.X] as in case files"
         ),
     )
     command.add_argument(
@@ -100,6 +102,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     one, or the tool could not do its work.
     """
     from ..case.io.atomic_files import require_writable, write
+    from ..case.models.files import is_table
     from ..harness.record import to_json
     from ..harness.standard import STANDARD
     from ..report.progress import complain, lacking
@@ -112,18 +115,19 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     if problems := problems or execution_options.unreachable(options):
         raise KincheckError("\n".join(problems))
     travel = None if options.travel is None else _values("--travel", options.travel)
-    table = Path(options.case).suffix.lower() not in ("", ".toml", ".json")
+    table = os.path.isfile(options.case) and is_table(Path(options.case))
     axle, given = options.axle, options.travel
     if not table:
         options.axle = options.travel = None
     elif given is not None and travel is not None:
         options.travel = f"{travel[0]}:{travel[-1]}:{len(travel)}"
+    own, options.bushings = options.bushings, options.bushings if table else None
     case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
-    if options.bushings is not None:
+    if own is not None and not table:
         from ..case.io.mechanism_sections import with_bushings
 
-        case = with_bushings(case, options.bushings)
+        case = with_bushings(case, own)
     page = None if options.out is None else options.out / "kc.html"
     if page is not None:
         page.parent.mkdir(parents=True, exist_ok=True)
@@ -145,7 +149,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
         print(*views.lines(results), sep="\n", file=out)
         if checked is not None:
             print_table(checked, out, reactions=True)
-        complain(f"note: {note}" for note in results.travel.notes)
+        complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
     named = [each.name for each in engines if each.name != STANDARD]
     problems += results.failures + (lacking(checked, (), named) if checked else [])
     if problems:

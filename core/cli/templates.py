@@ -20,6 +20,11 @@ def add(commands: Any) -> None:
     templates.add_argument(
         "template", nargs="*", metavar="NAME", help="print only these; default: all"
     )
+    templates.add_argument(
+        "--bushings",
+        action="store_true",
+        help="print a file of bushings by role, for kincheck kc TABLE --bushings FILE",
+    )
 
 
 def _templates(options: argparse.Namespace, registry: Registry) -> int:
@@ -29,6 +34,11 @@ def _templates(options: argparse.Namespace, registry: Registry) -> int:
     Its numbers are examples. Rows marked optional may be left out, and so may the column of
     meanings.
     """
+    if options.bushings:
+        from ..case.models.hardpoints.rubber import sample_bushings
+
+        print(*sample_bushings(options.template), sep="\n\n")
+        return Status.WITHIN
     from ..case.models.hardpoints.templates import sample_tables
 
     print(*sample_tables(options.template), sep="\n")

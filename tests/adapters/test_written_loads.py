@@ -14,9 +14,10 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import way_to, written
 from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+from kincheck.core.mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle
+from scipy.spatial.transform import Rotation
 
 # The arm: masses [kg] and their places, global at design [m].
 MASSES = np.array([0.5, 0.75, 1.25, 0.3])
@@ -67,15 +68,47 @@ LOADS = [
 ]
 
 
+def rubber(
+    law, turning=(10.0, 20.0, 30.0), stiffness=(100.0, 200.0, 300.0), bodies=("ground", "arm")
+):
+    """Return a bushing of the arm with oblique axes; the first body carries them."""
+    axes = ((1.0, 2.0, 1.0), (2.0, -1.0, 0.0))
+    sizes = {"stiffness": stiffness, "turning_stiffness": turning, "law": law}
+    return Bushing("rubber", *bodies, (0.3, 0.1, -0.2), axes, **sizes)
+
+
+def energy(each, angle):
+    """Return the energy of a bushing on an arm that turns about the axis."""
+    if each.i == "arm":  # ground turns the other way
+        angle = -angle
+    axes, R = np.array(each.triad), Rotation.from_rotvec(angle * AXIS)
+    x, turn = axes @ (R.apply(each.point) - each.point), axes @ R.as_matrix() @ axes.T
+    angles = Rotation.from_matrix(turn).as_euler("XYZ")
+    if each.law != "cardan":
+        angles = 2.0 * Rotation.from_matrix(turn).as_quat()[:3]
+    return 0.5 * (each.stiffness @ x**2 + each.turning_stiffness @ angles**2)
+
+
+def twisting(each):
+    """Return the torque of a bushing on the arm at the start, by differences of sixth order."""
+    weights, h = {3: 1 / 60, 2: -3 / 20, 1: 3 / 4}, 2e-3
+    ends = (
+        (w, energy(each, ANGLE + k * h) - energy(each, ANGLE - k * h)) for k, w in weights.items()
+    )
+    return -sum(w * change for w, change in ends) / h
+
+
 def turned(vector):
     """Return a vector turned about the axis by the angle of the start."""
     c, s = np.cos(ANGLE), np.sin(ANGLE)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ vector
 
 
-def start(springs, loads):
+def start(springs, loads, bushing=None):
     """Return the angular acceleration of the arm at rest [rad/s^2]."""
     torque = np.cross(turned(CENTER), MASSES.sum() * GRAVITY)
+    if bushing is not None:
+        torque += twisting(bushing) * AXIS
     if springs:
         eye = turned(EYE)
         pull = HOOK - eye
@@ -122,11 +155,15 @@ def test_mujoco_begins_to_turn():
     assert "Left out: force 'push' (force), force 'pull' (force), force 'twist' (torque)." in text
 
 
-def test_exudyn_begins_to_turn(tmp_path):
+@pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
+@pytest.mark.parametrize("law", ["euler_parameters", "cardan"])
+def test_exudyn_begins_to_turn(tmp_path, law, bodies):
     exu = pytest.importorskip("exudyn")
     exu.config.printToConsole = False
     script = tmp_path / "model.py"
-    script.write_text(texts("exudyn", arm(forces=[*SPRINGS, *LOADS]))[".py"], encoding="utf-8")
+    soft = rubber(law, bodies=bodies)
+    found = texts("exudyn", arm(forces=[*SPRINGS, *LOADS, soft]))[".py"]
+    script.write_text(found, encoding="utf-8")
     model = runpy.run_path(str(script))
     mbs = model["mbs"]
     settings = exu.SimulationSettings()
@@ -150,7 +187,7 @@ def test_exudyn_begins_to_turn(tmp_path):
     # p'' = 0.5 G' omega' of a turn about y at rest: e0 = cos, e2 = sin of half the angle
     e0, e2 = reference[0], reference[2]
     found = 2.0 * (e0 * acceleration[5] - e2 * acceleration[3])
-    assert found == pytest.approx(start(springs=True, loads=True), rel=1e-7)
+    assert found == pytest.approx(start(springs=True, loads=True, bushing=soft), rel=1e-7)
     rigid = mbs.GetObject(model["bodies"]["arm"])
     about = cloud(np.array(ORIGIN))
     expected = [about[k] for k in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))]
@@ -175,7 +212,8 @@ def test_pinocchio_begins_to_turn():
 
 def test_drake_begins_to_turn():
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
-    found = texts("sdf", arm(forces=[*SPRINGS, *LOADS]))[".sdf"]
+    soft = rubber("cardan", (0.0, 0.0, 0.0), (200.0, 200.0, 200.0))  # the same in any law
+    found = texts("sdf", arm(forces=[*SPRINGS, *LOADS, soft]))[".sdf"]
     plant = plants.MultibodyPlant(0.0)
     parsing = importlib.import_module("pydrake.multibody.parsing")
     parsing.Parser(plant).AddModelsFromString(found, "sdf")
@@ -186,17 +224,22 @@ def test_drake_begins_to_turn():
     def acceleration():
         return plant.EvalTimeDerivatives(context).CopyToVector()[-1]
 
-    assert acceleration() == pytest.approx(start(springs=True, loads=False), rel=1e-12)
+    assert acceleration() == pytest.approx(
+        start(springs=True, loads=False, bushing=soft), rel=1e-12
+    )
     still = acceleration()
     plant.SetVelocities(context, [SPEED])
     assert acceleration() - still == pytest.approx(slowed(), rel=1e-9)
+    assert "By Drake's own law" in found
     assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'push' (force), f" in found
 
 
-def test_simbody_begins_to_turn(tmp_path):
+@pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
+def test_simbody_begins_to_turn(tmp_path, bodies):
     o = pytest.importorskip("opensim", reason="opensim is not installed")
     o.Logger.setLevelString("Off")
-    found = texts("osim", arm(forces=[*SPRINGS, *LOADS]))[".osim"]
+    soft = rubber("cardan", bodies=bodies)
+    found = texts("osim", arm(forces=[*SPRINGS, *LOADS, soft]))[".osim"]
     file = tmp_path / "arm.osim"
     file.write_text(found, encoding="utf-8")
     model = o.Model(str(file))
@@ -207,10 +250,14 @@ def test_simbody_begins_to_turn(tmp_path):
         [found] = state.getUDot().to_numpy()
         return found
 
-    assert acceleration() == pytest.approx(start(springs=True, loads=False), rel=1e-12)
+    assert acceleration() == pytest.approx(
+        start(springs=True, loads=False, bushing=soft), rel=1e-12
+    )
     still = acceleration()
     state.setU(o.Vector.createFromMat(np.array([SPEED])))
     assert acceleration() - still == pytest.approx(slowed(), rel=1e-9)
+    assert "own law" not in found
+    assert "own law" in texts("osim", arm(forces=[rubber("euler_parameters")]))[".osim"]
     assert "Left out: force 'push' (force), force 'pull'" in found
 
 

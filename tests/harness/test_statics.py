@@ -12,6 +12,8 @@ from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.native_engine import NativeEngine
+from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from scipy.optimize import brentq
 
@@ -157,6 +159,30 @@ def test_resting_pose_needs_no_effort(tmp_path, engine):
 
     angle = brentq(lambda x: held(x, bent(x))[0], -1.0, 1.0, xtol=1e-15)
     assert found["angle"] == pytest.approx([angle], abs=1e-12)
+
+
+class Heavy(NativeEngine):
+    """An engine with twice the gravity."""
+
+    def __init__(self):
+        super().__init__(name="heavy")
+
+    def build(self, case):
+        gravity = tuple(2.0 * x for x in case.mechanism.gravity)
+        return super().build(replace(case, mechanism=replace(case.mechanism, gravity=gravity)))
+
+
+def test_equilibrium_without_outputs_of_efforts_is_judged(tmp_path):
+    """The efforts of free drivers vanish; bushings of joints wait for a compliance study."""
+    text = ARM + "[equilibrium]\n" + '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
+    text += "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
+    text += "[joints.shoulder.bushings.rubber]\nstiffness = 1e5\nturning_stiffness = 90.0\n"
+    case = read(tmp_path, text)
+    found = values(case, "native")
+    assert [found[f"{name}.effort"][0] for name in ("lift", "bend")] == pytest.approx([0.0] * 2)
+    (record,) = run([case], [Heavy()], tol=1e-12, baseline=NativeEngine()).records
+    assert record.outcome is Outcome.FAIL
+    assert "lift.effort" in record.message
 
 
 def test_resting_pose_follows_a_held_driver(tmp_path):

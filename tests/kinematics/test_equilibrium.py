@@ -210,6 +210,23 @@ def test_strut_on_bushings_is_where_six_simulators_have_it():
         assert np.abs(C - given).max() <= 1e-14 * np.abs(given).max()
 
 
+def test_many_samples_are_as_one_by_one():
+    """Samples are solved in blocks, whose programs keep nothing of those before."""
+    model, _ = strut()
+    loads, travel = np.zeros((700, 6)), np.linspace(-0.05, 0.05, 700)
+    loads[:, 1] = np.linspace(3000.0, -3000.0, 700)
+    found = model.solve({"patch": loads}, {"stroke": travel})
+    for k in (0, 255, 256, 699):
+        alone = model.solve({"patch": loads[k : k + 1]}, {"stroke": travel[k : k + 1]})
+        assert found.efforts["stroke"][k] == pytest.approx(alone.efforts["stroke"][0], abs=1e-10)
+        assert compliance(found, "patch", "knuckle")[k] == pytest.approx(
+            compliance(alone, "patch", "knuckle")[0], abs=1e-17
+        )
+    resting = model.solve({}, {"stroke": travel[:1]})
+    still = model.solve({"patch": np.zeros((1, 6))}, {"stroke": travel[:1]})
+    assert resting.efforts["stroke"][0] == pytest.approx(still.efforts["stroke"][0], abs=1e-10)
+
+
 def test_wheel_rate_is_derivative_of_wheel_load():
     model, _ = strut()
     travel, h = np.array([-0.03, 0.0, 0.04]), 1e-4

@@ -429,3 +429,74 @@ def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     options = ["--travel=0:20mm:2", "--jobs=0", "--engine", "mujoco-default"]
     assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 0
     assert "finds no equilibria" in capsys.readouterr().out
+
+
+def test_bench_gives_times_of_samples_and_matrices(tmp_path, capsys):
+    (tmp_path / "strut.toml").write_text(strut_text())
+    out = tmp_path / "bench.json"
+    command = ["bench", "compliance", str(tmp_path / "strut.toml"), "--rounds=1", f"--json={out}"]
+    assert main(command) == 0
+    found = json.loads(out.read_text())
+    assert found["reached"] == found["samples"]
+    assert found["us_per_sample"]["median"] > found["us_per_matrix"]["median"] > 0.0
+    assert "us a matrix at least" in capsys.readouterr().out
+
+
+SERIES = """
+schema = "kincheck-case/1"
+name = "series"
+source = "made"
+[units]
+length = "mm"
+[bodies.sub]
+mass = 3.0
+center_of_mass = [0, 500, 0]
+[bodies.wheel]
+mass = 10.0
+center_of_mass = [0, 700, 0]
+[forces.a]
+type = "bushing"
+bodies = ["ground", "sub"]
+point = [0, 700, 0]
+stiffness = 300
+turning_stiffness = 5e8
+[forces.b]
+type = "bushing"
+bodies = ["sub", "wheel"]
+point = [0, 700, 0]
+stiffness = [1000, 2000, 600]
+turning_stiffness = 5e8
+[points.wheel_center]
+body = "wheel"
+position = [0, 700, 0]
+[points.contact_patch]
+body = "wheel"
+position = [0, 700, -300]
+[drivers.stroke]
+type = "point_coordinate"
+point = "wheel_center"
+direction = [0, 0, 1]
+[sweep]
+driver = "stroke"
+start = 0
+stop = 10
+steps = 2
+"""
+
+
+@pytest.mark.parametrize("name", ["mujoco", "exudyn", "exudyn-static"])
+def test_body_between_two_bushings_is_a_series_of_springs(tmp_path, capsys, name):
+    """In mm; the second bushing's axes turn with its first body, which carries a couple."""
+    engine_of(name)
+    (tmp_path / "series.toml").write_text(SERIES)
+    out = tmp_path / "kc.json"
+    options = ["--travel=0:10mm:2", "--load=lateral=0:1kN:2", "--jobs=0", f"--json={out}"]
+    assert main(["kc", str(tmp_path / "series.toml"), *options, "--engine", name]) == 0
+    found = json.loads(out.read_text())
+    assert found["wheel_load"] == pytest.approx([0.0, 2000.0], abs=1e-9)
+    rate = found["outputs"]["wheel_rate"]["position"]
+    assert rate == pytest.approx([2e5, 2e5], rel=1e-12)
+    # lateral: both along y, and turning about x by the arm of 0.3 m
+    expected = 1.0 / 3e5 + 1.0 / 2e6 + 0.3**2 * 2.0 / 5e5
+    assert found["compliance"][0][1][1] == pytest.approx(expected, rel=1e-12)
+    assert {row["outcome"] for row in found["agreement"]} == {"pass", "not judged"}

@@ -71,6 +71,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
         angle_unit=units.angle.name,
         free=free,
     )
+    resting = None
     if keys.equilibrium is not None:
         from .resting import at_rest  # it takes the solver, and few cases need it
 
@@ -78,6 +79,10 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
         with explained(file, "equilibrium", units.length):
             case = at_rest(case, resting)
     case = _with_outputs(root, case, units)
+    if resting is not None:
+        from .resting import with_efforts
+
+        case = with_efforts(case, resting)
     if keys.compliance is not None:
         rig = read_rig(root.at("compliance"), case.mechanism, units)
         case = replace(case, rig=rig)

@@ -493,7 +493,8 @@ def with_bushings(case: Case, file: Path) -> Case:
     found = read_bushings(root, joints, FileUnits())
     if not found:
         raise root.at("joints").fault(
-            "found no bushing, expected tables [joints.NAME.bushings.X]; add one"
+            "found no bushing, expected tables [joints.NAME.bushings.X], or, for a table of"
+            " hardpoints, [bushings.ROLE]; add one"
         )
     bushings = (*case.mechanism.bushings, *found)
     return replace(case, mechanism=replace(case.mechanism, bushings=bushings))

@@ -37,6 +37,7 @@ class Supplied:
         without: elements of a model to leave out, by tag, name or TAG/NAME, or statements of a
             dataset of Adams that force the motion: KIND or KIND/id.
         recorded: whether a recording is there, whose motion a dataset without its own follows.
+        bushings: file of the bushings of hardpoints.
         closure: tolerance of rows redundant but for the digits of a file [m].
     """
 
@@ -65,15 +66,18 @@ class Supplied:
     closure: float | None = None
     without: tuple[str, ...] = ()
     recorded: bool = False
+    bushings: Path | None = None
 
     @property
     def given(self) -> list[str]:
         """Names of the given options, as on the command line."""
         values = (getattr(self, each.name) for each in fields(self))
         named = zip(_NAMES, values, strict=True)
-        return [name for name, value in named if value and name != "recorded"]
+        return [name for name, value in named if value and name not in _UNCHECKED]
 
 
+# not options of files of one kind
+_UNCHECKED = ("recorded", "bushings")
 _NAMES = tuple(each.name.replace("_", "-") for each in fields(Supplied))
 _CORNER = _NAMES.index("corner")
 OF_HARDPOINTS, OF_SEVERAL = _NAMES[:_CORNER], _NAMES[_CORNER : _CORNER + 2]

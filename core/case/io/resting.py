@@ -15,9 +15,11 @@ from ...kinematics import Equilibria, StaticModel
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import JointDriver, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
-from ..case import TIME, Case, Sweep
+from ..case import TIME, Case, Sweep, pace, size
 from ..compliance import Resting
-from ..measures import JointAngle, JointDisplacement
+from ..measures import DriverEffort, JointAngle, JointDisplacement
+from ..quantity import with_markers
+from .outputs import default, largest_load
 
 _COORDINATES: Any = {"rotation": JointAngle, "translation": JointDisplacement}
 
@@ -60,6 +62,25 @@ def at_rest(case: Case, resting: Resting) -> Case:
         motions = {name: _through(path.times, x) for name, x in values.items()}
         at = replace(sweep, rate=0.0, motions={**sweep.motions, **motions})
     return replace(case, sweep=at, assembly=(*case.assembly, *unstable))
+
+
+def with_efforts(case: Case, resting: Resting) -> Case:
+    """Return the case with the efforts of its free drivers as outputs: they vanish where a
+    simulator's own forces are in equilibrium.
+    """
+    mechanism, known = case.mechanism, {output.name for output in case.outputs}
+    known |= {
+        f"{x.driver}.effort" for x in case.outputs if isinstance(x, DriverEffort) and not x.at
+    }
+    load = largest_load(mechanism, size(case), pace(case))
+    scales = {False: default(load, "N"), True: default(load * size(case), "N m")}
+    efforts = [
+        DriverEffort(f"{each.name}.effort", *scales[each.turns], driver=each.name).bound(mechanism)
+        for each in mechanism.drivers
+        if each.name not in resting.held and f"{each.name}.effort" not in known
+    ]
+    outputs = (*case.outputs, *efforts)
+    return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
 
 
 def _through(times: Array, values: Array) -> Motion:

@@ -49,6 +49,9 @@ from .equations import (
 
 Lanes = NDArray[np.bool_]
 
+# Samples solved together: their numbers stay in a core's cache.
+LANES = 256
+
 # Newton's theorem (Kantorovich): if the second correction is at most a quarter of the first, a
 # solution is near, is the only one there, and moves continuously to the start of the step.
 CONTRACTION = 0.25
@@ -71,7 +74,7 @@ class Equilibria:
     Attributes:
         reached: whether the walk came to the end, shape (n,).
         share: the last part of loads and travel in equilibrium, shape (n,).
-        bodies: poses of the moving bodies at the last equilibrium.
+        states: of the formulation, by name, shape (numbers, n).
         efforts: of held drivers [N or N m], shape (n,).
         by_load: derivatives by force and torque at each load: of the motion of each body's internal
             origin [m/N, rad/N, ...], shape (n, unknowns, 6), and of efforts, shape (n, drivers, 6).
@@ -84,7 +87,6 @@ class Equilibria:
     model: StaticModel
     reached: Lanes
     share: Array
-    bodies: Mapping[str, BodyMotion]
     states: Mapping[str, Array]
     efforts: Mapping[str, Array]
     by_load: Mapping[str, tuple[Array, Array]]
@@ -92,6 +94,18 @@ class Equilibria:
     least: Array
     unstable: Sequence[str]
     iterations: NDArray[np.int64]
+
+    @cached_property
+    def bodies(self) -> Mapping[str, BodyMotion]:
+        """Poses of the moving bodies at the last equilibrium."""
+        n, frame, found = len(self.share), self.model.equations.frame, dict[str, BodyMotion]()
+        for body in self.model.mechanism.moving:
+            pose = self._pose(body.name)
+            moved = frame.unit * (pose.u + pose.swing(frame.arm(body.name, body.origin)))
+            r = np.array(body.origin) + np.stack([x + np.zeros(n) for x in moved], axis=1)
+            p = np.stack([x + np.zeros(n) for x in pose.q * quat(body.euler_parameters)], axis=1)
+            found[body.name] = BodyMotion(r, p, np.zeros((n, 6)), np.zeros((n, 6)))
+        return found
 
     def place(self, body: str, position: Sequence[float]) -> Array:
         """Return a point of a body, given at design [m], shape (n, 3)."""
@@ -164,10 +178,17 @@ class StaticModel:
         if compiled := available():
             make_loops_ready()
         self._code = LlvmCode(self.equations.plan) if compiled else None
+        self._bound: dict[int, Executor] = {}
+        self._signs = self._signs_at_design()
 
     def executor(self, lanes: int) -> Executor:
         """Return the programs bound to lanes at design."""
-        made = bind(self.equations.plan, lanes, self._code)
+        made = self._bound.get(lanes)
+        if made is None:
+            made = self._bound[lanes] = bind(self.equations.plan, lanes, self._code)
+        for name in (REST, *(f"{LOAD}{each.name}" for each in self.equations.loads)):
+            slots = self.equations.vectors[name]
+            made.put(slots, np.zeros((len(slots), 1)))
         put_design(made, self.equations.vectors, self.equations.design, self.drivers)
         made.put(self.equations.vectors[MULTIPLIERS], self.equations.multipliers[:, None])
         return made
@@ -180,6 +201,15 @@ class StaticModel:
         executor = self.executor(1)
         share, _ = self._walk(executor, partial(self._put_rest, executor))
         return executor.get(self._state), float(share[0])
+
+    def _signs_at_design(self) -> float:
+        """Return the signs of the tangent's blocks at design, where what is out of balance is held.
+        No walk changes them.
+        """
+        executor = self.executor(1)
+        self._put_rest(executor, np.zeros(1))
+        executor.run("newton")
+        return float(executor.get(self._tests)[1, 0])
 
     def _put_rest(self, executor: Executor, share: Array) -> None:
         left = self.equations.rest[:, None]
@@ -194,11 +224,25 @@ class StaticModel:
             loads: force and torque by load point [N, N m], shape (n, 6).
             travel: values of held drivers from design [m or rad], shape (n,). Without loads and
                 travel there is one sample.
-            slopes: whether to compute compliance and stability.
+            slopes: whether to compute compliance and stability, without which they are empty.
         """
         n = next((len(each) for each in (*loads.values(), *travel.values())), 1)
+        parts = [
+            self._solve(
+                {name: np.asarray(x)[k : k + LANES] for name, x in loads.items()},
+                {name: np.asarray(x)[k : k + LANES] for name, x in travel.items()},
+                min(LANES, n - k),
+                slopes,
+            )
+            for k in range(0, n, LANES)
+        ]
+        return parts[0] if len(parts) == 1 else _joined(parts)
+
+    def _solve(
+        self, loads: Mapping[str, Array], travel: Mapping[str, Array], n: int, slopes: bool
+    ) -> Equilibria:
+        state, settled = self.rest  # it takes an executor of one lane to itself
         executor, vectors = self.executor(n), self.equations.vectors
-        state, settled = self.rest
         if settled == 1.0:
             executor.put(self._state, state)
         elif not any(np.any(values) for values in loads.values()):
@@ -214,7 +258,8 @@ class StaticModel:
             for name, values in loads.items():
                 executor.put(vectors[f"{LOAD}{name}"], share * np.asarray(values).T)
             for name, values in travel.items():
-                executor.put(vectors[f"{DRIVE}{name}"], self._drive(name, share * values))
+                values = self._drive(name, share * values)
+                executor.put(vectors[f"{DRIVE}{name}"][: len(values)], values)
 
         share, iterations = self._walk(executor, put)
         executor.run("compliance")
@@ -223,8 +268,7 @@ class StaticModel:
     def _drive(self, name: str, values: Array) -> Array:
         if self.mechanism.driver(name).turns:
             return np.array([values, np.cos(0.5 * values), np.sin(0.5 * values)])
-        still = np.zeros(len(values))
-        return np.array([values / self.equations.frame.unit, 1.0 + still, still])
+        return values[None] / self.equations.frame.unit  # cosine and sine are of no angle
 
     def _walk(
         self, executor: Executor, put: Callable[[Array], None]
@@ -232,11 +276,7 @@ class StaticModel:
         """Walk from share zero to one; return the last share in equilibrium, and iterations."""
         n = executor.lanes
         share, step, count = np.zeros(n), np.ones(n), np.zeros(n, np.int64)
-        put(share)
-        state = executor.get(self._state)
-        executor.run("newton")  # for the signs at the start, where its correction is round-off
-        signs = executor.get(self._tests)[1]
-        executor.put(self._state, state)
+        state, signs = executor.get(self._state), self._signs
         while (active := (share < 1.0) & (step >= SHORTEST * np.maximum(share, SHORTEST))).any():
             target = np.where(active, np.minimum(1.0, share + step), share)
             put(target)
@@ -259,7 +299,7 @@ class StaticModel:
         put(share)
         return share, count
 
-    def _newton(self, executor: Executor, signs: Array) -> tuple[Lanes, NDArray[np.int64], Array]:
+    def _newton(self, executor: Executor, signs: float) -> tuple[Lanes, NDArray[np.int64], Array]:
         """Return the lanes with an equilibrium by contracting corrections, the iterations, and the
         size of the first correction.
         """
@@ -293,14 +333,17 @@ class StaticModel:
         efforts = get(EFFORTS) if m else np.empty((0, n))
 
         def by(names: Sequence[str]) -> tuple[Array, Array]:
-            found = np.stack([get(f"{BY}{name}") for name in names], axis=-1).swapaxes(0, 1)
+            slots = [slot for name in names for slot in equations.vectors[f"{BY}{name}"]]
+            found = executor.get(slots).reshape(len(names), -1, n).transpose(2, 1, 0)
             return found[:, : equations.unknowns], found[:, equations.unknowns :]
 
         by_load = {
-            each.name: by([f"{each.name}.{k}" for k in range(6)]) for each in equations.loads
+            each.name: by([f"{each.name}.{k}" for k in range(6)])
+            for each in equations.loads
+            if slopes
         }
         by_driver = dict[str, tuple[Array, Array]]()
-        for name in self.drivers:
+        for name in self.drivers if slopes else ():
             per = 1.0 if self.mechanism.driver(name).turns else 1.0 / equations.frame.unit
             step, of_efforts = by([name])
             by_driver[name] = per * step[..., 0], per * of_efforts[..., 0]
@@ -312,7 +355,6 @@ class StaticModel:
             self,
             share >= 1.0,
             share,
-            self._bodies(states, n),
             states,
             dict(zip(self.drivers, efforts, strict=True)),
             by_load,
@@ -321,16 +363,6 @@ class StaticModel:
             unstable,
             iterations,
         )
-
-    def _bodies(self, states: Mapping[str, Array], n: int) -> dict[str, BodyMotion]:
-        frame, found = self.equations.frame, dict[str, BodyMotion]()
-        for body in self.mechanism.moving:
-            pose = Pose.of(vec([*states[f"u {body.name}"]]), quat([*states[f"q {body.name}"]]))
-            moved = frame.unit * (pose.u + pose.swing(frame.arm(body.name, body.origin)))
-            r = np.array(body.origin) + np.stack([x + np.zeros(n) for x in moved], axis=1)
-            p = np.stack([x + np.zeros(n) for x in pose.q * quat(body.euler_parameters)], axis=1)
-            found[body.name] = BodyMotion(r, p, np.zeros((n, 6)), np.zeros((n, 6)))
-        return found
 
     def _stability(self, entries: Array) -> tuple[Array, list[str]]:
         """Return the smallest eigenvalue of the reduced stiffness over the largest, and the motion
@@ -356,3 +388,26 @@ class StaticModel:
 
     def _motion(self, motion: Any) -> str:
         return motion_of(self.equations.columns, motion)
+
+
+def _joined(parts: Sequence[Equilibria]) -> Equilibria:
+    def rows(values: Sequence[Any]) -> Any:
+        return np.concatenate(values, axis=0)
+
+    def slopes(of: Callable[[Equilibria], Mapping[str, tuple[Array, Array]]]) -> Any:
+        names = of(parts[0])
+        return {x: tuple(rows([of(p)[x][k] for p in parts]) for k in (0, 1)) for x in names}
+
+    first = parts[0]
+    return Equilibria(
+        first.model,
+        rows([each.reached for each in parts]),
+        rows([each.share for each in parts]),
+        {x: np.concatenate([p.states[x] for p in parts], axis=1) for x in first.states},
+        {x: rows([p.efforts[x] for p in parts]) for x in first.efforts},
+        slopes(lambda each: each.by_load),
+        slopes(lambda each: each.by_driver),
+        rows([each.least for each in parts]),
+        [way for each in parts for way in each.unstable],
+        rows([each.iterations for each in parts]),
+    )

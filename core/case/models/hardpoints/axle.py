@@ -115,6 +115,13 @@ class AxleMotion(StrEnum):
     STEER = "steer"
 
 
+def sides_of(said: str | None, side: Side) -> dict[str, int]:
+    """Return 1 for the left and -1 for the right side by the prefix of its names: of the one wheel,
+    or of both of an axle.
+    """
+    return {"": side.left} if said is None else {f"{side}_": side.left for side in Side}
+
+
 def mechanism_of(
     file: Path,
     said: str | None,
@@ -151,7 +158,7 @@ def mechanism_of(
         problem = "found it beside --axle steer, whose --travel is that of the rack"
         raise fault(file, "--rack", f"{problem}, expected one of them; leave it out")
     racked = bool(template.steered) and (said is not None or travels.rack is not None)
-    sides = {"": side.left} if said is None else {f"{side}_": side.left for side in Side}
+    sides = sides_of(said, side)
     joints: list[Joint] = []
     points: list[Point] = []
     drivers: list[Driver] = []

@@ -139,6 +139,13 @@ def is_chrono(tables: Mapping[str, Any]) -> bool:
     )
 
 
+_BESIDE_BUSHINGS = (
+    *("Bushing Data", "Mass", "COM", "Moments of Inertia", "Products of Inertia"),
+    *("Spring Coefficient", "Curve Data", "Free Length", "Damping Coefficient"),
+)
+"""Keys that a file with bushings has for statics."""
+
+
 def read_chrono(file: Path, text: str) -> HardpointTable:
     """Return the points of a suspension, named "Section/Key" as in the file.
 
@@ -163,6 +170,8 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         )
     points: dict[str, Hardpoint] = {}
     left_out: list[str] = []
+    beside = dict[str, dict[str, Any]]()
+    soft = any(isinstance(x, dict) and "Bushing Data" in x for x in tables.values())
     toe, camber = (math.radians(number(file, key, tables.pop(key, 0.0))) for key in (TOE, CAMBER))
     for section, content in tables.items():
         if section in ("Name", "Type", "Template"):
@@ -171,11 +180,12 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
             left_out.append(section)
             continue
         others: list[str] = []
+        beside[section] = cast("dict[str, Any]", content)
         for key, value in cast("dict[str, Any]", content).items():
             name = f"{section}/{key}"
             if key.startswith("Location") or name == WHEEL_CENTER:
                 points[name] = Hardpoint(_point(file, name, value), name)
-            else:
+            elif not (soft and key in _BESIDE_BUSHINGS):
                 others.append(key)
         if others:
             left_out.append(f"{section} ({', '.join(others)})")
@@ -187,7 +197,8 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
             " file of Chrono",
         )
     return HardpointTable(
-        file, "Project Chrono", points, "m", "forward,left,up", template, left_out, toe, camber
+        *(file, "Project Chrono", points, "m", "forward,left,up", template, left_out, toe, camber),
+        beside=beside,
     )
 
 

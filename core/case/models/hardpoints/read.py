@@ -25,8 +25,9 @@ from ...notes import SUSPENSIONS
 from ...quantity import with_markers
 from ...suspension import Side
 from ...units import plain
-from .axle import AxleMotion, mechanism_of, read_travels
+from .axle import AxleMotion, mechanism_of, read_travels, sides_of
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
+from .rubber import of_chrono, with_file, with_rubber
 from .shims import shims
 from .table import Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
@@ -134,7 +135,14 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     hardpoints = hardpoints_of(
         named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned
     )
-    return replace(case, hardpoints=hardpoints)
+    case, sides = replace(case, hardpoints=hardpoints), sides_of(supplied.axle, side)
+    rubber, left_out = of_chrono(table, template, named)
+    case = replace(case, assembly=(*case.assembly, *left_out))
+    with explained(file, "", unit):
+        case = with_rubber(case, template, at, sides, rubber)
+    if supplied.bushings is not None:
+        case = with_file(case, template, at, sides, supplied.bushings)
+    return case
 
 
 def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:

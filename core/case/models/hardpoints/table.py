@@ -8,9 +8,9 @@ import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from ....errors import CaseError
 from ....mechanism.mechanism import Vector
@@ -74,6 +74,7 @@ class HardpointTable:
         left_out: other content, without use for kinematics or a template.
         side: side of the wheel, if the file states it.
         corner: axle and side of the points, if the file tells those of several wheels apart.
+        beside: what sections of the file have beside points, if a reader uses it.
     """
 
     file: Path
@@ -87,6 +88,7 @@ class HardpointTable:
     static_camber: float = 0.0
     side: str | None = None
     corner: tuple[str, str] | None = None
+    beside: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Any])
 
 
 def wanted_corner(file: Path, said: str) -> tuple[str, str]:

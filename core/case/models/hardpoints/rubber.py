@@ -1,0 +1,267 @@
+"""Bushings at the hardpoints of a suspension, by role, and masses and springs beside them.
+
+A bushing at a role stands under the joint there. Its axes are two across the joint's axis and the
+axis itself, the third; along it, and about it, are the third numbers. Joints without an axis have
+the global ones. The right side mirrors the left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ....errors import CaseError, unknown
+from ....joints import Distance, Joint
+from ....joints.base import triad
+from ....mechanism.body import Body
+from ....mechanism.loads import Bushing, ForceElement, SpringDamper
+from ....mechanism.mechanism import GROUND, Vector
+from ...case import Case
+from ...io.document import Section, explained, parse, read_text
+from ...io.mechanism_sections import LARGEST_BUSHINGS, with_bushings
+from ...units import LENGTHS
+from .table import HardpointTable, number
+from .templates import KNUCKLE, TEMPLATES, Template
+
+Three = float | tuple[float, float, float]
+# A steel ball joint is stiff, rubber is not: numbers of a passenger car [N/m, N m/rad].
+SAMPLE_STIFFNESS, SAMPLE_TURNING = 5e6, 100.0
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+
+
+class RoleKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[bushings.ROLE], in SI."""
+
+    stiffness: Three = 0.0
+    turning_stiffness: Three = 0.0
+    damping: Three = 0.0
+    turning_damping: Three = 0.0
+    preload: Three = 0.0
+
+
+@dataclass(frozen=True)
+class Rubber:
+    """What a file has beside hardpoints, of the left side, by roles and bodies of the template.
+
+    Attributes:
+        bushings: keys of `RoleKeys` by role.
+        bodies: mass and centre of mass by body.
+        springs: keys of a spring-damper by the roles of its ends; the first is on the chassis.
+    """
+
+    bushings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Any])
+    bodies: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Any])
+    springs: Mapping[tuple[str, str], Mapping[str, Any]] = field(
+        default_factory=dict[tuple[str, str], Any]
+    )
+
+
+def joint_at(template: Template, role: str) -> str | None:
+    """Return the joint that a bushing at a role replaces, one on the chassis first; a rod has
+    none.
+    """
+    found = [
+        name
+        for name, (kind, _, _, *roles) in template.joint_rows.items()
+        if role in roles and Joint.registry[kind] is not Distance
+    ]
+    on_chassis = [name for name in found if GROUND in template.joint_rows[name]]
+    return next(iter((*on_chassis, *found)), None)
+
+
+def with_rubber(
+    case: Case, template: Template, at: Mapping[str, Vector], sides: Mapping[str, int], of: Rubber
+) -> Case:
+    """Return the case of a suspension with bushings, masses and springs.
+
+    Args:
+        at: positions by role, of the left side.
+        sides: 1 for the left, -1 for the right side, by the prefix of its names.
+    """
+    mechanism = case.mechanism
+
+    def placed(point: Sequence[float], side: int) -> Vector:
+        return point[0], side * point[1], point[2]
+
+    def bushings() -> Iterator[Bushing]:
+        for prefix, side in sides.items():
+            for role, keys in of.bushings.items():
+                joint: Any = mechanism.joint(f"{prefix}{joint_at(template, role)}")
+                base: list[Any] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+                if (axis := getattr(joint, "axis", None)) is not None:
+                    base = [[*x] for x in triad(placed([*axis], side))[:2]]
+                axes, numbers = [placed(x, side) for x in base], dict(keys)
+                if side < 0 and (given := keys.get("preload")):
+                    # the mirror image of a right-handed third axis
+                    x, y, z = (given,) * 3 if isinstance(given, float) else given
+                    numbers["preload"] = (x, y, -z)
+                yield Bushing(
+                    name=f"{joint.name}.{role}",
+                    i=joint.i,
+                    j=joint.j,
+                    point=placed(at[role], side),
+                    axes=(axes[0], axes[1]),
+                    joint=joint.name,
+                    **numbers,
+                )
+
+    def springs() -> Iterator[ForceElement]:
+        for prefix, side in sides.items():
+            for roles, keys in of.springs.items():
+                own = [template.bodies.get(role, GROUND) for role in roles]
+                i, j = (body if body == GROUND else prefix + body for body in own)
+                points = placed(at[roles[0]], side), placed(at[roles[1]], side)
+                name = f"{prefix}{roles[1].removesuffix('_lower')}"
+                yield SpringDamper(name, i, j, points, **keys)
+
+    bodies = {
+        f"{prefix}{name}": (name, side) for prefix, side in sides.items() for name in of.bodies
+    }
+
+    def loaded(body: Body) -> Body:
+        if body.name not in bodies:
+            return body
+        name, side = bodies[body.name]
+        facts = dict(of.bodies[name])
+        facts["center_of_mass"] = placed(facts["center_of_mass"], side)
+        return replace(body, **facts)
+
+    changed = replace(
+        mechanism,
+        bodies=[loaded(body) for body in mechanism.bodies],
+        forces=(*mechanism.forces, *springs()),
+        bushings=(*mechanism.bushings, *bushings()),
+        gravity=STANDARD_GRAVITY if of.bodies else mechanism.gravity,
+    )
+    return replace(case, mechanism=changed)
+
+
+def of_chrono(
+    table: HardpointTable, template: Template, named: Mapping[str, str]
+) -> tuple[Rubber, list[str]]:
+    """Return what a file of Project Chrono with bushings has beside its points, and notes.
+
+    A bushing of an arm is at each of its points on the chassis; "DOF" is for what the joint leaves
+    free (ChVehicleJoint.cpp). Its spring takes its curve over deflection, tension positive.
+    """
+    file, sections = table.file, table.beside
+    if not any("Bushing Data" in each for each in sections.values()):
+        return Rubber(), []
+
+    def value(section: str, key: str, at: Mapping[str, Any]) -> float:
+        return number(file, f"{section}/{key}", at.get(key, 0.0))
+
+    def several(section: str, key: str, of: Any) -> list[float]:
+        return [number(file, f"{section}/{key}", each) for each in of]
+
+    bushings, bodies = dict[str, Any](), dict[str, list[tuple[float, list[float]]]]()
+    inertias, impossible = list[str](), list[str]()
+    for section, content in sections.items():
+        chassis = f"{section}/Location Chassis"
+        roles = [role for role, name in named.items() if name.startswith(chassis)]
+        joints = {role: name for role in roles if (name := joint_at(template, role))}
+        data: Mapping[str, Any] = content.get("Bushing Data") or {}
+        free: Mapping[str, Any] = data.get("DOF") or {}
+        stiff, stiff_free = (value(section, "Stiffness Rotational", x) for x in (data, free))
+        damping, damping_free = (value(section, "Damping Rotational", x) for x in (data, free))
+        for role, joint in joints.items() if data else ():
+            axial = template.joint_rows[joint][0] == "revolute"
+            bushings[role] = {
+                "stiffness": value(section, "Stiffness Linear", data),
+                "damping": value(section, "Damping Linear", data),
+                "turning_stiffness": (stiff, stiff, stiff_free) if axial else stiff_free,
+                "turning_damping": (damping, damping, damping_free) if axial else damping_free,
+            }
+        body = next((template.joint_rows[name][2] for name in joints.values()), None)
+        body = KNUCKLE if section in ("Upright", "Spindle") else body
+        if body is None or "Mass" not in content:
+            continue
+        center = table.points.get(f"{section}/COM")
+        place = [*center.position] if center else several(section, "COM", content.get("COM") or ())
+        bodies.setdefault(body, []).append((value(section, "Mass", content), place))
+        if given := content.get("Moments of Inertia"):
+            low, middle, high = sorted(several(section, "Moments of Inertia", given))
+            (impossible if high > low + middle else inertias).append(section)
+    springs = dict[tuple[str, str], Any]()
+    for section, role in (("Spring", "spring"), ("Shock", "damper")):
+        ends, content = (f"{role}_upper", f"{role}_lower"), sections.get(section, {})
+        if not {*ends} <= named.keys():
+            continue
+        keys: dict[str, Any] = {"damping": value(section, "Damping Coefficient", content)}
+        keys["stiffness"] = value(section, "Spring Coefficient", content)
+        if "Free Length" in content:
+            keys["free_length"] = value(section, "Free Length", content)
+        if curve := content.get("Curve Data"):
+            keys["curve"] = tuple(tuple(several(section, "Curve Data", row)) for row in curve)
+        springs[ends] = keys
+    notes = [f"inertias of {', '.join(inertias)} are left out, as statics need none"] * bool(
+        inertias
+    )
+    notes += [
+        f"the inertia of {each!r} is left out: no body has it, its moments break the triangle rule"
+        for each in impossible
+    ]
+    return Rubber(bushings, {x: _together(parts) for x, parts in bodies.items()}, springs), notes
+
+
+def _together(parts: Sequence[tuple[float, Sequence[float]]]) -> dict[str, Any]:
+    """Return mass and centre of mass of parts as one body."""
+    mass = sum(each for each, _ in parts)
+    moments = [[each * x for x in place] for each, place in parts]
+    center = tuple(sum(x) / mass for x in zip(*moments, strict=True))
+    return {"mass": mass, "center_of_mass": center}
+
+
+def with_file(
+    case: Case, template: Template, at: Mapping[str, Vector], sides: Mapping[str, int], file: Path
+) -> Case:
+    """Return the case of a suspension with the bushings of a file, in SI: tables [bushings.ROLE],
+    and tables [joints.NAME.bushings.X] as in case files.
+
+    Raises:
+        CaseError: the file cannot be read, or a role has no joint for a bushing.
+    """
+    text = read_text(file, LARGEST_BUSHINGS, "it holds the bushings of one suspension")
+    root, found = Section(file, "", parse(file, text)), dict[str, Any]()
+    known = [role for role in at if joint_at(template, role)]
+    for role, section in root.at("bushings").each() if root.at("bushings").value else ():
+        if role not in known:
+            raise section.unknown(role, known, "a role of a joint")
+        keys = section.typed(RoleKeys)
+        found[role] = {name: getattr(keys, name) for name in keys.__struct_fields__}
+    if not found:
+        return with_bushings(case, file)
+    with explained(file, "bushings", LENGTHS["m"], root.at("bushings").value):
+        case = with_rubber(case, template, at, sides, Rubber(found))
+    return with_bushings(case, file) if root.at("joints").value is not None else case
+
+
+def sample_bushings(names: Sequence[str]) -> list[str]:
+    """Return files of bushings for the templates of these names, or of all.
+
+    Raises:
+        CaseError: there is no such template.
+    """
+    for name in names:
+        if name not in TEMPLATES:
+            raise CaseError(unknown("template", name, TEMPLATES))
+    return [_sample(TEMPLATES[name]) for name in names or TEMPLATES]
+
+
+def _sample(template: Template) -> str:
+    lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
+    lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
+    meanings = {role.name: role.meaning for role in (*template.roles, *template.optional)}
+    for role in meanings:
+        name = joint_at(template, role)
+        if name is None or GROUND not in template.joint_rows[name][1:3]:
+            continue
+        axial = template.joint_rows[name][0] == "revolute"
+        turning = [SAMPLE_TURNING, SAMPLE_TURNING, 0.0] if axial else [SAMPLE_TURNING] * 3
+        lines += ["", f"[bushings.{role}]  # {meanings[role]}"]
+        lines += [f"stiffness = {SAMPLE_STIFFNESS:g}  # N/m", f"turning_stiffness = {turning}"]
+    return "\n".join(lines)

@@ -1,0 +1,123 @@
+"""Bushings of hardpoint tables by role, and of Project Chrono's files, by the command and files."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.cli.main import main
+from kincheck.core.errors import KincheckError
+from kincheck.core.studies.compliance.study import compliance
+
+from ..support.sources import ROOT
+
+AXLE = json.loads((ROOT / "tests/data/elastokinematics/8_hmmwv_axle.json").read_text())
+P = AXLE["points"]
+
+
+def chrono_file(tmp_path, **spring):
+    """Return the axle of the data as a file of Chrono, with its upright's centre in two parts."""
+    rubber = {"Stiffness Linear": 7e7, "Damping Linear": 3.5e4, "Stiffness Rotational": 1e5}
+    rubber |= {"Damping Rotational": 500.0, "DOF": {"Stiffness Rotational": 0}}
+
+    def arm(key, mass, center, moments):
+        ends = {"Upright": "u", "Chassis Front": "f", "Chassis Back": "b"}
+        places = {f"Location {end}": P[f"{key}_{k}"] for end, k in ends.items()}
+        facts = {"Mass": mass, "COM": center, "Moments of Inertia": moments}
+        return {**facts, **places, "Bushing Data": rubber}
+
+    upright = (34.155 * 0.82 - 14.705 * 0.91) / 19.45
+    tables = {
+        "Type": "Suspension",
+        "Template": "DoubleWishbone",
+        "Spindle": {"Mass": 14.705, "COM": P["wc"]},
+        "Upright": {"Mass": 19.45, "COM": [-0.04, upright, -0.026]},
+        "Upper Control Arm": arm("uca", 5.813, [-0.106, 0.589, 0.218], [0.03, 0.03, 0.06276]),
+        "Lower Control Arm": arm("lca", 23.965, [0.0, 0.547, -0.059], [0.4, 0.4, 0.3]),
+        "Tierod": {"Location Chassis": P["tie_c"], "Location Upright": P["tie_u"]},
+        "Spring": {"Location Chassis": P["spr_c"], "Location Arm": P["spr_a"]}
+        | {"Spring Coefficient": 181496.15, "Free Length": 0.339, **spring},
+    }
+    file = tmp_path / "hmmwv.json"
+    file.write_text(json.dumps(tables))
+    return file
+
+
+AXLE_OPTIONS = Supplied(axle="heave", wheel_radius="0.47")
+
+
+def test_file_of_chrono_has_wheel_load_and_rate_of_the_data(tmp_path):
+    case = load(chrono_file(tmp_path), AXLE_OPTIONS)
+    notes = "; ".join(case.assembly)
+    assert "the inertia of 'Upper Control Arm' is left out: no body has it" in notes
+    assert "inertias of Lower Control Arm are left out" in notes
+    found = compliance(case, [0.0]).travel
+    rows = AXLE["rows"]
+    assert found.wheel_load[0] == pytest.approx(rows["static_wheel_load"], rel=1e-9)
+    rate = found.outputs["wheel_rate"].values[0]
+    assert rate == pytest.approx(rows["wheel_rate_parallel"], rel=1e-9)
+
+
+def test_spring_curve_of_chrono_is_tension_over_deflection(tmp_path):
+    """A straight curve is the spring of the same rate."""
+    straight = {"Spring Coefficient": 0.0, "Curve Data": [[-0.2, -36299.23], [0.2, 36299.23]]}
+    loads = [
+        compliance(load(chrono_file(tmp_path, **more), AXLE_OPTIONS), [0.0]).travel.wheel_load[0]
+        for more in ({}, straight)
+    ]
+    assert loads[1] == pytest.approx(loads[0], rel=1e-12)
+
+
+def sample(tmp_path, capsys, template, *options):
+    assert main(["templates", template, *options]) == 0
+    file = tmp_path / f"{template}{'.toml' if options else '.csv'}"
+    file.write_text(capsys.readouterr().out)
+    return file
+
+
+def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
+    table = sample(tmp_path, capsys, "mcpherson")
+    rubber = sample(tmp_path, capsys, "mcpherson", "--bushings")
+    assert list(tomllib.loads(rubber.read_text())["bushings"]) == [
+        *("lca_front", "lca_rear", "strut_upper"),
+    ]
+    assert main(["kc", str(table), f"--bushings={rubber}", "--travel=0:10mm:2"]) == 0
+    case = load(table, Supplied(bushings=rubber))
+    front, _, top = case.mechanism.bushings
+    hinge = np.array(case.mechanism.joint("lca_pivot").axis)
+    assert front.triad[2] == pytest.approx(hinge / np.linalg.norm(hinge))
+    assert front.turning_stiffness == (100.0, 100.0, 0.0)
+    assert (top.joint, top.axes) == ("strut_top", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+
+
+def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
+    table = sample(tmp_path, capsys, "double_wishbone")
+    rubber = tmp_path / "rubber.toml"
+    keys = "stiffness = [1e6, 5e6, 2e5]\nturning_stiffness = [90, 30, 5]\npreload = [900, 0, 70]\n"
+    roles = ("uca_front", "uca_rear", "lca_front", "lca_rear")
+    rubber.write_text("".join(f"[bushings.{role}]\n{keys}" for role in roles))
+    case = load(table, Supplied(axle="heave", bushings=rubber))
+    C = compliance(case, [0.02]).travel.compliance[0]
+    mirror = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    assert C[:6, :6] == pytest.approx(mirror @ C[6:, 6:] @ mirror, abs=1e-13 * np.abs(C).max())
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[bushings.lca_frnt]\nstiffness = 5e6\n", "did you mean 'lca_front'"),
+        ("[bushings.tierod_inner]\nstiffness = 5e6\n", "expected a role of a joint"),
+        ("[bushings.lca_front]\nstiffness = -3.0\n", "zero or more"),
+        ("[bushings.lca_front]\nstifness = 3.0\n", "did you mean 'stiffness'"),
+        ("[bushings.lca_front]\n", "has no stiffness"),
+        ("", "found no bushing"),
+    ],
+)
+def test_bushings_that_do_not_fit_a_table_are_refused(tmp_path, capsys, text, expected):
+    table = sample(tmp_path, capsys, "double_wishbone")
+    rubber = tmp_path / "rubber.toml"
+    rubber.write_text(text)
+    with pytest.raises(KincheckError, match=expected):
+        load(table, Supplied(bushings=rubber))
