@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 
 from ....algebra import Vec3, X, quat, vec
 from ....errors import CaseError, remedy
-from ...io.case_file import LARGEST_FILE
-from ...io.document import read_text, shown
-from .element import DEEPEST, Element, file_near, parse_xml, words
+from ...io.document import shown
+from .element import DEEPEST, Element, words
 from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
@@ -72,13 +71,10 @@ _READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STR
 _COUNTED = words("visual collision sensor light plugin")
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
-_PLACED = "placement_frame"
-MOST_INCLUDES, _SUFFIXES = 100, (".sdf", ".world", ".config")
-_WRITE_OUT = "write the whole model out: gz sdf -p FILE > flat.sdf"
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link unless given, of 1 kg [kg m^2]."""
 # Axes were in the model's frame before this version.
-_AXES_IN_JOINT = (1, 5)
+AXES_IN_JOINT = (1, 5)
 
 
 @dataclass(frozen=True)
@@ -129,7 +125,7 @@ class Frames:
             self.read(element, full, depth + 1)
         for element in around.only("joint"):
             element.require_known(("name", "type"), "SDF")
-            child = within(scope, _text(element, "child"))
+            child = within(scope, text_of(element, "child"))
             full = self._add(element, scope, child, child)
             self.joints[full] = self.found[full]
         for element in around.only("frame"):
@@ -276,104 +272,6 @@ def _endings(full: str) -> list[str]:
     return [SCOPE.join(parts[k:]) for k in range(len(parts))]
 
 
-def whole_sdf(file: Path, root: Element) -> Element:
-    """Return a document with the models that it includes from files beside it.
-
-    Raises:
-        CaseError: a model is elsewhere, or an option of its inclusion is not read.
-    """
-    folder = file.parent.resolve()
-    return _Inclusion(folder, folder.parent, _version(root)).whole(root)
-
-
-@dataclass
-class _Inclusion:
-    """The inclusion of models.
-
-    Attributes:
-        folder: of the document that includes.
-        around: all files are in here.
-        version: of SDF.
-        count: how many are included so far, at any depth.
-    """
-
-    folder: Path
-    around: Path
-    version: tuple[int, ...]
-    count: int = 0
-
-    def whole(self, around: Element) -> Element:
-        """Return an element with included models in place of <include>, at any depth."""
-        if not any(each.tag == "include" for each in around.below()):
-            return around
-        found = [
-            self._model(each) if each.tag == "include" else self.whole(each)
-            for each in around.children
-        ]
-        return replace(around, children=found)
-
-    def _model(self, element: Element) -> Element:
-        element.require_known(("merge",), "SDF")
-        if element.choice("merge", _FLAGS, "false") in _TRUE or any(element.only(_PLACED)):
-            raise element.fault(f"has merge or <{_PLACED}>, which are not read; {_WRITE_OUT}")
-        element.require_children(("uri", "name", "pose", "static", "plugin"), closed=True)
-        self.count += 1
-        if self.count > MOST_INCLUDES:
-            raise element.fault(f"found more than {MOST_INCLUDES} includes, or a ring of them")
-        file = self._file(element, _text(element, "uri"))
-        root = parse_xml(file, read_text(file, LARGEST_FILE, "it holds one model"))
-        models = [*root.only("model")]
-        if root.tag != "sdf" or len(models) != 1:
-            raise element.fault(
-                f"{file.name}: found <{root.tag}> with {len(models)} models, expected <sdf> with"
-                f" one; {_WRITE_OUT}"
-            )
-        if (_version(root) < _AXES_IN_JOINT) != (self.version < _AXES_IN_JOINT):
-            raise element.fault(
-                f"{file.name}: is of SDF {root.attributes.get('version')}, whose axes have another"
-                f" meaning than those of the file around it; {_WRITE_OUT}"
-            )
-        folder, self.folder = self.folder, file.parent
-        model = self.whole(models[0])
-        self.folder = folder
-        own = [*element.only("pose", "static", "plugin")]
-        given = {each.tag for each in own if each.tag != "plugin"}
-        children = [*own, *(each for each in model.children if each.tag not in given)]
-        attributes = dict(model.attributes)
-        if name := element.child("name"):
-            attributes["name"] = name.text
-        return replace(model, attributes=attributes, children=children)
-
-    def _file(self, element: Element, uri: str) -> Path:
-        """Return the file of a model: the URI's own, or that named by the folder's model.config."""
-        kind, _, path = uri.rpartition("://")
-        names = [f"../{path}", path] if kind == "model" else [path]
-        places = [file_near(self.folder, name, _SUFFIXES) for name in names]
-        if kind in ("model", ""):
-            # a folder beside the document's has no suffix
-            places += [
-                file_near(self.folder, f"{name}/{inside}", _SUFFIXES)
-                for name in names
-                for inside in ("model.config", "model.sdf")
-            ]
-        near = [each for each in places if each and each.is_relative_to(self.around)]
-        found = [each for each in near if each.is_file()]
-        if not found or kind not in ("model", "file", ""):
-            raise element.fault(
-                f"uri: found {shown(uri)}, expected a model in the folder of the file, in one"
-                f" beside it or below, and there is none; put it there, or {_WRITE_OUT}"
-            )
-        if found[0].suffix != ".config":
-            return found[0]
-        config = parse_xml(found[0], read_text(found[0], LARGEST_FILE, "it describes one model"))
-        files = [*config.only("sdf")]
-        newest = max(files, key=_version, default=config)
-        file = file_near(found[0].parent, newest.text, _SUFFIXES)
-        if file is None or not file.is_file():
-            raise newest.fault(f"found {shown(newest.text)}, expected a file beside it; correct it")
-        return file
-
-
 def read_sdf(file: Path, root: Element) -> Tree:
     """Return the tree of all models in a document, and their worlds, in its zero pose.
 
@@ -404,7 +302,7 @@ def read_sdf(file: Path, root: Element) -> Tree:
         if (gravity := world.child("gravity")) is not None:
             x, y, z = gravity.text_numbers(3, default=GRAVITY)
             graph.tree.gravity = x, y, z
-    graph.joints += joints_of(graph, frames, _version(root))
+    graph.joints += joints_of(graph, frames, version_of(root))
     in_models = [
         (child, partial(_link, frames, full), partial(_framed, frames, full))
         for full, framed in frames.models.items()
@@ -447,7 +345,7 @@ def _mass(element: Element) -> Mass | None:
     for child in element.only("inertia"):
         child.require_children(ENTRIES, closed=True)
     try:
-        if element.choice("auto", _FLAGS, "false") in _TRUE:
+        if element.choice("auto", FLAGS, "false") in TRUE:
             return None  # that of its collision shapes
         matrix = element.child("inertia")
         entries = [
@@ -466,7 +364,12 @@ def _number(element: Element, tag: str, default: float) -> float:
     return default if child is None else child.text_numbers(1, default=(default,))[0]
 
 
-def _version(root: Element) -> tuple[int, ...]:
+def version_of(root: Element) -> tuple[int, ...]:
+    """Return the version of SDF of a document; 1.7 unless given.
+
+    Raises:
+        CaseError: it is no number.
+    """
     try:
         return tuple(map(int, root.attributes.get("version", "1.7").split(".")))
     except ValueError:
@@ -522,7 +425,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         element.require_children(IN_JOINT, closed=True)
         ends: list[str] = []
         for tag in ("parent", "child"):
-            link = frames.link(element, within(framed.scope, _text(element, tag)))
+            link = frames.link(element, within(framed.scope, text_of(element, tag)))
             if not link and world not in graph.places:
                 graph.places[world], graph.elements[world] = ORIGIN, graph.root
                 graph.fixed.add(world)
@@ -600,7 +503,7 @@ class _Joint:
             xyz.require_known(("expressed_in",), "SDF")
             numbers = xyz.text_numbers(3, default=numbers)
             given = xyz.attributes.get("expressed_in", "")
-        if _flag(axis.child("use_parent_model_frame")) or self.version < _AXES_IN_JOINT:
+        if _flag(axis.child("use_parent_model_frame")) or self.version < AXES_IN_JOINT:
             given = given or MODEL
         if given:
             place = self.frames.place(axis, within(self.framed.scope, given))
@@ -648,7 +551,7 @@ class _Joint:
         return mimic(self.name, self.frames.short(leader), offset, factor, element)
 
 
-def _text(element: Element, tag: str) -> str:
+def text_of(element: Element, tag: str) -> str:
     """Return the text of the only element of a tag."""
     child = element.child(tag)
     if child is None or not child.text:
@@ -656,17 +559,17 @@ def _text(element: Element, tag: str) -> str:
     return child.text
 
 
-_FLAGS = ("true", "false", "1", "0")
-_TRUE = ("true", "1")
+FLAGS = ("true", "false", "1", "0")
+TRUE = ("true", "1")
 
 
 def _flag(element: Element | None) -> bool:
     """Return the flag in the text of an element; false without one."""
     if element is None:
         return False
-    if element.text.lower() not in _FLAGS:
+    if element.text.lower() not in FLAGS:
         raise element.fault(f"found {shown(element.text)}, expected true or false; correct it")
-    return element.text.lower() in _TRUE
+    return element.text.lower() in TRUE
 
 
 def _pose(element: Element | None) -> Place:
@@ -687,6 +590,6 @@ def _pose(element: Element | None) -> Place:
         return Place(vec(numbers[:3]), unit_quaternion(quat((w, x, y, z))))
     *at, roll, pitch, yaw = element.text_numbers(6, default=(0.0,) * 6)
     angles = [roll, pitch, yaw]
-    if element.choice("degrees", _FLAGS, "false") in _TRUE:
+    if element.choice("degrees", FLAGS, "false") in TRUE:
         angles = [*map(math.radians, angles)]
     return Place(vec(at), roll_pitch_yaw(angles))
