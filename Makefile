@@ -17,9 +17,10 @@ test: .venv/ready
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest --numprocesses auto --dist worksteal
 
-# The dear tests, which the nightly workflow runs.
+# The dear tests, which the nightly workflow runs, and new examples for those that draw them.
 nightly: .venv/ready
 	$(BIN)/pytest -m nightly --numprocesses auto --dist worksteal
+	$(BIN)/pytest -m hypothesis --hypothesis-profile=search --numprocesses auto --dist worksteal
 
 # Pages, figures and reference pages; a warning is an error.
 docs: .venv/docs
@@ -84,7 +85,7 @@ mutants: .venv/ready
 
 # An hour on each reader.
 fuzz: .venv/ready
-	for reader in adams casefile hardpoints mjcf reference results sdf urdf; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
+	for reader in adams casefile hardpoints mjcf recording reference results sdf urdf; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
 
 clean:
 	rm -rf .venv build report site .mutants *.egg-info

@@ -3,6 +3,8 @@ adapter is imported at its first use.
 """
 
 import importlib
+import json
+from pathlib import Path
 from typing import Any
 
 ENGINES = {
@@ -23,7 +25,7 @@ SIMULATIONS = {
     "pinocchio": ("pinocchio.pinocchio", "Dynamics"),
     "exudyn": ("exudyn.solvers", "trapezoidal"),
     "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
-    "exudyn-static": ("exudyn.solvers", "static"),
+    "exudyn-static": ("exudyn.statics", "static"),
     "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
     "drake": ("drake.drake", "Steps"),
     "dart": ("dart.dart", "Steps"),
@@ -60,3 +62,27 @@ CONVERTERS = {"mujoco": "mujoco.saved"}
 def converter(name: str) -> Any:
     """Return the function from a model's file to the text saved by a simulator."""
     return importlib.import_module(f".{CONVERTERS[name]}", __name__).saved
+
+
+STEPPERS = ("mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody")
+"""Steppers of free motion, by engine; the module NAME.stepper is a script without kincheck."""
+
+
+def stepper_files(name: str, mechanism: Any, twists: Any) -> dict[str, str]:
+    """Return the files of a stepper's reproducer, by name: model.json and run.py, which needs numpy
+    and the engine alone.
+
+    Args:
+        twists: see `shared.stepper_model`.
+
+    Raises:
+        UnsupportedError: steppers lack a part of the mechanism.
+    """
+    stepper_model = importlib.import_module(".shared.stepper_model", __name__).stepper_model
+    folder = Path(__file__).resolve().parent
+    parts = [folder / name / "stepper.py", folder / "shared" / "stepper_loop.py"]
+    text = "\n\n".join(part.read_text("utf-8").rstrip() for part in parts)
+    return {
+        "model.json": json.dumps(stepper_model(mechanism, twists), indent=1) + "\n",
+        "run.py": f"{text}\n\n\nmain(stepper, version)\n",
+    }

@@ -98,6 +98,9 @@ class Mat3:
     y: Vec3
     z: Vec3
 
+    def __iter__(self) -> Iterator[Vec3]:
+        return iter((self.x, self.y, self.z))
+
     @property
     def T(self) -> Mat3:
         """The transpose."""

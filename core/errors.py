@@ -124,7 +124,7 @@ def remedy(name: str, known: Iterable[str]) -> str:
 
 def similar(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return the most similar known name; an empty text if there is none."""
-    short = islice((each for each in known if len(each) <= LONGEST_NAME), MOST_SEARCHED)
+    short = islice((str(each) for each in known if len(each) <= LONGEST_NAME), MOST_SEARCHED)
     return (
         next(iter(difflib.get_close_matches(name, short, 1, cutoff)), "")
         if len(name) <= LONGEST_NAME

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+FORCES = ("N", "N m")
+"""Units of forces and torques, which come first where there are any."""
+
 
 def unit_text(unit: str) -> str:
     """Return a unit as it is printed: m/s² for m/s^2; empty for a ratio."""

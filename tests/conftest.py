@@ -9,6 +9,7 @@ from pathlib import Path
 import kincheck.adapters
 import kincheck.cases
 import pytest
+from hypothesis import settings
 from kincheck.core import Joint
 from kincheck.core.caches import clear_caches
 from kincheck.core.cli import main as cli
@@ -23,6 +24,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Processes that tests start keep their bytecode, as those of users do: each would compile its own.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.pop("COLUMNS", None)  # pytest-xdist sets it for its workers; logs have their own width
+
+# A change is judged by the same examples on every machine. `--hypothesis-profile=search` draws new
+# ones, as the nightly run does.
+settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("search", derandomize=False)
+settings.load_profile("repeatable")
 
 # By default Python searches for garbage after 700 new objects. With the syntax trees of two hundred
 # test files in memory, that takes a third of the collection of tests.

@@ -14,7 +14,8 @@ from .support.sources import SOURCES, folder_of, imported, module_of, tree
 
 LAYERS = (
     (".",),
-    ("primitives", "program"),
+    ("program",),
+    ("primitives",),
     ("joints",),
     ("mechanism",),
     ("kinematics",),
@@ -34,14 +35,14 @@ LAYERS = (
 
 IMPORTS = {
     ".": "",
-    "primitives": ".",
     "program": ".",
     "program/llvm": ". program",
+    "primitives": ". program",
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
     "kinematics/forces": ". primitives program joints mechanism kinematics/formulation",
-    "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
+    "kinematics/structure": ". primitives program/llvm joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm joints mechanism kinematics/formulation "
         "kinematics/forces kinematics/structure"
@@ -89,7 +90,7 @@ IMPORTS = {
     "harness/reporting": "",
     "recorded": (". primitives joints mechanism kinematics case case/io case/models/trees harness"),
     "history": ". case case/io harness",
-    "report": ". joints mechanism case case/io harness history",
+    "report": ". joints mechanism kinematics case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/truth": ". program mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/truth",
@@ -108,7 +109,8 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
-    "studies/compliance": (". mechanism kinematics case case/suspension report"),
+    "studies/compliance": (". mechanism kinematics case case/suspension harness report"),
+    "studies/board": ". mechanism kinematics case case/io harness report",
     "studies/same": ". joints mechanism kinematics case/models",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
@@ -123,8 +125,8 @@ IMPORTS = {
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/same studies/diagnosis studies/bench studies/compliance "
-        "live"
+        "studies/paper studies/same studies/diagnosis studies/bench studies/board "
+        "studies/compliance live"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (

@@ -10,6 +10,7 @@ import kincheck.adapters
 import kincheck.core
 import pytest
 from kincheck.core.case.models.hardpoints.templates import sample_tables
+from kincheck.primitives import Dot10
 
 from .support.sources import ROOT
 
@@ -114,7 +115,7 @@ def test_sweep_and_primitives_are_there(tmp_path):
     results = kincheck.sweep(case, vary, samples=20)
     assert results.samples == 20
     assert "toe" in results.to_html()
-    assert kincheck.primitives.Dot10
+    assert kincheck.primitives.Dot10 is Dot10
 
 
 def test_explain_is_that_of_the_command():

@@ -81,9 +81,10 @@ class Loads:
                 )
             )
         for each in self.mechanism.forces:
-            self._add(each)
+            self.add(each)
 
-    def _add(self, each: Any) -> None:
+    def add(self, each: Any) -> None:
+        """Add a force element."""
         rows, items = self.rows, self.items
         if isinstance(each, Bushing) or (isinstance(each, SpringDamper) and each.curve):
             self.framed.append(each)

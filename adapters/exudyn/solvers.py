@@ -56,10 +56,12 @@ class Coordinates(Rows):
             counted.
     """
 
-    def __init__(self, mbs: Any, items: Any, case: Case, table: DriverTable) -> None:
+    def __init__(
+        self, mbs: Any, items: Any, case: Case, table: DriverTable, *, loaded: bool = False
+    ) -> None:
         self.table = table
         self.angles: list[int | None] = []
-        super().__init__(mbs, items, case.mechanism)
+        super().__init__(mbs, items, case.mechanism, loaded=loaded)
 
     def relative(self, name: str, freedom: str, value: int | None = None) -> int:
         """Return a new marker for the coordinate of a joint."""
@@ -144,7 +146,7 @@ def limitation_of(case: Case) -> str | None:
             return f"{coupler}: Exudyn's own solvers have no object that keeps a polynomial"
         if len(coupler.joints) > 2:
             return f"{coupler}: this adapter gives Exudyn's own solvers relations of two joints"
-    if (reason := uneven(case, "Exudyn")) is not None:
+    if case.balance is None and (reason := uneven(case, "Exudyn")) is not None:
         return reason
     if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
         return "turns of coupled joints count from the design, where this motion does not begin"
@@ -233,11 +235,6 @@ def trapezoidal() -> Solver:
 def generalized_alpha() -> Solver:
     """Return the time stepping that satisfies the position constraints."""
     return Solver("exudyn-alpha", "generalized alpha", steps=4)
-
-
-def static() -> Solver:
-    """Return load steps with full Newton."""
-    return Solver("exudyn-static", "static", modified=False)
 
 
 def static_modified() -> Solver:

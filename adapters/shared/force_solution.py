@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -32,7 +33,7 @@ from ...core.mechanism.loads import (
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
 from .constraints import CLOSURES, BodyFrame, FrameOnBody, by_frame
-from .pose_solver import ProjectionModel, Sample
+from .pose_solver import ProjectionModel
 from .tree_plan import ends_of
 
 
@@ -105,12 +106,17 @@ def curve_force(table: Curve | None, deflection: float) -> float:
     """Return the force of a curve at a deflection; straight beyond its ends."""
     if not table:
         return 0.0
+    inside = float(np.clip(deflection, table[0][0], table[-1][0]))
+    cubic = _cubic(table)
+    return float(cubic(inside) + cubic(inside, 1) * (deflection - inside))
+
+
+@cache
+def _cubic(table: Curve) -> Any:
     # slow to import, and few mechanisms have curves
     from scipy.interpolate import PchipInterpolator  # pyright: ignore[reportMissingTypeStubs]
 
-    inside = float(np.clip(deflection, table[0][0], table[-1][0]))
-    cubic: Any = PchipInterpolator(*np.array(table).T)
-    return float(cubic(inside) + cubic(inside, 1) * (deflection - inside))
+    return PchipInterpolator(*np.array(table).T)
 
 
 def bushing_at_work(
@@ -219,6 +225,19 @@ class ForceModel(ProjectionModel, Protocol):
         ...
 
 
+class Solved(Protocol):
+    """A solved sample: the saved configuration, driver values in the unit of the rows, rates."""
+
+    @property
+    def saved(self) -> Any: ...
+    @property
+    def c(self) -> Array: ...
+    @property
+    def v(self) -> Array: ...
+    @property
+    def a(self) -> Array: ...
+
+
 @dataclass(frozen=True, eq=False)
 class _Given:
     """The rows at a sample, those left out last, the drivers' columns, and the dynamics."""
@@ -237,13 +256,14 @@ def reacting(case: Case) -> list[str]:
 
 
 def solved_forces(
-    model: ForceModel, case: Case, samples: Mapping[int, Sample], unit: float
+    model: ForceModel, case: Case, samples: Mapping[int, Solved], unit: float, freedoms: int = 0
 ) -> Forces:
     """Return the forces that the outputs of the case use, at solved samples.
 
     Args:
         samples: solved samples by their index in the sweep.
         unit: unit of length in the model [m].
+        freedoms: number of degrees of freedom that no row holds.
     """
     mechanism, path = case.mechanism, case.sweep.path
     n, wanted = len(path.times), set(case.forces)
@@ -256,7 +276,7 @@ def solved_forces(
     amounts = {each.name: np.full(n, np.nan) for each in mechanism.forces if each.name in wanted}
     solved = sorted(samples)
     given = [_given(model, samples[k]) for k in solved]
-    found = _multipliers(given)
+    found = _multipliers(given, freedoms)
     wrenches = {name: np.full((n, 6), np.nan) for name in joints}
     free = {name: np.full((n, 6, found.free.shape[2]), np.nan) for name in joints}
     known = np.full(n, np.nan)
@@ -298,7 +318,7 @@ def solved_forces(
     )
 
 
-def _given(model: ForceModel, at: Sample) -> _Given:
+def _given(model: ForceModel, at: Solved) -> _Given:
     model.restore(at.saved)
     model.residual(at.c)
     J, columns = np.array(model.jacobian()), np.array(model.driver_columns())
@@ -306,7 +326,7 @@ def _given(model: ForceModel, at: Sample) -> _Given:
     return _Given(np.vstack([J, dynamics.left_out]), columns, dynamics)
 
 
-def _multipliers(given: Sequence[_Given]) -> Multipliers:
+def _multipliers(given: Sequence[_Given], freedoms: int) -> Multipliers:
     if not given:
         return Multipliers(np.zeros((0, 0)), np.zeros((0, 0, 0)), *np.zeros((4, 0)))
     return Multipliers.of(
@@ -314,6 +334,7 @@ def _multipliers(given: Sequence[_Given]) -> Multipliers:
         np.array([each.dynamics.demand for each in given]),
         np.flatnonzero(given[0].columns.any(axis=1)).tolist(),
         len(given[0].dynamics.left_out),
+        freedoms,
     )
 
 

@@ -133,14 +133,6 @@ def link_coordinates(
     ]
 
 
-def backwards(link: Link, value: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the coordinate of a link for the reversed chain, from second body to first."""
-    if link.move != "ball":
-        return (-value[0],)
-    e0, *e = value
-    return e0, *(-each for each in e)
-
-
 def about(axis: Vec3, angle: Scalar) -> Quat:
     """Return the rotation about a unit axis by an angle [rad]."""
     return Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * axis)

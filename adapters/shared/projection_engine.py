@@ -13,20 +13,23 @@ from __future__ import annotations
 import importlib
 import timeit
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.errors import SolveError
+from ...core.errors import SolveError, UnsupportedError
+from ...core.forces import Forces
 from ...core.harness.engine import Floor
 from ...core.joints import Joint
 from ...core.mechanism.mechanism import replaced_joints, with_equivalents
 from ...core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from ...core.trajectory import Trajectory
+from .equilibrium import Rest, Walk, equilibria
 from .equivalents import in_own_frame, own_frame
+from .force_solution import ForceModel
 from .pose_solver import ProjectionModel
 from .projection import EFFORTS, solve_by_projection, without_counterpart
 
@@ -181,6 +184,17 @@ class ProjectionEngine(ABC):
             )
         details = {**model.details, **({"equivalents": replaced} if replaced else {})}
         return solve_by_projection(model, case, tol, details, self.corrections, own_frame(case))
+
+    def equilibria(self, case: Case) -> Trajectory:
+        """Return the equilibria of a case; see `harness.engine.Balancing`."""
+
+        def solve(case: Case, group: Sequence[int]) -> tuple[Mapping[int, Rest], Forces, str]:
+            model = self.build(case)
+            if not (case.forces and isinstance(model, ForceModel)):
+                raise UnsupportedError(f"{self.title} gives no forces of case {case.name!r}")
+            return Walk(model, self.known(case)).solve(group)
+
+        return equilibria(case, solve)
 
     def efforts(self) -> Mapping[str, Self]:
         """Return the efforts by the number of Newton steps."""

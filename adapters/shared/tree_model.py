@@ -205,12 +205,13 @@ class TreeModel(TreeSimulator):
         for frame in self.frames:
             frame.jacobian = np.zeros((6, self.unknowns))
         self.moving = [each for each in self.frames[:conditioned] if each.handle is not None]
-        ends = np.cumsum([each.n for each in self.conditions])
+        ends = [*accumulate(each.n for each in self.conditions)]
         self.slices = [
             slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)
         ]
-        self.J = np.zeros((ends[-1], self.unknowns))
-        self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]
+        rows = ends[-1] if ends else 0
+        self.J = np.zeros((rows, self.unknowns))
+        self.columns = np.eye(rows)[:, rows - len(mechanism.drivers) :]
         self.reset()
 
     # methods that a simulator may override

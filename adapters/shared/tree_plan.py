@@ -17,7 +17,7 @@ twist.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -170,11 +170,17 @@ class Chain:
     def each(self) -> Iterator[tuple[str, Link, str, str]]:
         """Yield the links of a joint: name of the coordinate, link, names of the bodies before and
         after, where those between are auxiliary.
+
+        A chain from the second body to the first has reversed axes: its coordinates have the sense
+        of the joint's.
         """
         assert self.joint is not None
         names = link_names(self.joint.name, self.links[:: self.sign])[:: self.sign]
         bodies = [self.parent, *(f"{name}.link" for name in names[:-1]), self.child]
-        yield from zip(names, self.links, bodies, bodies[1:], strict=False)
+        for name, link, before, after in zip(names, self.links, bodies, bodies[1:], strict=False):
+            x, y, z = link.axis
+            axis = link.axis if self.sign > 0 else (-x, -y, -z)
+            yield name, replace(link, axis=axis), before, after
 
 
 @dataclass(frozen=True)
@@ -239,6 +245,7 @@ def plan_tree(
     *,
     whole: Collection[type[Joint]],
     counted: Collection[str] = (),
+    first: Collection[str] = (),
     loose: Callable[[Joint], bool] = lambda joint: False,
     auxiliary: str = "{joint}.auxiliary",
 ) -> Iterator[Chain | Relation | Closure]:
@@ -248,12 +255,13 @@ def plan_tree(
         whole: types of joints that close a loop by all their conditions at once. Others have their
             links on the first body, and a point or a frame at the end is tied to the second.
         counted: names of joints that have their links in any case, since coordinates count turns.
+        first: names of joints that carry bodies if they can, as driven and coupled ones do.
         loose: returns whether a joint of the tree is cut, and its body free.
         auxiliary: name of the body at the end of a cut joint's links, by the joint and the last
             link.
     """
     signs, cut = dict[str, int](), set[str]()
-    tree = spanning_tree(mechanism)
+    tree = spanning_tree(mechanism, first)
     names = {body.name for body in mechanism.bodies}
 
     def related(joint: Joint) -> Iterator[Relation]:

@@ -19,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 
 from ...core import joints as j
-from ...core.algebra import vec
+from ...core.algebra import triple, vec
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -72,9 +72,11 @@ def load_options(element: ForceElement) -> dict[str, Any]:
     return {"stiffness": element.stiffness, "damping": element.damping, **own}
 
 
-def beginning(loaded: bool) -> str:
-    """Return the functions that the lines call; with masses and force elements if loaded."""
-    masses, body = (text.LOADED, LOADED_BODY) if loaded else (text.PLAIN, PLAIN_BODY)
+def beginning(mechanism: Mechanism) -> str:
+    """Return the functions that the lines call; with masses and force elements if it has loads."""
+    masses, body = text.PLAIN, PLAIN_BODY
+    if mechanism.has_loads:
+        masses, body = text.weights(mechanism.bodies), LOADED_BODY
     return BEGINNING.replace("MASSES", masses).replace("BODY", body)
 
 
@@ -254,7 +256,7 @@ class _Script:
                 f"points[{point.name!r}] = bodies[{point.body!r}],"
                 f" {self.arm(point.body, point.position)}"
             )
-        return beginning(self.loaded) + "\n".join(self.lines) + "\n" + END
+        return beginning(self.mechanism) + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
         """Add a line with a call."""
@@ -370,7 +372,7 @@ def _spelled_out(
         )
         for name, (link, angle) in zip(names[:-1], hinges, strict=False):
             swing = swing.then_about(vec(link.axis), vec(P), angle)
-            bodies.append(Body(name, P))
+            bodies.append(text.link_between(name, triple(P), mechanism))
             way[name] = _motion(swing, P)
             joints.append(j.Revolute(name, before, name, P, link.axis))
             before = name

@@ -1,43 +1,45 @@
 """A mechanism as MJCF, the XML of MuJoCo. Writing needs no MuJoCo, whose own writer keeps only six
 digits.
 
-A body is a <body> with its frame in the case. A joint is a chain of MuJoCo joints (see
-`tree_plan`), in the tree or, if it closes a loop, on an auxiliary body tied to the second
-body by an equality; a distance is a tendon of constant length. Joint equalities tie
-coordinates to one another. Spring-dampers are tendons and attributes of joints; MJCF has
-no constant forces. Without masses in the mechanism, bodies have a unit mass and inertia.
+A body is a <body> with its frame in the case. A joint of the tree is a chain of MuJoCo joints on
+one body. A loop is closed by a connect at a ball, two connects at a hinge, a tendon of constant
+length at a distance, and else by a weld of an auxiliary body (see `hung_tree`). Joint equalities
+tie coordinates to one another. Spring-dampers are tendons and attributes of joints; MJCF has no
+constant forces. Without masses in the mechanism, bodies have a unit mass and inertia. Joints have
+an armature only where a mass is missing.
 """
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.models.trees.mjcf import STAND_INS
-from ...core.joints import Distance, Spherical
+from ...core.case.models.trees.mjcf_mass import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion
 from ..shared.poses import (
     attitude,
-    backwards,
     direction,
     displacements,
     link_coordinates,
     local,
     rotated,
 )
-from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, ends_of, plan_tree
+from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, ends_of
 from . import text
-from .text import document, numbers, require_known
+from .hung_tree import Tie, loops, plan, share_masses, ties
+from .text import add_note, document, numbers, require_known
 
 NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Drivers are not part of the model:"
-    " the keyframe is consistent with the driver values under custom.{} "
+    " the keyframe is consistent with the driver values under custom.{}{} "
 )
 PLAIN = "Masses, inertias and armatures are placeholders."
-LOADED = f"{text.LOADED} Coordinates have an armature of {text.STAND_IN:g}."
+ARMATURE = f" Coordinates have an armature of {text.STAND_IN[1]:g}."
+KINDS = ("connect", "weld", "tendon")
 
 
 def write(
@@ -59,15 +61,9 @@ class _Model:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("mujoco", model=mechanism.name)
         self.loaded = mechanism.has_loads
-        self.note = ET.Comment(NOTE)
-        self.root.append(self.note)
         ET.SubElement(self.root, "compiler", angle="radian")
         gravity = numbers(mechanism.gravity) if self.loaded else "0 0 0"
         ET.SubElement(self.root, "option", gravity=gravity)
-        # an inertia of each coordinate alone: otherwise hinges in line make the mass matrix nearly
-        # singular
-        armature = numbers([text.STAND_IN]) if self.loaded else "1"
-        ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature=armature)
         self.custom = ET.SubElement(self.root, "custom")
         if not self.loaded:  # for the reader: the masses below are placeholders
             ET.SubElement(self.custom, "text", name=STAND_INS, data="masses")
@@ -78,25 +74,38 @@ class _Model:
         )
         self.frames = {GROUND: Body(GROUND)}  # design frames of everything with an element
         self.qpos: dict[str, Sequence[float]] = {}
-        # name and sign of coordinates, by joint and freedom
-        self.coordinates: dict[tuple[str, str], tuple[str, int]] = {}
+        self.coordinates: dict[tuple[str, str], str] = {}  # names, by joint and freedom
+        self.ties: list[Tie] = []
         for body in mechanism.bodies:
             if body.fixed:
                 self.add_body(body, GROUND)
-        for part in plan_tree(mechanism, whole=[Distance]):
+        for part in plan(mechanism):
             match part:
                 case Chain():
                     self.carry(part)
                 case Closure():
-                    self.close(part)
+                    self.ties += ties(part, mechanism)
                 case Relation():
                     self.relate(part)
         for point in mechanism.points:
             self.add_site(point.name, point.body, point.position)
+        for tie in self.ties:
+            self.close(tie)
         sprung = {force.name for force in mechanism.forces if self.add_spring(force)}
-        self.note.text = NOTE.format(
-            LOADED if self.loaded else PLAIN, text.left_out(mechanism, sprung, True)
-        )
+        share_masses(self.frames, self.ties, mechanism)
+        for frame in self.frames.values():
+            self.weigh(frame)
+        whole = self.loaded and text.weighs_all(self.frames.values())
+        if not whole:
+            # an inertia of each coordinate alone: otherwise hinges in line make the mass matrix
+            # nearly singular
+            default = ET.Element("default")
+            armature = numbers([text.STAND_IN[1]]) if self.loaded else "1"
+            ET.SubElement(default, "joint", armature=armature)
+            self.root.insert(2, default)
+        masses, left_out = text.facts(mechanism, sprung, True, self.frames.values())
+        masses = f"{masses}{'' if whole else ARMATURE}" if self.loaded else PLAIN
+        add_note(self.root, NOTE.format(masses, loops(self.ties, KINDS), left_out))
 
     def text(self, start: Mapping[str, float]) -> str:
         """Return the document, with a consistent start."""
@@ -110,7 +119,14 @@ class _Model:
         ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="start", qpos=qpos)
         return document(
             self.root,
-            (["body"], ["joint", "freejoint"], ["site"], ["spatial", "fixed"], ["numeric"]),
+            (
+                ["body"],
+                ["joint", "freejoint"],
+                ["site"],
+                ["spatial", "fixed"],
+                ["numeric"],
+                [*KINDS],
+            ),
             reserved=["world"],
         )
 
@@ -123,6 +139,11 @@ class _Model:
         self.elements[frame.name] = ET.SubElement(
             self.elements[parent], "body", {"name": frame.name, **at}
         )
+
+    def weigh(self, frame: Body) -> None:
+        """Set the mass of a body."""
+        if frame.name == GROUND:
+            return
         at = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
         if self.loaded:
             at = {
@@ -130,7 +151,7 @@ class _Model:
                 "mass": numbers([text.mass_of(frame)]),
                 "fullinertia": numbers(text.six(text.own_inertia(frame))),
             }
-        ET.SubElement(self.elements[frame.name], "inertial", at)
+        self.elements[frame.name].insert(0, ET.Element("inertial", at))
 
     def add_site(
         self, name: str, body: str, position: Sequence[float], aligned: bool = False
@@ -167,23 +188,23 @@ class _Model:
             along = {} if link.move == "ball" else {"axis": numbers(direction(frame, link.axis))}
             at = {"pos": numbers(local(frame, link.point)), **along}
             ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
-            self.qpos[name] = value = value if chain.sign > 0 else backwards(link, value)
+            self.qpos[name] = value
             if link.move == "ball":  # in the axes of the body that it carries
-                self.qpos[name] = value[0], *rotated(attitude(frame).conjugate(), vec(value[1:]))
-            self.coordinates[joint.name, link.name] = name, chain.sign
+                turn = chain.sign * rotated(attitude(frame).conjugate(), vec(value[1:]))
+                self.qpos[name] = value[0], *turn
+            self.coordinates[joint.name, link.name] = name
 
-    def close(self, closure: Closure) -> None:
-        """Express a joint of a closed loop by an equality."""
-        joint = closure.joint
-        if isinstance(joint, Distance):
-            self.add_tendon(joint.name, joint.bodies, joint.points)
+    def close(self, tie: Tie) -> None:
+        """Hold a tie by an equality."""
+        if tie.length is not None:
+            self.add_tendon(tie.name, tie.links, tie.points)
             # the constant of the polynomial is the change of length since design
-            change = numbers([joint.rod_length - joint.design_distance, 0, 0, 0, 0])
-            ET.SubElement(self.equalities, "tendon", tendon1=joint.name, polycoef=change)
+            change = numbers([tie.length - math.dist(*tie.points), 0, 0, 0, 0])
+            ET.SubElement(self.equalities, "tendon", tendon1=tie.name, polycoef=change)
             return
-        one, two = self.add_ends(joint.name, closure.ends, closure.points)
-        kind = "connect" if closure.by is Spherical else "weld"
-        ET.SubElement(self.equalities, kind, name=joint.name, site1=one, site2=two)
+        one, two = self.add_ends(tie.name, tie.links, tie.points)
+        kind = "weld" if tie.whole else "connect"
+        ET.SubElement(self.equalities, kind, name=tie.name, site1=one, site2=two)
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether MJCF has the force element."""
@@ -193,14 +214,14 @@ class _Model:
             tendon = self.add_tendon(force.name, force.bodies, force.points)
             tendon.set("springlength", numbers([force.free_length]))
         elif isinstance(force, TorsionSpringDamper):
-            name, sign = self.coordinates.get((force.joint, "rotation"), ("", 1))
+            name = self.coordinates.get((force.joint, "rotation"), "")
             tendon = next(
                 (each for each in self.root.iter("joint") if name and each.get("name") == name),
                 None,
             )
             if tendon is None or "stiffness" in tendon.attrib:  # between fixed bodies, or a second
                 return False
-            tendon.set("springref", numbers([sign * force.free_angle]))
+            tendon.set("springref", numbers([force.free_angle]))
         else:
             return False
         tendon.set("stiffness", numbers([force.stiffness]))
@@ -232,11 +253,11 @@ class _Model:
             name = f"{relation.name}.sum"
             tendon = ET.SubElement(self.tendons, "fixed", name=name)
             for joint, freedom, weight in relation.terms:
-                own, sign = self.coordinates[joint, freedom]
-                ET.SubElement(tendon, "joint", joint=own, coef=numbers([sign * weight]))
+                own = self.coordinates[joint, freedom]
+                ET.SubElement(tendon, "joint", joint=own, coef=numbers([weight]))
             ET.SubElement(self.equalities, "tendon", tendon1=name)
             return
-        one, other, curve = relation.follower(signed=True)
-        (name, _), (other_name, _) = self.coordinates[one], self.coordinates[other]
+        one, other, curve = relation.follower(signed=False)
+        names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
         polynomial = numbers([*curve, 0, 0, 0, 0][:5])
-        ET.SubElement(self.equalities, "joint", joint1=name, joint2=other_name, polycoef=polynomial)
+        ET.SubElement(self.equalities, "joint", names, polycoef=polynomial)

@@ -22,12 +22,12 @@ from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.poses import about, at_start, attitude, euler_angles, local, orientation
 from . import text
-from .hung_tree import Hung, Tie, hung
-from .text import add_text, document, numbers, require_known
+from .hung_tree import Hung, Tie, hung, loops
+from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Coordinates are zero at the start,"
-    " which is the pose of this file{}.{} "
+    " which is the pose of this file{}.{}{} "
 )
 KINDS = {
     "slide": "SliderJoint",
@@ -58,8 +58,9 @@ def write(
     require_known(mechanism, "OpenSim")
     model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    masses, left_out = text.facts(mechanism, model.sprung, True)
-    model.root.insert(0, ET.Comment(NOTE.format(masses, at and f" ({at})", left_out)))
+    masses, left_out = text.facts(mechanism, model.sprung, True, model.tree.frames.values())
+    closed = loops(model.tree.ties, TIES[:3])
+    add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, left_out))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
     return {".osim": document(model.root, sets, reserved=[GROUND])}
 
@@ -122,9 +123,7 @@ class _Model:
         element = ET.SubElement(bodies, "Body", name=_name(body.name))
         add_text(element, "mass", numbers([text.mass_of(body)]))
         add_text(element, "mass_center", numbers(local(body, text.center_of(body))))
-        # a placeholder is the same in all axes, so the frame does not matter
-        matrix = text.inertia_of(body) if body.inertia is None else text.own_inertia(body)
-        xx, yy, zz, xy, yz, xz = text.six(matrix)
+        xx, yy, zz, xy, yz, xz = text.six(text.own_inertia(body))
         add_text(element, "inertia", numbers([xx, yy, zz, xy, xz, yz]))
 
     def add_joint(self, joints: ET.Element, joint: Hung) -> None:

@@ -3,8 +3,8 @@ mimic others.
 
 SDF has no state, so the model is written in its start pose, where all joints are at zero. A link
 has the frame of its body in the case; spring-dampers are Drake's. Drake's parser reads only ball
-constraints: three of them tie a frame, and a rod is a link between a cross and a ball. Drake
-supports constraints only in discrete plants.
+constraints: two of them tie a hinge, three a frame, and a rod is a link between a cross and a ball.
+Drake supports constraints only in discrete plants.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from ...core.trajectory import BodyMotion
 from ..shared.equivalents import cross_of
 from ..shared.poses import at_start, attitude, local
 from . import text
-from .hung_tree import Hung, Tie, hung
-from .text import add_text, document, numbers, require_known
+from .hung_tree import Hung, Tie, extent, hung, loops
+from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Joints are at zero at the start,"
     " which is the pose of this file{}. Read it into a discrete plant of Drake: a continuous one"
-    " has no constraints.{} "
+    " has no constraints.{}{} "
 )
+TIES = ("a ball constraint", "three ball constraints", "a link on a cross and a ball constraint")
 KINDS = {"slide": "prismatic", "hinge": "revolute", "ball": "ball", "fixed": "fixed"}
 WORLD = "world"
 MIMIC = "drake:mimic"
@@ -56,8 +57,9 @@ def write(
             )
     model = _Model(at_start(mechanism, way))
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    masses, left_out = text.facts(mechanism, model.sprung, False)
-    model.root.insert(0, ET.Comment(NOTE.format(masses, at and f" ({at})", left_out)))
+    masses, left_out = text.facts(mechanism, model.sprung, False, model.tree.frames.values())
+    note = NOTE.format(masses, at and f" ({at})", model.loops, left_out)
+    add_note(model.root, note)
     kinds = (["link", "frame", "joint", "drake:ball_constraint"], [SPRING])
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}
 
@@ -70,6 +72,7 @@ class _Model:
         self.root = ET.Element("sdf", {"version": "1.11", "xmlns:drake": DRAKE})
         self.model = ET.SubElement(self.root, "model", name=mechanism.name)
         self.joints: dict[str, ET.Element] = {}
+        self.loops = loops(self.tree.ties, TIES)
         for tie in self.tree.ties:
             if tie.length is not None:
                 self.add_rod(tie)
@@ -86,17 +89,11 @@ class _Model:
         for point in mechanism.points:
             frame = {"name": f"point.{point.name}", "attached_to": point.body}
             self.add_pose(ET.SubElement(self.model, "frame", frame), point.position)
-        arm = self.size()
+        arm = extent(mechanism)
         for tie in self.tree.ties:
             if tie.length is None:
                 self.add_tie(tie, arm)
         self.sprung = {each.name for each in mechanism.forces if self.add_spring(each)}
-
-    def size(self) -> float:
-        """Return the largest distance of joints along an axis, or 1 m if all are in one place."""
-        points = np.array([P for tie in self.tree.ties for P in tie.points] or [(0.0, 0.0, 0.0)])
-        places = np.array([each.point for each in self.tree.joints])
-        return float(np.ptp(np.concatenate([points, places]), axis=0).max()) or 1.0
 
     def add_rod(self, tie: Tie) -> None:
         """Add a link on a cross at the first point of a rod; tie its end to the second point."""
@@ -121,9 +118,7 @@ class _Model:
         add_text(inertial, "mass", numbers([text.mass_of(body)]))
         inertia = ET.SubElement(inertial, "inertia")
         entries = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        # a placeholder is the same in all axes, so the frame does not matter
-        matrix = text.inertia_of(body) if body.inertia is None else text.own_inertia(body)
-        for entry, value in zip(entries, text.six(matrix), strict=True):
+        for entry, value in zip(entries, text.six(text.own_inertia(body)), strict=True):
             add_text(inertia, entry, numbers([value]))
 
     def add_pose(self, element: ET.Element, at: Vector, frame: Body | None = None) -> None:

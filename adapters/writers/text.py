@@ -10,20 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
 from ...core.joints import Distance
 from ...core.mechanism.body import Body, inertia_matrix
-from ...core.mechanism.mechanism import Mechanism, Vector
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array
 from ..shared.poses import direction
 from ..shared.tree_plan import CHAINS
 
-# Simulators require mass and inertia of every moving body [kg, kg m^2].
-STAND_IN = 1e-6
+# Simulators require mass and inertia of every moving body. A point mass has an inertia far below
+# that about joints some centimetres away, per mass [m^2].
+POINT = 1e-10
 PLAIN = "Masses and inertias are placeholders."
-LOADED = (
-    f"Masses are in kg; {STAND_IN:g} kg and {STAND_IN:g} kg m^2 are placeholders for missing ones."
-)
 
 
 def require_known(mechanism: Mechanism, title: str) -> None:
@@ -40,16 +39,51 @@ def require_known(mechanism: Mechanism, title: str) -> None:
             )
 
 
-def facts(mechanism: Mechanism, sprung: Collection[str], gravity: bool) -> tuple[str, str]:
+SMALL = (BETWEEN[1], BETWEEN[1], BETWEEN[1], 0.0, 0.0, 0.0)
+
+
+def link_between(name: str, point: Vector, mechanism: Mechanism) -> Body:
+    """Return the frame of a link between the freedoms of a joint."""
+    if not mechanism.has_loads:
+        return Body(name, point)
+    return Body(name, point, mass=BETWEEN[0], center_of_mass=point, inertia=SMALL)
+
+
+def weighs_all(frames: Iterable[Body]) -> bool:
+    """Return whether every link that moves has a mass."""
+    return all(body.mass or body.fixed or body.name == GROUND for body in frames)
+
+
+def facts(
+    mechanism: Mechanism, sprung: Collection[str], gravity: bool, frames: Iterable[Body]
+) -> tuple[str, str]:
     """Return sentences on the masses of a file, and on the loads that it cannot hold.
 
     Args:
         sprung: names of the force elements in the file.
         gravity: whether the file has gravity.
+        frames: of the links in the file, with their masses.
     """
     if not mechanism.has_loads:
         return PLAIN, ""
-    return LOADED, left_out(mechanism, sprung, gravity)
+    return weights(frames), left_out(mechanism, sprung, gravity)
+
+
+def weights(frames: Iterable[Body]) -> str:
+    """Return a sentence on the masses of links."""
+    found = [*frames]
+    masses = "Masses are in kg"
+    if not weighs_all(found):
+        mass, moment = STAND_IN
+        masses += f"; {mass:g} kg and {moment:g} kg m^2 are placeholders for missing ones"
+    if any((body.mass, body.inertia) == (BETWEEN[0], SMALL) for body in found):
+        masses += f"; other links have {BETWEEN[0]:g} kg"
+    return f"{masses}."
+
+
+def add_note(root: ET.Element, text: str) -> None:
+    """Begin a document with a comment, in which XML has no two hyphens in line."""
+    root.insert(0, ET.Comment(text.replace("--", "- -")))
 
 
 def add_text(
@@ -95,7 +129,7 @@ def document(root: ET.Element, kinds: Sequence[Sequence[str]], reserved: Sequenc
 
 def mass_of(body: Body) -> float:
     """Return the mass of a body, or its placeholder [kg]."""
-    return body.mass or STAND_IN
+    return body.mass or STAND_IN[0]
 
 
 def center_of(body: Body) -> Vector:
@@ -103,17 +137,19 @@ def center_of(body: Body) -> Vector:
     return body.center_of_mass or body.origin
 
 
-def inertia_of(body: Body, missing: float = STAND_IN) -> Array:
-    """Return the inertia about the centre of mass, global axes at design [kg m^2], shape (3, 3).
-
-    Args:
-        missing: principal moments of a body without one.
+def inertia_of(body: Body) -> Array:
+    """Return the inertia about the centre of mass, or its placeholder, global axes at design
+    [kg m^2], shape (3, 3).
     """
-    return missing * np.eye(3) if body.inertia is None else inertia_matrix(body.inertia)
+    if body.inertia is None:
+        return (POINT * body.mass or STAND_IN[1]) * np.eye(3)
+    return inertia_matrix(body.inertia)
 
 
 def own_inertia(body: Body) -> Array:
     """Return the inertia about the centre of mass in the body's axes [kg m^2], shape (3, 3)."""
+    if body.inertia is None:  # the same in all axes, without round-off
+        return inertia_of(body)
     turn = np.column_stack([direction(body, axis) for axis in np.eye(3).tolist()])
     return turn @ inertia_of(body) @ turn.T
 

@@ -4,8 +4,10 @@ Every link is parallel to the global axes at design, so axes and arms are the nu
 its origin is the point of its joint. A joint is a chain of URDF's revolute and prismatic joints
 (see `tree_plan`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
 body that every chain connects by a ball floats, and its joints are conditions (see
-`constraints`). Hinges are "revolute" with very large limits, not "continuous": their coordinate
-is then the angle including full turns.
+`constraints`). In a file with masses every link that moves has one, because some simulators take
+1 kg for none; for the same reason points are no links, but stand in the JSON file. Hinges are
+"revolute" with very large limits, not "continuous": their coordinate is then the angle including
+full turns.
 """
 
 from __future__ import annotations
@@ -30,15 +32,15 @@ from ..shared.constraints import (
     Frame,
     Length,
 )
-from ..shared.poses import backwards, displacements, link_coordinates
+from ..shared.poses import displacements, link_coordinates
 from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
 from . import text
-from .text import document, numbers, require_known
+from .text import add_note, document, numbers, require_known
 
 SCHEMA = "kincheck-constraints/1"
 NOTE = (
-    " Written by kincheck. Lengths are in m, angles in rad; {}. The tree alone is not"
-    " the mechanism: the constraints in the file beside it close its loops.{} "
+    " Written by kincheck. Lengths are in m, angles in rad. {} The tree alone is not"
+    " the mechanism: the constraints in the file beside it close its loops{}.{} "
 )
 MEANING = {
     "coincident": "the points i and j are one (3 equations)",
@@ -50,6 +52,7 @@ MEANING = {
         "the coordinate of the driven joint is the polynomial of the driving one's, constant first"
     ),
     "bodies": "the frame of the body in its link at design",
+    "points": "the point in the axes of its link",
     "start": (
         "coordinates of joints: m or rad; floating: displacement x, y, z [m] and quaternion x, y,"
         " z, w"
@@ -81,6 +84,10 @@ def write(
         "meaning": MEANING,
         "constraints": model.constraints,
         "bodies": {body.name: model.pose(body) for body in mechanism.bodies},
+        "points": {
+            point.name: {"link": point.body, "point": model.arm(point.body, point.position)}
+            for point in mechanism.points
+        },
         "start": {"drivers": dict(start), "coordinates": model.q},
     }
     found = document(model.root, (["link"], ["joint"]))
@@ -150,14 +157,9 @@ class _Model:
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("robot", name=mechanism.name)
-        note = ("nothing has a mass", "")
-        if mechanism.has_loads:
-            note = ("masses are in kg", text.left_out(mechanism, (), False))
-        self.root.append(ET.Comment(NOTE.format(*note)))
         self.origin: dict[str, Vector] = {}  # origins of links, global at design
         self.q: dict[str, list[float]] = {}
-        # name and sign of coordinates, by joint and freedom
-        self.coordinates: dict[tuple[str, str], tuple[str, float]] = {}
+        self.coordinates: dict[tuple[str, str], str] = {}  # names, by joint and freedom
         self.constraints: list[dict[str, Any]] = []
         self.add_link(GROUND, (0.0, 0.0, 0.0))
         for body in mechanism.bodies:
@@ -175,13 +177,20 @@ class _Model:
                     self.close(part)
                 case Relation():
                     self.relate(part)
-        for point in mechanism.points:
-            self.attach(
-                f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed"
-            )
-        for body in mechanism.bodies:
-            if body.mass:
-                self.weigh(body)
+        masses, left_out = "Nothing has a mass.", ""
+        if mechanism.has_loads:
+            known = {body.name: body for body in mechanism.bodies if body.mass or not body.fixed}
+            frames = [
+                known.get(name) or text.link_between(name, at, mechanism)
+                for name, at in self.origin.items()
+                if name != GROUND
+            ]
+            for frame in frames:
+                self.weigh(frame)
+            masses, left_out = text.facts(mechanism, (), False, frames)
+        closed = dict.fromkeys(each["joint"] for each in self.constraints)
+        closed = f": {', '.join(closed)}" if closed else ""
+        add_note(self.root, NOTE.format(masses, closed, left_out))
 
     def add_link(self, name: str, origin: Vector) -> ET.Element:
         """Add a link with its origin at a position, global at design."""
@@ -200,14 +209,14 @@ class _Model:
         return element
 
     def weigh(self, body: Body) -> None:
-        """Set the mass of a body's link; a point mass has no inertia."""
+        """Set the mass of a link."""
         link = next(each for each in self.root.iter("link") if each.get("name") == body.name)
         inertial = ET.Element("inertial")
         link.insert(0, inertial)
         center = numbers(self.arm(body.name, text.center_of(body)))
         ET.SubElement(inertial, "origin", xyz=center, rpy="0 0 0")
-        ET.SubElement(inertial, "mass", value=numbers([body.mass]))
-        values = [numbers([x]) for x in text.six(text.inertia_of(body, 0.0))]
+        ET.SubElement(inertial, "mass", value=numbers([text.mass_of(body)]))
+        values = [numbers([x]) for x in text.six(text.inertia_of(body))]
         ET.SubElement(inertial, "inertia", dict(zip(ENTRIES, values, strict=True)))
 
     def arm(self, link: str, P: Sequence[float]) -> list[float]:
@@ -230,8 +239,8 @@ class _Model:
             element = self.attach(following, parent, link.point, name, KINDS[link.move])
             ET.SubElement(element, "axis", xyz=numbers(link.axis))
             ET.SubElement(element, "limit", FAR)
-            self.q[name] = [*(value if chain.sign > 0 else backwards(link, value))]
-            self.coordinates[joint.name, link.name] = name, float(chain.sign)
+            self.q[name] = [*value]
+            self.coordinates[joint.name, link.name] = name
 
     def close(self, closure: Closure) -> None:
         """Add the conditions of a cut joint."""
@@ -250,16 +259,16 @@ class _Model:
         another.
         """
         if relation.curve:
-            one, other, coefficients = relation.follower(signed=True)
+            one, other, coefficients = relation.follower(signed=False)
             table = {
                 "kind": "polynomial",
-                "driven": self.coordinates[one][0],
-                "driving": self.coordinates[other][0],
+                "driven": self.coordinates[one],
+                "driving": self.coordinates[other],
                 "coefficients": coefficients,
             }
         else:
-            found = [(*self.coordinates[name, one], weight) for name, one, weight in relation.terms]
-            table = {"kind": "linear", "weights": {one: sign * w for one, sign, w in found}}
+            weights = {self.coordinates[name, one]: w for name, one, w in relation.terms}
+            table = {"kind": "linear", "weights": weights}
         self.constraints.append({"joint": relation.name, **table})
 
     def pose(self, body: Body) -> dict[str, Any]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,9 @@ from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
 from .quantity import Quantity
 
+if TYPE_CHECKING:
+    from ..kinematics import LoadPoint
+
 
 @dataclass(frozen=True, eq=False)
 class Hardpoint:
@@ -29,12 +32,17 @@ class Hardpoint:
     Attributes:
         name: as in the table.
         roles: names in the template of the suspension.
+        position: x forward, y left and z up of the left wheel's point, or of the mirror image of a
+            right one's [m].
+        axes: axis among these, and its sign, along each of x, y and z of the table.
         moves: derivatives of the numbers of each following place, see `kinematics.places`, by x, y
             and z of the table [m/m], shape (numbers, 3). They are constant.
     """
 
     name: str
     roles: tuple[str, ...]
+    position: tuple[float, float, float]
+    axes: Sequence[tuple[int, float]]
     moves: Mapping[str, Array]
 
 
@@ -211,6 +219,19 @@ class Closure:
 
 
 @dataclass(frozen=True, eq=False)
+class Balance:
+    """Samples that are equilibria: the drivers of the case hold, all other motions are free.
+
+    Attributes:
+        places: of further loads.
+        loads: force and torque at each place by its name [N, N m], shape (n, 6).
+    """
+
+    places: tuple[LoadPoint, ...] = ()
+    loads: Mapping[str, Array] = field(default_factory=dict[str, Array])
+
+
+@dataclass(frozen=True, eq=False)
 class Case:
     """The input of engines, and of the harness that judges their results, in SI units.
 
@@ -226,6 +247,7 @@ class Case:
         wheels: each `Vehicle` of [suspension], whether outputs read it or not.
         unforced: drivers without a force, which only follow a recording.
         free: its free motion; None for the default.
+        balance: None unless its samples are equilibria.
     """
 
     name: str
@@ -245,6 +267,7 @@ class Case:
     wheels: tuple[Any, ...] = ()
     unforced: tuple[str, ...] = ()
     free: Free | None = None
+    balance: Balance | None = None
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

@@ -73,7 +73,7 @@ class Printed:
         places = self.decimals or 0
         if self.exact or self.decimals is None or (self.numbers == 0 and places <= 1):
             return np.zeros(values.shape)
-        fixed = np.full(values.shape, 0.5 * 10.0**-places)
+        fixed = np.full(values.shape, float(f"5e{-places - 1}"))  # infinite beyond doubles
         left_out = self.numbers * places - self.all_decimals
         if left_out <= self.numbers * self.significant - self.all_significant:
             return fixed

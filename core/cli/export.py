@@ -67,7 +67,7 @@ def _export(options: argparse.Namespace, registry: Registry) -> int:
 
     if options.to not in registry.writers:
         raise KincheckError(unknown("format", options.to, registry.writers))
-    case = registry.find_case(options.case, import_options.supplied(options))
+    case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
     keep_texts(written(case, registry.writer(options.to), options.at), case.name, options.out)
     return Status.WITHIN

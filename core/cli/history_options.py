@@ -26,7 +26,8 @@ def selection(options: argparse.Namespace) -> dict[str, Any]:
     """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
     options of solution and judgement.
     """
-    run = ("joints", "joint_type", "mode", "reference", "require")
+    run = ("joints", "joint_type", "mode", "reference", "require", "static", "reactions")
+    run += ("recorded", "engine_command", "fmu", "analysis")
     parts = {
         "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
         "files": vars(supplied(options)),
@@ -61,8 +62,8 @@ def keeping(
     """Return the run in its history, or None, and the reasons if the history does not store it.
 
     Args:
-        mistyped: names of cases that do not exist: the run is only stored if an earlier one was
-            asked for the same, which then lacks them.
+        mistyped: names of cases that do not exist: with one, or if no case can be read at all,
+            the run is only stored if an earlier one was asked for the same, which then lacks them.
     """
     if options.history is None:
         return None, []
@@ -74,9 +75,10 @@ def keeping(
     code = [*options.joint_type, *(type(each).__module__ for each in engines)]
     about |= {"unread": unread, "resume": options.resume, "sources": sources(code)}
     try:
-        if mistyped and not _known(Path(options.history), settings):
-            names = shortened(mistyped, MOST_NAMED)
-            return None, [f"{names}: no such case; the run is not in the history"]
+        if (mistyped or not cases) and not _known(Path(options.history), settings):
+            names = shortened(mistyped or unread, MOST_NAMED)
+            why = "no such case" if mistyped else "no case could be read"
+            return None, [f"{names}: {why}; the run is not in the history"]
         found = keep(Path(options.history), cases, engines, **about)
     except HistoryError as error:
         return None, [f"{error}; the run is not in the history"]

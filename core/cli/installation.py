@@ -262,5 +262,5 @@ def _largest(record: Record) -> tuple[float | None, float | None]:
     found = [each.position for each in record.errors.values() if each.position is not None]
     if not found:
         return None, None
-    worst = max(found, key=lambda each: each.max_abs / each.tolerance)
+    worst = max(found, key=lambda each: each.ratio)
     return worst.max_abs, worst.tolerance

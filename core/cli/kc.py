@@ -6,12 +6,20 @@ import argparse
 import math
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
-from . import import_options
+from . import execution_options, import_options
+from .option_types import positive
 from .registry import Registry, Status
+from .run_options import TOL
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..harness.engine import Engine
+    from ..harness.record import Record, Results
 
 _UNITS = {
     "": 1.0, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "rad": 1.0, "deg": math.pi / 180.0,
@@ -53,11 +61,31 @@ def add(commands: Any) -> None:
             " [joints.NAME.bushings.X] as in case files, in SI"
         ),
     )
+    command.add_argument(
+        "--engine",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help=(
+            "check the equilibria by these engines: each finds them by its own kinematics, gravity"
+            " and rows, exudyn-static by its own solver, and gets a verdict against native"
+        ),
+    )
+    command.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE",
+        help="store the records of native and of these engines in this file, as kincheck run does",
+    )
     command.add_argument("--csv", metavar="FILE", help="write the curves, in mm, deg, N, kN")
     command.add_argument(
         "--json", metavar="FILE", help="write the results in SI; - for standard output"
     )
-    command.add_argument("--out", type=Path, metavar="DIR", help="write the page DIR/kc.html")
+    command.add_argument(
+        "--out", type=Path, metavar="DIR", help="write the page DIR/kc.html, and results.json"
+    )
+    execution_options.add_options(command, positive)
     import_options.add_options(command)
 
 
@@ -67,14 +95,22 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     Joints with bushings give way to them. --travel=A:B:N is of the wheel, from design, in m or with
     a unit: --travel=-60mm:60mm:25. --axle heave, roll or steer moves both wheels of an axle.
 
-    Exit status: 0 all samples have an equilibrium; 2 one has none, and its message gives the last
-    load that has one, or the tool could not do its work.
+    Exit status: 0 all samples have an equilibrium, and all engines agree; 1 an engine deviates or
+    ends in an error; 2 a sample has no equilibrium, and its message gives the last load that has
+    one, or the tool could not do its work.
     """
     from ..case.io.atomic_files import require_writable, write
-    from ..report.progress import complain
+    from ..harness.record import to_json
+    from ..harness.standard import STANDARD
+    from ..report.progress import complain, lacking
+    from ..report.table import print_table
     from ..report.terminal import with_json
     from ..studies.compliance import study, views
 
+    problems = execution_options.contradictions(options)
+    engines = _engines(options, registry, problems)
+    if problems := problems or execution_options.unreachable(options):
+        raise KincheckError("\n".join(problems))
     travel = None if options.travel is None else _values("--travel", options.travel)
     table = Path(options.case).suffix.lower() not in ("", ".toml", ".json")
     axle, given = options.axle, options.travel
@@ -91,20 +127,76 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     page = None if options.out is None else options.out / "kc.html"
     if page is not None:
         page.parent.mkdir(parents=True, exist_ok=True)
-    require_writable([("--json", options.json), ("--csv", options.csv), ("--out", page)])
+    of_engines = None if page is None or not engines else page.with_name("results.json")
+    require_writable(
+        [("--json", options.json), ("--csv", options.csv), ("--out", page), ("--out", of_engines)]
+    )
     loads = dict(map(_load, options.load))
     results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
     if options.csv is not None:
         write("--csv", Path(options.csv), views.table(results).encode())
+    checked = _checked(options, engines, results.cases, problems) if engines else None
+    if checked is not None and of_engines is not None:
+        write("--out", of_engines, to_json(checked))
     if page is not None:
-        write("--out", page, views.page(results).encode())
+        write("--out", page, views.page(results, checked).encode())
     out = sys.stderr if options.json == "-" else sys.stdout
-    with with_json(views.as_data(results), options.json):
+    with with_json(views.as_data(results, checked), options.json):
         print(*views.lines(results), sep="\n", file=out)
+        if checked is not None:
+            print_table(checked, out, reactions=True)
         complain(f"note: {note}" for note in results.travel.notes)
-    if results.failures:
-        raise KincheckError("\n".join(results.failures))
-    return Status.WITHIN
+    named = [each.name for each in engines if each.name != STANDARD]
+    problems += results.failures + (lacking(checked, (), named) if checked else [])
+    if problems:
+        raise KincheckError("\n".join(problems))
+    bad = checked is not None and any(each.outcome.bad for each in checked.records)
+    return Status.DEVIATES if bad else Status.WITHIN
+
+
+def _engines(options: argparse.Namespace, registry: Registry, problems: list[str]) -> list[Engine]:
+    """Return native and the named engines; none if nothing is to be checked or stored."""
+    found = registry.find_engines(options.engine, problems)
+    if not (options.engine or options.history):
+        return []
+    native = registry.baseline(found)
+    return [native, *found] if native is not None else found
+
+
+def _checked(
+    options: argparse.Namespace,
+    engines: Sequence[Engine],
+    cases: Sequence[Case],
+    problems: list[str],
+) -> Results:
+    """Return the records of the engines, stored in the history if there is one."""
+    from ..harness import run as running
+    from ..history.run_recorder import keep
+    from ..history.store import HistoryError
+
+    solver, settings = execution_options.solver(options, engines)
+    keeping = None
+    if options.history is not None:
+        names = {"cases": [each.name for each in cases], "engines": [x.name for x in engines]}
+        settings["selection"] = {**names, "options": {}}
+        about: dict[str, Any] = {"tol": TOL, "command": options.command, "resume": False}
+        try:
+            keeping = keep(options.history, cases, engines, settings=settings, **about)
+        except HistoryError as error:
+            problems.append(f"{error}; the run is not in the history")
+
+    def add(record: Record, done: int, total: int) -> None:
+        if keeping is not None:
+            keeping.add(record)
+
+    facts = keeping.facts if keeping is not None else settings
+    results = running.run(
+        cases, engines, tol=TOL, progress=add, command=options.command, solver=solver, facts=facts
+    )
+    if keeping is not None:
+        keeping.end(results, interrupted=False)
+        problems += keeping.problems + keeping.store.damage
+    return results
 
 
 def _load(text: str) -> tuple[str, Any]:

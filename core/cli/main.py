@@ -144,6 +144,8 @@ def registry() -> Registry:
         tuple(adapters.SIMULATIONS),
         tuple(adapters.CONVERTERS),
         adapters.converter,
+        adapters.STEPPERS,
+        adapters.stepper_files,
     )
 
 

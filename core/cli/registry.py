@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from fnmatch import fnmatchcase
@@ -50,6 +50,9 @@ class Registry:
         simulations: names of the engines in simulate mode.
         converters: names of the simulators that save models.
         converter: returns the function of such a name, from a file to the text of another.
+        steppers: names of the engines that step free motion.
+        stepper_files: returns the files of a stepper's reproducer, of an engine, a mechanism and
+            its twists at the start.
     """
 
     engines: Sequence[str]
@@ -62,6 +65,8 @@ class Registry:
     simulations: Sequence[str] = ()
     converters: Sequence[str] = ()
     converter: Callable[[str], Callable[[Path], str]] | None = None
+    steppers: Sequence[str] = ()
+    stepper_files: Callable[..., Mapping[str, str]] | None = None
 
     def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
         """Return the case of a name or in a file.

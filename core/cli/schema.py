@@ -42,12 +42,19 @@ def _live() -> dict[str, Any]:
     return live_schema()
 
 
+def _board() -> dict[str, Any]:
+    from ..studies.board.results import Board
+
+    return msgspec.json.schema(Board)
+
+
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "case": _case,
     "variation": _variation,
     "results": _results,
     "regression": _regression,
     "live": _live,
+    "board": _board,
 }
 
 

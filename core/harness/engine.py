@@ -107,6 +107,17 @@ class Floor:
 
 
 @runtime_checkable
+class Balancing(Engine, Protocol):
+    """An engine that finds equilibria, of a case with `balance`."""
+
+    def equilibria(self, case: Case) -> Trajectory:
+        """Return positions and efforts at the samples: the drivers hold their values, and all other
+        motions are in equilibrium, on the way of continuous loads and values from the design.
+        """
+        ...
+
+
+@runtime_checkable
 class Measurable(Engine, Protocol):
     """An engine with a work-precision diagram.
 

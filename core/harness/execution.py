@@ -18,7 +18,7 @@ from ..failures import FailureKind
 from ..forces import Forces
 from ..trajectory import Array, Trajectory
 from .compare import output_series
-from .engine import Engine
+from .engine import Balancing, Engine
 from .held_trajectory import held_trajectories
 from .provenance import plain, readable
 from .record import Outcome, Seconds
@@ -218,11 +218,24 @@ def attempt(pair: Pair, report: Callable[[Facts], object] = lambda facts: None) 
         reason = engine.unsupported(case)
         if reason is not None:
             return become(Failure(Outcome.UNSUPPORTED, bounded(reason)))
+        if case.balance is not None:
+            return become(_balanced(pair, seconds))
         return become(_solve(pair, seconds))
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # simulators may raise anything; some raise SystemExit
         return become(Failure.of(error))
+
+
+def _balanced(pair: Pair, seconds: dict[str, float]) -> Answer:
+    case, engine = pair.case, pair.engine
+    if not isinstance(engine, Balancing):
+        raise UnsupportedError(f"{engine.name} in mode {engine.mode} finds no equilibria")
+    begin = perf_counter()
+    found = engine.equilibria(case)
+    seconds["first"] = perf_counter() - begin
+    check(case, engine.name, found)
+    return Answer.of(pair, found)
 
 
 def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:

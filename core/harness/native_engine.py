@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..case.case import Case
+import numpy as np
+
+from ..case.case import Balance, Case
+from ..failures import FailureKind
+from ..forces import Forces
 from ..kinematics import LAST_ITERATION, NativeSolver, Solver, Style
 from ..program.llvm.compiler import available
-from ..trajectory import Trajectory
+from ..trajectory import PointMotion, Trajectory
 from ..version import VERSION
 from .standard import STANDARD
 
@@ -85,6 +89,36 @@ class NativeEngine:
         mechanism = case.mechanism
         every = (*mechanism.given_joints, *mechanism.drivers, *mechanism.forces)
         return tuple(each.name for each in every) if self.every_force else case.forces
+
+    def equilibria(self, case: Case) -> Trajectory:
+        """Return the equilibria of a case; see `engine.Balancing`."""
+        from ..kinematics import StaticModel, largest_residual  # few cases need them
+
+        mechanism, balance, path = case.mechanism, case.balance or Balance(), case.sweep.path
+        names = [driver.name for driver in mechanism.drivers]
+        travel = dict(zip(names, path.drive(names, path.times)[0], strict=True))
+        found = StaticModel(mechanism, balance.places).solve(balance.loads, travel, slopes=False)
+
+        def place(name: str) -> PointMotion:
+            point = mechanism.point(name)
+            at = found.place(point.body, point.position)
+            return PointMotion(np.where(found.reached[:, None], at, np.nan), None, None)
+
+        kept = {
+            name: replace(each, r=each.r[found.reached], p=each.p[found.reached])
+            for name, each in found.bodies.items()
+        }
+        unknown = np.full(len(found.reached), np.nan)
+        efforts = {name: np.where(found.reached, x, np.nan) for name, x in found.efforts.items()}
+        return Trajectory(
+            {name: place(name) for name in case.points},
+            found.reached,
+            found.iterations,
+            largest_residual(mechanism, mechanism.joints, kept),
+            "" if found.reached.all() else "the path of loads and travel turns back (snap-through)",
+            forces=Forces({}, efforts, {}, unknown, unknown),
+            failures=[] if found.reached.all() else [FailureKind.NOT_FOUND],
+        )
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """Solve all samples in order; tol is relative to the mechanism's size."""

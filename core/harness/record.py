@@ -4,6 +4,7 @@ schema kincheck-results/1.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from enum import StrEnum
@@ -90,6 +91,13 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: float
     against: str
     within: bool
+
+    @property
+    def ratio(self) -> float:
+        """The error in tolerances; infinite if none is allowed."""
+        if self.tolerance > 0.0:
+            return self.max_abs / self.tolerance
+        return math.inf if self.max_abs > 0.0 else 0.0
 
 
 class Deviations(msgspec.Struct, frozen=True, kw_only=True):

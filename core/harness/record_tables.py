@@ -100,5 +100,5 @@ def _share(record: Any, quantity: str) -> float:
     compared.
     """
     found = [getattr(each, quantity) for each in record.errors.values()]
-    shares = [each.max_abs / each.tolerance for each in found if each is not None]
+    shares = [each.ratio for each in found if each is not None]
     return max(shares, default=np.nan)

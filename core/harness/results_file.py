@@ -214,7 +214,8 @@ def _check_scene(file: Path, key: str, scene: Scene) -> None:
     for joint in scene.joints:
         there = len(joint.bodies) == 2 and known.issuperset(joint.bodies)
         _check(file, f"{key}.joints", there, f"found {shown(joint.bodies)}, expected two bodies")
-        _check_rows(file, f"{key}.joints", [(3, each) for each in (*joint.points, *joint.axes)])
+        places = (*joint.points, *joint.axes, *[joint.far] * bool(joint.far))
+        _check_rows(file, f"{key}.joints", [(3, each) for each in places])
         directions = all(1e-100 < math.hypot(*axis) < 1e100 for axis in joint.axes)
         _check(file, f"{key}.joints", directions, f"found {shown(joint.axes)}, expected directions")
     for point in scene.points:
@@ -225,6 +226,15 @@ def _check_scene(file: Path, key: str, scene: Scene) -> None:
             f"found {shown(point.body)}, expected a body",
         )
         _check_rows(file, f"{key}.points", [(3, point.position)])
+    names = {point.name for point in scene.points}
+    for spring in scene.springs:
+        there = len(spring.bodies) == len(spring.points) == 2 and known.issuperset(spring.bodies)
+        _check(file, f"{key}.springs", there, f"found {shown(spring.bodies)}, expected two bodies")
+        _check_rows(file, f"{key}.springs", [(3, each) for each in spring.points])
+    for wheel in scene.wheels:
+        there = len(wheel.kingpin) in (0, 2) and names.issuperset(wheel.kingpin)
+        _check(file, f"{key}.wheels", there, f"found {shown(wheel.kingpin)}, expected two points")
+        _check_rows(file, f"{key}.wheels", [(3, each) for each in (wheel.middle,) if each])
 
 
 def _check_rows(file: Path, key: str, rows: Iterable[tuple[int, Sequence[float]]]) -> None:

@@ -11,16 +11,25 @@ import numpy as np
 
 from ..case.case import MARKER, Case
 from ..case.measures import DriverEffort, JointForce
-from ..case.suspension import SuspensionOutput
+from ..case.suspension import MotionRatio, SuspensionOutput
 from ..errors import KincheckError
 from ..joints import Kind
 from ..joints.base import unit
 from ..kinematics import NativeSolver
+from ..mechanism.loads import SpringDamper
 from ..mechanism.mechanism import Vector
 from ..mechanism.motions import PointCoordinate
 from ..trajectory import Array, BodyMotion
 from .record import Record, Results
-from .scene_record import Scene, SceneBody, SceneForce, SceneJoint, ScenePoint, SceneWheel
+from .scene_record import (
+    Scene,
+    SceneBody,
+    SceneForce,
+    SceneJoint,
+    ScenePoint,
+    SceneSpring,
+    SceneWheel,
+)
 from .standard import STANDARD
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
@@ -63,6 +72,7 @@ def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
         requested: if `poses` is false, whether the native engine was run and had no answer.
     """
     mechanism = case.mechanism
+    stated = {place for row in case.hardpoints for place in row.moves}
     frames, motions = list[int](), dict[str, BodyMotion]()
     message = (
         f"the native engine {'has no answer' if requested else 'was not run'} in this run: this is"
@@ -95,7 +105,11 @@ def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
                 type=joint.type,
                 bodies=list(joint.bodies),
                 points=[list(point) for point in joint.points_on()],
-                axes=[list(value) for _, kind, value in joint.parts() if kind is Kind.DIRECTION],
+                axes=(axes := [list(v) for _, kind, v in joint.parts() if kind is Kind.DIRECTION]),
+                # rows of a table at both ends of an axis: their difference is the axis
+                far=[a + b for a, b in zip(joint.points_on()[0], axes[0], strict=True)]
+                if f"joints.{joint.name}.axis" in stated
+                else [],
             )
             for joint in mechanism.joints
         ],
@@ -110,6 +124,7 @@ def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
             if not point.name.startswith(MARKER)
         ],
         wheels=_wheels(case),
+        springs=_springs(case),
         forces=_forces(case),
         frames=frames,
         message=message,
@@ -123,14 +138,41 @@ def _wheels(case: Case) -> list[SceneWheel]:
     for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
         if (radius := vehicle.radius(case.mechanism)) is not None:
             center = case.mechanism.point(vehicle.wheel_center)
+            moved = {case.sweep.driver, *case.sweep.motions}
+            alone = not vehicle.travel or moved <= {*vehicle.travel}
+            two = len(vehicle.kingpin or ()) == len(vehicle.kingpin_points) == 2
             found[center.name] = SceneWheel(
                 body=center.body,
                 center=list(center.position),
                 spin=[float(x) for x in vehicle.spin(case.mechanism)],
                 up=list(vehicle.up),
                 radius=radius,
+                kingpin=[*vehicle.kingpin_points] if two else [],
+                middle=[*vehicle.middle] if alone else [],
             )
     return list(found.values())
+
+
+def _springs(case: Case) -> list[SceneSpring]:
+    """Return the springs and dampers among the force elements, and those of motion ratios."""
+
+    def named(spring: object, damper: object) -> str:
+        return "both" if spring and damper else "damper" if damper else "spring"
+
+    found = {
+        each.points: (named(each.stiffness or each.curve, each.damping), each.bodies)
+        for each in case.mechanism.forces
+        if isinstance(each, SpringDamper)
+    }
+    for output in case.outputs:
+        if isinstance(output, MotionRatio):
+            a, b = (case.mechanism.point(name) for name in output.between)
+            kind = named(None, "damper" in output.name)
+            found.setdefault((a.position, b.position), (kind, (a.body, b.body)))
+    return [
+        SceneSpring(kind=kind, bodies=[*bodies], points=[[*point] for point in points])
+        for points, (kind, bodies) in found.items()
+    ]
 
 
 def _forces(case: Case) -> list[SceneForce]:

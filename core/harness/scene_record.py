@@ -30,6 +30,8 @@ class SceneJoint(msgspec.Struct, frozen=True, kw_only=True):
         bodies: names of the first and the second body.
         points: none, one common to both bodies, or one on each.
         axes: directions of any length: none, one common to both bodies, or one on each.
+        far: another place on the axis that the file states, such as the second pivot of an arm;
+            empty without one.
     """
 
     name: str
@@ -37,6 +39,21 @@ class SceneJoint(msgspec.Struct, frozen=True, kw_only=True):
     bodies: list[str]
     points: list[list[float]] = []
     axes: list[list[float]] = []
+    far: list[float] = []
+
+
+class SceneSpring(msgspec.Struct, frozen=True, kw_only=True):
+    """A spring or a damper between two bodies.
+
+    Attributes:
+        kind: "spring", "damper" or "both".
+        bodies: names of the first and the second body.
+        points: one on each, global at the design [m].
+    """
+
+    kind: str
+    bodies: list[str]
+    points: list[list[float]]
 
 
 class ScenePoint(msgspec.Struct, frozen=True, kw_only=True):
@@ -60,6 +77,9 @@ class SceneWheel(msgspec.Struct, frozen=True, kw_only=True):
         center: wheel centre [m].
         spin, up: unit vectors along the axis of rotation and away from the road [-].
         radius: from the wheel centre to the contact centre [m].
+        kingpin: names of the lower and the upper point of the steering axis; empty without two.
+        middle: a point of the vehicle's centre plane [m], if the sweep moves the wheels' travel
+            alone, so that its motion has a roll centre; otherwise empty.
     """
 
     body: str
@@ -67,6 +87,8 @@ class SceneWheel(msgspec.Struct, frozen=True, kw_only=True):
     spin: list[float]
     up: list[float]
     radius: float
+    kingpin: list[str] = []
+    middle: list[float] = []
 
 
 class SceneForce(msgspec.Struct, frozen=True, kw_only=True):
@@ -101,6 +123,7 @@ class Scene(msgspec.Struct, frozen=True, kw_only=True):
     joints: list[SceneJoint]
     points: list[ScenePoint]
     wheels: list[SceneWheel] = []
+    springs: list[SceneSpring] = []
     forces: list[SceneForce] = []
     frames: list[int] = []
     message: str = ""

@@ -49,8 +49,7 @@ class _Off:
     @property
     def rank(self) -> tuple[int, float]:
         """Sort key: positions first, then the largest deviation in tolerances."""
-        tolerance = self.deviation.tolerance
-        return self.order, -(self.deviation.max_abs / tolerance if tolerance else np.inf)
+        return self.order, -self.deviation.ratio
 
 
 def suspect(

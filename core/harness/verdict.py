@@ -112,7 +112,7 @@ def _deviations(
 def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
     """Return a sentence on the deviation farthest out of tolerance; empty if all are within."""
     outside: list[tuple[float, Quantity, str, Deviation]] = [
-        (off.max_abs / off.tolerance if off.tolerance else np.inf, output, quantity, off)
+        (off.ratio, output, quantity, off)
         for output in case.outputs
         for quantity, off in errors[output.name].items()
         if not off.within

@@ -12,6 +12,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import PurePath
 from typing import Any
 
 import msgspec
@@ -31,6 +32,23 @@ def same(a: Facts, b: Facts) -> bool:
     return a.get("command") == b.get("command")
 
 
+def _of_its_files(later: Facts, earlier: Facts) -> bool:
+    """Return whether a run was asked for all case files of an earlier one, as far as both tell:
+    another file may have a case of the same name.
+
+    Of two paths one may be the end of the other, as seen from another folder.
+    """
+    if not (later.get("selection") and earlier.get("selection")):
+        return True
+    paths = [PurePath(name).parts for name in later["selection"]["cases"]]
+    files = (PurePath(name) for name in earlier["selection"]["cases"])
+    return all(
+        any(path[-len(file.parts) :] == file.parts[-len(path) :] for path in paths)
+        for file in files
+        if file.suffix or len(file.parts) > 1  # otherwise a built-in name
+    )
+
+
 def alike(a: Facts, b: Facts) -> bool:
     """Return whether two runs solve and judge alike, as far as both tell their options."""
     ours, theirs = a.get("selection"), b.get("selection")
@@ -41,8 +59,8 @@ def series(rows: Iterable[RunRow]) -> list[list[RunRow]]:
     """Return the runs, given from the first to the last, as series of the same thing; of several,
     the one with the earliest run first.
 
-    A run goes on with a series if it was asked for the same as its last run, or has all pairs of
-    this run and solves and judges alike.
+    A run goes on with a series if it was asked for the same as its last run, or has all pairs and
+    case files of this run and solves and judges alike.
     """
     found: list[list[RunRow]] = []
     for row in rows:
@@ -50,7 +68,11 @@ def series(rows: Iterable[RunRow]) -> list[list[RunRow]]:
             each
             for each in found
             if same(row.key, each[-1].key)
-            or (alike(row.key, each[-1].key) and {*row.plan}.issuperset(each[-1].plan))
+            or (
+                alike(row.key, each[-1].key)
+                and {*row.plan}.issuperset(each[-1].plan)
+                and _of_its_files(row.key, each[-1].key)
+            )
         ]
         for other in going_on[1:]:
             going_on[0].extend(other)

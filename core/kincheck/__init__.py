@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from kincheck import core
 
 if TYPE_CHECKING:
+    from kincheck import primitives
     from kincheck.by_name import (
         check_engine,
         compliance,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
         sweep,
     )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
-    from kincheck.core import primitives
 
 _BY_NAME = ("check_engine", "compliance", "explain", "free", "load", "report", "run", "sweep")
 __all__ = [
@@ -53,7 +53,7 @@ if not TYPE_CHECKING:  # otherwise type checkers would accept any name
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         if name == "primitives":
-            found = import_module("kincheck.core.primitives")
+            found = import_module("kincheck.primitives")
         else:
             module = import_module("kincheck.by_name") if name in _BY_NAME else core
             found = getattr(module, name)

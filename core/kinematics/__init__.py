@@ -16,6 +16,7 @@ Solve:
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
     count_turns        an angle known up to whole turns, from sample to sample
+    begun_turns        the whole turns at which coupled joints of a recording begin
     residuals          what poses from elsewhere leave of the rows, and what their digits allow
     needed_forces      the forces that a motion from elsewhere needs, and what nothing holds
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
@@ -89,7 +90,16 @@ if TYPE_CHECKING:
     from .free_poses import FreePoses, Poses, Walked
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
-    from .replay import Residuals, Worst, count_turns, judged_part, replayed, residuals
+    from .replay import (
+        TURN,
+        Residuals,
+        Worst,
+        begun_turns,
+        count_turns,
+        judged_part,
+        replayed,
+        residuals,
+    )
     from .replayed_forces import Needed, needed_forces
     from .statics.equations import LoadPoint
     from .statics.equilibrium import Equilibria, StaticModel
@@ -122,7 +132,7 @@ _NAMES = {
     "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
-    "replay": "Residuals Worst count_turns judged_part replayed residuals",
+    "replay": "TURN Residuals Worst begun_turns count_turns judged_part replayed residuals",
     "replayed_forces": "Needed needed_forces",
     "statics.equations": "LoadPoint",
     "statics.equilibrium": "Equilibria StaticModel",

@@ -108,6 +108,8 @@ def by_program(
 # it is compiled. Larger rings are so near to singular that the estimate of sigma by one program
 # leaves all their samples in doubt.
 ONE_PROGRAM = 40
+# Moving bodies of a component up to which it is made ready in a third of a second.
+COMPONENT = 20
 
 
 def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
@@ -161,7 +163,7 @@ def by_blocks(
         except SolveError:
             require_driven(mechanism)  # which names what can still move
             raise
-        by_components = 0 < max((len(part.bodies) for part in parts), default=0) <= ONE_PROGRAM
+        by_components = 0 < max((len(part.bodies) for part in parts), default=0) <= COMPONENT
     lanes = _lanes(mechanism, request, parts) if by_components else SparseLanes(mechanism, request)
 
     def along(path: Path) -> Solver:

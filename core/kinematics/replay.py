@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ WIDTHS = {"poses": 7, "velocities": 6, "accelerations": 6}
 TURN = 2.0 * np.pi
 # Angles are this near to zero at one sample as at another: rounding must not decide [rad].
 NEAR = 1e-3
+SMALL = 1e-9
+# A recording may begin after so many turns of so many coupled joints; so many samples tell.
+MOST_TURNS, MOST_OPEN, SAMPLES = 20, 3, 25
 # Lanes at once: some 10 kB each for twenty bodies.
 MOST_LANES = 20_000
 # Divides what is left where nothing is allowed: far below all rounding.
@@ -209,12 +213,31 @@ def count_turns(angle: Array) -> Array:
     return whole - TURN * np.round(whole[first] / TURN)
 
 
+def begun_turns(mechanism: Mechanism, motions: Mapping[str, BodyMotion]) -> dict[str, int]:
+    """Return the whole turns at which coupled joints begin, by coordinate; see `count_turns`."""
+    part, _ = judged_part(mechanism, motions)
+    if not part.couplers:
+        return {}
+    rows = _Rows(part, 1)
+    rows.left(motions)
+    return rows.whole
+
+
+def _counted(x: Array) -> Array:
+    """Return an angle with its turns counted, zero where it is unknown."""
+    there = np.isfinite(x)
+    found = np.zeros(len(x))
+    found[there] = count_turns(x[there])
+    return found
+
+
 class _Rows:
     """The native rows of a mechanism without drivers, and of their rates as far as wanted."""
 
     def __init__(self, mechanism: Mechanism, orders: int) -> None:
         self.mechanism, self.orders = mechanism, orders
         self.turns: dict[str, Array] = {}
+        self.whole: dict[str, int] = {}
         self.formulation = Cartesian.of(mechanism, frames(mechanism))
         self.bodies = [self._bodies(c) for _, c in _numbered(self.formulation)]
 
@@ -251,18 +274,42 @@ class _Rows:
         return [unit * lines.stacked(each) if each else np.zeros((count, 0)) for each in found]
 
     def _turned(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Return a state with all turns of coupled joints: poses tell an angle up to whole turns,
-        which follow from sample to sample, from the one nearest to the design.
-        """
-        for key in [f"x {name}" for name in self.formulation.coordinates if "rotation" in name]:
-            (x,) = state[key]
-            if key not in self.turns:
-                there = np.flatnonzero(np.isfinite(x))
-                self.turns[key] = np.zeros(len(x))
-                self.turns[key][there] = count_turns(x[there])
-            around = np.resize(self.turns[key], len(x))
-            state[key] = (x - TURN * np.round((x - around) / TURN),)
+        """Return a state with all turns of coupled joints."""
+        turning = [name for name in self.formulation.coordinates if "rotation" in name]
+        if not self.turns:
+            self.turns = {name: _counted(state[f"x {name}"][0]) for name in turning}
+            slides = {name: state[f"x {name}"][0] for name in self.formulation.coordinates}
+            for c in self.formulation.constraints:
+                if isinstance(c, Relation):
+                    self._begin(c, {**slides, **self.turns})
+        for name in turning:
+            (x,) = state[f"x {name}"]
+            around = np.resize(self.turns[name], len(x))
+            state[f"x {name}"] = (x - TURN * np.round((x - around) / TURN),)
         return state
+
+    def _begin(self, relation: Relation, values: Mapping[str, Array]) -> None:
+        """Begin to count at the fewest whole turns with which coupled joints fit: poses leave them
+        open, and a recording may begin after several.
+        """
+        free = [name for name in relation.weights if name in self.turns.keys() - self.whole.keys()]
+        at = np.column_stack([values[name] for name in relation.weights])
+        at = at[np.isfinite(at).all(axis=1)]
+        if not len(at) or len(free) > MOST_OPEN:
+            return
+        at = at[:: 1 + len(at) // SAMPLES]
+        numbers = range(-MOST_TURNS, MOST_TURNS + 1)
+        fewest: list[tuple[int, ...]] = sorted(
+            product(numbers, repeat=len(free)), key=lambda each: sum(map(abs, each))
+        )
+        added = dict(zip(free, TURN * np.array(fewest).T[..., None], strict=True))
+        x = [each + added.get(name, 0.0) for name, each in zip(relation.weights, at.T, strict=True)]
+        left = np.median(np.abs(relation.value(x)), axis=-1)
+        fits = np.flatnonzero(left <= 2.0 * left.min() + SMALL)
+        begun = fewest[int(fits[0])] if left.min() < NEAR else (0,) * len(free)
+        for name, number in zip(free, begun, strict=True):
+            self.whole[name] = number
+            self.turns[name] = self.turns[name] + TURN * number
 
     def changes(
         self,

@@ -184,11 +184,8 @@ const DIRECTIONS = {
   function start(message) {
     parts.first = false;
     const { outputs, axis } = opening;
-    one("#scene [data-layer=forces]").closest("label").hidden = !message.drawing.arrows.length;
-    parts.scene = mechanism(one("#scene"), message.drawing);
-    const slider = one("#scene input[type=range]");
-    slider.max = message.drawing.steps.length - 1;
-    slider.value = message.drawing.start;
+    const stem = opening.file.replace(/\.[^.]*$/, "");
+    parts.scene = mechanism(one("#scene"), message.drawing, `${stem}_scene`, trouble);
     if (parts.planes) {
       parts.planes.change(message.drawing);
       parts.planes.ghost(message.drawing);

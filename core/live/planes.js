@@ -31,13 +31,13 @@ function planes(box, points, { metres, file, step }, design, choose) {
     const [azimuth, elevation] = PLANES[plane];
     let held = null;
 
-    const camera = () =>
-      cameraOf(azimuth, elevation, 1, state.bounds, canvas.clientWidth, canvas.clientHeight);
+    const look = { azimuth, elevation, zoom: 1, layers: ["wheels"] };
+    const camera = () => cameraOf(look, state.bounds, canvas.clientWidth, canvas.clientHeight);
 
     function draw() {
       if (!state.motion || !canvas.clientWidth) return;
-      const look = { frame: state.drawing.start, azimuth, elevation, zoom: 1, layers: ["wheels"] };
-      paint(figure, state.drawing, state.motion, state.bounds, look);
+      const { drawing, motion, bounds } = state;
+      paint(figure, drawing, motion, bounds, { ...look, frame: drawing.start });
       const style = getComputedStyle(figure);
       const colour = (key) => style.getPropertyValue(`--${key}`).trim();
       const { seen } = camera();

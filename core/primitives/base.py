@@ -29,11 +29,27 @@ twist and dpi of a row have components in their own body.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, ClassVar, NamedTuple
 
-from ..algebra import IDENTITY, UNIT, ZERO, Mat3, Quat, Scalar, Vec3, cross, rotation_less_identity
+from ..algebra import (
+    IDENTITY,
+    UNIT,
+    ZERO,
+    Mat3,
+    Quat,
+    Scalar,
+    Vec3,
+    X,
+    Y,
+    Z,
+    cross,
+    rotation_less_identity,
+    vec,
+)
 from ..errors import SolveError
+from ..program.tape import Gradient, Tape, Traced, changes, folded
 
 
 class NoFormError(SolveError):
@@ -150,21 +166,43 @@ class Primitive(ABC):
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         """Return the residuals; zero when the condition holds. Lengths [m] or plain numbers."""
 
-    @abstractmethod
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        """Return the rows of the Jacobian."""
+        """Return the rows of the Jacobian; by default the derivative of phi, without the terms that
+        a simplified row leaves out.
+        """
+        traced = _Derivation(self, i, j)
+        vectors = [
+            vec(traced.values([slopes.get(k + part, 0.0) for part in range(3)]))
+            for slopes in changes(traced.tape, traced.phi, traced.slopes)
+            for k in range(0, 12, 3)
+        ]
+        return tuple(Row(*vectors[k : k + 4]) for k in range(0, len(vectors), 4))
 
-    @abstractmethod
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         """Return the right-hand sides of the acceleration equations: required values of rows .
-        acceleration.
+        acceleration; by default from the derivative of rows and nu.
         """
+        traced = _Derivation(self, i, j, vi, vj)
+        if type(self).rows is Primitive.rows:
+            speeds = traced.rates(traced.phi)
+        else:
+            pair = traced.i, traced.j
+            speeds = [
+                row.along("i", traced.vi) + row.along("j", traced.vj) - value
+                for row, value in zip(
+                    traced.primitive.rows(*pair), traced.primitive.nu(*pair), strict=True
+                )
+            ]
+        return tuple(-x for x in traced.values(traced.rates(speeds)))
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         """Return the right-hand sides of the velocity equations: zero unless driven, linear in the
-        drive's rate.
+        drive's rate; by default from phi.
         """
-        return (0.0,) * self.n
+        if not hasattr(self, "drive"):
+            return (0.0,) * self.n
+        traced = _Derivation(self, i, j)
+        return tuple(-x for x in traced.values(traced.rates(traced.phi)))
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         """Return numbers that are positive on the intended branch of phi = 0; empty without
@@ -190,3 +228,101 @@ class Primitive(ABC):
             NoFormError: the primitive has none.
         """
         return self.paper_form()
+
+
+class _Derivation:
+    """A primitive and the motion of its bodies as inputs of a tape of its own, to differentiate its
+    equations by their operations.
+
+    Attributes:
+        slopes: derivatives of the inputs of poses by (dr_i, dpi_i, dr_j, dpi_j).
+        speeds: derivatives of the inputs by time, at constant velocities.
+    """
+
+    def __init__(
+        self,
+        primitive: Any,
+        i: Pose,
+        j: Pose,
+        vi: Twist = GROUND_TWIST,
+        vj: Twist = GROUND_TWIST,
+    ) -> None:
+        self.tape = Tape()
+        self.given: dict[int, Scalar] = {}
+        self.i, self.j = (
+            Pose(
+                self._vector(p.u),
+                Quat(self._input(p.q.e0), self._vector(p.q.e)),
+                Mat3(*map(self._vector, p.D)),
+            )
+            for p in (i, j)
+        )
+        self.vi, self.vj = (Twist(self._vector(t.v), self._vector(t.w)) for t in (vi, vj))
+        motion = [x for t in (self.vi, self.vj) for a in (t.v, t.w) for x in a]
+        self.slopes: dict[Traced, Gradient] = {}
+        for first, pose in ((0, self.i), (6, self.j)):
+            turned = [
+                [*(Quat(0.0, 0.5 * axis) * pose.q), *(x for c in pose.A.T for x in cross(axis, c))]
+                for axis in (X, Y, Z)
+            ]
+            self.slopes |= {x: {first + k: 1.0} for k, x in enumerate(pose.u)}
+            for x, *about in zip(
+                (*pose.q, *(x for c in pose.D.T for x in c)), *turned, strict=True
+            ):
+                self.slopes[x] = {first + 3 + k: slope for k, slope in enumerate(about)}
+        self.speeds: dict[Traced, Gradient] = {
+            x: {0: sum((k * motion[n] for n, k in slopes.items()), 0.0)}
+            for x, slopes in self.slopes.items()
+        }
+        self.primitive: Primitive = self._lifted(primitive)
+        if hasattr(primitive, "drive"):
+            self.primitive = replace(self.primitive, drive=self._driven(primitive.drive))
+
+    @property
+    def phi(self) -> tuple[Scalar, ...]:
+        """The residuals."""
+        return self.primitive.phi(self.i, self.j)
+
+    def rates(self, values: Sequence[Scalar]) -> list[Scalar]:
+        """Return the derivatives of traced values by time, at constant velocities."""
+        return [each.get(0, 0.0) for each in changes(self.tape, values, self.speeds)]
+
+    def values(self, traced: Sequence[Scalar]) -> list[Scalar]:
+        """Return the traced scalars for the motion and the geometry that were given."""
+        return folded(self.tape, traced, self.given)
+
+    def _input(self, value: Scalar) -> Traced:
+        self.given[len(self.given)] = value
+        return self.tape.input(len(self.given) - 1)
+
+    def _vector(self, a: Vec3) -> Vec3:
+        return vec([*map(self._input, a)])
+
+    def _driven(self, drive: Drive) -> Drive:
+        given = {each.name: self._input(getattr(drive, each.name)) for each in fields(drive)}
+        driven = Drive(**given)
+        half = 0.5 * driven.c_t
+        for x, speed in (
+            (driven.c, driven.c_t),
+            (driven.c_t, driven.c_tt),
+            (driven.half_cos, -driven.half_sin * half),
+            (driven.half_sin, driven.half_cos * half),
+        ):
+            self.speeds[x] = {0: speed}
+        return driven
+
+    def _lifted(self, value: Any) -> Any:
+        """Return a value with its numbers of other kinds, such as those of varied geometry, as
+        inputs.
+        """
+        if isinstance(value, int | float | complex | str):
+            return value
+        if hasattr(value, "__truediv__"):
+            return self._input(value)
+        if isinstance(value, tuple):
+            return tuple(map(self._lifted, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        if is_dataclass(value) and not isinstance(value, type):
+            parts = {each.name: getattr(value, each.name) for each in fields(value)}
+            lifted = {name: self._lifted(part) for name, part in parts.items()}
+            return replace(value, **{k: x for k, x in lifted.items() if x is not parts[k]})
+        return value

@@ -23,6 +23,7 @@ From a plan to machine code:
   tables.
 - `llvm.loops`: loops over lanes as LLVM text, the same for all plans. `llvm.plan` lays out a plan
   in memory for them.
+- `llvm.fixed_order`: sparse LU factors of several matrices at once, as loops over lists of places.
 - `llvm.compiler`: compile the text, link the object file, and load it.
 - `llvm.jit`: choose cached code, interpretation or compilation for a plan.
 - `disk_cache`: keep machine code, tables and traced programs on disk.

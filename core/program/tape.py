@@ -323,7 +323,20 @@ def jacobian(
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",
             "max", "larger", "where").
     """
-    gradients: dict[int, Gradient] = {each.number: {k: 1.0} for k, each in enumerate(inputs)}
+    return changes(tape, values, {each: {k: 1.0} for k, each in enumerate(inputs)}, smooth=smooth)
+
+
+def changes(
+    tape: Tape,
+    values: Sequence[Scalar],
+    inputs: Mapping[Traced, Gradient],
+    *,
+    smooth: bool = False,
+) -> list[Gradient]:
+    """Return the derivatives of each value by parameters, on which inputs depend with these
+    derivatives; see `jacobian`.
+    """
+    gradients = {each.number: gradient for each, gradient in inputs.items()}
     # the tape grows as the derivatives are traced
     for number, node in enumerate(tuple(tape.nodes)):
         read = operands(node)
@@ -348,8 +361,10 @@ def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
     return {k: value for k, value in total.items() if isinstance(value, Traced) or value != 0.0}
 
 
-def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, float]) -> list[Scalar]:
-    """Return scalars with numbers in place of some inputs, by slot: all operations fold again."""
+def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, Scalar]) -> list[Scalar]:
+    """Return scalars with numbers in place of some inputs, by slot, or with scalars of one other
+    kind in place of all: all operations fold again.
+    """
     new: dict[int, Scalar] = {}
     waiting = [each.number for each in values if isinstance(each, Traced)]
     live = set[int]()

@@ -183,7 +183,7 @@ def _of_driver(
                 best = sorted(lowest, key=left.__getitem__)
                 zeros = [float(grid[k]) for k in best[:_TRIED]]
             for zero in zeros:
-                if found := change.refined(unit, factor, zero):
+                if found := change.refined(unit, factor, zero, reach * max(1.0, abs(factor))):
                     yield found
 
 
@@ -224,12 +224,14 @@ class _Change:
         sign = min(sizes, key=lambda k: float(np.nan_to_num(sizes[k], nan=np.inf)))
         return sign, sizes[sign]
 
-    def refined(self, unit: str, factor: float, zero: float) -> str:
-        """Return a phrase on the best zero near a given one, by Newton on exact curves; empty if
-        an output is still out of tolerance.
+    def refined(self, unit: str, factor: float, first: float, reach: float) -> str:
+        """Return a phrase on the best zero within reach of the first, by Newton on exact curves;
+        empty if an output is still out of tolerance.
         """
+        zero = first
         for _ in range(_STEPS):
-            rest = self._rest(factor, zero)
+            # outputs that no motion has would send it thousands of turns away
+            rest = self._rest(factor, zero) if abs(zero - first) <= reach else None
             if rest is None:
                 return ""
             if all(each.fits(left - offset) for each, _, offset, left, _ in rest):

@@ -11,6 +11,7 @@ import platform
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -22,7 +23,7 @@ import numpy as np
 from ..case.case import TIME, Case
 from ..case.io.document import fault, read_bytes
 from ..case.models.trees.element import Element, parse_xml
-from ..errors import MOST_NAMED, KincheckError, shortened
+from ..errors import MOST_NAMED, KincheckError, brief, shortened
 from ..extras import how_to_install, installed_version
 from ..harness.reported import Reported
 from ..trajectory import Array
@@ -261,7 +262,8 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
     for name, use in numbers.items():
         head = variables[use.column].head
         if name in inputs and not variables[use.column].free:
-            raise fault(file, MAP, f"found {head.name} for {name}, expected an input of the FMU")
+            problem = f"found {brief(head.name)} for {name}, expected an input of the FMU"
+            raise fault(file, MAP, f'{problem}; say {MAP} "INPUT={name}"')
         if not (use.unit or head.unit or use.si == "1"):
             problem = f"found no unit of {head.name}, expected one of {use.si}"
             raise fault(file, MAP, f'{problem}; say {MAP} "{head.name}={name} [UNIT]"')
@@ -285,7 +287,7 @@ def _description(file: Path) -> tuple[Element, Sequence[str]]:
             if size > LARGEST_DESCRIPTION:
                 raise fault(file, "", f"describes itself in {size} bytes; export fewer variables")
             text = archive.read("modelDescription.xml").decode("utf-8")
-    except (zipfile.BadZipFile, KeyError, UnicodeDecodeError, RuntimeError, EOFError, OSError):
+    except (zipfile.BadZipFile, zlib.error, ValueError, KeyError, RuntimeError, EOFError, OSError):
         problem = "found no model description in a zip archive, expected an FMU"
         raise fault(file, "", f"{problem}; export it anew") from None
     return parse_xml(file, text), names
@@ -301,7 +303,8 @@ def _require_binary(file: Path, names: Sequence[str], fmi: int) -> None:
         own = f"{short}{64 if sys.maxsize > 2**32 else 32}"
     there = sorted({name.split("/")[1] for name in names if name.startswith("binaries/")} - {""})
     if own not in there:
-        raise fault(file, "", f"has binaries for {', '.join(there) or 'no machine'}, this is {own}")
+        known = ", ".join(map(brief, there[:MOST_NAMED])) or "no machine"
+        raise fault(file, "", f"has binaries for {known}, this is {own}; export it for {own}")
 
 
 def _states(structure: Element, fmi: int) -> Sequence[Element]:

@@ -1,15 +1,12 @@
 """Readers of recordings: tables, motions of OpenSim (.mot, .sto), results of Adams in XML (.res),
-and MAT-files, of Modelica tools (level 4) and of MATLAB (level 5).
+and MAT-files.
 """
 
 from __future__ import annotations
 
-import io
 import re
-from collections.abc import Iterator, Mapping
-from importlib import import_module
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +14,8 @@ from ..case.io.document import fault, read_bytes, read_text, shown
 from ..case.io.reference_samples import layout_of, read_table, samples_of
 from ..case.io.table import unit_of_head
 from ..case.models.trees.element import Element, parse_xml
-from ..errors import MOST_NAMED, CaseError, brief, remedy, shortened
-from ..trajectory import Array
+from ..errors import MOST_NAMED, remedy, shortened
+from .mat_files import of_mat
 from .recording import Choose, Column, Head, Recording, column_of
 
 LARGEST_FILE = 256_000_000
@@ -28,8 +25,6 @@ _DEGREES = re.compile(r"^\s*inDegrees\s*=\s*(yes|no)\s*$", re.IGNORECASE | re.MU
 # Blocks of an analysis that are no motion.
 _NO_MOTION = ("modelInput", "initialConditions")
 _POSE = "_XFORM"
-_UNIT = re.compile(r"\[([^\]|]*)")
-_V73 = (b"MATLAB 7.3", b"\x89HDF")
 
 UNREAD: Mapping[str, str] = {
     ".abf": "a binary result of MotionSolve; in HyperGraph, export the curves as CSV",
@@ -64,7 +59,7 @@ def read_recording(
     if analysis is not None:
         raise fault(file, "--analysis", "found for a file without analyses; leave it out")
     if suffix == ".mat":
-        return _of_mat(file, choose)
+        return of_mat(file, choose, read_bytes(file, LARGEST_FILE, LESS), LARGEST_FILE)
     return _of_table(file, choose, sheet)
 
 
@@ -153,73 +148,3 @@ def _heads(analysis: Element) -> Mapping[int, Head]:
             posed = part if name.endswith(_POSE) else ()
             found[int(number)] = Head(head, "" if unit == "no_units" else unit, posed)
     return found
-
-
-def _of_mat(file: Path, choose: Choose) -> Recording:
-    data = read_bytes(file, LARGEST_FILE, LESS)
-    if data.startswith(_V73):
-        raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
-    try:
-        scipy_io: Any = import_module("scipy.io")  # slow to import
-        found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
-        modelica = "Aclass" in found and "dataInfo" in found
-        series = [*(_of_modelica(found) if modelica else _of_matlab(found))]
-    except CaseError:
-        raise
-    except Exception as error:  # scipy raises many errors for a damaged file
-        what = brief(f"{type(error).__name__}: {error}")
-        expected = "expected one of MATLAB (save with -v7) or of a Modelica tool; or give CSV"
-        raise fault(file, "", f"found no readable MAT-file ({what}), {expected}") from None
-    chosen = choose([head for head, _ in series])
-    columns = {k: Column(series[k][0], *_numbers(series[k][1])) for k in chosen}
-    return Recording(file, columns, "Modelica" if modelica else "MATLAB")
-
-
-def _numbers(values: Any) -> tuple[Array, Array]:
-    """Return numbers, and half the distance of those of single precision."""
-    single = values.dtype == np.float32
-    exact = values.astype(np.float64)
-    known = np.where(np.isfinite(exact), exact, np.nan)
-    half = 0.5 * np.spacing(np.abs(values)).astype(np.float64) if single else np.zeros(len(values))
-    return known, half
-
-
-def _of_modelica(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
-    """Yield heads and values by the layout of Dymola and OpenModelica; constants are repeated."""
-    kind = ["".join(row).rstrip("\0 ") for row in found["Aclass"]]
-    turned = len(kind) > 3 and kind[3] == "binTrans"
-
-    def table(name: str) -> Any:
-        return found[name].T if turned else found[name]
-
-    names, texts = (
-        ["".join(row).rstrip("\0 ") for row in table(key)] for key in ("name", "description")
-    )
-    count = len(table("data_2"))
-    for name, text, (block, column, *_) in zip(
-        names, texts, table("dataInfo").tolist(), strict=True
-    ):
-        values = table(f"data_{int(block) or 2}")[:, abs(int(column)) - 1]
-        values = -values if column < 0 else values
-        unit = _UNIT.search(text)
-        if block == 1:  # constants have their first and last value
-            values = np.repeat(values[:1], count)
-        yield Head(name, unit[1].strip() if unit else ""), values
-
-
-def _of_matlab(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
-    """Yield columns of matrices and of the fields of structs, those of one length."""
-    tables: dict[str, Any] = {}
-    for name, each in found.items():
-        if name.startswith("__"):
-            continue
-        if each.dtype.names and each.size == 1:
-            tables |= {f"{name}.{field}": each[field].item() for field in each.dtype.names}
-        else:
-            tables[name] = each
-    for name, each in tables.items():
-        numbers: Any = np.asarray(each)
-        if numbers.dtype.kind in "fiu" and numbers.ndim == 2:
-            numbers = numbers.T if numbers.shape[0] == 1 else numbers
-            for k in range(numbers.shape[1]):
-                yield Head(name if numbers.shape[1] == 1 else f"{name}({k + 1})"), numbers[:, k]

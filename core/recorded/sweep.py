@@ -17,13 +17,18 @@ from ..case.case import TIME, Case, Series, Sweep, Truth
 from ..case.curves import matched
 from ..case.io.document import fault, shown
 from ..case.io.schema import MOST_SAMPLES
-from ..mechanism.motions import Absolute, Motion, Table
+from ..kinematics import TURN, begun_turns
+from ..mechanism.motions import Absolute, JointDriver, Motion, Table
 from ..trajectory import Array
 from .meaning import MAP
 from .samples import Samples, driver_motion
 
 # Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance.
 SAME = 1e-12
+
+
+# Solving takes some milliseconds a turn, and is done for each digit and slip.
+MOST_TURNS = 10_000
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,11 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
     own = timed and time is not None and not stated
     followed = {} if own else _drives(case, samples)
     lead = next(iter(followed), TIME) if timed else sweep.driver
+    for name, each in followed.items():
+        turns = float(np.abs(np.diff(each.orders[0])).sum()) / TURN
+        if case.mechanism.driver(name).turns and turns > MOST_TURNS:
+            problem = f"driver {name} turns {turns:.3g} times, expected {MOST_TURNS} at most"
+            raise fault(file, "", f'{problem}; correct its unit by {MAP} "{name}=COLUMN [UNIT]"')
     notes = [f"{file}: driver {name} {each.source}" for name, each in followed.items()]
     if time is not None and lead not in followed:
         rate = 1.0 if timed else sweep.rate
@@ -151,6 +161,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
 def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
     """Return the recorded motions of drivers, of columns or else of poses."""
     found: dict[str, Drive] = {}
+    begun = begun_turns(case.mechanism, samples.motions)
     for driver in case.mechanism.drivers:
         columns = [
             samples.numbers.get(driver.name + ending)
@@ -168,13 +179,15 @@ def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
         if jet is None:
             continue
         orders = _orders(jet)
+        if isinstance(driver, JointDriver) and driver.turns:
+            orders[0] = orders[0] + TURN * begun.get(f"{driver.joint}.rotation", 0)
         halves = [np.zeros(samples.count) for _ in orders]
         for name, changed in samples.moved.items():
             for motion in changed:
                 motions = {**samples.motions, name: motion}
                 other = driver_motion(replace(samples, motions=motions), case.mechanism, driver)
                 assert other is not None
-                for half, a, b in zip(halves, _orders(other), orders, strict=False):
+                for half, a, b in zip(halves, _orders(other), _orders(jet), strict=False):
                     half += np.abs(a - b)
         if np.isfinite(orders[0]).all():
             found[driver.name] = Drive(orders, halves, "follows the recorded poses")

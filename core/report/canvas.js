@@ -13,10 +13,10 @@ function cleared(canvas, width, height) {
   return pen;
 }
 
-// The projection along a viewing direction.
-// Returns `seen`, the place of a point on the canvas [px] and its depth in sizes of the mechanism,
-// and `flat`, the components of a vector to the right and down.
-function cameraOf(azimuth, elevation, zoom, bounds, width, height) {
+// The projection along a viewing direction, enlarged and moved.
+// Returns `seen`, the place of a point on the canvas and towards the eye [px], `turn`, the same for
+// a vector, and `scale` [px/m].
+function cameraOf({ azimuth, elevation, zoom, pan = [0, 0] }, bounds, width, height) {
   const [ca, sa] = [Math.cos(azimuth), Math.sin(azimuth)];
   const [ce, se] = [Math.cos(elevation), Math.sin(elevation)];
   const right = [-sa, ca, 0];
@@ -25,13 +25,14 @@ function cameraOf(azimuth, elevation, zoom, bounds, width, height) {
   const reach = (axis) => Math.max(bounds.reach(axis), 0.05 * bounds.size);
   const fit = Math.min((width / 2 - 60) / reach(right), (height / 2 - 34) / reach(up));
   const scale = zoom * fit;
-  const flat = (vector) => [dot(right, vector), -dot(up, vector)];
-  const seen = (at) => {
-    const arm = sum(at, bounds.middle, -1);
-    const [x, y] = flat(arm);
-    return [width / 2 + scale * x, height / 2 + scale * y, dot(near, arm) / bounds.size];
-  };
-  return { seen, flat };
+  const turn = (vector) => [
+    scale * dot(right, vector),
+    -scale * dot(up, vector),
+    scale * dot(near, vector),
+  ];
+  const origin = [width / 2 + pan[0], height / 2 + pan[1], 0];
+  const seen = (at) => sum(origin, turn(sum(at, bounds.middle, -1)));
+  return { seen, turn, scale };
 }
 
 // Functions that draw lines and shapes through points on the canvas.
@@ -46,17 +47,22 @@ function brush(pen) {
     pen.setLineDash([]);
     pen.globalAlpha = 1;
   };
-  const area = (points, shade, alpha) => {
+  // edged: with an edge that closes the seam between two areas
+  const area = (points, shade, alpha, edged = false) => {
     pen.beginPath();
-    points.forEach(([x, y]) => pen.lineTo(x, y));
+    points.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y)));
     Object.assign(pen, { fillStyle: shade, globalAlpha: alpha });
     pen.fill();
+    if (edged) {
+      Object.assign(pen, { strokeStyle: shade, lineWidth: 0.8 });
+      pen.stroke();
+    }
     pen.globalAlpha = 1;
   };
   const disc = ([x, y], radius, fill, edge) => {
     pen.beginPath();
     pen.arc(x, y, radius, 0, 2 * Math.PI);
-    Object.assign(pen, { fillStyle: fill, strokeStyle: edge, lineWidth: 1.6 });
+    Object.assign(pen, { fillStyle: fill, strokeStyle: edge, lineWidth: 1.2 });
     pen.fill();
     pen.stroke();
   };

@@ -70,8 +70,8 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
         if record.case not in known:
             known.add(record.case)
             if reference := results.references.get(record.case):
-                tables.append((record.case, REFERENCE, _columns(about, record, reference)))
-        tables.append((record.case, record.engine, _columns(about, record, record.outputs)))
+                tables.append((record.case, REFERENCE, columns_of(about, record, reference)))
+        tables.append((record.case, record.engine, columns_of(about, record, record.outputs)))
     several = {"case": {case for case, *_ in tables}, "engine": {name for _, name, _ in tables}}
     labels = [name for name, among in several.items() if len(among) > 1]
     heads = dict.fromkeys(head for *_, columns in tables for head in columns)
@@ -81,10 +81,14 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
     return dict.fromkeys(labels, Kind.TEXT) | dict.fromkeys(heads, Kind.NUMBER), rows
 
 
-def _columns(
+def columns_of(
     about: Mapping[str, Any], record: Record, outputs: Mapping[str, OutputSeries]
 ) -> dict[str, list[float | None]]:
-    """Return the values of drivers and outputs in the units of the table, by their heads."""
+    """Return the values of drivers and outputs in the units of the table, by their heads.
+
+    Args:
+        about: facts of the case, with these units.
+    """
     drivers = {about["driver"]["name"]: about["driver"], **about["motions"]}
     found = dict[str, list[float | None]]()
 

@@ -37,6 +37,7 @@ SAME = 1e-6
 
 
 Numbers: TypeAlias = list[float]
+Wheel: TypeAlias = tuple[int, Numbers, Numbers, Numbers, float, list[int], Numbers]
 
 
 @dataclass
@@ -53,8 +54,11 @@ class Drawing:
         marks: node, kind of mark, axis in the body's frame or null, whether the joint is on a fixed
             body.
         labels: two nodes, and the text between them.
-        wheels: body, centre [m] and axis of rotation in its frame, global upward direction, and
-            radius [m].
+        springs: two nodes, and "spring", "damper" or "both".
+        tubes: a node of a slide, and a place on its axis as far as its file states [m].
+        wheels: body, centre [m] and axis of rotation in its frame, global upward direction, radius
+            [m], nodes of the steering axis and a point of the vehicle's centre plane; empty if
+            there are none.
         arrows: body, place in its frame [m], label, and global force [N] in each frame of the
             scene; null if unknown.
         paths: nodes whose path over the frames is drawn.
@@ -74,9 +78,9 @@ class Drawing:
         default_factory=list[tuple[int, str, list[float] | None, bool]]
     )
     labels: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
-    wheels: list[tuple[int, Numbers, Numbers, Numbers, float]] = field(
-        default_factory=list[tuple[int, Numbers, Numbers, Numbers, float]]
-    )
+    springs: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
+    tubes: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    wheels: list[Wheel] = field(default_factory=list[Wheel])
     arrows: list[tuple[int, Numbers, str, list[Numbers | None]]] = field(
         default_factory=list[tuple[int, Numbers, str, list["Numbers | None"]]]
     )
@@ -85,12 +89,6 @@ class Drawing:
     start: int = 0
     joints: list[tuple[str, str, str]] = field(default_factory=list[tuple[str, str, str]])
     caption: str = ""
-
-    @property
-    def layers(self) -> list[str]:
-        """Return the names of the layers that the page can hide."""
-        there = {"wheels": self.wheels, "forces": self.arrows}
-        return ["names", "frames", "paths", *(name for name, each in there.items() if each)]
 
 
 def drawing(
@@ -122,6 +120,10 @@ class _Draughtsman:
             self._label(node, node, point.name)
             if point.output and scene.frames:
                 self.drawn.paths.append(node)
+        for spring in scene.springs:
+            ends = zip(spring.bodies, spring.points, strict=True)
+            first, second = (self._node(*end) for end in ends)
+            self.drawn.springs.append((first, second, spring.kind))
         self.drawn.wheels = [self._wheel(wheel) for wheel in scene.wheels]
         self.drawn.bodies = [self._body(k) for k in range(len(self.bodies))]
         self.drawn.steps = [f"sample {k} · {axis.at(k)}".removesuffix(" · ") for k in scene.frames]
@@ -158,10 +160,12 @@ class _Draughtsman:
         arm = vec(position) - vec(self.bodies[number].origin)
         return number, list(_in_body(self.bodies[number], arm))
 
-    def _wheel(self, wheel: SceneWheel) -> tuple[int, Numbers, Numbers, Numbers, float]:
+    def _wheel(self, wheel: SceneWheel) -> Wheel:
         number, center = self._local(wheel.body, wheel.center)
         spin = list(_in_body(self.bodies[number], vec(wheel.spin)))
-        return number, center, spin, wheel.up, wheel.radius
+        points = {point.name: point for point in self.scene.points}
+        ends = [self._node(points[name].body, points[name].position) for name in wheel.kingpin]
+        return number, center, spin, wheel.up, wheel.radius, ends, wheel.middle
 
     def _from_design(self, frame: int) -> float:
         """Return the distance of the bodies from the design position [m + -], to compare frames."""
@@ -201,7 +205,13 @@ class _Draughtsman:
                 if joint.axes
                 else None
             )
-            self._mark(first, MARKS.get(joint.type, "other"), axis, i, j)
+            kind = MARKS.get(joint.type, "other")
+            self._mark(first, kind, axis, i, j)
+            if joint.far and kind == "slide":
+                self.drawn.tubes.append((first, self._node(j, joint.far)))
+            elif joint.far:
+                self._node(j, joint.far)
+                self._mark(self._node(i, joint.far), kind, axis, i, j)
 
     def _mark(self, node: int, kind: str, axis: list[float] | None, *bodies: str) -> None:
         self.drawn.marks.append(
@@ -223,7 +233,11 @@ class _Draughtsman:
         """
         body = self.bodies[number]
         if not body.fixed:
-            mine = [k for k, (other, *_) in enumerate(self.drawn.nodes) if other == number]
+            mine = [
+                k
+                for k, (other, *place) in enumerate(self.drawn.nodes)
+                if other == number and not self._on_road(number, place)
+            ]
             # the global origin is the default, not a given origin
             if len(mine) == 1 and any(body.origin):
                 mine = sorted({*mine, self._node(body.name, body.origin)})
@@ -231,6 +245,13 @@ class _Draughtsman:
         frame = self._frame([vec(place) for other, *place in self.drawn.nodes if other == number])
         r, p = body.r or [body.origin], body.p or [body.euler_parameters]
         return {"name": body.name, "fixed": body.fixed, "frame": frame, "r": r, "p": p}
+
+    def _on_road(self, number: int, place: Sequence[float]) -> bool:
+        """Return whether a place of a body is as far from a wheel's centre as the tyre is high."""
+        return any(
+            wheel[0] == number and abs(math.dist(place, wheel[1]) - wheel[4]) < SAME
+            for wheel in self.drawn.wheels
+        )
 
     def _link(self, number: int, nodes: Sequence[int]) -> None:
         if len(nodes) <= ALL_JOINED:

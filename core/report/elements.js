@@ -52,7 +52,7 @@ function listenToKeys(on, keys) {
     if (!(event.key in keys) || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
-    keys[event.key]();
+    keys[event.key](event);
   });
 }
 
@@ -71,7 +71,7 @@ function standalone(box) {
   return copy.outerHTML;
 }
 
-// Hand a text to the user as a file.
+// Hand a text or a blob to the user as a file.
 function save(text, type, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([text], { type }));

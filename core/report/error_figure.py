@@ -71,21 +71,23 @@ def error_figure(
         "meta": {"floor": floor},
     }
     if tolerance:
-        line = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": tolerance, "y1": tolerance}
-        below = {
-            "type": "rect",
-            "xref": "paper",
-            "x0": 0,
-            "x1": 1,
-            "y0": floor / 10,
-            "y1": tolerance,
-            "layer": "below",
-        }
-        layout["shapes"] = [
-            {**below, "line": {"width": 0}, "fillcolor": "rgba(0,158,115,0.07)"},
-            {**line, "line": {"width": 1.5, "dash": "dot", "color": "#7f7f7f"}},
-        ]
+        layout["shapes"] = accepted(floor, tolerance)
     return {"data": traces, "layout": layout}
+
+
+def accepted(floor: float, tolerance: float) -> list[Figure]:
+    """Return the field of accepted errors above a floor, and the line of the tolerance over it."""
+    across = {"xref": "paper", "x0": 0, "x1": 1, "y1": tolerance}
+    below = {"type": "rect", **across, "y0": floor / 10, "layer": "below"}
+    return [
+        {**below, "line": {"width": 0}, "fillcolor": "rgba(0,158,115,0.07)"},
+        {
+            "type": "line",
+            **across,
+            "y0": tolerance,
+            "line": {"width": 1.5, "dash": "dot", "color": "#7f7f7f"},
+        },
+    ]
 
 
 def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:

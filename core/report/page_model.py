@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,12 +13,15 @@ from ..harness.labels import against, engine_name, motion_unit, number, output_l
 from ..harness.record import Deviation, OutputSeries, Record, Results
 from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
-from ..unit_text import motion_word, value_text
+from ..unit_text import FORCES, motion_word, value_text
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .error_figure import error_figure
-from .figure_data import Effort, Past, precision_figure, trend_figures
+from .figure_data import Effort, Mark, Past, marks, precision_figure, trend_figures
 from .figures import Figure, Style, Values, band_is_thin, output_figure
+
+ROUND_OFF = 1e-12
+"""Part of a value by which an output may change that counts as constant without a tolerance."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +36,7 @@ class Judged:
     @property
     def ratio(self) -> float:
         """The error in tolerances."""
-        d = self.deviation
-        return (
-            d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
-        )
+        return self.deviation.ratio
 
     @property
     def word(self) -> str:
@@ -78,12 +79,15 @@ class OutputView:
     """One output of a case: its curves against the driver, and their differences to the standard.
 
     Attributes:
+        constant: whether it moves by less than its tolerance, and is right.
         errors: a figure for each compared quantity.
         rates: the quantities of these figures after the first.
     """
 
     name: str
     label: str
+    unit: str
+    constant: bool
     plot: Plot
     errors: list[Plot]
     rates: list[str]
@@ -98,7 +102,8 @@ class CaseView:
         worst: the deviation closest to its tolerance, or farthest beyond it.
         account: the degrees of freedom, as counted in the paper and by rank.
         scene: the drawn mechanism; None if the results have none.
-        trends: error and time over earlier runs; empty without a history.
+        trends: errors and time over earlier runs; empty without a history.
+        marks: steps and other versions in them.
         precision: error against time at several effort settings, by mode; empty if not measured.
     """
 
@@ -114,6 +119,7 @@ class CaseView:
     account: Mapping[str, Any] | None
     scene: Drawing | None
     trends: list[Plot]
+    marks: Sequence[Mark]
     precision: list[Plot]
 
     def by_engine(self, name: str) -> list[Record]:
@@ -159,7 +165,7 @@ def case_view(
         records=records,
         evidence=next((record.evidence for record in records if record.evidence), None),
         axis=axis,
-        outputs=outputs,
+        outputs=sorted(outputs, key=lambda each: each.unit not in FORCES),
         worst=worst(deviations),
         account=next(
             (r.details["dof_account"] for r in records if r.details.get("dof_account")), None
@@ -168,6 +174,7 @@ def case_view(
         if name in results.scenes
         else None,
         trends=_trends(anchor, given.history.get(name, ()), styles, figures),
+        marks=marks(given.history.get(name, ())),
         precision=_precision(anchor, given.precision.get(name, ()), styles, figures),
     )
 
@@ -224,7 +231,19 @@ def _output(
         f"{label} against {axis.name}, all engines",
         " ".join([*sentences, axis.besides]).strip(),
     )
-    return OutputView(output, label, plot, errors, compared[1:])
+    constant = all(each.deviation.within for each in deviations) and _constant(
+        [series.position for _, series in curves], band[1] if band else 0.0
+    )
+    unit = curves[0][1].unit
+    return OutputView(output, label, unit, constant, plot, errors, compared[1:])
+
+
+def _constant(curves: Sequence[Values], tolerance: float) -> bool:
+    """Return whether all curves stay at one value, to the tolerance or to round-off."""
+    known = [v for curve in curves for v in curve if v is not None and math.isfinite(v)]
+    if not known:
+        return False
+    return max(known) - min(known) <= max(tolerance, ROUND_OFF * max(map(abs, known)))
 
 
 def _trends(
@@ -238,7 +257,7 @@ def _trends(
     return [
         Plot(
             f"{anchor}-trend-{what}",
-            f"{what} over {runs} runs, log axis",
+            f"{what.replace('-', ' ')} over {runs} runs, log axis",
             f"{runs} runs, oldest first.",
         )
         for what in made

@@ -29,7 +29,10 @@ SCENE_SCRIPTS = (
     "vectors.js",
     "motion.js",
     "canvas.js",
+    "solids.js",
+    "centres.js",
     "scene.js",
+    "pictures.js",
     "mechanism.js",
 )
 """Scripts of figures and scenes, in loading order: each depends only on earlier ones."""

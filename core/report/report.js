@@ -37,7 +37,10 @@ function onClick(selector, act) {
     save(JSON.parse(await unpacked("curves"))[dataset.curves], "text/csv", dataset.file);
   });
   const boxes = [...document.querySelectorAll("[data-scene]")];
-  const canvases = boxes.map((box) => mechanism(box, scenes[box.dataset.scene]));
+  const canvases = boxes.map((box) => {
+    const name = box.closest("[data-case]").dataset.case;
+    return mechanism(box, scenes[box.dataset.scene], `${name}_scene`, trouble);
+  });
 
   function draw(box) {
     if (drawn.has(box)) return;

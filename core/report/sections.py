@@ -1,5 +1,5 @@
-"""Benchmark reports: measurements of kincheck itself as tables on the terminal, as JSON and as a
-page.
+"""Reports of tables and diagrams, on the terminal, as JSON and as a page: measurements of kincheck
+itself, and comparisons of designs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TextIO
 import msgspec
 from rich.text import Text
 
-from ..case.io.atomic_files import to_standard_output, write_all
+from ..case.io.atomic_files import Content, to_standard_output, write_all
 from ..errors import KincheckError
 from ..harness.record import to_json
 from . import terminal
@@ -34,13 +34,15 @@ class Diagram:
 
 @dataclass(frozen=True)
 class Section:
-    """One table of a benchmark, with its conclusions.
+    """One table of a report, with its conclusions.
 
     Attributes:
         verdict: the conclusions as sentences.
         notes: the method of measurement.
         columns: headings; the first `labels` of them head words, the others numbers.
-        diagrams: diagrams above the table, only on the page.
+        diagrams: diagrams above the table, only on the page; those with the same styles side by
+            side.
+        links: file that belongs to each row, beside the page; empty for none.
     """
 
     title: str
@@ -50,11 +52,12 @@ class Section:
     labels: int
     rows: Sequence[Sequence[str]]
     diagrams: Sequence[Diagram] = ()
+    links: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class Report:
-    """A benchmark's results for readers. `name` is also the name of its files."""
+    """Results for readers. `name` is also the name of its files."""
 
     name: str
     headline: str
@@ -69,6 +72,7 @@ def deliver(
     out: Path | None,
     json: str | None,
     beside: Mapping[str, str] = {},
+    files: Sequence[tuple[Path, Content]] = (),
     problems: Sequence[str] = (),
 ) -> None:
     """Print the tables and write the requested files.
@@ -77,12 +81,15 @@ def deliver(
         out: folder for NAME.json, NAME.html and the files beside them.
         json: a file, or "-" for standard output, which then holds nothing else.
         beside: further texts by file name.
+        files: further files.
         problems: earlier problems, to raise with those of the files.
 
     Raises:
         KincheckError: a file cannot be written, or there are earlier problems.
     """
-    contents = [(Path(json), to_json(results))] if json not in (None, "-") else []
+    contents: list[tuple[Path, Content]] = [*files]
+    if json not in (None, "-"):
+        contents.append((Path(json), to_json(results)))
     if out is not None:
         contents += [
             (out / f"{report.name}.json", to_json(results)),
@@ -103,9 +110,11 @@ def deliver(
 def print_report(report: Report, file: TextIO) -> None:
     """Print the tables, each with its verdict and notes."""
     console = terminal.console(file)
-    console.print(Text(report.headline, style="bold"))
+    console.print(Text(report.headline, style="bold"), soft_wrap=True)
     console.print(Text(" · ".join(report.facts)), soft_wrap=True)
     for section in report.sections:
+        if not (section.rows or section.verdict):  # diagrams, for the page
+            continue
         table = FittingTable()
         for column, heading in enumerate(section.columns):
             table.add_column(Text(heading), justify="left" if column < section.labels else "right")
@@ -113,7 +122,8 @@ def print_report(report: Report, file: TextIO) -> None:
             table.add_row(*(Text(cell) for cell in row))
         console.print()
         console.print(Text(section.title, style="bold"))
-        console.print(table)
+        if section.rows:
+            console.print(table)
         for sentence in section.verdict:
             console.print(Text(f"- {sentence}"), soft_wrap=True)
         for note in section.notes:

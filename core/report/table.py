@@ -15,7 +15,7 @@ from ..case.io.escape import visible
 from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread, unsound
 from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
-from ..unit_text import motion_word
+from ..unit_text import FORCES, motion_word
 from . import terminal
 from .travel_table import print_travel
 
@@ -26,7 +26,6 @@ COLOURS = {
     Outcome.UNAVAILABLE: "yellow",
 }
 LENGTH = "m"
-FORCES = ("N", "N m")
 
 
 def _heads(reactions: bool) -> tuple[str, ...]:
@@ -210,18 +209,23 @@ def print_messages(results: Results, console: Console) -> None:
         console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
     for case, why in suspects(results):
         console.print(Text(visible(f"suspect: {case}: {why}"), style="bold"), soft_wrap=True)
+    said = list[str]()
+    absent: dict[str, list[str]] = {}
     for (engine, outcome, message), cases in messages(results).items():
-        console.print(
-            Text(visible(f"{outcome.shown}: {named(cases)} · {engine}: {message}", also="\n\t")),
-            soft_wrap=True,
-        )
+        if outcome is Outcome.UNAVAILABLE:
+            absent.setdefault(message.removeprefix(f"{engine} is "), []).append(engine)
+        else:
+            said.append(f"{outcome.shown}: {named(cases)} · {engine}: {message}")
+    said += [f"{Outcome.UNAVAILABLE}: {named(each)}: {why}" for why, each in absent.items()]
+    for line in said:
+        console.print(Text(visible(line, also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
     console.print(
         ", ".join(f"{count} {outcome.shown}" for outcome in Outcome if (count := counts[outcome]))
         or "nothing was run"
     )
-    if said := unread(results.run):
-        console.print(Text(visible(said), style="bold red"), soft_wrap=True)
+    if lost := unread(results.run):
+        console.print(Text(visible(lost), style="bold red"), soft_wrap=True)
 
 
 def truth(record: Record) -> str:

@@ -49,20 +49,31 @@ def print_travel(results: Results, console: Console) -> None:
 
 
 def _print(record: Record, facts: Mapping[str, Any], console: Console) -> None:
+    places = events(record, facts)
+    heads = [">" + each.replace(", ", "\n") for each in places]
+    table = terminal.columns(record.case, *heads, ">gradient at design", "")
+    samples = list(places.values())
+    for cells in _rows(record, facts, samples, samples[1]):
+        table.add_row(*map(Text, cells))
+    if table.row_count:
+        console.print(table)
+
+
+def events(record: Record, facts: Mapping[str, Any]) -> dict[str, int]:
+    """Return the samples of rebound, design and jounce, or of the ends of another driver, by a head
+    with their travel: "rebound, -80 mm".
+
+    Args:
+        facts: of the case, with the units of its table.
+    """
     name, travel = next(iter(record.driver.items()))
-    measure = DRIVER_UNITS.get(facts["driver"].get("type", ""), "")
-    unit, scale = _shown(measure, facts)
+    unit, scale = _shown(DRIVER_UNITS.get(facts["driver"].get("type", ""), ""), facts)
     low, high = (pick(range(len(travel)), key=travel.__getitem__) for pick in (min, max))
     design = min(range(len(travel)), key=lambda k: abs(travel[k]))
     ends = ("rebound", "jounce") if name.endswith("stroke") else ("least", "most")
     middle = "design" if abs(travel[design]) < ZERO else "nearest to design"
     places = {ends[0]: low, middle: design, ends[1]: high}
-    heads = [f">{each}\n{_number(travel[k], scale)} {unit}" for each, k in places.items()]
-    table = terminal.columns(record.case, *heads, ">gradient at design", "")
-    for cells in _rows(record, facts, list(places.values()), design):
-        table.add_row(*map(Text, cells))
-    if table.row_count:
-        console.print(table)
+    return {f"{each}, {number(travel[k], scale)} {unit}": k for each, k in places.items()}
 
 
 def _rows(
@@ -72,12 +83,12 @@ def _rows(
         if name.removeprefix("left_").removeprefix("right_") not in NAMES or not series.position:
             continue
         unit, scale = _shown(series.unit, facts)
-        cells = [_number(series.position[k], scale) for k in samples]
+        cells = [number(series.position[k], scale) for k in samples]
         per = record.outputs.get(name + PER_TRAVEL)
         gradient, per_unit = "", ""
         if per is not None and per.position:
             per_unit, factor = _shown(per.unit, facts)
-            gradient = _number(per.position[design], factor)
+            gradient = number(per.position[design], factor)
         yield visible(with_unit(name, unit)), *cells, gradient, per_unit
 
 
@@ -86,7 +97,8 @@ def _shown(unit: str, facts: Mapping[str, Any]) -> tuple[str, float]:
     return unit_text(text).replace("deg", "\N{DEGREE SIGN}"), 1.0 / size
 
 
-def _number(value: float | None, scale: float) -> str:
+def number(value: float | None, scale: float = 1.0) -> str:
+    """Return a number to four digits; what is zero within the tolerance of outputs as 0."""
     if value is None:
         return "–"
     shown = f"{scale * value:.4g}" if abs(scale * value) > ZERO else "0"

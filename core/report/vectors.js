@@ -47,28 +47,25 @@ function outline(points) {
   return [...half(sorted), ...half(sorted.reverse())];
 }
 
-// A tyre as a circle about its axis of rotation, and the road below it: a rectangle through the
-// contact centre.
+// A wheel about its axis of rotation, and the road below it: a rectangle through the contact.
 function wheelShape(center, spin, up, radius) {
   const rise = direction(sum(up, spin, -dot(up, spin)));
   const heading = direction(cross(spin, rise));
   const aside = cross(up, heading);
-  const rim = (angle, r) =>
-    sum(sum(center, heading, r * Math.cos(angle)), rise, r * Math.sin(angle));
-  const circle = (r) => Array.from({ length: 49 }, (_, k) => rim((k * Math.PI) / 24, r));
-  const contact = rim(-Math.PI / 2, radius);
+  const contact = sum(center, rise, -radius);
   const corner = (along, across) =>
     sum(sum(contact, heading, along * radius), aside, across * radius);
+  const tyre = Array.from({ length: 24 }, (_, k) => {
+    const angle = (k * Math.PI) / 12;
+    return sum(sum(center, heading, radius * Math.cos(angle)), rise, radius * Math.sin(angle));
+  });
   return {
-    tyre: circle(radius),
-    rim: circle(0.62 * radius),
-    axis: [sum(center, spin, -0.4 * radius), sum(center, spin, 0.4 * radius)],
-    road: [
-      corner(-1.4, -0.8),
-      corner(1.4, -0.8),
-      corner(1.4, 0.8),
-      corner(-1.4, 0.8),
-      corner(-1.4, -0.8),
-    ],
+    center,
+    spin,
+    radius,
+    contact,
+    tyre,
+    axis: [sum(center, spin, -0.5 * radius), sum(center, spin, 0.5 * radius)],
+    road: [corner(-1.4, -0.8), corner(1.4, -0.8), corner(1.4, 0.8), corner(-1.4, 0.8)],
   };
 }

@@ -66,7 +66,7 @@ def test_what_a_solver_cannot_express_is_named():
     assert record(case, simulation("exudyn-static")).outcome is Outcome.PASS
 
 
-COUPLED = "constant_velocity gear polynomial rack_pinion screw"
+COUPLED = "constant_velocity gear linear_coupler polynomial rack_pinion screw"
 EXUDYN = "constant_velocity polynomial revolute_spherical"
 REFUSED = {
     **dict.fromkeys(("mujoco", "mujoco-default", "mujoco-projecting"), ""),

@@ -58,11 +58,11 @@ def test_polynomials_count_from_the_start():
     np.testing.assert_allclose(moved.coefficients, [0.0, 1.2, 0.2], rtol=0.0, atol=1e-15)
 
 
-def cut_elsewhere(mechanism):
+def cut_elsewhere(mechanism, first=()):
     """The tree without the joint that is probed: what it carried is free, and it closes the
     loop.
     """
-    tree = spanning_tree(mechanism)
+    tree = spanning_tree(mechanism, first)
     tested = [
         joint
         for joint in mechanism.joints

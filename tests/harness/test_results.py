@@ -125,6 +125,15 @@ def test_a_long_message_is_not_broken_into_lines(capsys):
     assert message.strip() in capsys.readouterr().out
 
 
+def test_missing_engines_have_a_row_each_and_one_message(capsys):
+    engines = [Fake("one"), Fake("two", installed=None), Fake("three", installed=None)]
+    found = run([crank(), crank("other")], engines, tol=TOL)
+    print_table(found, sys.stdout)
+    said = capsys.readouterr().out
+    assert "unavailable: two, three: not installed, or cannot be imported" in said
+    assert [said.count(name) for name in ("two", "three")] == [3, 3]
+
+
 def test_the_table_names_modes_where_there_are_several(capsys):
     print_table(run([crank()], [Fake("one"), Fake("two")], tol=TOL), sys.stdout)
     assert "projection" not in capsys.readouterr().out

@@ -153,25 +153,71 @@ def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
     text = page.read_text()
     assert "http://" not in text.replace("http://www.w3.org/2000/svg", "")
     figures = drawn(page)
-    assert [*figures] == ["error-1", "time-1", "error-2", "time-2"]  # of two cases
+    assert [*figures] == [
+        f"{what}-{case}"
+        for case in (1, 2)
+        for what in ("position-error", "velocity-error", "acceleration-error", "time")
+    ]
     with Store(path) as store:
         past = trends(read(store))["first"]
     mine = [each for each in past if each.engine == "mujoco"]
     assert (
-        figures["error-1"]["data"][0]["y"]
-        == [each.max_error for each in mine]
-        == pytest.approx([5e-13] * 4, rel=1e-3)
+        figures["position-error-1"]["data"][0]["y"]
+        == [each.errors["position"] for each in mine]
+        == pytest.approx([5e-13 / 1e-9] * 4, rel=1e-3)
     )
     assert figures["time-1"]["data"][0]["y"] == [each.us_per_step for each in mine]
     assert figures["time-1"]["data"][0]["x"] == [each.run for each in mine]
     assert mine[0].run == "2026-11-01 03:00 #1"
 
 
+def test_a_velocity_fault_is_drawn_red_since_its_run(path, tmp_path):
+    """Whose positions are as before: with its step, and the version that came with it."""
+    for night in range(1, 9):
+        made = records()
+        if night >= 4:
+            fault = {"max_abs": 3e-6, "within": False}
+            errors = made[1].errors["x"]
+            errors = msgspec.structs.replace(
+                errors, velocity=msgspec.structs.replace(errors.velocity, **fault)
+            )
+            what = {"outcome": Outcome.FAIL, "version": "4.1.0"}
+            made = changed(made, errors={**made[1].errors, "x": errors}, **what)
+        if night == 6:
+            gone = {"outcome": Outcome.TIMEOUT, "errors": {}, "us_per_step": None}
+            made = changed(made, case="second", **gone)
+        keep(path, made)
+    page = tmp_path / "trends.html"
+    assert history(path, "--plot", page) == 0
+    figures = drawn(page)
+
+    def failed(figure):
+        return [
+            (run[-2:], y)
+            for trace in figures[figure]["data"]
+            if trace["uid"] == "failed"
+            for run, y in zip(trace["x"], trace["y"], strict=True)
+        ]
+
+    velocity = next(e for e in records()[1].errors["x"].items() if e[0] == "velocity")[1]
+    assert failed("velocity-error-1") == [
+        (f"#{night}", pytest.approx(3e-6 / velocity.tolerance)) for night in range(4, 9)
+    ]
+    assert failed("position-error-1") == failed("acceleration-error-1") == []
+    assert failed("position-error-2") == [("#6", 1.0)]  # no error tells a timeout
+    upright = [each for each in figures["velocity-error-1"]["layout"]["shapes"] if "yref" in each]
+    assert {each["x0"][-2:] for each in upright} == {"#4"}
+    assert {each["line"]["dash"] for each in upright} == {"dash", "dot"}
+    text = page.read_text()
+    assert "mujoco: version 4.0.0 → 4.1.0 since 2026-11-04 03:00 #4" in text
+    assert "mujoco: x velocity error: 0 → 3e-6 m/s since run 4" in text
+
+
 def test_zero_errors_are_drawn_on_floor(path, tmp_path):
     nights(path, 1)
     page = tmp_path / "trends.html"
     history(path, "--engine", "native", "--plot", page)
-    figure = drawn(page)["error-1"]
+    figure = drawn(page)["position-error-1"]
     assert figure["data"][0]["y"] == [0.0]
     assert figure["layout"]["meta"]["floor"] > 0.0
 
@@ -190,11 +236,12 @@ def test_waiting_time_is_subtracted(path):
 def test_quantities_without_values_are_not_drawn(path, tmp_path):
     def past(error, time):
         return [
-            Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")
+            Past(run, "native", {} if error is None else {"velocity": error}, time)
+            for run in ("1", "2")
         ]
 
     assert [*trend_figures(past(None, 2.0), {})] == ["time"]
-    assert [*trend_figures(past(0.0, None), {})] == ["error"]
+    assert [*trend_figures(past(0.0, None), {})] == ["velocity-error"]
     assert trend_figures(past(None, None), {}) == {}
     keep(path, [msgspec.structs.replace(each, errors={}, us_per_step=None) for each in records()])
     assert history(path, "--plot", tmp_path / "trends.html") == 0
@@ -208,7 +255,7 @@ def test_close_times_span_a_decade():
     """Else a tenth looks like a step; a decade or more is drawn as it is."""
     for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
         past = [
-            Past(run=str(k), engine="native", max_error=None, us_per_step=time)
+            Past(run=str(k), engine="native", errors={}, us_per_step=time)
             for k, time in enumerate((2.0, 2.0 * factor))
         ]
         axis = trend_figures(past, {})["time"]["layout"]["yaxis"]

@@ -12,6 +12,18 @@ from ..support.nights import changed, keep, records, reported, worse
 RIGHT = Fake("native", untimed=True)
 WRONG = Fake("native", answer=off("position", lambda p: p + 1.0), untimed=True)
 NIGHT, OTHER = ("crank",), ("crank_two",)
+FILE = """
+schema = "kincheck-case/1"
+name = "swing"
+source = "made up for this test"
+truth = "closed_form"
+bodies.arm = {}
+joints.pivot = {type = "revolute", bodies = ["ground", "arm"], point = [0, 0, 0], axis = [0, 0, 1]}
+points.tip = {body = "arm", position = [0.5, 0, 0]}
+drivers.angle = {type = "joint_angle", joint = "pivot"}
+sweep = {driver = "angle", start = 0, stop = 1, steps = 2}
+reference = {columns = ["angle", "tip.x"], rows = [[0.0, 0.5]], citation = "a circle's radius"}
+"""
 
 
 @pytest.fixture
@@ -97,10 +109,46 @@ def test_undecodable_names_are_stored(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(*NIGHT, "--reference", "\udcff.csv")
     (tmp_path / "\udcff.toml").write_text("no case")
-    assert run("\udcff.toml") == 2
+    assert run("\udcff.toml", *NIGHT) == 2
     with Store(tmp_path / "kept", writable=False) as store:
         (row,) = store.runs()
-    assert row.circumstances["selection"]["cases"] == ["?.toml"]
+    assert row.circumstances["selection"]["cases"] == ["?.toml", "crank"]
+
+
+def test_a_run_of_nothing_readable_is_not_stored(run, report, capsys, tmp_path):
+    (tmp_path / "broken.toml").write_text("no case")
+    run(*NIGHT)
+    for _ in range(2):
+        assert run(str(tmp_path / "broken.toml")) == 2
+        assert "no case could be read; the run is not in the history" in capsys.readouterr().err
+    assert report()[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("again", "status"), [("b/swing.toml", 1), ("./a/swing.toml", 0)], ids=["other", "same"]
+)
+def test_another_file_of_its_name_repairs_nothing(
+    run, report, monkeypatch, tmp_path, again, status
+):
+    monkeypatch.chdir(tmp_path)
+    for folder in "ab":
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "swing.toml").write_text(FILE)
+    run("a/swing.toml")
+    run("a/swing.toml", right=False)
+    run(again)
+    assert report()[0] == status
+
+
+@pytest.mark.parametrize(
+    "more", [("--static",), ("--engine-command", "true {case} {samples} {out}")]
+)
+def test_options_of_the_task_make_another_selection(run, tmp_path, more):
+    run(*NIGHT)
+    run(*NIGHT, *more)
+    with Store(tmp_path / "kept", writable=False) as store:
+        first, second = (row.key["selection"]["options"] for row in store.runs())
+    assert first != second
 
 
 def test_a_mistyped_case_makes_no_history(run, tmp_path):

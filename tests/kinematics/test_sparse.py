@@ -24,9 +24,11 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.one_design import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
+from kincheck.core.kinematics.structure.sparse_lu import Pattern
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.bench import scaling
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+from scipy.sparse import linalg
 
 from ..support.block_structures import (
     assert_alike,
@@ -182,3 +184,40 @@ def test_costs_are_measured_with_residuals_and_errors():
     assert all(row.residual <= 1e-15 for row in rows)
     assert all(row.error <= 1e-14 for row in rows)
     assert all(row.us_per_value.median > 0.0 for row in rows)
+
+
+def test_samples_of_a_ring_are_factored_together(monkeypatch):
+    calls, splu = [], linalg.splu
+    monkeypatch.setattr(
+        linalg, "splu", lambda *matrix, **how: (calls.append(1), splu(*matrix, **how))[1]
+    )
+    path = turning(*np.linspace(-0.8, 0.8, 64))
+    together = solve_sparse(ring(9), path, ("tip4",))
+    few = len(calls)
+    alone = solve_sparse(ring(9), path, ("tip4",), compiled=False)
+    # at the design position rows are chosen and an order is made; after that no pose is alone
+    assert few < 16
+    assert len(calls) - few > 64
+    motion, expected = together.points["tip4"], alone.points["tip4"]
+    assert np.abs(motion.position - expected.position).max() <= 1e-14
+    assert np.abs(motion.acceleration - expected.acceleration).max() <= 3e-12
+
+
+def test_poses_that_outgrow_an_order_are_factored_in_their_own():
+    """Two rows change places: by the order of the first matrix, multipliers of the others grow."""
+    rows, columns = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    first = np.array([1.0, 0.5, 0.25, 1.0])
+    entries = np.tile(first[:, None], 8)
+    entries[0, 3:], entries[3, 7] = 1e-9, 0.0
+    entries[2, 7] = 0.0
+    pattern, lanes = Pattern(rows, columns, 2, np.arange(4), first), np.arange(8)
+    b = np.arange(16.0).reshape(2, 8)
+    for _ in range(20):  # the order of the others takes its place
+        factors = pattern.factor_lanes(entries, lanes)
+        assert factors.regular(lanes).tolist() == [0, 1, 2, 3, 4, 5, 6]
+        found, signs = factors.solve(b), factors.signs(8)
+        for k in range(7):
+            matrix = entries[:, k].reshape(2, 2)
+            assert found[:, k] == pytest.approx(np.linalg.solve(matrix, b[:, k]), rel=1e-14)
+            assert signs[k] * signs[0] == np.sign(np.linalg.det(matrix))
+        assert np.isnan([*found[:, 7], signs[7]]).all()

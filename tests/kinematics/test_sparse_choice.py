@@ -213,10 +213,11 @@ def test_sigmas_of_blocks():
             u, s, v = np.linalg.svd(matrix[own])
             s[-1] *= near
             matrix[own] = (u * s) @ v
-        blocks = Blocks(i, j, n)
-        found, sign = blocks.sigmas(matrix[i, j])
+        blocks = Blocks(i, j, n, np.arange(len(i)), None)
+        one = np.arange(1)
+        (found,), (sign,) = (each.T for each in blocks.sigmas(matrix[i, j][:, None], one))
         matrix[3] *= -1.0
-        assert blocks.sigmas(matrix[i, j])[1] == -sign
+        assert blocks.sigmas(matrix[i, j][:, None], one)[1] == -sign
         expected = [
             np.linalg.svd(matrix[np.ix_(block == k, block == k)], compute_uv=False)[-1]
             for k in range(4)

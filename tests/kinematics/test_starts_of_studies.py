@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.adapters.exudyn.solvers import static
+from kincheck.adapters.exudyn.statics import static
 from kincheck.core import (
     JointAngle,
     Point,

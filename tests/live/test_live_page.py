@@ -163,6 +163,52 @@ def test_page_fits_a_narrow_window(served, browser):
     assert browser.run("return document.documentElement.scrollWidth <= innerWidth")
 
 
+def test_scene_shows_the_roll_centre_of_the_outputs(opened):
+    """The construction is from differences of poses a few millimetres apart."""
+    opened.click("[data-layer=centres]")
+    drawn, expected = opened.run(
+        "const { drawing, frames, outputs } = kincheckLive.answer, motion = motionOf(drawing);"
+        "const height = (_, k) =>"
+        " centresOf(drawing, motion, k)[0].center[2] - motion.wheels[k][0].contact[2];"
+        "return [frames.map(height), frames.map((k) => outputs.roll_center_height[k])]"
+    )
+    assert drawn == pytest.approx(expected, abs=1e-4)
+
+
+def test_scene_is_saved_as_picture_and_film(opened):
+    opened.run(
+        "window.files = []; const made = URL.createObjectURL;"
+        "URL.createObjectURL = (blob) => (files.push(blob), made.call(URL, blob));"
+    )
+    for kind in ("svg", "png", "film"):
+        opened.click(f"[data-picture={kind}]")
+    opened.until("files.length === 3")
+    kinds = opened.run("return files.map(({ type }) => type.split(';')[0])")
+    assert kinds == ["image/svg+xml", "image/png", "video/webm"]
+    bad, shapes = opened.run(
+        "const text = await files[0].text();"
+        "const svg = new DOMParser().parseFromString(text, 'image/svg+xml');"
+        "return [svg.querySelectorAll('parsererror').length, svg.querySelectorAll('path').length]"
+    )
+    assert bad == 0
+    assert shapes > 100
+    assert opened.run("return (await files[2].arrayBuffer()).byteLength") > 10_000
+
+
+def test_scene_turns_moves_and_enlarges(opened):
+    look = "return document.querySelector('#scene canvas').toDataURL()"
+    seen = [opened.run(look)]
+    x, y = opened.middle("#scene canvas")
+    opened.drag((x, y), (40.0, 10.0))
+    seen.append(opened.run(look))
+    for key, shift in (("ArrowLeft", False), ("ArrowLeft", True), ("+", False)):
+        opened.key(key, shift=shift)
+        seen.append(opened.run(look))
+    opened("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-200)
+    opened.until(f"(() => {{ {look} }})() !== {seen[-1]!r}")
+    assert len({*seen}) == len(seen)
+
+
 def test_slider_moves_a_mechanism(tmp_path, browser):
     known = registry()
     file = tmp_path / "rssr"

@@ -16,6 +16,7 @@ from kincheck.core.primitives.base import GROUND_POSE, Drive, Primitive
 from ..support.specimens import (
     MAKERS,
     admissible,
+    body,
     direction,
     discovered,
     lanes,
@@ -165,6 +166,29 @@ def test_gamma_is_the_rest_of_the_second_derivative(kind, rng):
     """
     specimen = make(kind, rng)
     assert acceleration_defect(specimen, *admissible(specimen, rng)).max() <= ROUND_OFF
+
+
+def of_residual(primitive, *methods):
+    """The primitive as a user has it who writes phi alone."""
+    own = {method: getattr(Primitive, method) for method in methods or ("rows", "nu", "gamma")}
+    return retyped(primitive, type("OfResidual", (type(primitive),), own))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in TYPES if kind in MAKERS])
+def test_residual_alone_gives_exact_equations(kind, rng):
+    """At any pose and velocity, on the manifold or not."""
+    specimen = make(kind, rng)
+    derived = replace(specimen, primitive=of_residual(specimen.primitive))
+    i, j = body(rng), body(rng)
+    assert velocity_defect(derived, i, j).max() <= ROUND_OFF
+    assert acceleration_defect(derived, i, j).max() <= ROUND_OFF
+
+
+@pytest.mark.parametrize("kind", [kind for kind in TYPES if kind in MAKERS])
+def test_own_rows_without_gamma_have_theirs(kind, rng):
+    specimen = make(kind, rng)
+    derived = replace(specimen, primitive=of_residual(specimen.primitive, "gamma"))
+    assert acceleration_defect(derived, *admissible(specimen, rng)).max() <= ROUND_OFF
 
 
 @pytest.mark.parametrize("kind", SIMPLIFIED)

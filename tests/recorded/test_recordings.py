@@ -3,15 +3,21 @@
 import csv
 import json
 import re
+import struct
+import zlib
 from pathlib import Path
 
+import numpy as np
+import openpyxl
 import pytest
 from kincheck.adapters import engine
+from scipy.io import savemat
 
 DATA = Path(__file__).parent.parent / "data" / "recordings"
 NATIVE = engine("native")
 CASE = DATA / "fourbar.toml"
 PARTS = {"PART_2": "crank", "PART_3": "coupler", "PART_4": "rocker"}
+MODELICA = ["--map", "MOTION_1=crank.phi", "--map", "JOINT_4.angle=rocker.phi"]
 XYZW, EULER = "quaternion xyzw qx qy qz qw", "euler 123 a b c"
 
 
@@ -84,10 +90,90 @@ def test_adams_results_are_judged_in_all_rates(judged):
     [("fourbar_modelica.mat", 2e-15), ("fourbar_modelica_single.mat", 1e-7)],
 )
 def test_modelica_results_of_truth_pass(judged, file, tolerance):
-    options = ["--map", "MOTION_1=crank.phi", "--map", "JOINT_4.angle=rocker.phi"]
-    status, record = judged(DATA / file, *options)
+    status, record = judged(DATA / file, *MODELICA)
     assert status == 0
     assert largest(record) < tolerance
+
+
+def written_as(file, form, crank, rocker):
+    """Write the angles [rad] as a program would, and return the options that state their names."""
+    rows = np.column_stack([crank, rocker]).tolist()
+    if form == "workbook":
+        book = openpyxl.Workbook()
+        for row in [("crank [rad]", "rocker [rad]"), *rows]:
+            book.active.append(row)
+        book.save(file)
+        return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+    if form == "storage":
+        lines = ["run", "inDegrees=no", "endheader", "crank\trocker"]
+        file.write_text("\n".join([*lines, *(f"{x!r}\t{y!r}" for x, y in rows)]))
+        return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+    variables, names = {
+        "vectors": ({"crank": crank, "rocker": rocker, "n": 3.0}, ("crank", "rocker")),
+        "matrix": ({"log": np.column_stack([crank, rocker])}, ("log(1)", "log(2)")),
+        "struct": ({"log": {"crank": crank, "rocker": rocker}}, ("log.crank", "log.rocker")),
+    }[form]
+    savemat(file, variables, do_compression=form != "vectors")
+    return ["--map", f"MOTION_1={names[0]} [rad]", "--map", f"JOINT_4.angle={names[1]} [rad]"]
+
+
+@pytest.mark.parametrize(
+    ("form", "suffix"),
+    [
+        ("workbook", ".xlsx"),
+        ("storage", ".sto"),
+        ("vectors", ".mat"),
+        ("matrix", ".mat"),
+        ("struct", ".mat"),
+    ],
+)
+def test_truth_in_other_formats_passes(judged, tmp_path, form, suffix):
+    _, truth = judged(DATA / "fourbar_modelica.mat", *MODELICA)
+    crank = np.array(truth["driver"]["MOTION_1"])
+    rocker = np.array(truth["outputs"]["JOINT_4.angle"]["position"])
+    file = tmp_path / f"run{suffix}"
+    status, record = judged(file, *written_as(file, form, crank, rocker))
+    assert status == 0
+    assert largest(record) < 2e-15
+    rocker[30] += 1e-5
+    status, record = judged(file, *written_as(file, form, crank, rocker))
+    assert status == 1
+    assert record["errors"]["JOINT_4.angle"]["position"]["worst_step"] == 30
+
+
+def test_matrix_without_rows_is_left_out(judged, tmp_path, capsys):
+    file = tmp_path / "run.mat"
+    file.write_bytes(struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0")
+    assert judged(file)[0] == 2
+    assert "found the columns none, expected one of MOTION_1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("place", "number", "text"),
+    [
+        (176, 199, "numbers of type 199"),  # with which scipy 1.17 ends the process
+        (128, 13, "an element of type 13"),
+        (152, 1, "a matrix without its head"),
+        (132, 10**9, "an element is cut off"),
+    ],
+)
+def test_damaged_elements_of_matlab_are_refused(judged, tmp_path, capsys, place, number, text):
+    file = tmp_path / "run.mat"
+    savemat(file, {"a": np.arange(9.0)})
+    data = bytearray(file.read_bytes())
+    struct.pack_into("<I", data, place, number)
+    file.write_bytes(data)
+    assert judged(file)[0] == 2
+    assert text in capsys.readouterr().err
+
+
+def test_unpacked_size_of_a_file_is_bounded(judged, tmp_path, capsys):
+    head = b"MATLAB 5.0".ljust(124) + b"\0\1IM"
+    packed = zlib.compress(bytes(300_000_000), 9)
+    file = tmp_path / "run.mat"
+    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    assert judged(file)[0] == 2
+    assert "too many bytes when unpacked" in capsys.readouterr().err
 
 
 def test_opensim_motion_of_truth_passes(judged):
@@ -341,3 +427,73 @@ def test_driver_on_an_even_grid_has_no_digits(judged, tmp_path):
 
     assert write(0.0) == 0
     assert write(1e-6) == 1
+
+
+GEARS = """schema = "kincheck-case/1"
+name = "gears"
+source = "made up for this test"
+[bodies.a]
+[bodies.b]
+origin = [0.3, 0, 0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "a"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.other]
+type = "revolute"
+bodies = ["ground", "b"]
+point = [0.3, 0, 0]
+axis = [0, 0, 1]
+[couplers.mesh]
+type = "gear"
+joints = ["pin", "other"]
+ratio = -0.4
+[points.tip]
+body = "b"
+position = [0.4, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pin"
+[sweep]
+driver = "turn"
+start = 0
+stop = 12
+steps = 61
+[outputs.x]
+point = "tip"
+component = "x"
+relative = false
+"""
+HINGE = 'type = "revolute"\nbodies = ["ground", "b"]'
+RACK = GEARS.replace(HINGE, HINGE.replace("revolute", "translational")).replace("ratio = -0.4", "")
+RACK = RACK.replace('type = "gear"', 'type = "rack_pinion"\nradius = 0.05')
+RACK = RACK.replace('component = "x"', 'component = "z"')
+
+
+@pytest.mark.parametrize("driven", ["by column", "by poses"])
+@pytest.mark.parametrize("first", [0, 20, 45])
+@pytest.mark.parametrize("kind", ["gears", "rack"])
+def test_coupled_joints_pass_after_several_turns(kincheck_main, tmp_path, kind, first, driven):
+    turn = np.linspace(0.0, 12.0, 61)[first:]
+    half, nil = 0.5 * turn, 0.0 * turn
+    other = {"gears": -1.25 * turn, "rack": nil}[kind]
+    lift = {"gears": nil, "rack": 0.05 * turn}[kind]
+    columns = {
+        **({"turn": turn} if driven == "by column" else {}),
+        **dict(zip("xyz", (nil, nil, nil), strict=True)),
+        **dict(zip(("e0", "e1", "e2", "e3"), (np.cos(half), nil, nil, np.sin(half)), strict=True)),
+    }
+    columns = {name if name == "turn" else f"a.{name}": x for name, x in columns.items()}
+    columns |= {"b.x": nil + 0.3, "b.y": nil, "b.z": lift, "b.e0": np.cos(other)}
+    columns |= {"b.e1": nil, "b.e2": nil, "b.e3": np.sin(other)}
+    rows = [
+        ",".join(columns),
+        *(",".join(f"{x:.9f}" for x in row) for row in zip(*columns.values(), strict=True)),
+    ]
+    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
+    case.write_text({"gears": GEARS, "rack": RACK}[kind])
+    file.write_text("\n".join(rows))
+    assert kincheck_main("run", case, "--recorded", file, "--quiet", engines=[NATIVE]) == 0
+    case.write_text(case.read_text().replace("-0.4", "-0.40001").replace("0.05", "0.05001"))
+    assert kincheck_main("run", case, "--recorded", file, "--quiet", engines=[NATIVE]) == 1

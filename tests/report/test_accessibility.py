@@ -31,7 +31,7 @@ pytestmark = [
 
 
 def run_page(file: Path) -> None:
-    past = [Past(run, "one", 1e-12, 10.0) for run in ("2026-11-01", "2026-11-02")]
+    past = [Past(run, "one", {"position": 1e-3}, 10.0) for run in ("2026-11-01", "2026-11-02")]
     efforts = [Effort("one", "tol 1e-6", 1e-7, 20.0), Effort("one", "tol 1e-3", 1e-4, 9.0)]
     write_report(strut(), file, history={"strut": past}, precision={"strut": efforts})
 

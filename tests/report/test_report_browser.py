@@ -182,8 +182,12 @@ def test_figures_zoom_and_save_in_browser(visit: Any) -> None:
 
 def test_trends_are_drawn_in_browser(visit: Any) -> None:
     past = [
-        Past(run, "one", error, 10.0)
-        for run, error in (("2026-11-01", 1e-12), ("2026-11-02", 0.0), ("2026-11-03", None))
+        Past(run, "one", errors, 10.0)
+        for run, errors in (
+            ("2026-11-01", {"velocity": 1e-3}),
+            ("2026-11-02", {"velocity": 0.0}),
+            ("2026-11-03", {}),
+        )
     ]
     efforts = [
         Effort("one", "tol 1e-6", 1e-7, 20.0),
@@ -196,16 +200,19 @@ def test_trends_are_drawn_in_browser(visit: Any) -> None:
         const precision = "case-0-precision-projection";
         const curves = all(`[data-figure=${precision}] .curve`);
         return {
-          error: told("case-0-trend-error", 2),
+          error: told("case-0-trend-velocity-error", 2),
           time: told("case-0-trend-time", 3),
-          zeros: all("[data-figure=case-0-trend-error] .zeros").length,
+          zeros: all("[data-figure=case-0-trend-velocity-error] .zeros").length,
           precision: told(precision, 2),
           drawn: curves.map((each) => each.dataset.series),
         };
     """
     )
     told = visit(results(), read, history={"strut": past}, precision={"strut": efforts})
-    assert told["error"] == [["2026-11-01", "one 1e−12 m"], ["2026-11-02", "one 0 m"]]
+    assert told["error"] == [
+        ["2026-11-01", "one 0.001 tolerances"],
+        ["2026-11-02", "one 0 tolerances"],
+    ]
     assert told["time"] == [[f"2026-11-0{k}", "one 10 µs"] for k in (1, 2, 3)]
     assert told["zeros"] == 1
     assert told["drawn"] == ["one", "gone"]
@@ -227,7 +234,10 @@ def test_hostile_text_is_text(visit: Any) -> None:
         records=[run.records[0], strange],
         scenes={HOSTILE: msgspec.structs.replace(shown, joints=joints, message=HOSTILE)},
     )
-    past, effort = Past(HOSTILE, HOSTILE, 1e-9, 1.0), Effort(HOSTILE, HOSTILE, 1e-9, 1.0)
+    past, effort = (
+        Past(HOSTILE, HOSTILE, {"position": 1e-9}, 1.0, version=HOSTILE),
+        Effort(HOSTILE, HOSTILE, 1e-9, 1.0),
+    )
     told = visit(
         run,
         """

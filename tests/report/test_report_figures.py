@@ -46,6 +46,37 @@ def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None
     )
 
 
+def test_forces_come_first_and_constant_outputs_are_folded(tmp_path: Path) -> None:
+    """A constant output that is wrong is not folded."""
+
+    def with_more(record: Record) -> Record:
+        moving, errors = record.outputs["half_track_change"], record.errors["half_track_change"]
+        still = [0.3] * len(GRID)
+        resting = msgspec.structs.replace(moving, position=still, velocity=[0.0] * len(GRID))
+        right = judged(resting, resting, 1e-9, "closed_form")
+        wrong = msgspec.structs.replace(
+            right, position=msgspec.structs.replace(right.position, within=False)
+        )
+        load = msgspec.structs.replace(moving, unit="N")
+        outputs = {"x": moving, "height": resting, "depth": resting, "load": load}
+        judgements = {"x": errors, "height": right, "depth": wrong, "load": errors}
+        return msgspec.structs.replace(record, outputs=outputs, errors=judgements)
+
+    run = results()
+    page = report(Results(run=run.run, records=[with_more(run.records[0])]), tmp_path)
+    text = (tmp_path / "report.html").read_text("utf-8")
+    headings = re.findall(r'<h3 id="(case-0-\d)">(\w+)</h3>', text)
+    assert [name for _, name in headings] == ["load", "x", "depth", "height"]
+    folded = text[text.index("Constant: height") :]
+    assert '<h3 id="case-0-1">height' in folded
+    assert '<h3 id="case-0-2">' not in folded
+    assert [row[0] for row in page.rows("Largest deviations")] == ["load", "x", "height", "depth"]
+    contents = text.partition('aria-label="Contents"')[2].partition("</nav>")[0]
+    targets = re.findall(r'href="#([\w-]+)"', contents)
+    assert targets == ["overview", "case-0", "settings", "caveats"]
+    assert {*targets} <= {tag["id"] for _, tag in page.tags if "id" in tag}
+
+
 def in_unit(found: Record, unit: str) -> Record:
     outputs = {
         name: msgspec.structs.replace(each, unit=unit) for name, each in found.outputs.items()
@@ -181,11 +212,16 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
 
 
 def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
-    runs = [Past(run=str(k), engine="one", max_error=1e-9, us_per_step=2.0) for k in range(2)]
+    runs = [
+        Past(run=str(k), engine="one", errors={"position": 1.0}, us_per_step=2.0) for k in range(2)
+    ]
     for past, drawn in ((runs[1:], False), (runs, True)):
         write_report(results(), tmp_path / "report.html", history={"strut": past})
         text = (tmp_path / "report.html").read_text("utf-8")
-        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-error" in text) == (drawn, drawn)
+        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-position-error" in text) == (
+            drawn,
+            drawn,
+        )
 
 
 def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import cases, load
 from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.hardpoints.templates import sample_tables
 from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import LARGEST, POSES, scene, with_scenes
 from kincheck.core.report.axis import Axis, driver_axis
@@ -60,7 +64,7 @@ def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
     assert wheel.spin == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
     aslant = msgspec.structs.replace(wheel, spin=[0.6, 0.8, 0.0])
     drawn = drawing(msgspec.structs.replace(shown, wheels=[aslant]), AXIS)
-    [(body, center, spin, up, radius)] = drawn.wheels
+    [(body, center, spin, up, radius, kingpin, middle)] = drawn.wheels
     assert drawn.bodies[body]["name"] == "knuckle"
     turn = A(np.array(drawn.bodies[body]["p"][0]))
     assert np.array(drawn.bodies[body]["r"][0]) + turn @ center == pytest.approx(
@@ -68,7 +72,7 @@ def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
     )
     assert turn @ spin == pytest.approx((0.6, 0.8, 0.0), abs=1e-12)
     assert (up, radius) == ([0.0, 0.0, 1.0], 0.3)
-    assert drawn.layers == ["names", "frames", "paths", "wheels"]
+    assert (len(kingpin), middle) == (2, [0.0, 0.0, 0.0])
     assert drawing(scene(STRUT, poses=False), AXIS).wheels == []
 
 
@@ -106,4 +110,45 @@ def test_scene_arrows_are_output_forces():
     turn = A(np.array(drawn.bodies[body]["p"][0]))
     assert np.array(drawn.bodies[body]["r"][0]) + turn @ place == pytest.approx(
         (0.9676, 0.66, -0.01)
+    )
+
+
+def test_an_arm_has_both_pivots_of_its_table(tmp_path: Path):
+    (tmp_path / "car.csv").write_text(sample_tables(["double_wishbone"])[0], "utf-8")
+    case = load(tmp_path / "car.csv")
+    drawn = drawing(scene(case, poses=False), AXIS)
+    names = [body["name"] for body in drawn.bodies]
+    arm = [place for b, *place in drawn.nodes if names[b] == "lca"]
+    pivots = [[0.12, 0.21, 0.125], [-0.13, 0.215, 0.12]]
+    assert [min(math.dist(pivot, place) for place in arm) for pivot in pivots] == pytest.approx(
+        [0.0, 0.0], abs=1e-12
+    )
+    marks = [node for node, kind, *_ in drawn.marks if kind == "hinge"]
+    assert len(marks) == 4
+    [(lower, upper, kind)] = drawn.springs
+    assert [names[drawn.nodes[node][0]] for node in (lower, upper)] == ["lca", "ground"]
+    assert kind == "spring"
+    contact = next(k for k, (*_, z) in enumerate(drawn.nodes) if z == 0.0)
+    assert contact not in {node for link in drawn.links for node in link}
+
+
+def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path: Path):
+    (tmp_path / "car.csv").write_text(sample_tables(["mcpherson"])[0], "utf-8")
+    drawn = drawing(scene(load(tmp_path / "car.csv"), poses=False), AXIS)
+    names = [body["name"] for body in drawn.bodies]
+    [(tube, far)] = drawn.tubes
+    assert [names[drawn.nodes[node][0]] for node in (tube, far)] == ["knuckle", "strut"]
+
+
+@pytest.mark.parametrize(
+    ("axle", "rack", "middle"),
+    [(None, None, 3), (None, "0.01", 0), ("heave", None, 3), ("steer", None, 0)],
+)
+def test_steering_in_the_sweep_leaves_no_centre(
+    tmp_path: Path, axle: str | None, rack: str | None, middle: int
+):
+    (tmp_path / "car.csv").write_text(sample_tables(["mcpherson"])[0], "utf-8")
+    case = load(tmp_path / "car.csv", Supplied(axle=axle, rack=rack, travel="0.02:3"))
+    assert [len(wheel.middle) for wheel in scene(case, poses=False).wheels] == [middle] * (
+        1 if axle is None else 2
     )

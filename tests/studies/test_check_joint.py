@@ -21,12 +21,13 @@ BUILT_IN = sorted(
     name for name, joint in Joint.registry.items() if joint.__module__.startswith("kincheck.")
 )
 USERS = {
+    "bowl": "Bowl",
     "pin_in_slot": "PinInSlot",
     "rzeppa": "Rzeppa",
     "point_on_parabola": "PointOnParabola",
     "line_no_twist": "LineNoTwist",
 }
-WITHOUT_EQUIVALENT = ("point_on_parabola", "line_no_twist")
+WITHOUT_EQUIVALENT = ("bowl", "point_on_parabola", "line_no_twist")
 
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")

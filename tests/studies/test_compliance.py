@@ -2,16 +2,21 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import cases
+from kincheck import adapters, cases
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
+from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.kinematics import LoadPoint, StaticModel
+from kincheck.core.mechanism.loads import Bushing
 from kincheck.core.studies.compliance.study import compliance
+
+from ..support.engine_motion import SIMULATORS, installed
 
 DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
@@ -340,3 +345,87 @@ HINGES = {
     "uca_pivot": {"front": (0.09, 0.26, 0.285), "rear": (-0.11, 0.265, 0.28)},
     "lca_pivot": {"front": (0.12, 0.21, 0.125), "rear": (-0.13, 0.215, 0.12)},
 }
+
+
+OUTBOARD = WHEEL.replace("CONVENTION", "iso8855").replace(
+    "wheel_radius", 'drive = "outboard"\nwheel_radius'
+)
+
+
+@pytest.fixture(scope="module")
+def load_cases(tmp_path_factory):
+    """The four load cases of the data as equilibria for engines, with their results."""
+    case, found = strut(tmp_path_factory.mktemp("strut"), OUTBOARD), []
+    for row in STRUT["results"]:
+        fx, fy, _, _, _, mz = row["load_at_contact_patch"]
+        loads = {"longitudinal": fx, "lateral": fy, "aligning": mz}
+        found.append((compliance(case, [row["travel"]], loads).cases[0], row))
+    return found
+
+
+@pytest.mark.parametrize("name", [*SIMULATORS, "exudyn-static"])
+def test_engine_finds_equilibria_of_the_data(load_cases, name):
+    """Wheel centre and load by its own kinematics, gravity and rows, for four load cases."""
+    engine = engine_of(name)
+    for asked, row in load_cases:
+        found = engine.equilibria(asked)
+        center = found.points["wheel_center"].position[0]
+        assert center == pytest.approx(row["wheel_center"], abs=1e-12)
+        assert found.forces.drivers["stroke"][0] == pytest.approx(row["wheel_load"], abs=4e-6)
+
+
+def test_engines_have_verdicts_on_an_axle(tmp_path, capsys):
+    """Both wheels against each other, with an anti-roll bar."""
+    names = ["mujoco", "exudyn-static"]
+    for name in names:
+        engine_of(name)
+    (tmp_path / "axle.toml").write_text(axle_text(800.0))
+    options = ["--travel=-60mm:50mm:2", "--axle=roll", "--jobs=0", "--engine", *names]
+    out = tmp_path / "kc.json"
+    assert main(["kc", str(tmp_path / "axle.toml"), *options, f"--json={out}"]) == 0
+    for row in json.loads(out.read_text())["agreement"][1:]:
+        assert row["outcome"] == "pass"
+        assert row["wheel_center"] <= 1e-12
+        assert row["wheel_load"] <= 1e-5
+
+
+def engine_of(name):
+    if name in adapters.ENGINES:
+        return installed(name)
+    engine = adapters.engine(name, "simulate")
+    if engine.version() is None:
+        pytest.skip(f"{name} is not installed")
+    return engine
+
+
+def test_engine_that_deviates_is_named(tmp_path, capsys):
+    """Its bushings are twice as stiff; history and page have its verdict."""
+    (tmp_path / "strut.toml").write_text(strut_text())
+    options = ["--travel=0:20mm:2", "--jobs=0", "--engine", f"{__name__}:Stiff"]
+    files = [f"--{what}={tmp_path / what}" for what in ("out", "history")]
+    assert main(["kc", str(tmp_path / "strut.toml"), *options, *files]) == 1
+    assert "wheel_center_x: position is off by" in capsys.readouterr().out
+    assert "wheel_load" in (tmp_path / "out" / "results.json").read_text()
+    assert ">fail<" in (tmp_path / "out" / "kc.html").read_text()
+    assert main(["history", "--history", str(tmp_path / "history")]) == 0
+    assert "1 fail" in capsys.readouterr().out
+
+
+class Stiff(NativeEngine):
+    def __init__(self):
+        super().__init__(name="stiff")
+
+    def equilibria(self, case):
+        def twice(each):
+            return replace(each, stiffness=[2.0 * k for k in np.atleast_1d(each.stiffness)])
+
+        forces = [twice(x) if isinstance(x, Bushing) else x for x in case.mechanism.forces]
+        return super().equilibria(replace(case, mechanism=replace(case.mechanism, forces=forces)))
+
+
+def test_engine_without_statics_is_unsupported(tmp_path, capsys):
+    engine_of("mujoco")
+    (tmp_path / "strut.toml").write_text(strut_text())
+    options = ["--travel=0:20mm:2", "--jobs=0", "--engine", "mujoco-default"]
+    assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 0
+    assert "finds no equilibria" in capsys.readouterr().out

@@ -11,16 +11,19 @@ from kincheck.core import (
     Distance,
     JointAngle,
     Mechanism,
+    OrientationLock,
     Point,
     PointCoordinate,
     Revolute,
     Screw,
     Spherical,
     Translational,
+    solve,
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.quantity import with_markers
+from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Kind
@@ -261,3 +264,28 @@ def test_spring_torque_of_unreached_motion_is_missing():
     assert record.message.startswith("0 of 3 samples solved: cannot be followed beyond rock = ")
     assert record.outputs["effort"].position == [None] * 3
     assert diagnose(of, samples=41, tol=1e-12).samples == []
+
+
+@pytest.mark.usefixtures("in_folder", "own_joint_types")
+def test_joint_of_its_residual_alone_is_solved_and_explained():
+    """A marble in a bowl: z = x^2 / (2 R), so z' = x / R, z'' = 1 / R, and dz / dR = -z / R."""
+    bowl = load_joint("bowl:Bowl")("bowl", "ground", "marble", (0.0, 0.0, 0.0), Z, 0.4)
+    marble = Mechanism(
+        "marble",
+        [Body("marble")],
+        [bowl, OrientationLock("upright", "ground", "marble")],
+        [Point("centre", "marble", (0.0, 0.0, 0.0))],
+        [PointCoordinate("along", "centre", X), PointCoordinate("across", "centre", Y)],
+    )
+    x = np.linspace(-0.2, 0.2, 5)
+    found = solve(marble, "along", x).points["centre"]
+    assert found.position[:, 2] == pytest.approx(x * x / 0.8, abs=1e-15)
+    assert found.velocity[:, 2] == pytest.approx(x / 0.4, abs=1e-14)
+    assert found.acceleration[:, 2] == pytest.approx(1.0 / 0.4, abs=1e-13)
+    explained = diagnose(case(marble, x, "centre"), samples=3, tol=1e-12)
+    slope = next(
+        each
+        for each in explained.sensitivities
+        if each.output == "z" and each.number == "joints.bowl.radius"
+    )
+    assert slope.by_sample[0] == pytest.approx(-0.05 / 0.4)

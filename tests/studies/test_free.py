@@ -285,7 +285,7 @@ def test_bad_free_table_names_its_key(case, old, new, message):
 
 
 def test_free_without_duration_says_what_to_give(capsys):
-    assert main(["free", "four_bar"]) == 2
+    assert main(["free", "hooke_joint"]) == 2
     assert "--duration" in capsys.readouterr().err
     with pytest.raises(KincheckError, match="duration"):
-        kincheck.free("four_bar")
+        kincheck.free("hooke_joint")

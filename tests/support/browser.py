@@ -156,7 +156,9 @@ class Browser:
 
     def key(self, key: str, *, ctrl: bool = False, shift: bool = False, alt: bool = False) -> None:
         """Press and release a key."""
-        code = {"ArrowUp": 38, "ArrowDown": 40, "Enter": 13, "Tab": 9}.get(key, ord(key[0].upper()))
+        codes = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
+        codes |= {"Enter": 13, "Tab": 9, "Escape": 27}
+        code = codes.get(key, ord(key[0].upper()))
         modifiers = alt + 2 * ctrl + 8 * shift
         for kind in ("rawKeyDown", "keyUp"):
             self(

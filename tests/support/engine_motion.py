@@ -76,7 +76,7 @@ def solved(engine, mechanism, values, rate=1.0, cut=(), **more):
 def cutting(*names):
     """Trees without these joints; the native engine, whose models are kept, has none."""
 
-    def tree(mechanism):
+    def tree(mechanism, first=()):
         kept = [each for each in mechanism.joints if each.name not in names]
         rest = spanning_tree(replace(mechanism, joints=kept, drivers=(), couplers=()))
         return SpanningTree(rest.branches, (*rest.cut, *map(mechanism.joint, names)))

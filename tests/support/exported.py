@@ -154,7 +154,7 @@ def _urdf(texts, mechanism, folder):
             link(frame["link"]).act(np.array(frame["origin"])),
             link(frame["link"]).rotation @ naive.A(frame["euler_parameters"]),
         )
-    points = {each.name: link(f"point.{each.name}").translation for each in mechanism.points}
+    points = {each.name: point(beside["points"][each.name]) for each in mechanism.points}
     return Reading(found, model.nv - _rank(J, 1e-7), bodies, points)
 
 

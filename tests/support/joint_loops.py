@@ -1,5 +1,6 @@
 """A body that hangs on a crank by a joint of any type, in a closed loop, with its native motion."""
 
+from collections.abc import Collection
 from functools import cache
 
 import numpy as np
@@ -103,7 +104,7 @@ def on_crank(kind: str, first: str, second: str) -> Mechanism:
     )
 
 
-def crank_only(mechanism: Mechanism) -> SpanningTree:
+def crank_only(mechanism: Mechanism, first: Collection[str] = ()) -> SpanningTree:
     """B is free, all joints but the crank's are cut."""
     branches = (Branch(GROUND, "A", mechanism.joint("crank")), Branch(GROUND, "B", None))
     return SpanningTree(

@@ -81,7 +81,15 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
             f"case {case.name!r}: the start {stop} is not finite; give a value of"
             f" {case.sweep.driver!r}"
         )
-    bodies, path = tuple(body.name for body in case.mechanism.moving), case.sweep.path
+    moving = case.mechanism.moving
+    if not case.mechanism.drivers and stop == case.sweep.design:  # of a free motion
+        return {
+            body.name: BodyMotion(
+                np.array([body.origin]), np.array([body.euler_parameters]), None, None
+            )
+            for body in moving
+        }
+    bodies, path = tuple(body.name for body in moving), case.sweep.path
     solver, begin = NativeSolver(order=0), start_of(case.mechanism, path)
     first = case.sweep.design + case.sweep.pace * begin.time
     for samples in (1,) if stop == first and begin.lead is None else SAMPLES:

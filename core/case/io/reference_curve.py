@@ -220,22 +220,7 @@ def _with_accuracy(
             (name,), right = compared, name
         if name not in units:
             raise unknown_name(file, "--accuracy", name, units, "an output with a column")
-        _, number, unit = re.split(r"^([-+.\deE]*)", right, maxsplit=1)
-        try:
-            size = decimal(number)
-        except ValueError:
-            size = float("nan")
-        if not 0.0 < size < float("inf"):
-            raise fault(
-                file,
-                "--accuracy",
-                f"found {shown(text)}, expected OUTPUT=NUMBER UNIT; say --accuracy"
-                f' "{name}=0.02 {"deg" if units[name] == "rad" else units[name]}"',
-            )
-        convert = compared[name].convert
-        if unit := unit.strip():
-            convert = required_unit(file, "--accuracy", name, unit, units[name]).convert
-        stated[name] = abs(convert(size) - convert(0.0))
+        stated[name] = size_of(file, "--accuracy", name, right, units[name], compared[name].convert)
     why = f"the accuracy of {file.name}, as its user states it"
     found: list[Any] = [*outputs]
     for k, output in enumerate(found):
@@ -243,6 +228,34 @@ def _with_accuracy(
             rest = {} if isinstance(output, PerTravel) else {"rtol": 0.0, "why": why}
             found[k] = replace(output, atol=stated[output.name], **rest)
     return tuple(found)
+
+
+def size_of(file: Path, option: str, name: str, text: str, unit: str, bare: Convert) -> float:
+    """Return a positive size of an output in SI, of an option OUTPUT=NUMBER UNIT.
+
+    Args:
+        text: "0.02 deg", or a number alone.
+        unit: the output's, in SI.
+        bare: conversion of a number without a unit.
+
+    Raises:
+        CaseError: another text, or a unit of something else.
+    """
+    _, number, stated = re.split(r"^([-+.\deE]*)", text.strip(), maxsplit=1)
+    try:
+        size = decimal(number)
+    except ValueError:
+        size = float("nan")
+    if not 0.0 < size < float("inf"):
+        raise fault(
+            file,
+            option,
+            f"found {shown(f'{name}={text}')}, expected OUTPUT=NUMBER UNIT; say {option}"
+            f' "{name}=0.02 {"deg" if unit == "rad" else unit}"',
+        )
+    if stated := stated.strip():
+        bare = required_unit(file, option, name, stated, unit).convert
+    return abs(bare(size) - bare(0.0))
 
 
 def _signs(file: Path, written: str, stated: str | None) -> str:

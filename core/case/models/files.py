@@ -155,7 +155,7 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
             from .trees.urdf import read_urdf as read
         case "sdf":
             from .trees.sdf import read_sdf as read
-            from .trees.sdf_include import whole_sdf
+            from .trees.sdf import whole_sdf
 
             root = whole_sdf(file, root)
         case _:

@@ -5,13 +5,14 @@ and the meaning of its sign.
 from .axle import AxleOutput
 from .base import PerTravel, Rate, SuspensionOutput
 from .corner import Axle, Convention, Reaction, Side, Vehicle
-from .wheel import Camber, Toe, camber_of_front_view
+from .wheel import Camber, MotionRatio, Toe, camber_of_front_view
 
 __all__ = [
     "Axle",
     "AxleOutput",
     "Camber",
     "Convention",
+    "MotionRatio",
     "PerTravel",
     "Rate",
     "Reaction",

@@ -1,6 +1,6 @@
 """A large mechanism as one sparse system bound to lanes, one sample a lane: a list of one block.
 
-All equations are one program without an elimination; each pose has factors of its own (SuperLU).
+All equations are one program without an elimination; the poses of all lanes are factored at once.
 Lengths are measured near the size of the bodies, not of the whole mechanism: the entries of the
 matrix and the round-off of the rows depend on that size.
 """
@@ -8,7 +8,6 @@ matrix and the round-off of the rows depend on that size.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -47,7 +46,7 @@ from ..formulation.constraints import measured
 from ..formulation.formulation import row_names
 from ..formulation.state_vectors import turns
 from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
-from ..structure.sparse_lu import Blocks, Factors, Pattern, SingularError
+from ..structure.sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
 
 POSES = 8
@@ -75,29 +74,25 @@ class Rows:
     dropped: Indices
     pattern: Pattern
     blocks: Blocks
-    _solved: Indices
 
     @staticmethod
-    def of(kept: Indices, system: System, count: int) -> Rows:
-        """Return the choice of these rows, of as many."""
+    def of(kept: Indices, system: System, entries: Array, *, compiled: bool) -> Rows:
+        """Return the choice of these rows; several lanes are factored in the order of a pose with
+        these entries of all rows.
+        """
+        count = len(system.tracer.formulation.owners)
         place = np.full(count, -1, np.intp)
         place[kept] = np.arange(len(kept))
         solved = np.flatnonzero(place[system.rows] >= 0)
-        pattern = place[system.rows[solved]], system.columns[solved], len(kept)
+        square = place[system.rows[solved]], system.columns[solved], len(kept), solved
+        values = entries if compiled else None
         dropped = np.setdiff1d(np.arange(count), kept)
-        return Rows(kept, dropped, Pattern(*pattern), Blocks(*pattern), solved)
+        return Rows(kept, dropped, Pattern(*square, values), Blocks(*square, values))
 
-    def factor(self, entries: Array) -> Factors:
-        """Return the factors for entries of all rows. Raises SingularError."""
-        return self.pattern.factor(entries[self._solved])
-
-    def tests(self, entries: Array) -> tuple[Array, float]:
-        """Return the sigmas of the blocks and the sign of the determinant for entries of all rows.
-
-        Raises:
-            SingularError: a block is singular.
-        """
-        return self.blocks.sigmas(entries[self._solved])
+    def begin(self) -> None:
+        """Forget the orders of before."""
+        self.pattern.begin()
+        self.blocks.pattern.begin()
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,33 +131,57 @@ class Poses:
         return float(self.sample[0])
 
 
+class Rest(NamedTuple):
+    """Residuals, right-hand sides of the velocities and entries of the Jacobian at poses, and the
+    largest residual of the solved rows of each.
+    """
+
+    phi: Array
+    nu: Array
+    entries: Array
+    closure: Array
+
+
 class Solved(NamedTuple):
     """Poses after Newton's iteration, shape (numbers, lanes) or (lanes,)."""
 
     state: Array
+    rest: Rest
     iterations: Array
     done: NDArray[np.bool_]
 
 
 class Motion(NamedTuple):
-    """Residuals, entries of the Jacobian, rates, accelerations and factors at poses; NaN and None
-    where rows are singular.
+    """Rates and accelerations at poses, NaN where rows are singular; the factors, and the regular
+    lanes.
     """
 
-    phi: Array
-    entries: Array
     rates: Array
     accelerations: Array
-    factors: Sequence[Factors | None]
+    factors: FactorsOfLanes
+    regular: Indices
 
 
-def solutions(factors: Sequence[Factors | None], b: Array, *, transposed: bool = False) -> Array:
-    """Return solutions by the factors of each lane, NaN without any, shape (unknowns, lanes)."""
-    found = np.full_like(b, np.nan)
-    for k, each in enumerate(factors):
-        if each is not None:
-            found[:, k] = (each.solve_transposed if transposed else each.solve)(b[:, k])
-    return found
+FOLD = 32
+"""Rows side by side: of rows as short as the lanes, numpy takes seven times as long."""
+
+
+def folded(function: Any, values: Array) -> Array:
+    """Return the reduction over one or more rows, shape (rows, lanes)."""
+    rows, lanes = values.shape
+    whole = rows - rows % FOLD
+    if whole:
+        some: Array = function.reduce(values[:whole].reshape(-1, FOLD * lanes), axis=0)
+        values = np.concatenate([some.reshape(FOLD, lanes), values[whole:]])
+    return function.reduce(values, axis=0)
+
+
+def largest_size(values: Array) -> Array:
+    """Return the largest size of the numbers of each lane, zero without any; NaN if one is."""
+    if not len(values):
+        return np.zeros(len(values.T))
+    sizes: Array = np.abs(values)
+    return folded(np.maximum, sizes)
 
 
 def _numbers(here: Poses) -> Numbers:
@@ -224,16 +243,16 @@ class SparseLanes(Lanes):
                 " coordinate",
                 FailureKind.LOCKED,
             )
-        self.rows = Rows.of(kept, system, len(phi))
+        self.rows = self._rows_of(kept, entries[:, 0])
         redundant, count = self._redundant, len(phi) - drivers
         self.details = {
             **counted(mechanism, system.unknowns, count, redundant).details,
             "unknowns": system.unknowns,
             "program": system.sizes,
-            "factor_entries": self.rows.factor(entries[:, 0]).entries,
+            "factor_entries": self.rows.pattern.factor(entries[:, 0]).entries,
         }
         found = self._iterated(system.design, sample, CLOSED, ASSEMBLING)
-        closure = np.abs(system.evaluate(found.state, sample)[0][kept]).max()
+        (closure,) = found.rest.closure
         zero = np.zeros((system.unknowns, 1))
         (branch,) = system.outputs(found.state, sample, zero, zero)["branch"]
         if not (closure <= CLOSED and branch[0] > 0.0):
@@ -263,6 +282,9 @@ class SparseLanes(Lanes):
         null = NullSpaces(system.rows, system.columns, entries, (count, system.unknowns))
         return null.independent_rows(len(self.mechanism.drivers))
 
+    def _rows_of(self, kept: Indices, entries: Array) -> Rows:
+        return Rows.of(kept, self.system, entries, compiled=self.request.compiled)
+
     @property
     def _redundant(self) -> list[str]:
         """The rows left out, as "joint: primitive"."""
@@ -272,6 +294,7 @@ class SparseLanes(Lanes):
     def begin(self) -> None:
         """See `Lanes`."""
         self._renewed = 0
+        self.rows.begin()
 
     @property
     def findings(self) -> Mapping[str, Any]:
@@ -297,8 +320,12 @@ class SparseLanes(Lanes):
             SingularError: the rows are singular there.
         """
         here, state = self.here, self.here.state[:, None]
-        found = self._motion(state, sample)
-        sigmas, sign = self.rows.tests(found.entries[:, 0])
+        rest = self._rest(state, sample)
+        found = self._motion(state, sample, rest)
+        of_lanes, (sign,) = self.rows.blocks.sigmas(rest.entries, np.arange(1))
+        sigmas = of_lanes[:, 0]
+        if np.isnan(sign):
+            raise SingularError("a block is exactly singular")
         known = len(here.sigmas) == len(sigmas)
         largest = np.maximum(here.largest, sigmas) if known else sigmas
         self.here = Poses(
@@ -312,9 +339,9 @@ class SparseLanes(Lanes):
             here.slopes if known else np.zeros_like(sigmas),
             largest,
             largest,
-            np.array(sign),
+            sign,
         )
-        if found.factors[0] is None:
+        if not len(found.regular):
             raise SingularError("exactly singular")
 
     def anchor(self, time: float) -> Anchor:
@@ -360,35 +387,31 @@ class SparseLanes(Lanes):
         kept, iterations = self.rows.kept, np.zeros(state.shape[1])
         last = np.full(state.shape[1], np.inf)
         while True:
-            phi, _, entries = self.system.evaluate(state, sample)
-            closure: Array = np.abs(phi[kept]).max(axis=0)
+            rest = self._rest(state, sample)
+            closure = rest.closure
             done = (closure <= SETTLED) | ((closure <= tol) & (closure > STALLS * last))
             active = np.flatnonzero((~done & (closure < np.inf))[:count])
             if not len(active) or iterations.max() >= most:
-                return Solved(state, iterations, done)
-            factors, step = self._factors(entries, active), np.zeros((len(kept), state.shape[1]))
-            step[:, active] = -solutions(factors, phi[kept])[:, active]
+                return Solved(state, rest, iterations, done)
+            factors = self.rows.pattern.factor_lanes(rest.entries, active)
+            step = np.zeros((len(kept), len(done)))
+            step[:, active] = -factors.solve(rest.phi.take(kept, axis=0))[:, active]
             state, last = self.system.stepped(state, step), closure
             iterations[active] += 1.0
 
-    def _factors(self, entries: Array, lanes: Indices) -> list[Factors | None]:
-        """Return the factors of some lanes, None for the others and where rows are singular."""
-        found: list[Factors | None] = [None] * entries.shape[1]
-        for k in lanes.tolist():
-            with suppress(SingularError):
-                found[k] = self.rows.factor(entries[:, k])
-        return found
-
-    def _motion(self, state: Array, sample: Array, count: int | None = None) -> Motion:
-        """Return the motion of the first lanes."""
-        kept = self.rows.kept
+    def _rest(self, state: Array, sample: Array) -> Rest:
         phi, nu, entries = self.system.evaluate(state, sample)
-        factors = self._factors(
-            entries, np.flatnonzero(np.abs(phi[:, :count]).max(axis=0) < np.inf)
+        return Rest(phi, nu, entries, largest_size(phi.take(self.rows.kept, axis=0)))
+
+    def _motion(self, state: Array, sample: Array, rest: Rest, count: int | None = None) -> Motion:
+        """Return the motion of the first lanes."""
+        kept, lanes = self.rows.kept, np.flatnonzero(rest.closure[:count] < np.inf)
+        factors = self.rows.pattern.factor_lanes(rest.entries, lanes)
+        rates = factors.solve(rest.nu.take(kept, axis=0))
+        gamma = self.system.gamma(state, sample, rates)
+        return Motion(
+            rates, factors.solve(gamma.take(kept, axis=0)), factors, factors.regular(lanes)
         )
-        rates = solutions(factors, nu[kept])
-        accelerations = solutions(factors, self.system.gamma(state, sample, rates)[kept])
-        return Motion(phi, entries, rates, accelerations, factors)
 
     def _judge(
         self, solved: Solved, sample: Array, taylor: Array, count: int, *, neighbours: bool
@@ -404,25 +427,23 @@ class SparseLanes(Lanes):
                 else np.broadcast_to(first[..., None], values.shape)
             )
 
-        state = solved.state
-        motion = self._motion(state, sample, count)
-        sigmas, sign = np.full((rows.blocks.count, POSES), np.nan), np.full(POSES, np.nan)
-        for k, factors in enumerate(motion.factors):
-            if factors is not None:
-                sigmas[:, k], sign[k] = rows.tests(motion.entries[:, k])
+        state, rest = solved.state, solved.rest
+        motion = self._motion(state, sample, rest, count)
+        sigmas, sign = rows.blocks.sigmas(rest.entries, motion.regular)
         self.outputs = system.outputs(state, sample, motion.rates, motion.accelerations)
         (branch,) = self.outputs["branch"]
-        closure = np.abs(motion.phi[rows.kept]).max(axis=0)
-        leftover = np.abs(motion.phi[rows.dropped]).max(axis=0, initial=0.0)
+        closure, leftover = rest.closure, largest_size(rest.phi.take(rows.dropped, axis=0))
         off = previous(state - taylor, np.zeros(len(state)))
         moved = self._distance(state - previous(state, here.state))
         slope = known_slope(here.slopes)
         slopes = slope_between(sigmas, previous(sigmas, here.sigmas), moved)
         least = least_slope(slope)[:, None]
         known = maximum(previous(slopes, slope), least)
-        largest = np.maximum.accumulate(np.column_stack([here.largest, sigmas]), axis=1)[:, 1:]
-        high = np.maximum.accumulate(np.column_stack([here.high, sigmas]), axis=1)[:, 1:]
-        sigma = sigmas.min(axis=0)
+        highest = sigmas.copy()
+        for k in range(1, POSES):
+            np.maximum(highest[:, k], highest[:, k - 1], out=highest[:, k])
+        largest, high = (maximum(each[:, None], highest) for each in (here.largest, here.high))
+        sigma = folded(np.minimum, sigmas)
         candidate = Candidate(
             done=solved.done.astype(float),
             closure=closure,
@@ -434,12 +455,12 @@ class SparseLanes(Lanes):
             turns=[sample[k] - previous(sample[k], here.sample[k]) for k in self._angles],
             sigma=sigma,
             before=previous(sigma, here.sigmas.min()),
-            largest=largest.min(axis=0),
+            largest=folded(np.minimum, largest),
             reversal=sign - previous(sign, here.sign),
             blocks=[Block(sigmas, previous(sigmas, here.sigmas), maximum(slopes, known))],
         )
         self._margins = {
-            name: margin.reshape(-1, POSES).min(axis=0)
+            name: folded(np.minimum, margin.reshape(-1, POSES))
             for name, margin in margins(candidate, self._limits).items()
         }
         margin: Array = np.minimum.reduce([*self._margins.values()])
@@ -466,7 +487,7 @@ class SparseLanes(Lanes):
 
     def _distance(self, change: Array) -> Array:
         """Return the largest of changes of the state, each number by its scale, shape (lanes,)."""
-        return np.abs(change * self._scale).max(axis=0)
+        return largest_size(change * self._scale)
 
     def carry(self, lane: int) -> None:
         """See `Lanes`; change to better rows there, if the present ones have become much more
@@ -491,7 +512,7 @@ class SparseLanes(Lanes):
         kept = self._independent(entries[:, 0], len(phi))
         least = max(BETTER * here.sigmas.min(), SEEN * here.largest.min())
         if kept is not None:
-            self.rows = Rows.of(kept, self.system, len(phi))
+            self.rows = self._rows_of(kept, entries[:, 0])
             self._stand(sample)
             if self.here.sigmas.min() > least:
                 self._renewed += 1
@@ -536,20 +557,19 @@ class SparseLanes(Lanes):
 
     def _error_bounds(self, state: Array, sample: Array) -> Array:
         with np.errstate(all="ignore"):  # what overflows is no number
-            here = self._motion(state, sample)
+            rest = self._rest(state, sample)
+            here = self._motion(state, sample, rest)
             left = np.ones(here.rates.shape)
             for _ in range(STEPS):
-                right = solutions(here.factors, left / np.abs(left).max(axis=0))
-                left = solutions(here.factors, right, transposed=True)
-            closure = np.abs(here.phi[self.rows.kept]).max(axis=0)
-            step = solutions(here.factors, np.maximum(closure, EPSILON) * np.sign(left))
+                right = here.factors.solve(left / largest_size(left))
+                left = here.factors.solve(right, transposed=True)
+            closure = rest.closure
+            step = here.factors.solve(np.maximum(closure, EPSILON) * np.sign(left))
             moved = self.system.stepped(state, step)
-            there = self._motion(moved, sample)
-            speed, acceleration = (
-                np.abs(each).max(axis=0) for each in (here.rates, here.accelerations)
-            )
+            there = self._motion(moved, sample, self._rest(moved, sample))
+            speed, acceleration = map(largest_size, (here.rates, here.accelerations))
             off = [
-                np.abs(a - b).max(axis=0) / np.where(size == 0.0, 1.0, size)
+                largest_size(a - b) / np.where(size == 0.0, 1.0, size)
                 for a, b, size in (
                     (there.rates, here.rates, speed),
                     (there.accelerations, here.accelerations, np.maximum(acceleration, speed**2)),

@@ -122,8 +122,8 @@ class System:
             for name, each in wanted.items()
         ]
         programs.append(tracer.outputs_of_rates())
-        self._vectors = tracer.layout.vectors
-        self._state = [slot for slots in names.values() for slot in slots]
+        self._vectors = {name: _run(slots) for name, slots in tracer.layout.vectors.items()}
+        self._state = _run([slot for slots in names.values() for slot in slots])
         self._sampled = [
             tracer.layout.scalar(TIME),
             *(k for name in tracer.request.drivers for k in vector(f"drive {name}", 5)),
@@ -252,3 +252,9 @@ class System:
         executor.put(self._state, state)
         executor.put(self._sampled, sample)
         return executor
+
+
+def _run(slots: Sequence[int]) -> Sequence[int]:
+    """Return slots one after the other as a range: executors copy those at once."""
+    run = range(slots[0], slots[0] + len(slots)) if slots else range(0)
+    return run if [*run] == [*slots] else slots

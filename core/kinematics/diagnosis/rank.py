@@ -24,8 +24,8 @@ from ...primitives.base import Twist
 from ...trajectory import Array
 from ..compiled.request import CONSISTENT
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Constraint, Frames, Style, constraints_left_out, frames
-from ..formulation.formulation import Configuration, Formulation
+from ..formulation.constraints import Constraint, Frames, constraints_left_out, frames
+from ..formulation.formulation import Configuration, Formulation, State
 from ..formulation.state_vectors import jacobian
 from ..structure.degrees_of_freedom import FreedomAccount, account
 from ..structure.redundancy import DIGITS, RANK_TOLERANCE, independent_joint_rows, independent_rows
@@ -149,6 +149,8 @@ SHARE = 0.1
 # size, rad], within which rows are near to linear, and there are enough to go around the mechanism
 # several times.
 STEP, STEPS = 0.1, 200
+COMPLEX_STEP = 1e-30
+"""Imaginary step for derivatives: its square vanishes beside every number."""
 
 
 @dataclass(frozen=True)
@@ -390,19 +392,26 @@ class Ranks:
         """Return the rows violated in the pose nearest to an assembly, drivers at design; empty if
         it closes.
         """
-        exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
-        state = exact.design
+        equations = self.formulation
+
+        def residuals(state: State) -> Array:
+            return np.array(equations.phi(equations.configuration(state)))
+
+        state = equations.design
         for _ in range(STEPS):
-            at = exact.configuration(state)
-            phi = np.array(exact.phi(at))
+            at, phi = equations.configuration(state), residuals(state)
             if np.abs(phi).max(initial=0.0) <= CONSISTENT:
                 break
-            step = np.linalg.lstsq(jacobian(exact, at), -phi, rcond=RANK_TOLERANCE)[0]
+            # exact rows: simplified ones lead astray where phi = 0 is out of reach
+            steps = 1j * COMPLEX_STEP * np.eye(equations.unknowns)
+            turned = [residuals(equations.retract(at, each.tolist())) for each in steps]
+            slopes = np.array(turned).imag.T / COMPLEX_STEP
+            step = np.linalg.lstsq(slopes, -phi, rcond=RANK_TOLERANCE)[0]
             size = float(np.abs(step).max())
-            state = exact.retract(at, (step * min(1.0, STEP / size) if size else step).tolist())
+            state = equations.retract(at, (step * min(1.0, STEP / size) if size else step).tolist())
             if size < CONSISTENT:
                 break
-        phi = np.array(self.formulation.phi(self.formulation.configuration(state)))
+        phi = residuals(state)
         return (
             self._violations(phi, self.frame.unit)
             if np.abs(phi).max(initial=0.0) > CONSISTENT

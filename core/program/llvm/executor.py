@@ -55,9 +55,11 @@ class LlvmExecutor:
 
     def arranged(self, table: Table) -> Table:
         """See `NumpyExecutor`."""
-        padded = np.empty((len(table), self.room), table.dtype)
-        padded[:, : self.lanes] = table
-        padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
+        padded = table
+        if self.room > self.lanes:
+            padded = np.empty((len(table), self.room), table.dtype)
+            padded[:, : self.lanes] = table
+            padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
         found: Any = padded.reshape(len(table), self._groups, self.group).transpose(1, 0, 2)
         return found
 

@@ -133,7 +133,7 @@ def agreement(
         why: reason of the limit.
     """
     shares = [
-        (off.max_abs / off.tolerance if off.tolerance else math.inf, f"{output} {quantity}", off)
+        (off.ratio, f"{output} {quantity}", off)
         for output, each in errors.items()
         for quantity, off in each.items()
     ]

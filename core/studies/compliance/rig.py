@@ -50,6 +50,7 @@ class Wheel:
     Attributes:
         name: before the names of its load points; empty for the only wheel.
         body: its carrier.
+        point: its centre's name.
         spin: axis of rotation, outboard [-].
         travel: held driver of the height of its centre.
         axes: x, y, z of the convention, shape (3, 3).
@@ -57,6 +58,7 @@ class Wheel:
 
     name: str
     body: str
+    point: str
     center: Vector
     contact: Vector
     spin: Vector
@@ -170,7 +172,9 @@ def _wheel(
     if vehicle is not None and vehicle.convention is not Convention.ISO_8855:
         axes[1:] *= -1.0
     at = next((d for d in travels if d.point == center.name), travels[0])
-    return Wheel(name, center.body, center.position, contact, spin, at.name, axes, vehicle)
+    return Wheel(
+        *(name, center.body, center.name, center.position, contact, spin, at.name, axes, vehicle)
+    )
 
 
 def _contact(

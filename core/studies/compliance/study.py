@@ -15,23 +15,29 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Vec3
-from ...case.case import Case
+from ...case.case import TIME, Balance, Case, Sweep, Truth
 from ...case.compliance import Load, Rig
-from ...case.quantity import ORDERS, Quantity
+from ...case.measures import DriverEffort
+from ...case.quantity import ORDERS, Output, Quantity, with_markers
 from ...case.suspension import PerTravel
 from ...errors import KincheckError, SolveError
 from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, solve
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import Motion
+from ...mechanism.motions import Motion, Ramp
 from ...trajectory import Array
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
 
+# Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
+WITHIN, SAME_LOAD, ROUND_OFF = 1e-12, 1e-9, 1e-15
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+GOAL = "engines differ by round-off"
 DEFAULT_TRAVEL = np.linspace(-0.06, 0.06, 25)
 
 
@@ -86,12 +92,17 @@ class ComplianceCurves:
 
 @dataclass(frozen=True, eq=False)
 class ComplianceResults:
-    """Results of a study: over travel, and over each load at design by its name."""
+    """Results of a study: over travel, and over each load at design by its name.
+
+    Attributes:
+        cases: the same equilibria for engines, in the same order.
+    """
 
     case: str
     travel: ComplianceCurves
     loads: Mapping[Load, ComplianceCurves] = field(default_factory=dict[Load, ComplianceCurves])
     signs: str = ""
+    cases: tuple[Case, ...] = ()
 
     @property
     def failures(self) -> list[str]:
@@ -134,7 +145,10 @@ def compliance(
     every = {Load(name): np.asarray(values, float) for name, values in (loads or {}).items()}
     always = {load: values for load, values in every.items() if not values.ndim}
     curves = {load: study.over_load(load, values) for load, values in every.items() if values.ndim}
-    return ComplianceResults(case.name, study.over_travel(given, always), curves, study.signs)
+    over_travel = study.over_travel(given, always)
+    cases = [study.case_of("travel", given, always, over_travel)]
+    cases += [study.case_of(x, curve.at, {x: curve.at}, curve) for x, curve in curves.items()]
+    return ComplianceResults(case.name, over_travel, curves, study.signs, tuple(cases))
 
 
 class _Study:
@@ -183,6 +197,46 @@ class _Study:
             unit = "rad"
         curves = self._curves("travel", values, found, lambda x: f"{what} {x:.6g} {unit}")
         return replace(curves, rigid=self._rigid(values), turning=unit == "rad")
+
+    def case_of(
+        self, axis: str, at: Array, loads: Mapping[Load, Array], found: ComplianceCurves
+    ) -> Case:
+        """Return the equilibria of these samples as a case for engines.
+
+        Its outputs are the wheels' centres and loads, and those of the case that are poses.
+        """
+        n = len(at)
+        given = self._loads({load: np.broadcast_to(x, (n,)) for load, x in loads.items()}, n)
+        places = tuple(point for wheel in self.wheels for point in wheel.points)
+        largest = max(np.nanmax(np.abs([found.wheel_load, *(x[:, 2] for x in given.values())])), 0)
+        stiff = max((x for each in self.mechanism.forces for x in _stiffnesses(each)), default=0.0)
+        outputs: list[Quantity] = []
+        for wheel in self.wheels:
+            outputs += [
+                Output(
+                    f"{wheel.name}wheel_center_{name}", wheel.point, axis, False, WITHIN, 0.0, GOAL
+                )
+                for name, axis in AXES.items()
+            ]
+            load = SAME_LOAD * float(largest) + ROUND_OFF * stiff
+            effort = DriverEffort(f"{wheel.name}wheel_load", load, 0.0, GOAL, driver=wheel.travel)
+            outputs.append(effort.bound(self.mechanism))
+        known = [x for x in self.case.outputs if not x.forces and x.orders == ORDERS]
+        sweep = Sweep(TIME, np.arange(n, dtype=np.float64), 0.0)
+        if axis == "travel":
+            (first, _), *others = self._travels(np.ones(n)).items()
+            motions = {name: Ramp(float(x[0])) for name, x in others}
+            sweep = Sweep(first, at, 0.0, motions=motions)
+        return replace(
+            self.case,
+            name=f"{self.case.name} over {axis}",
+            truth=Truth.CONSENSUS_ONLY,
+            mechanism=with_markers(self.mechanism, outputs),
+            sweep=sweep,
+            outputs=tuple(outputs + known),
+            reference={},
+            balance=Balance(places, given),
+        )
 
     def over_load(self, load: Load, values: Array) -> ComplianceCurves:
         """Return the curves over a load at design."""
@@ -351,8 +405,6 @@ class _Study:
         driver, given = next(iter(travels.items()))
         others: dict[str, Motion] = {}
         if len(travels) == 2:
-            from ...mechanism.motions import Ramp
-
             others = {[*travels][1]: Ramp(self._other)}
         try:
             moved = solve(
@@ -376,6 +428,10 @@ class _Study:
                 design[name] = Vec3(*(Jet(np.array(x), still, still) for x in place))
             found[output.name] = np.where(moved.solved, output.of(at, design).x, np.nan)
         return found
+
+
+def _stiffnesses(each: Any) -> Sequence[float]:
+    return np.atleast_1d(getattr(each, "stiffness", 0.0)).tolist()
 
 
 def _steering(case: Case, held: Sequence[str], wheels: Sequence[Wheel]) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...case.compliance import Load
+from ...harness.record import Record, Results
 from ...report.figures import Figure, Style
 from ...report.page_model import Plot
 from ...report.page_parts import environment, figure_parts
@@ -38,8 +39,12 @@ SHOWN: Mapping[str, tuple[str, float]] = {
 _HERE = Path(__file__).parent
 
 
-def as_data(results: ComplianceResults) -> dict[str, Any]:
-    """Return the results as plain data in SI; null without an equilibrium."""
+def as_data(results: ComplianceResults, checked: Results | None = None) -> dict[str, Any]:
+    """Return the results as plain data in SI; null without an equilibrium.
+
+    Args:
+        checked: records of engines.
+    """
     return {
         "schema": SCHEMA,
         "case": results.case,
@@ -47,7 +52,31 @@ def as_data(results: ComplianceResults) -> dict[str, Any]:
         **_data(results.travel),
         "loads": {str(name): _data(each) for name, each in results.loads.items()},
         "failures": results.failures,
+        **({"agreement": agreement(checked)} if checked else {}),
     }
+
+
+def agreement(checked: Results) -> list[dict[str, Any]]:
+    """Return a row for each engine and case: its verdict, and the largest deviations from native of
+    the wheels' centres [m] and of their loads [N]; None without any.
+    """
+    return [
+        {
+            "case": each.case,
+            "engine": each.engine,
+            "mode": each.mode,
+            "outcome": each.outcome.shown,
+            "wheel_center": _largest(each, lambda name: "wheel_center_" in name),
+            "wheel_load": _largest(each, lambda name: name.endswith("wheel_load")),
+            "message": each.message,
+        }
+        for each in checked.records
+    ]
+
+
+def _largest(record: Record, wanted: Callable[[str], bool]) -> float | None:
+    every = [each.position for name, each in record.errors.items() if wanted(name)]
+    return max((each.max_abs for each in every if each is not None), default=None)
 
 
 def _data(curves: ComplianceCurves) -> dict[str, Any]:
@@ -131,8 +160,12 @@ def lines(results: ComplianceResults) -> Iterator[str]:
         yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
 
 
-def page(results: ComplianceResults) -> str:
-    """Return the page: curves over travel with the rigid ones beside, then over each load."""
+def page(results: ComplianceResults, checked: Results | None = None) -> str:
+    """Return the page: curves over travel with the rigid ones beside, then over each load.
+
+    Args:
+        checked: records of engines.
+    """
     figures: dict[str, Figure] = {}
     sections: list[tuple[str, list[Style], list[Plot]]] = []
     soft, rigid = Style.number(0, "with bushings"), Style.number(1, "rigid joints")
@@ -166,6 +199,7 @@ def page(results: ComplianceResults) -> str:
             results=results,
             sections=sections,
             matrix=_matrix(results.travel),
+            agreement=agreement(checked) if checked else [],
             **figure_parts(figures),
         )
     )

@@ -160,7 +160,7 @@ def judged(
         )
         if off is None:
             continue
-        ratio = off.max_abs / off.tolerance if off.tolerance else (np.inf if off.max_abs else 0.0)
+        ratio = off.ratio
         if worst.ratio is None or ratio > worst.ratio:
             told = (
                 row.output.name,

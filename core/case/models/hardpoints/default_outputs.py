@@ -273,15 +273,10 @@ def hardpoints_of(
         place: np.array([np.broadcast_to(derivatives(x), by_table.shape[2]) for x in value])
         for place, value in found.items()
     }
-    return tuple(
-        Hardpoint(
-            name,
-            tuple(role for role, filled in named.items() if filled == name),
-            {
-                place: each[:, 3 * row : 3 * row + 3]
-                for place, each in slopes.items()
-                if each[:, 3 * row : 3 * row + 3].any()
-            },
-        )
-        for row, name in enumerate(rows)
-    )
+    hardpoints: list[Hardpoint] = []
+    for row, name in enumerate(rows):
+        roles = tuple(role for role, filled in named.items() if filled == name)
+        own = {place: each[:, 3 * row : 3 * row + 3] for place, each in slopes.items()}
+        moves = {place: each for place, each in own.items() if each.any()}
+        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves))
+    return tuple(hardpoints)

@@ -7,18 +7,18 @@ pose in its child, and a frame's pose in its `attached_to`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-from ....algebra import Vec3, X, quat, vec
-from ....errors import CaseError, remedy
-from ...io.document import shown
-from .element import DEEPEST, Element, words
+from ....algebra import Vec3, X
+from ....errors import CaseError
+from ...io.case_file import LARGEST_FILE
+from ...io.document import read_text, shown
+from .element import Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
-from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
+from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
     BUSHING,
@@ -35,12 +35,9 @@ from .robot_elements import (
     mimic,
     screw,
 )
+from .sdf_frames import FLAGS, MODEL, TRUE, Frames, endings, flag_of, pose_of, text_of, within
 from .tree import WORLD, Coupling, Mass, Move, Tree
 
-MODEL = "__model__"
-SCOPE = "::"
-# Three for each body that other models may have.
-MOST_FRAMES = 6_000
 TYPES = words("revolute continuous prismatic fixed ball universal revolute2 screw")
 TWO_AXES = ("universal", "revolute2")
 IN_MODEL = words(
@@ -69,207 +66,115 @@ IN = {"sdf": IN_ROOT, "world": IN_WORLD, "model": IN_MODEL, "link": IN_LINK}
 IN_LIMIT = words("lower upper effort velocity stiffness dissipation")
 _READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT, BUSHING)
 _COUNTED = words("visual collision sensor light plugin")
+# Three for each body that other models may have.
+MOST_FRAMES = 6_000
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
+_PLACED = "placement_frame"
+MOST_INCLUDES, _SUFFIXES = 100, (".sdf", ".world", ".config")
+_WRITE_OUT = "write the whole model out: gz sdf -p FILE > flat.sdf"
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link unless given, of 1 kg [kg m^2]."""
 # Axes were in the model's frame before this version.
-AXES_IN_JOINT = (1, 5)
+_AXES_IN_JOINT = (1, 5)
 
 
-@dataclass(frozen=True)
-class Framed:
-    """An element with a frame.
+def whole_sdf(file: Path, root: Element) -> Element:
+    """Return a document with the models that it includes from files beside it.
 
-    Attributes:
-        scope: full name of the model around it; empty for the world.
-        default: full name of the base of its pose without relative_to.
-        attached: full name of the frame it moves with; empty for a link, or the world.
+    Raises:
+        CaseError: a model is elsewhere, or an option of its inclusion is not read.
     """
-
-    element: Element
-    scope: str
-    default: str
-    attached: str = ""
+    folder = file.parent.resolve()
+    return _Inclusion(folder, folder.parent, _version(root)).whole(root)
 
 
 @dataclass
-class Frames:
-    """All frames of a document, by full name: MODEL::LINK; the world has an empty name."""
+class _Inclusion:
+    """The inclusion of models.
 
-    found: dict[str, Framed] = field(default_factory=dict[str, Framed])
-    links: dict[str, Framed] = field(default_factory=dict[str, Framed])
-    joints: dict[str, Framed] = field(default_factory=dict[str, Framed])
-    models: dict[str, Framed] = field(default_factory=dict[str, Framed])
-    static: set[str] = field(default_factory=set[str])
-    _places: dict[str, Place] = field(default_factory=lambda: {"": ORIGIN})
-
-    def read(self, around: Element, scope: str, depth: int = 0) -> None:
-        """Take the frames of a model or world.
-
-        Raises:
-            CaseError: a name is missing or given twice, or models nest too deeply.
-        """
-        if depth > DEEPEST // 10:
-            raise around.fault("nests too deeply, expected few models in models; flatten the file")
-        for element in around.only("link"):
-            element.require_known(("name",), "SDF")
-            full = self._add(element, scope, scope)
-            self.links[full] = self.found[full]
-        for element in around.only("model"):
-            element.require_known(("name", "canonical_link"), "SDF")
-            full = self._add(element, scope, scope)
-            self.models[full] = self.found[full]
-            if _flag(element.child("static")):
-                self.static.add(full)
-            self.read(element, full, depth + 1)
-        for element in around.only("joint"):
-            element.require_known(("name", "type"), "SDF")
-            child = within(scope, text_of(element, "child"))
-            full = self._add(element, scope, child, child)
-            self.joints[full] = self.found[full]
-        for element in around.only("frame"):
-            element.require_known(("name", "attached_to"), "SDF")
-            element.require_children(("pose",), closed=True)
-            base = element.attributes.get("attached_to", "")
-            attached = within(scope, base) if base else scope
-            self._add(element, scope, attached, attached)
-
-    def _add(self, element: Element, scope: str, default: str, attached: str = "") -> str:
-        name = element.attributes.get("name", "")
-        if not name or SCOPE in name or name in (WORLD, MODEL):
-            raise element.fault(f"name: found {shown(name)}, expected a name of its own; give one")
-        full = _full_name(scope, name)
-        if full in self.found:
-            raise element.repeated_name(name, "them")
-        self.found[full] = Framed(element, scope, default, attached)
-        return full
-
-    def put(self, name: str, element: Element, place: Place, link: str) -> None:
-        """Take a frame of another format, at a place on a link."""
-        self.found[name] = Framed(element, "", "", link)
-        self._places[name] = place
-        if name == link:
-            self.links[name] = self.found[name]
-
-    def named(self) -> dict[str, str]:
-        """Return the links by the names of links and frames, with and without their models.
-
-        Raises:
-            CaseError: a frame is attached to none.
-        """
-        links = {WORLD: WORLD}
-        for full, framed in self.found.items():
-            if full not in self.models and full not in self.joints:
-                link = self.link(framed.element, full) or WORLD
-                links |= {name: link for name in _endings(full) if name not in links}
-        return links
-
-    @cached_property
-    def _prefix(self) -> str:
-        """What all names have in common: the model, if there is only one at the top."""
-        tops = [full for full, each in self.models.items() if not each.scope]
-        outside = any(not each.scope for each in (*self.links.values(), *self.joints.values()))
-        return f"{tops[0]}{SCOPE}" if len(tops) == 1 and not outside else ""
-
-    def short(self, full: str) -> str:
-        """Return a full name without the model, if there is only one at the top; not before all are
-        read.
-        """
-        return full.removeprefix(self._prefix)
-
-    def known(self, element: Element, full: str) -> str:
-        """Return a full name of a frame.
-
-        Raises:
-            CaseError: there is none.
-        """
-        if full and full not in self.found:
-            raise element.fault(
-                f"found the frame {shown(full)}, expected another one; {remedy(full, self.found)}"
-            )
-        return full
-
-    def place(self, element: Element, full: str) -> Place:
-        """Return the place of a frame, global.
-
-        Raises:
-            CaseError: it is unknown, or given in itself by a ring of frames.
-        """
-        chain: list[str] = []
-        name = self.known(element, full)
-        while name not in self._places:
-            chain.append(name)
-            if len(chain) > len(self.found):
-                raise self.found[name].element.fault(
-                    "is given in itself by a ring of frames, expected poses from the model on;"
-                    " correct relative_to"
-                )
-            name = self.known(self.found[name].element, self._base(name))
-        for name in reversed(chain):
-            base = self._places[self._base(name)]
-            self._places[name] = base.then(_pose(self.found[name].element.child("pose")))
-        return self._places[full]
-
-    def _base(self, full: str) -> str:
-        """Return the base of the pose of a frame."""
-        framed = self.found[full]
-        pose = framed.element.child("pose")
-        given = pose.attributes.get("relative_to", "") if pose is not None else ""
-        return within(framed.scope, given) if given else framed.default
-
-    def link(self, element: Element, full: str) -> str:
-        """Return the link of a frame; empty for the world.
-
-        Raises:
-            CaseError: there is none.
-        """
-        for _ in range(len(self.found) + 1):
-            if not full or full in self.links:
-                return full
-            self.known(element, full)
-            full = self._canonical(full) if full in self.models else self.found[full].attached
-        raise element.fault(
-            f"found the frame {shown(full)}, which is attached to itself; correct attached_to"
-        )
-
-    def _canonical(self, model: str) -> str:
-        """Return the link of a model's frame: its canonical one, its first, or that of a model
-        inside.
-        """
-        element = self.found[model].element
-        if name := element.attributes.get("canonical_link", ""):
-            return _full_name(model, name)
-        for full, each in (*self.links.items(), *self.models.items()):
-            if each.scope == model:
-                return full
-        raise element.fault("has no link, expected one; give a model with links")
-
-    def is_still(self, full: str) -> bool:
-        """Return whether a link is in a static model, or in a model inside it."""
-        scope = self.found[full].scope
-        while scope and scope not in self.static:
-            scope = self.found[scope].scope
-        return bool(scope)
-
-
-def within(scope: str, name: str) -> str:
-    """Return the full name of a name in a scope; whether there is such a frame is asked later, for
-    it may follow.
+    Attributes:
+        folder: of the document that includes.
+        around: all files are in here.
+        version: of SDF.
+        count: how many are included so far, at any depth.
     """
-    if name == MODEL:
-        return scope
-    return "" if name == WORLD else _full_name(scope, name)
 
+    folder: Path
+    around: Path
+    version: tuple[int, ...]
+    count: int = 0
 
-def _full_name(scope: str, name: str) -> str:
-    return f"{scope}{SCOPE}{name}" if scope else name
+    def whole(self, around: Element) -> Element:
+        """Return an element with included models in place of <include>, at any depth."""
+        if not any(each.tag == "include" for each in around.below()):
+            return around
+        found = [
+            self._model(each) if each.tag == "include" else self.whole(each)
+            for each in around.children
+        ]
+        return replace(around, children=found)
 
+    def _model(self, element: Element) -> Element:
+        element.require_known(("merge",), "SDF")
+        if element.choice("merge", FLAGS, "false") in TRUE or any(element.only(_PLACED)):
+            raise element.fault(f"has merge or <{_PLACED}>, which are not read; {_WRITE_OUT}")
+        element.require_children(("uri", "name", "pose", "static", "plugin"), closed=True)
+        self.count += 1
+        if self.count > MOST_INCLUDES:
+            raise element.fault(f"found more than {MOST_INCLUDES} includes, or a ring of them")
+        file = self._file(element, text_of(element, "uri"))
+        root = parse_xml(file, read_text(file, LARGEST_FILE, "it holds one model"))
+        models = [*root.only("model")]
+        if root.tag != "sdf" or len(models) != 1:
+            raise element.fault(
+                f"{file.name}: found <{root.tag}> with {len(models)} models, expected <sdf> with"
+                f" one; {_WRITE_OUT}"
+            )
+        if (_version(root) < _AXES_IN_JOINT) != (self.version < _AXES_IN_JOINT):
+            raise element.fault(
+                f"{file.name}: is of SDF {root.attributes.get('version')}, whose axes have another"
+                f" meaning than those of the file around it; {_WRITE_OUT}"
+            )
+        folder, self.folder = self.folder, file.parent
+        model = self.whole(models[0])
+        self.folder = folder
+        own = [*element.only("pose", "static", "plugin")]
+        given = {each.tag for each in own if each.tag != "plugin"}
+        children = [*own, *(each for each in model.children if each.tag not in given)]
+        attributes = dict(model.attributes)
+        if name := element.child("name"):
+            attributes["name"] = name.text
+        return replace(model, attributes=attributes, children=children)
 
-def _endings(full: str) -> list[str]:
-    """Return a full name, and what it is called within its models."""
-    parts = full.split(SCOPE)
-    return [SCOPE.join(parts[k:]) for k in range(len(parts))]
+    def _file(self, element: Element, uri: str) -> Path:
+        """Return the file of a model: the URI's own, or that named by the folder's model.config."""
+        kind, _, path = uri.rpartition("://")
+        names = [f"../{path}", path] if kind == "model" else [path]
+        places = [file_near(self.folder, name, _SUFFIXES) for name in names]
+        if kind in ("model", ""):
+            # a folder beside the document's has no suffix
+            places += [
+                file_near(self.folder, f"{name}/{inside}", _SUFFIXES)
+                for name in names
+                for inside in ("model.config", "model.sdf")
+            ]
+        near = [each for each in places if each and each.is_relative_to(self.around)]
+        found = [each for each in near if each.is_file()]
+        if not found or kind not in ("model", "file", ""):
+            raise element.fault(
+                f"uri: found {shown(uri)}, expected a model in the folder of the file, in one"
+                f" beside it or below, and there is none; put it there, or {_WRITE_OUT}"
+            )
+        if found[0].suffix != ".config":
+            return found[0]
+        config = parse_xml(found[0], read_text(found[0], LARGEST_FILE, "it describes one model"))
+        files = [*config.only("sdf")]
+        newest = max(files, key=_version, default=config)
+        file = file_near(found[0].parent, newest.text, _SUFFIXES)
+        if file is None or not file.is_file():
+            raise newest.fault(f"found {shown(newest.text)}, expected a file beside it; correct it")
+        return file
 
 
 def read_sdf(file: Path, root: Element) -> Tree:
@@ -302,7 +207,7 @@ def read_sdf(file: Path, root: Element) -> Tree:
         if (gravity := world.child("gravity")) is not None:
             x, y, z = gravity.text_numbers(3, default=GRAVITY)
             graph.tree.gravity = x, y, z
-    graph.joints += joints_of(graph, frames, version_of(root))
+    graph.joints += joints_of(graph, frames, _version(root))
     in_models = [
         (child, partial(_link, frames, full), partial(_framed, frames, full))
         for full, framed in frames.models.items()
@@ -354,7 +259,7 @@ def _mass(element: Element) -> Mass | None:
         ]
         mass = element.child("mass")
         kilograms = 1.0 if mass is None else mass.text_numbers(1)[0]
-        return mass_in(_pose(element.child("pose")), kilograms, entries)
+        return mass_in(pose_of(element.child("pose")), kilograms, entries)
     except CaseError:
         return None
 
@@ -364,12 +269,7 @@ def _number(element: Element, tag: str, default: float) -> float:
     return default if child is None else child.text_numbers(1, default=(default,))[0]
 
 
-def version_of(root: Element) -> tuple[int, ...]:
-    """Return the version of SDF of a document; 1.7 unless given.
-
-    Raises:
-        CaseError: it is no number.
-    """
+def _version(root: Element) -> tuple[int, ...]:
     try:
         return tuple(map(int, root.attributes.get("version", "1.7").split(".")))
     except ValueError:
@@ -394,7 +294,7 @@ def _framed(frames: Frames, model: str, element: Element, name: str) -> tuple[st
 
 def _require_apart(graph: Graph, frames: Frames) -> None:
     """Refuse elements that are not read and may join links."""
-    joints = {name: frames.short(full) for full in frames.joints for name in _endings(full)}
+    joints = {name: frames.short(full) for full in frames.joints for name in endings(full)}
     links = {name: frames.short(full) for name, full in frames.named().items()}
     unread = Unread(links, joints, graph.followers, f"a <joint> or <{BALL}>")
     around = [("", each) for each in (graph.root, *graph.root.only("world"))]
@@ -503,7 +403,7 @@ class _Joint:
             xyz.require_known(("expressed_in",), "SDF")
             numbers = xyz.text_numbers(3, default=numbers)
             given = xyz.attributes.get("expressed_in", "")
-        if _flag(axis.child("use_parent_model_frame")) or self.version < AXES_IN_JOINT:
+        if flag_of(axis.child("use_parent_model_frame")) or self.version < _AXES_IN_JOINT:
             given = given or MODEL
         if given:
             place = self.frames.place(axis, within(self.framed.scope, given))
@@ -549,47 +449,3 @@ class _Joint:
             )
         factor, offset = element.number("multiplier", 1.0), element.number("offset", 0.0)
         return mimic(self.name, self.frames.short(leader), offset, factor, element)
-
-
-def text_of(element: Element, tag: str) -> str:
-    """Return the text of the only element of a tag."""
-    child = element.child(tag)
-    if child is None or not child.text:
-        raise element.fault(f"<{tag}>: missing, expected a name; add it")
-    return child.text
-
-
-FLAGS = ("true", "false", "1", "0")
-TRUE = ("true", "1")
-
-
-def _flag(element: Element | None) -> bool:
-    """Return the flag in the text of an element; false without one."""
-    if element is None:
-        return False
-    if element.text.lower() not in FLAGS:
-        raise element.fault(f"found {shown(element.text)}, expected true or false; correct it")
-    return element.text.lower() in TRUE
-
-
-def _pose(element: Element | None) -> Place:
-    """Return the place of a <pose>; the frame itself without one."""
-    if element is None:
-        return ORIGIN
-    element.require_known(("relative_to", "degrees", "rotation_format", "frame"), "SDF")
-    if element.attributes.get("frame"):
-        raise element.fault(
-            "frame: found an attribute of SDF 1.6, expected relative_to; convert it"
-        )
-    kind = element.choice("rotation_format", ("euler_rpy", "quat_xyzw"), "euler_rpy")
-    if kind == "quat_xyzw":
-        numbers = element.text_numbers(7, default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
-        if not math.hypot(*numbers[3:]) > 0.0:
-            raise element.fault("found a quaternion of zeros, expected a rotation; correct it")
-        x, y, z, w = numbers[3:]
-        return Place(vec(numbers[:3]), unit_quaternion(quat((w, x, y, z))))
-    *at, roll, pitch, yaw = element.text_numbers(6, default=(0.0,) * 6)
-    angles = [roll, pitch, yaw]
-    if element.choice("degrees", FLAGS, "false") in TRUE:
-        angles = [*map(math.radians, angles)]
-    return Place(vec(at), roll_pitch_yaw(angles))

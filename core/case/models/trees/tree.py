@@ -28,10 +28,12 @@ WORLD = "world"
 # the square of their number: 1,000 take 25 s, as many as these some minutes. The rows of ties are
 # solved together, in some seconds.
 MOST_LINKS, MOST_MOVING, MOST_TIES = 20_000, 2_500, 6_000
-STAND_IN = 1e-6
+STAND_IN = 1e-6, 1e-6
 """Mass and moments written by kincheck for a body without a mass [kg, kg m^2]."""
-# Of the stand-in's moments, turned into the axes of a body [kg m^2].
-_ROUND_OFF = 1e-9 * STAND_IN
+BETWEEN = 1e-9, 1e-12
+"""Those for a link between the freedoms of a joint, in a file with masses: no simulator sees them
+in the motion of what it carries.
+"""
 
 Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
 UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}
@@ -192,8 +194,12 @@ class Mass:
     @property
     def is_stand_in(self) -> bool:
         """Whether it is what kincheck itself writes for none."""
-        alike = np.allclose(self.inertia, STAND_IN * np.eye(3), rtol=0, atol=_ROUND_OFF)
-        return self.mass == STAND_IN and alike
+        return any(
+            self.mass == mass
+            # moments that were turned into the axes of a body
+            and np.allclose(self.inertia, moment * np.eye(3), rtol=0, atol=1e-9 * moment)
+            for mass, moment in (STAND_IN, BETWEEN)
+        )
 
     def seen_in(self, place: Place) -> Mass:
         """Return the mass in another frame, in which the place of its own one is given."""

@@ -1,0 +1,131 @@
+"""The loop of every stepper: run it at each effort, compare with the truth, write result.json.
+
+This file stands behind an engine's part in run.py, which needs numpy and the engine alone.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# Frame of a body: position of its origin, rotation, angular velocity, velocity of the origin;
+# global axes. At design the frame of every body is the global one.
+State = tuple[Any, Any, Any, Any]
+STILL: State = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+
+
+def place(states: Mapping[str, State], body: str, point: Any) -> tuple[Any, Any]:
+    """Return position and velocity of a point of a body, given globally at design."""
+    x, R, w, v = states.get(body, STILL)
+    arm = R @ np.array(point)
+    return x + arm, v + np.cross(w, arm)
+
+
+def spring(states: Mapping[str, State], each: Any) -> tuple[Any, float, float]:
+    """Return the direction of a spring, its length, and its tension."""
+    (P, V), (Q, U) = (
+        place(states, *end) for end in zip(each["bodies"], each["points"], strict=True)
+    )
+    length = float(np.linalg.norm(Q - P))
+    along = (Q - P) / length
+    elastic = each["stiffness"] * (length - each["free_length"])
+    return along, length, elastic + each["damping"] * float(along @ (U - V))
+
+
+def loads(model: Any, states: Mapping[str, State]) -> Iterable[tuple[str, Any, Any, Any]]:
+    """Yield body, point, force and torque of all springs and constant loads, global."""
+    for each in model["springs"]:
+        along, _, tension = spring(states, each)
+        for body, point, sign in zip(each["bodies"], each["points"], (1.0, -1.0), strict=True):
+            if body in states:
+                yield body, place(states, body, point)[0], sign * tension * along, np.zeros(3)
+    for each in model["loads"]:
+        at, _ = place(states, each["body"], each["point"])
+        yield each["body"], at, np.array(each["force"]), np.array(each["torque"])
+
+
+def energy(model: Any, states: Mapping[str, State]) -> float:
+    """Return the energy of motion, weight and springs [J]."""
+    found = 0.0
+    for body in model["bodies"]:
+        _, R, w, _ = states[body["name"]]
+        at, speed = place(states, body["name"], body["center"])
+        I = R @ np.array(body["inertia"]) @ R.T  # noqa: E741
+        found += 0.5 * (body["mass"] * speed @ speed + w @ I @ w)
+        found -= body["mass"] * (np.array(model["gravity"]) @ at)
+    for each in model["springs"]:
+        _, length, _ = spring(states, each)
+        found += 0.5 * each["stiffness"] * (length - each["free_length"]) ** 2
+    return float(found)
+
+
+def gap(model: Any, states: Mapping[str, State]) -> float:
+    """Return the largest gap of ties, and of joints whose points coincide [m]."""
+    meeting = [each for each in model["joints"] if all(each["rows"][:3]) and each["rows"]]
+    found = 0.0
+    for each in [*meeting, *model["ties"]]:
+        P, Q = (place(states, *end)[0] for end in zip(each["bodies"], each["points"], strict=True))
+        found = max(found, abs(float(np.linalg.norm(Q - P)) - each.get("length", 0.0)))
+    return found
+
+
+def run(stepper: Any, model: Any, settings: Any, effort: Any, truth: Any) -> dict[str, Any]:
+    """Return the largest errors of a run, and its time by simulated second."""
+    times, points, energies = truth
+    advance, states = stepper(model, settings, effort, times, loads)
+    largest, spent, message, k = np.zeros(3), 0.0, "", 0
+    for k in range(len(times)):
+        begin = time.perf_counter()
+        if k:
+            advance(k)
+        spent += time.perf_counter() - begin
+        found = states(k)
+        at = [place(found, each["body"], each["position"])[0] for each in model["points"]]
+        errors = np.array(
+            [
+                np.linalg.norm(np.array(at) - points[k], axis=1).max(),
+                gap(model, found),
+                abs(energy(model, found) - energies[k]),
+            ]
+        )
+        if not np.isfinite(errors).all():
+            message = f"not finite at {times[k]:.6g} s"
+            break
+        largest = np.maximum(largest, errors)
+    names, done = ("error", "gap", "energy"), float(times[k] - times[0])
+    measured = [None] * 3 if message else largest.tolist()
+    cost = spent / done if done else None
+    return {**effort, **dict(zip(names, measured, strict=True)), "cost": cost, "message": message}
+
+
+def main(stepper: Callable[..., Any], version: Callable[[], str]) -> None:
+    """Run all efforts; keep what is found so far in result.json."""
+    folder = Path(sys.argv[0]).resolve().parent
+    model, settings = (
+        json.loads((folder / f"{name}.json").read_text("utf-8")) for name in ("model", "settings")
+    )
+    table = np.loadtxt(folder / "truth.csv", delimiter=",", skiprows=1, ndmin=2)
+    truth = table[:, 0], table[:, 2:].reshape(len(table), -1, 3), table[:, 1]
+    found: dict[str, Any] = {"version": "", "message": "", "runs": []}
+    try:
+        found["version"] = version()
+    except ImportError as error:
+        found["message"] = f"unavailable: {error}"
+    for effort in settings["efforts"] if found["version"] else ():
+        try:
+            done = run(stepper, model, settings, effort, truth)
+        except NotImplementedError as error:
+            found["message"] = f"unsupported: {error}"
+            break
+        except Exception as error:  # of the engine: it belongs to this run
+            done = {**effort, "message": f"{type(error).__name__}: {error}"[:300]}
+        found["runs"].append(done)
+        (folder / "result.json").write_text(json.dumps(found, indent=1), "utf-8")
+        print(*(f"{name} {value}" for name, value in done.items()), sep="  ", flush=True)
+    (folder / "result.json").write_text(json.dumps(found, indent=1), "utf-8")
+    if found["message"]:
+        print(found["message"])

@@ -1,0 +1,178 @@
+"""The page of the board, in the style of a benchmark: a table and a work-precision diagram by case,
+and the settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+
+from ...harness.labels import number
+from ...report.figure_data import floored, ticked_axis
+from ...report.figures import Figure, Style
+from ...report.page_model import Plot
+from ...report.sections import Diagram, Report, Section
+from .results import Board, Row, Run, TruthFacts
+
+COLUMNS = (
+    "integrator",
+    "engine",
+    "settings",
+    "outcome",
+    "step [s]",
+    "error [m]",
+    "gap [m]",
+    "energy [J]",
+    "cost [s/s]",
+    "order",
+    "floor [m]",
+    "loop",
+)
+LABELS = 4
+NOTES = (
+    "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
+    " Gap: largest opening of a loop. Energy: of motion, weight and springs, less the truth's at"
+    " the same time: what loads and dampers took is in both.",
+    "Errors are those of the shortest step, cost is wall time for a simulated second there, in one"
+    " process and one run on a machine that also does other things: costs within a factor of two"
+    " are alike. Loop: in the engine, or in Python, whose time is then in the cost.",
+    "Order: by least squares over steps that lower the error. Floor: an error that the last halving"
+    " does not lower, by softness or because steps are still too long. Default: the engine's"
+    " settings at these steps; best: best known ones.",
+)
+
+
+def report(board: Board) -> Report:
+    """Return the page of the board."""
+    return Report(
+        "board",
+        "How well time steppers hold a closed loop",
+        [
+            f"kincheck {board.kincheck}",
+            board.started,
+            board.processor,
+            "float64 on the CPU",
+            *(sorted({f"{row.engine} {row.version}" for row in board.rows if row.version})),
+        ],
+        [
+            *(_section(truth, rows) for truth in board.truths if (rows := _rows(board, truth))),
+            _settings(board.rows),
+        ],
+    )
+
+
+def _rows(board: Board, truth: TruthFacts) -> list[Row]:
+    """Return the rows of a case, those of one kind of integrator together."""
+    groups = [*dict.fromkeys(row.group for row in board.rows)]
+    mine = [row for row in board.rows if row.case == truth.case]
+    return sorted(mine, key=lambda row: groups.index(row.group))
+
+
+def _section(truth: TruthFacts, rows: Sequence[Row]) -> Section:
+    measured = [row for row in rows if row.measured]
+    styles = [Style.number(k, row.name) for k, row in enumerate(measured)]
+    verdict = [
+        f"{truth.source}. {truth.duration:.6g} s, {truth.samples} samples, {truth.points} points,"
+        f" {truth.freedoms} freedom{'s' * (truth.freedoms > 1)}, {truth.redundant} redundant rows.",
+        f"Truth: {truth.method}; halved steps change a point by {number(truth.error)} m, and energy"
+        f" less work by {number(truth.energy)} J.",
+        *([truth.message] if truth.message else []),
+        *_alike(rows),
+    ]
+    diagram = [Diagram(_plot(truth.case), _figure(measured, styles), styles)] if measured else []
+    return Section(
+        truth.case,
+        verdict,
+        [],
+        COLUMNS,
+        LABELS,
+        [_cells(row) for row in rows],
+        diagram,
+        [f"{row.folder}/run.py" if row.folder else "" for row in rows],
+    )
+
+
+def _alike(rows: Sequence[Row]) -> list[str]:
+    """Return a sentence on each kind of integrator whose engines share their error."""
+    found = list[str]()
+    for group, each in groupby(rows, key=lambda row: row.group):
+        best = _best(each)
+        errors = [row.measured[-1].error or 0.0 for row in best if row.measured]
+        if len({row.engine for row in best if row.measured}) > 1 and max(errors) < 1.1 * min(
+            errors
+        ):
+            found.append(
+                f"{group}: {len(errors)} steppers share their error to"
+                f" {100 * (max(errors) / min(errors) - 1):.1g} %: it is the integrator's, not the"
+                " engine's."
+            )
+    return found
+
+
+def _best(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows with the best known settings of each stepper, which may be the defaults."""
+    found = {(row.engine, row.integrator): row for row in rows}
+    return [*found.values()]
+
+
+def _cells(row: Row) -> list[str]:
+    last = row.measured[-1] if row.measured else Run()
+    return [
+        row.group,
+        f"{row.engine} {row.integrator}",
+        row.column,
+        f"{row.state}: {row.message}" if row.message else row.state,
+        number(last.step) if last.step else "own" if last.accuracy else "–",
+        *(number(each) for each in (last.error, last.gap, last.energy, last.cost)),
+        "–" if row.order is None else f"{row.order:.2f}",
+        number(row.floor),
+        row.loop,
+    ]
+
+
+def _plot(case: str) -> Plot:
+    caption = "Left is faster, down is more accurate; each point halves the step of the one before."
+    return Plot(case, f"{case}: error against cost, both log axes", caption)
+
+
+def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
+    traces, costs = list[Figure](), list[float]()
+    for row, style in zip(rows, styles, strict=True):
+        drawn = [run for run in row.measured if run.cost]
+        costs += [run.cost for run in drawn if run.cost]
+        curve = style.curve([run.cost for run in drawn], [run.error for run in drawn])
+        efforts = [f"{number(run.step or run.accuracy)} {'s' * bool(run.step)}" for run in drawn]
+        hover = {"text": efforts, "hovertemplate": "%{text}: %{x:.3~g} s/s, %{customdata:.3~g} m"}
+        traces.append(curve | hover)
+    axis = ticked_axis("cost: wall time for a simulated second [s/s]", costs)
+    layout = {"xaxis": axis, "hovermode": "closest"}
+    return floored({"data": traces, "layout": layout}, "largest position error [m]")
+
+
+def _settings(rows: Sequence[Row]) -> Section:
+    named = {(row.engine, row.integrator, row.column): row for row in rows}
+    return Section(
+        "Settings and measures",
+        [
+            "Default: nothing but integrator and step is set. Best: the best known settings, kept"
+            " in settings.toml of the board; whoever knows better ones changes that file.",
+            "Not run here: PyBullet, MJX, MuJoCo Warp, Newton and Genesis, which need environments"
+            " of their own.",
+        ],
+        NOTES,
+        ("engine", "version", "integrator", "settings", "closed loops", "values", "by", "since"),
+        8,
+        [
+            [
+                row.engine,
+                row.version,
+                row.integrator,
+                row.column,
+                row.ties,
+                ", ".join(f"{name} {value}" for name, value in row.settings.items()) or "–",
+                row.by or "–",
+                row.date or "–",
+            ]
+            for row in named.values()
+        ],
+    )

@@ -1,0 +1,220 @@
+"""The board of time steppers: rows against known figures, its site, and its reproducers."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import kincheck
+import numpy as np
+import pytest
+from kincheck.core.case.case import Free
+from kincheck.core.cli.main import main
+from kincheck.core.studies.board.results import Run
+from kincheck.core.studies.board.run import order_and_floor
+from kincheck.core.studies.board.truth import truth_of
+
+DATA = Path(__file__).parents[1] / "data"
+FOUR_BAR = DATA / "free_four_bar.toml"
+
+
+def short(tmp_path, duration=0.3, samples=16):
+    text = FOUR_BAR.read_text("utf-8")
+    text = text.replace("duration = 2.0", f"duration = {duration}")
+    file = tmp_path / "four_bar.toml"
+    file.write_text(text.replace("samples = 201", f"samples = {samples}"), "utf-8")
+    return file
+
+
+def measured(tmp_path, *options):
+    given = ["--case", str(short(tmp_path)), "--out", str(tmp_path / "site")]
+    assert main(["board", *given, "--steps", "60", *options]) == 0
+    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("the board")
+    given = ["--engine", "mujoco", "exudyn", "pinocchio", "--steps", "60"]
+    status = main(["board", *given, "--case", str(short(folder)), "--out", str(folder / "site")])
+    assert status == 0
+    return folder / "site"
+
+
+@pytest.fixture(scope="module")
+def rows(site):
+    found = json.loads((site / "board.json").read_text("utf-8"))["rows"]
+    return {(row["engine"], row["integrator"], row["column"]): row for row in found}
+
+
+def errors(row):
+    return [run["error"] for run in row["runs"]]
+
+
+def test_runge_kutta_of_stiff_mujoco_is_of_second_order(rows):
+    # four-bar of the study: 7.8e-6, 1.9e-6, 4.5e-7
+    row = rows["mujoco", "RK4", "best"]
+    assert row["order"] == pytest.approx(2.0, abs=0.15)
+    assert errors(row)[-1] < 1e-4
+
+
+def test_default_softness_is_a_floor(rows):
+    row = rows["mujoco", "RK4", "default"]
+    assert row["floor"] == min(errors(row))
+    assert errors(row)[-1] > 30 * errors(rows["mujoco", "RK4", "best"])[-1]
+
+
+def test_semi_implicit_steppers_share_their_error(rows):
+    one, other = (errors(rows["mujoco", name, "best"]) for name in ("Euler", "implicitfast"))
+    assert one == pytest.approx(other, rel=0.05)
+    assert rows["mujoco", "Euler", "best"]["order"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("engine", ["drake", "dart"])
+def test_semi_implicit_engines_share_their_error(engine, rows, tmp_path):
+    package = {"drake": "pydrake.multibody.plant", "dart": "dartpy"}[engine]
+    pytest.importorskip(package, exc_type=ImportError)
+    (*_, best) = measured(tmp_path, "--engine", engine)
+    one = errors(rows["mujoco", "Euler", "best"])
+    assert errors(best)[-2:] == pytest.approx(one[-2:], rel=0.05)
+
+
+def test_error_of_simbody_follows_its_accuracy(tmp_path):
+    pytest.importorskip("opensim", exc_type=ImportError)
+    (row,) = measured(tmp_path, "--engine", "simbody")
+    found = errors(row)
+    assert found == sorted(found, reverse=True)
+    assert found[-1] < 1e-8
+    assert row["runs"][-1]["gap"] < 1e-9
+
+
+@pytest.mark.parametrize("integrator", ["GeneralizedAlpha", "TrapezoidalIndex2"])
+def test_implicit_steppers_are_of_second_order(rows, integrator):
+    for column in ("default", "best"):
+        assert rows["exudyn", integrator, column]["order"] == pytest.approx(2.0, abs=0.05)
+
+
+def test_pinocchio_needs_its_proximal_setting(rows):
+    assert rows["pinocchio", "RK4", "default"]["state"] == "diverged"
+    best = rows["pinocchio", "RK4", "best"]
+    assert errors(best)[-1] < 1e-8
+    assert best["loop"] == "Python"
+
+
+def test_energy_and_gap_follow_the_error(rows):
+    last = rows["exudyn", "GeneralizedAlpha", "best"]["runs"][-1]
+    assert last["gap"] < 1e-10
+    assert 0.1 * last["error"] < last["energy"] < 1e3 * last["error"]
+
+
+def test_site_has_every_row_and_its_reproducer(site, rows):
+    page = (site / "index.html").read_text("utf-8")
+    for row in rows.values():
+        folder = site / row["folder"]
+        assert json.loads((folder / "row.json").read_text("utf-8")) == row
+        assert f'href="{row["folder"]}/run.py"' in page
+        assert "kincheck." not in (folder / "run.py").read_text("utf-8")
+    assert "://" not in page.replace("http://www.w3.org", "")
+
+
+def test_reproducer_runs_alone_and_repeats_the_row(site, rows):
+    row = rows["mujoco", "RK4", "best"]
+    folder = site / row["folder"]
+    command = [sys.executable, "-P", "-S", "-c", ALONE, str(folder / "run.py")]
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, "OWN": ENGINES})
+    again = json.loads((folder / "result.json").read_text("utf-8"))
+    assert errors(again) == errors(row)
+
+
+ENGINES = str(Path(np.__file__).parents[1])
+# the packages of the engines, without those that .pth files add: kincheck is one
+ALONE = """
+import os, runpy, sys
+sys.path.append(os.environ["OWN"])
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+assert not any(name.startswith("kincheck") for name in sys.modules)
+"""
+
+
+def test_truth_of_the_site_is_that_of_kincheck_free(site, rows):
+    folder = site / rows["mujoco", "RK4", "best"]["folder"]
+    with (folder / "truth.csv").open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    found = kincheck.free(FOUR_BAR, duration=0.3, samples=16)
+    for axis in "xy":
+        values = [float(row[f"P.{axis}"]) for row in table]
+        assert values == pytest.approx(found.outputs[f"P_{axis}"], abs=1e-13)
+    energy = [float(row["energy"]) for row in table]
+    assert np.ptp(energy) < 1e-12  # of motion and weight, which nothing else works on
+
+
+def test_truth_of_a_turned_body_follows_its_points():
+    case = replace(kincheck.load("mcpherson_strut_loaded"), free=Free(0.05, 3))
+    truth, found = truth_of(case), kincheck.free(case)
+    place, _ = truth.frames["knuckle"].at([0.975, 0.715, 0.101])
+    assert place[:, 1] - 0.715 == pytest.approx(found.outputs["half_track_change"], abs=1e-12)
+    force = found.outputs["spring_force"]
+    assert np.ptp(force) > 1.0
+    lost = np.diff(truth.energy)  # into the damper
+    assert (lost < 0.0).all()
+
+
+def test_order_and_floor_of_halved_steps():
+    def runs(*found):
+        return [Run(step=0.5**k, error=error) for k, error in enumerate(found)]
+
+    assert order_and_floor(runs(64.0, 16.0, 4.0, 1.0)) == (pytest.approx(2.0), None)
+    assert order_and_floor(runs(64.0, 8.0, 1.0, 1.0)) == (pytest.approx(3.0), 1.0)
+    # the first step is too long for any order
+    assert order_and_floor(runs(3.0, 3.0, 0.75, 0.1875)) == (pytest.approx(2.0), None)
+    assert order_and_floor(runs(1.0, 1.0, 1.0, 1.0)) == (None, 1.0)
+    assert order_and_floor([*runs(8.0, 4.0), Run(step=0.25, message="not finite")]) == (None, None)
+
+
+FAKES = {
+    "mujoco": ("unavailable", "raise ImportError('libEGL is missing')"),
+    "exudyn": ("crashed", "import os\nos._exit(139)"),
+    "pinocchio": ("timeout", "import time\ntime.sleep(60)"),
+}
+
+
+def test_fault_of_an_engine_costs_only_its_rows(tmp_path, monkeypatch):
+    for name, (_, text) in FAKES.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    file, out = short(tmp_path, 0.02, 3), tmp_path / "site"
+    given = ["--case", str(file), "--engine", *FAKES, "--timeout", "2"]
+    assert main(["board", *given, "--out", str(out)]) == 0
+    for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
+        assert row["state"] == FAKES[row["engine"]][0]
+        assert row["message"]
+
+
+def test_missing_constraint_is_a_row_with_its_reason(tmp_path):
+    case = tmp_path / "rssr.toml"
+    text = (Path(kincheck.__path__[0]) / "cases" / "rssr.toml").read_text("utf-8")
+    text = text.replace("duration = 2.0", "duration = 0.02").replace("samples = 201", "samples = 3")
+    case.write_text(text, "utf-8")
+    out = tmp_path / "site"
+    given = ["--engine", "pinocchio", "--case", str(case), "--out", str(out), "--steps", "1"]
+    assert main(["board", *given]) == 0
+    for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
+        assert row["state"] == "unsupported"
+        assert "distance" in row["message"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--engine", "mujco"], "did you mean 'mujoco'"),
+        (["--case", "delta_robot"], "add [free] with duration"),
+        (["--case", "four_bra"], "four_bar"),
+    ],
+)
+def test_wrong_options_are_told(options, message, tmp_path, capsys):
+    assert main(["board", "--out", str(tmp_path / "site"), *options]) == 2
+    assert message in capsys.readouterr().err
