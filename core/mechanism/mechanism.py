@@ -412,6 +412,25 @@ class Mechanism:
         )
 
     @cached_property
+    def joints_on(self) -> Mapping[str, Sequence[Joint]]:
+        """Joints by the bodies that they join."""
+        found: dict[str, list[Joint]] = {}
+        for joint in self.joints:
+            for body in joint.bodies:
+                found.setdefault(body, []).append(joint)
+        return found
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest extent along a global axis of the points of joints, and of those that are no
+        markers [m].
+        """
+        places = [place for joint in self.joints for place in joint.points_on()]
+        places += [p.position for p in self.points if not p.name.startswith(MARKER)]
+        ends = zip(*places, strict=True)
+        return max((max(each) - min(each) for each in ends), default=0.0)
+
+    @cached_property
     def _named(self) -> Mapping[str, Mapping[str, Any]]:
         """Members by kind and name."""
         all_of = {
