@@ -255,7 +255,7 @@ def sample_bushings(names: Sequence[str]) -> list[str]:
 def _sample(template: Template) -> str:
     lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
     lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
-    meanings = {role.name: role.meaning for role in (*template.roles, *template.optional)}
+    meanings = {role.name: role.meaning for role in template.roles}
     for role in meanings:
         name = joint_at(template, role)
         if name is None or GROUND not in template.joint_rows[name][1:3]:
