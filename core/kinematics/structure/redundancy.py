@@ -31,8 +31,9 @@ from ...joints import (
 )
 from ...joints.base import triad
 from ...mechanism.loads import TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Reduced, Vector, spanning_tree
+from ...mechanism.mechanism import Mechanism, Reduced, Vector
 from ...mechanism.motions import JointDriver
+from ...mechanism.tree import spanning_tree
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian
