@@ -2,6 +2,7 @@
 
     pytest --kincheck                                   # every installed engine
     pytest --kincheck --kincheck-engine mujoco          # only this one, which must be installed
+    pytest --kincheck arm.toml --kincheck-recorded arm.res  # results of another program beside them
 
 Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails if an
 output is out of tolerance or an engine fails. A test is skipped if an engine is missing or cannot
@@ -12,6 +13,7 @@ so slow imports wait for --kincheck.
 from __future__ import annotations
 
 import re
+from argparse import Namespace
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -48,6 +50,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
             " installed engines"
         ),
     )
+    for name, metavar, text in (
+        ("recorded", "FILE", "results of another program, as an engine of the case files"),
+        ("map", "TEXT", "the meaning of their columns, as --map of kincheck run"),
+        ("accuracy", "TEXT", "their accuracy, as --accuracy of kincheck run"),
+    ):
+        group.addoption(
+            f"--kincheck-{name}", action="append", default=[], metavar=metavar, help=text
+        )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -79,20 +89,31 @@ def _required(config: pytest.Config) -> list[str]:
     return [*names]
 
 
+def _recordings(config: pytest.Config) -> Namespace:
+    """Return the options of recordings, as those of the command line."""
+    given: dict[str, Any] = {
+        name: config.getoption(f"--kincheck-{name}") for name in ("recorded", "map", "accuracy")
+    }
+    given["recorded"] = [Path(file) for file in given["recorded"]]
+    return Namespace(**given, analysis=None, sheet=None)
+
+
 class CaseFile(pytest.File):
     """A case file with a test for each engine."""
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..errors import KincheckError
+        from .recorded_options import recorded_engines
 
         registry = _registry()
         try:
             case = registry.find_case(str(self.path))
+            case, recorded = recorded_engines(_recordings(self.config), case)
         except KincheckError as error:
             raise self.CollectError(str(error)) from None
         required = _required(self.config)
-        for engine in registry.find_engines(required or registry.engines, []):
+        for engine in [*registry.find_engines(required or registry.engines, []), *recorded]:
             yield EngineTest.from_parent(  # pyright: ignore[reportUnknownMemberType]
                 self, name=engine.name, case=case, engine=engine, required=bool(required)
             )

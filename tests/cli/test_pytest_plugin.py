@@ -89,6 +89,22 @@ def test_plugin_reports_worst_sample(repository, pytest_there):
     assert "Traceback" not in out
 
 
+@pytest.mark.parametrize(("last", "outcome"), [("1.60", "1 passed"), ("1.62", "1 failed")])
+def test_plugin_judges_recordings(repository, pytest_there, last, outcome):
+    (repository / "rig.csv").write_text(f"Push,Tip\n-0.10,1.40\n0.03,1.53\n0.10,{last}\n")
+    maps = ("--kincheck-map", "push=Push", "--kincheck-map", "tip_x=Tip")
+    given = ("--kincheck", "slider.toml", "--kincheck-recorded", "rig.csv", *maps)
+    out, _ = pytest_there(*given, "--kincheck-engine", "native")
+    assert f"{outcome}, 1 skipped" in out  # native has no reference at these samples
+    assert ("rig: fail: tip_x: position" in out) == (outcome == "1 failed")
+
+
+def test_plugin_reports_unreadable_recordings(repository, pytest_there):
+    (repository / "rig.csv").write_text("a,b\n1,2\n")
+    out, status = pytest_there("--kincheck", "slider.toml", "--kincheck-recorded", "rig.csv")
+    assert (status, "found the columns 'a', 'b'" in out) == (2, True)
+
+
 def test_plugin_skips_unjudged_case(repository, pytest_there):
     (repository / "slider.toml").write_text(BASE)
     out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
