@@ -2,4 +2,4 @@
 time.
 """
 
-VERSION = "0.2.0"
+VERSION = "0.3.0"
