@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from . import execution_options, import_options
-from .option_types import positive
+from .option_types import add_several, positive
 from .registry import Registry, Status
 from .run_options import TOL
 
@@ -63,16 +63,11 @@ def add(commands: Any) -> None:
             " [joints.NAME.bushings.X] as in case files"
         ),
     )
-    command.add_argument(
+    add_several(
+        command,
         "--engine",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help=(
-            "check the equilibria by these engines: each finds them by its own kinematics, gravity"
-            " and rows, exudyn-static by its own solver, and gets a verdict against native"
-        ),
+        "check the equilibria by these engines: each finds them by its own kinematics, gravity"
+        " and rows, exudyn-static by its own solver, and gets a verdict against native",
     )
     command.add_argument(
         "--history",
