@@ -172,11 +172,21 @@ def _checked(
     solver, settings = execution_options.solver(options, engines)
     keeping = None
     if options.history is not None:
-        names = {"cases": [each.name for each in cases], "engines": [x.name for x in engines]}
-        settings["selection"] = {**names, "options": {}}
-        about: dict[str, Any] = {"tol": TOL, "command": options.command, "resume": False}
+        settings["selection"] = {
+            "cases": [each.name for each in cases],
+            "engines": [each.name for each in engines],
+            "options": {},
+        }
         try:
-            keeping = keep(options.history, cases, engines, settings=settings, **about)
+            keeping = keep(
+                options.history,
+                cases,
+                engines,
+                tol=TOL,
+                command=options.command,
+                settings=settings,
+                resume=False,
+            )
         except HistoryError as error:
             problems.append(f"{error}; the run is not in the history")
 
