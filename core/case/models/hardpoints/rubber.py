@@ -1,8 +1,8 @@
 """Bushings at the hardpoints of a suspension, by role, and masses and springs beside them.
 
-A bushing at a role stands under the joint there. Its axes are two across the joint's axis and the
-axis itself, the third; along it, and about it, are the third numbers. Joints without an axis have
-the global ones. The right side mirrors the left.
+A bushing at a role takes the place of the joint there. Its third axis is the joint's, and the first
+two are across it; so the third number of each key is along this axis or about it. Joints without an
+axis have the global axes. The right side mirrors the left.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ def of_chrono(
         inertias
     )
     notes += [
-        f"the inertia of {each!r} is left out: no body has it, its moments break the triangle rule"
+        f"the inertia of {each!r} is left out: no body has it, one moment exceeds the other two"
         for each in impossible
     ]
     return Rubber(bushings, {x: _together(parts) for x, parts in bodies.items()}, springs), notes
