@@ -32,7 +32,8 @@ from ...core.joints import (
 from ...core.joints.base import triad
 from ...core.mechanism.body import inertia_matrix
 from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector, spanning_tree
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
+from ...core.mechanism.tree import spanning_tree
 from ...core.trajectory import Array
 from .constraints import skew
 from .tree_plan import CHAINS, Link, ends_of

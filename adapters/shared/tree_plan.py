@@ -44,7 +44,8 @@ from ...core.joints import (
 )
 from ...core.joints.base import triad, unit
 from ...core.mechanism.body import Body
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector, spanning_tree
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
+from ...core.mechanism.tree import spanning_tree
 from ...core.trajectory import Array
 
 

@@ -99,12 +99,9 @@ def length(design: Mapping[str, Vec3], start: str, end: str) -> Any:
 
 def place_on(mechanism: Mechanism, body: str) -> Vec3:
     """Return a place on a body near its joints and points [m]."""
-    places = [
-        place
-        for joint in mechanism.joints
-        for place in joint.points_on(body)
-        if body in joint.bodies
-    ]
+    places = [p for joint in mechanism.joints_on.get(body, ()) for p in joint.points_on(body)]
+    if places:
+        return vec(places[0])
     places += [point.position for point in mechanism.points if point.body == body]
     if body != GROUND:
         places.append(mechanism.body(body).origin)
@@ -115,9 +112,7 @@ def reach_of(mechanism: Mechanism) -> float:
     """Return the distance of markers from their place [m], a power of two near the mechanism's
     size: directions then keep all digits of positions.
     """
-    places = [place for joint in mechanism.joints for place in joint.points_on()]
-    places += [p.position for p in mechanism.points if not p.name.startswith(MARKER)]
-    extent = float(np.ptp(np.array(places), axis=0).max()) if places else 0.0
+    extent = mechanism.extent
     return 2.0 ** round(math.log2(extent)) if extent else 1.0
 
 

@@ -22,6 +22,11 @@ STATUS = {"same": Status.WITHIN, "differs": Status.DEVIATES, "not judged": Statu
 """Exit status by verdict."""
 CONVERTERS = ("mujoco",)
 """Simulators that save models, for the help: adapters load later."""
+NO_CONVERTERS = {
+    "drake": "Drake reads URDF, SDF and MJCF, and writes none of them",
+    "pinocchio": "Pinocchio saves an archive of its own, which no other program reads",
+}
+"""Simulators that save no model, and what they do."""
 
 
 def add(commands: Any) -> None:
@@ -52,8 +57,9 @@ def add(commands: Any) -> None:
         "--converted-by",
         action="append",
         default=[],
-        choices=CONVERTERS,
-        help="compare with what a simulator makes of the first file: it loads and saves the file",
+        choices=(*CONVERTERS, *NO_CONVERTERS),
+        help="compare with what a simulator makes of the first file: it loads and saves the file;"
+        " drake and pinocchio save no model, and say so",
     )
     same.add_argument(
         "--without",
@@ -81,6 +87,12 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
     from ..studies.same import compare
 
     require_writable([("--json", options.json)])
+    for name in options.converted_by:
+        if name in NO_CONVERTERS:
+            raise KincheckError(
+                f"--converted-by {name}: {NO_CONVERTERS[name]}, so there is no file to compare; run"
+                f" the model in it: kincheck run FILE --engine native {name}"
+            )
     given = dict(map(_pair, options.match))
     names: Sequence[str] = options.files
     if len(names) + len(options.converted_by) < 2:

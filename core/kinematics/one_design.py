@@ -18,12 +18,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..caches import keep_last
 from ..driving import Driving
 from ..errors import SolveError
+from ..failures import FailureKind
 from ..input_checks import finite, names_of, no_such, real, require_kind
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path, Ramp, as_changes
@@ -35,6 +37,11 @@ from .compiled.routes import Route, recent_route, start_of
 from .continuation.sweep import follow
 from .formulation.constraints import Style, frames
 from .structure.degrees_of_freedom import require_driven
+
+if TYPE_CHECKING:
+    from .blocks.component_lanes import ComponentLanes
+    from .blocks.sparse_lanes import SparseLanes
+    from .structure.components import Component
 
 Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""
@@ -144,7 +151,6 @@ def by_blocks(
     unless it is given.
     """
     # few mechanisms are so large: the others need not wait for the import
-    from .blocks.component_lanes import Cascade, ComponentLanes
     from .blocks.sparse_lanes import SparseLanes
     from .blocks.sweep import BlockSweep
     from .structure.components import components
@@ -158,17 +164,34 @@ def by_blocks(
             require_driven(mechanism)  # which names what can still move
             raise
         by_components = 0 < max((len(part.bodies) for part in parts), default=0) <= COMPONENT
-    lanes = (
-        ComponentLanes(Cascade(mechanism, request, parts))
-        if by_components
-        else SparseLanes(mechanism, request)
-    )
+    lanes = _lanes(mechanism, request, parts) if by_components else SparseLanes(mechanism, request)
 
     def along(path: Path) -> Solver:
         return BlockSweep(lanes, path).solve
 
     again = keep_last(1)(along)
     return lambda path: (again if path.is_builtin else along)(path)
+
+
+def _lanes(
+    mechanism: Mechanism, request: Request, parts: Sequence[Component] | None
+) -> ComponentLanes | SparseLanes:
+    """Return the lanes of the components, or of a sparse system if one of them lacks rows.
+
+    Redundant rows may be matched with its unknowns, and the rows it needs with those of others.
+    """
+    from .blocks.component_lanes import Cascade, ComponentLanes
+    from .blocks.sparse_lanes import SparseLanes
+
+    try:
+        return ComponentLanes(Cascade(mechanism, request, parts))
+    except SolveError as error:
+        if error.kind is not FailureKind.LOCKED or parts is None:
+            raise
+        try:
+            return SparseLanes(mechanism, request)
+        except SolveError:
+            raise error from None
 
 
 # One only, and of its paths the last: they fill much of the memory. A thread solves it in place.

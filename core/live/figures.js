@@ -20,7 +20,8 @@ function figures(box, outputs, axis, state) {
     const { values, tolerance } = (state.reference || {})[output.name] || {};
     if (!values) return [];
     const known = values.flatMap((value, k) => (value === null ? [] : [[value, driver[k]]]));
-    const side = (sign) => known.map(([value, at]) => [(value + sign * tolerance) * output.scale, at]);
+    const side = (sign) =>
+      known.map(([value, at]) => [(value + sign * tolerance) * output.scale, at]);
     const ring = [...side(1), ...side(-1).reverse()];
     const band = { [across]: ring.map(([value]) => value), [along]: ring.map(([, at]) => at) };
     const look = { fill: "toself", fillcolor: "rgba(128, 128, 128, 0.25)", hoverinfo: "skip" };

@@ -360,7 +360,8 @@ const DIRECTIONS = {
       say("the engines are solving");
       // curves are those of the native engine; a report compares the ticked ones
       const engines = kind === "report" ? ticked() : [];
-      link.tell({ type: "export", kind, engines: engines.length ? engines : ["native"], ...rows() });
+      const named = engines.length ? engines : ["native"];
+      link.tell({ type: "export", kind, engines: named, ...rows() });
     };
   }
   function exported({ name, content }) {

@@ -156,7 +156,8 @@ function controlsOf(box, { steps, wheels, arrows }) {
     button("+", { "data-act": "in", "aria-label": "larger" }),
     button("−", { "data-act": "out", "aria-label": "smaller" }),
   ];
-  const there = { wheels: wheels.length, centres: wheels.length, forces: arrows.length || "forces" in box.dataset };
+  const forces = arrows.length || "forces" in box.dataset;
+  const there = { wheels: wheels.length, centres: wheels.length, forces };
   const off = ["centres", ...(box.dataset.off || "").split(" ")];
   const layers = ["names", "frames", "paths", ...Object.keys(there).filter((name) => there[name])];
   const checks = layers.map((name) => {

@@ -19,7 +19,7 @@ from kincheck.core import (
 )
 from kincheck.core.case.io.model_writer import way_to
 from kincheck.core.case.joint_probe import probes
-from kincheck.core.mechanism.mechanism import Branch, SpanningTree, spanning_tree
+from kincheck.core.mechanism.tree import Branch, SpanningTree, spanning_tree
 
 from ..support.exported import READERS, read
 from ..support.mechanisms import mcpherson

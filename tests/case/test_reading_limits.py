@@ -173,6 +173,25 @@ def test_long_chain_of_fixed_links_is_read(tmp_path: Path):
     assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
 
 
+def test_many_linkages_of_few_digits_are_read(tmp_path: Path):
+    """Rows that are redundant but for digits are those of each linkage alone."""
+    bars = "".join(
+        f'<body name="c{k}" pos="{k} 0 0"><joint name="j{k}" axis="0 1 0"/><body name="r{k}"'
+        f' pos="0 0 0.3"><joint axis="0.000001 1 0"/></body></body><body name="f{k}"'
+        f' pos="{k + 0.4} 0 0"><joint axis="0 1 0.000001"/></body>'
+        for k in range(52)
+    )
+    ties = "".join(
+        f'<connect body1="r{k}" body2="f{k}" anchor="0.312345 0 0.212345"/>' for k in range(52)
+    )
+    file = tmp_path / "scene.xml"
+    file.write_text(f"<mujoco><worldbody>{bars}</worldbody><equality>{ties}</equality></mujoco>")
+    hold = tuple(f"j{k}" for k in range(1, 52))
+    case = load(file, Supplied(drive=("j0:0:0.1:2",), hold=hold))
+    assert len(case.mechanism.drivers) == 52
+    assert len(case.mechanism.reduced) == 52
+
+
 def test_springs_without_a_length_are_left_out(tmp_path: Path):
     """A tendon between sites in one place has no direction."""
     text = BODIES.replace("<joint/>", '<joint/><site name="t"/>').replace(

@@ -14,7 +14,7 @@ from kincheck.core import (
     Spherical,
 )
 from kincheck.core.joints import Fixed
-from kincheck.core.mechanism.mechanism import spanning_tree
+from kincheck.core.mechanism.tree import spanning_tree
 
 Z = (0.0, 0.0, 1.0)
 

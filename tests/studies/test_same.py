@@ -12,6 +12,7 @@ from kincheck.core.case.models.undriven import undriven_case, undriven_file
 from kincheck.core.cli.main import main
 from kincheck.core.studies.same import compare
 
+from .. import converters
 from ..support.written_mechanisms import CASES, case
 
 LIMIT = '<limit lower="-0.2" upper="0.8" effort="5" velocity="2"/>'
@@ -171,3 +172,32 @@ def test_one_file_asks_for_another(tmp_path, capsys):
     (file := Path(tmp_path) / "gripper.urdf").write_text(GRIPPER)
     assert main(["same", str(file)]) == 2
     assert "expected two or more" in capsys.readouterr().err
+
+
+def test_a_converter_that_saves_no_model_says_so(tmp_path, capsys):
+    (file := tmp_path / "gripper.urdf").write_text(GRIPPER)
+    for name in ("drake", "pinocchio"):
+        assert main(["same", str(file), "--converted-by", name]) == 2
+        assert f"--converted-by {name}: " in capsys.readouterr().err
+
+
+def test_table_of_converters_has_a_row_for_each_file(tmp_path):
+    pytest.importorskip("mujoco")
+    (tmp_path / "gripper.urdf").write_text(GRIPPER)
+    (tmp_path / "none.urdf").write_text("<robot name='r'/>")
+    *_, first, second = converters.rows([tmp_path / "gripper.urdf", tmp_path / "none.urdf"])
+    assert "the same motion within" in first
+    assert "lost in converted.xml: velocity limit of left, right" in first
+    assert second.startswith("| `none.urdf` | mujoco | not judged: ")
+
+
+def test_without_leaves_elements_out_of_both_files(tmp_path, capsys):
+    tied = GRIPPER.replace("</robot>", '<tie a="left_link" b="right_link"/></robot>')
+    for name, text in (("tied", tied), ("plain", GRIPPER)):
+        (tmp_path / f"{name}.urdf").write_text(text)
+    files = [str(tmp_path / f"{name}.urdf") for name in ("tied", "plain")]
+    assert main(["same", *files]) == 2
+    assert main(["same", *files, "--without", "tie"]) == 0
+    assert "tied.urdf: left out by --without: line 12: <tie>" in capsys.readouterr().out
+    assert main(["same", files[1], files[1], "--without", "mimik"]) == 2
+    assert "did you mean 'mimic'?" in capsys.readouterr().err

@@ -14,7 +14,7 @@ from kincheck.core import Body, JointAngle, Mechanism, Point
 from kincheck.core import solve as solve_natively
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational, Universal
-from kincheck.core.mechanism.mechanism import SpanningTree, spanning_tree
+from kincheck.core.mechanism.tree import SpanningTree, spanning_tree
 
 TOL = 1e-12
 TREES = ("mujoco", "pinocchio", "drake", "dart", "simbody")

@@ -16,7 +16,7 @@ from kincheck.core import (
     solve,
 )
 from kincheck.core import joints as library
-from kincheck.core.mechanism.mechanism import Branch, SpanningTree
+from kincheck.core.mechanism.tree import Branch, SpanningTree
 from kincheck.core.trajectory import Trajectory
 
 HINGE = (0.2, -0.1, 0.3)

@@ -25,7 +25,8 @@ from ...errors import number_of
 from ...input_checks import require_positive
 from ...joints import Joint
 from ...joints.base import unit
-from ...mechanism.mechanism import Mechanism, spanning_tree
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.tree import spanning_tree
 from ...primitives.base import GROUND_POSE, Pose
 from ...tabular import Tabular
 from ...trajectory import Array

@@ -19,8 +19,9 @@ from ...algebra import ZERO, Vec3, vec
 from ...errors import SolveError
 from ...joints import Attachment, AxialJoint, Joint
 from ...joints.base import unit
-from ...mechanism.mechanism import GROUND, Mechanism, spanning_tree
+from ...mechanism.mechanism import GROUND, Mechanism
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
+from ...mechanism.tree import spanning_tree
 from ...primitives.base import Drive
 from .formulation import Relation as Relation
 

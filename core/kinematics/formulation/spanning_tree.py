@@ -31,7 +31,8 @@ from ...joints import (
     Universal,
 )
 from ...joints.base import unit
-from ...mechanism.mechanism import GROUND, Branch, Mechanism, spanning_tree
+from ...mechanism.mechanism import GROUND, Mechanism
+from ...mechanism.tree import Branch, spanning_tree
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
 from ...program import cos, sin
 from .constraints import Frames

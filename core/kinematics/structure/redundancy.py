@@ -17,6 +17,7 @@ import numpy as np
 
 from ... import primitives as p
 from ...algebra import ZERO, Vec3, X, Y, Z, cross, vec
+from ...errors import SolveError
 from ...joints import (
     Attachment,
     AxialJoint,
@@ -30,8 +31,9 @@ from ...joints import (
 )
 from ...joints.base import triad
 from ...mechanism.loads import TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Reduced, Vector, spanning_tree
+from ...mechanism.mechanism import Mechanism, Reduced, Vector
 from ...mechanism.motions import JointDriver
+from ...mechanism.tree import spanning_tree
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian
@@ -43,6 +45,9 @@ from ..formulation.state_vectors import displaced, jacobian
 # independent remainder in sound linkages is near 1e-2. Values between belong to nearly singular
 # geometry, which is solved and not reduced.
 RANK_TOLERANCE = 1e-9
+# Seconds of singular values for each rows x columns x lesser of both, on one slow core; and the
+# longest time to spend on them unasked [s].
+DENSE_WORK, LONGEST = 3e-9, 600.0
 SHARE = 1e-6
 """Smallest weight of a row in a vanishing sum, squares adding to one: round-off is 1e-15."""
 # Values from 0.1 to 0.3 leave out the same rows of 113 pairs of four-bars; 0.5 splits one of the
@@ -271,26 +276,41 @@ def reduce_rows(
     """
     bare = replace(mechanism, drivers=())
     frame = frames(bare)
-    formulation = Cartesian.of(bare, frame)
-    matrix, named = jacobian(formulation), dict[str, list[int]]()
-    for k, (owner, _) in enumerate(formulation.owners):
-        named.setdefault(owner, []).append(k)
     keeping = {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
     keeping |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     keeping |= {each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)}
     tree = spanning_tree(mechanism, {*carrying, *keeping})
     held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}
-    whole = [name for name in named if held.get(name) is None]
-    span = _spanned(
-        np.empty((0, formulation.unknowns)), matrix[[k for n in whole for k in named[n]]]
-    )
+    if not any(held.values()):  # no loop, or none whose rows can be left out
+        return Reduction(mechanism, frame.unit, ADDED_UP * tolerance)
+    formulation = Cartesian.of(bare, frame)
+    matrix, named = jacobian(formulation), dict[str, list[int]]()
+    for k, (owner, _) in enumerate(formulation.owners):
+        named.setdefault(owner, []).append(k)
+    part_of = _parts(formulation, matrix)
+    columns: dict[int, list[int]] = {}
+    for k, part in enumerate(part_of):
+        columns.setdefault(part, []).append(k)
+    whole = {part: list[int]() for part in columns}
+    for name, rows in named.items():
+        if held.get(name) is None:
+            for k in rows:
+                if (used := np.flatnonzero(matrix[k])).size:
+                    whole[part_of[int(used[0])]].append(k)
+    span: dict[int, Array] = {}
     enough, changed = ADDED_UP * tolerance / frame.unit, dict[str, list[Joint]]()
     reduced = list[Reduced]()
     for joint in tree.cut:
         if (holds := held.get(joint.name)) is None:
             continue
-        rows = holds.rows(joint, frame, formulation)
-        left, sizes, _ = np.linalg.svd(_without(rows, span), full_matrices=True)
+        body = next(name for name in joint.bodies if name in formulation.columns)
+        part = part_of[formulation.columns[body]]
+        own = columns[part]
+        if part not in span:
+            _require_affordable(joint, len(whole[part]), len(own))
+            span[part] = _spanned(np.empty((0, len(own))), matrix[np.ix_(whole[part], own)])
+        rows = holds.rows(joint, frame, formulation)[:, own]
+        left, sizes, _ = np.linalg.svd(_without(rows, span[part]), full_matrices=True)
         weak = np.concatenate([sizes <= enough, np.ones(len(rows) - len(sizes), dtype=np.bool_)])
         if weak.any():
             holds, less = holds.parted(left[:, weak].T)
@@ -298,8 +318,8 @@ def reduce_rows(
             names = tuple(each.name for each in kept)
             left_out = tuple(each.changed(name=joint.name) for each in less.joints(joint))
             reduced.append(Reduced(joint, names, left_out))
-            rows = holds.rows(joint, frame, formulation)
-        span = _spanned(span, rows)
+            rows = holds.rows(joint, frame, formulation)[:, own]
+        span[part] = _spanned(span[part], rows)
     joints = [each for joint in mechanism.joints for each in changed.get(joint.name, [joint])]
     return Reduction(
         replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism,
@@ -372,6 +392,30 @@ def _normal(pair: Array) -> Vector:
     """Return the normal of two vectors, shape (2, 3)."""
     x, y, z = cross(*map(vec, pair.tolist()))
     return x, y, z
+
+
+def _parts(formulation: Cartesian, matrix: Array) -> list[int]:
+    """Return the part of each column: rows tie bodies of one part alone."""
+    parts = [*range(matrix.shape[1])]
+    for first in formulation.columns.values():
+        parts[first : first + COLUMNS] = [first] * COLUMNS
+    for row in matrix:
+        tied = {parts[k] for k in np.flatnonzero(row).tolist()}
+        if len(tied) > 1:
+            first = min(tied)
+            parts = [first if part in tied else part for part in parts]
+    return parts
+
+
+def _require_affordable(joint: Joint, rows: int, columns: int) -> None:
+    """Refuse loops whose rows take longer than `LONGEST`."""
+    seconds = DENSE_WORK * rows * columns * min(rows, columns)
+    if seconds > LONGEST:
+        raise SolveError(
+            f"{joint} closes a loop among {columns // 6} bodies, whose {rows} rows, known within"
+            f" digits, would be compared for some {seconds / 60.0:.0f} minutes; take out what does"
+            " not take part, or give all digits"
+        )
 
 
 def _spanned(span: Array, rows: Array) -> Array:

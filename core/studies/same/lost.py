@@ -158,7 +158,7 @@ def _whole(file: Undriven, link: str, matched: Collection[str]) -> Body:
         for one, other in (joint.bodies, joint.bodies[::-1]):
             if isinstance(joint, Fixed) and one == link and other not in (GROUND, *matched):
                 found.append(mechanism.body(other))
-    if not all(body.mass for body in found):
+    if len(found) == 1 or not all(body.mass for body in found):
         return found[0]
     whole = together(
         [Mass(body.mass, vec(body.center_of_mass or body.origin), _inertia(body)) for body in found]

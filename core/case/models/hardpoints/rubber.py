@@ -243,7 +243,7 @@ def sample_bushings(template: Template) -> str:
     """Return the text of a file of bushings to begin one's own with; its numbers are invented."""
     lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
     lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
-    meanings = {role.name: role.meaning for role in (*template.roles, *template.optional)}
+    meanings = {role.name: role.meaning for role in template.roles}
     for role in meanings:
         name = joint_at(template, role)
         if name is None or GROUND not in template.joint_rows[name][1:3]:

@@ -285,9 +285,18 @@ class Freedom:
         self._leave(self._free[:, [*self._columns[move]]].T)
 
     def _leave(self, rows: Array) -> None:
-        """Leave the motions on which rows over them vanish, shape (rows, motions)."""
-        _, sizes, right = np.linalg.svd(rows, full_matrices=True)
-        self._free = right[int((sizes > AT_REST).sum()) :] @ self._free
+        """Leave the motions on which rows over them vanish, shape (rows, motions).
+
+        Each independent row is turned to the first motion by a reflection, which is left out.
+        """
+        _, sizes, right = np.linalg.svd(rows, full_matrices=False)
+        right = right[sizes > AT_REST]
+        while len(right):
+            normal = right[0].copy()
+            normal[0] += math.copysign(1.0, normal[0])
+            normal /= np.linalg.norm(normal)
+            self._free = (self._free - 2.0 * np.outer(normal, normal @ self._free))[1:]
+            right = (right - 2.0 * np.outer(right @ normal, normal))[1:, 1:]
 
 
 def choose_held(

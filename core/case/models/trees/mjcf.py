@@ -60,11 +60,7 @@ _ACTUATORS = words("general motor position velocity intvelocity damper cylinder 
 
 
 def whole_mjcf(file: Path, root: Element) -> Element:
-    """Return a model with all that it includes.
-
-    Raises:
-        CaseError: another document, an unknown section, or see `expand`.
-    """
+    """Return a model with all that it includes; see `expand`."""
     _require_model(root)
     root = expand(file, root)
     _require_model(root)

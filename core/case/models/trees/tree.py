@@ -24,10 +24,10 @@ from .element import Element, Names
 from .place import ORIGIN, Place
 
 WORLD = "world"
-# Scenes have many links, robots and hands at most some tens that move, a joint each; the freedom
-# of all is counted at once, in a time that grows with the cube of their number: some seconds for as
-# many as these. The rows of ties are solved together, in some seconds.
-MOST_LINKS, MOST_MOVING, MOST_TIES = 2_000, 150, 6_000
+# Scenes have many links. The freedom of all that move is counted at once, in a time that grows with
+# the square of their number: 1,000 take 25 s, as many as these some minutes. The rows of ties are
+# solved together, in some seconds.
+MOST_LINKS, MOST_MOVING, MOST_TIES = 20_000, 2_500, 6_000
 STAND_IN = 1e-6, 1e-6
 """Mass and moments written by kincheck for a body without a mass [kg, kg m^2]."""
 BETWEEN = 1e-9, 1e-12
