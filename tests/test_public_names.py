@@ -9,7 +9,7 @@ import kincheck
 import kincheck.adapters
 import kincheck.core
 import pytest
-from kincheck.core.case.models.hardpoints.templates import sample_tables
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.primitives import Dot10
 
 from .support.sources import ROOT
@@ -92,7 +92,7 @@ def test_run_in_one_line():
 def test_run_takes_a_measured_curve(tmp_path):
     """That of the case itself, rounded."""
     table, curve = tmp_path / "car.csv", tmp_path / "rig.csv"
-    table.write_text(sample_tables(["mcpherson"])[0])
+    table.write_text(sample_table(TEMPLATES["mcpherson"]))
     case = kincheck.load(table, kincheck.Supplied(travel="0.05:11"))
     (record,) = kincheck.run(case, "native").records
     toe = record.outputs["toe"].position
@@ -109,7 +109,7 @@ def test_run_takes_a_measured_curve(tmp_path):
 
 def test_sweep_and_primitives_are_there(tmp_path):
     table, vary = tmp_path / "car.csv", tmp_path / "vary.toml"
-    table.write_text(sample_tables(["mcpherson"])[0])
+    table.write_text(sample_table(TEMPLATES["mcpherson"]))
     vary.write_text(VARY)
     case = kincheck.load(table, kincheck.Supplied(travel="0.05:3"))
     results = kincheck.sweep(case, vary, samples=20)

@@ -8,7 +8,7 @@ import sys
 import kincheck
 import numpy as np
 import pytest
-from kincheck.core.case.models.hardpoints.templates import sample_tables
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.dataset import Dataset, Variable
 from kincheck.core.harness.scene_record import Scene, SceneBody, SceneJoint, ScenePoint
 from kincheck.core.tabular import Tabular
@@ -83,7 +83,7 @@ def test_pandas_and_xarray_hold_the_same_numbers(results, kind):
 
 def test_plots_of_a_suspension_have_six_useful_axes(tmp_path):
     pytest.importorskip("matplotlib")
-    (tmp_path / "car.csv").write_text(sample_tables(["mcpherson"])[0])
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]))
     supplied = kincheck.Supplied(travel="0.05:3")
     record = kincheck.run(kincheck.load(tmp_path / "car.csv", supplied), "native").records[0]
     useful = ["toe", "camber", "caster", "roll_center_height", "half_track_change", "scrub_radius"]

@@ -37,7 +37,7 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
 from ..shared.exudyn_joints import JOINTS
-from ..shared.force_solution import Dynamics, Element, curve_force, left_out_of, places, reacting
+from ..shared.force_solution import Dynamics, Element, elastic_force, left_out_of, places, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
 from .rows import NO_ROTATION, Rows, turned
 
@@ -180,8 +180,7 @@ class Loads:
         given, place = each.given, model.coordinates + each.value - len(self.mechanism.drivers)
         joint: Any = self.mechanism.joint(given.joint)
         deflection = float(model.x[place]) - given.free_angle
-        elastic = given.stiffness * deflection + curve_force(given.curve, deflection)
-        amount = -(elastic + given.damping * float(v[place]))
+        amount = -(elastic_force(given, deflection) + given.damping * float(v[place]))
         A = np.array(self.mbs.GetMarkerOutput(each.marker, self.kinds.RotationMatrix))
         axis = A.reshape(3, 3) @ np.array([*unit(joint.axis)])
         for load, sign in each.torques:

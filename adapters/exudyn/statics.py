@@ -17,7 +17,7 @@ from ...core.forces import Forces
 from ...core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from ...core.trajectory import Array, Trajectory
 from ..shared.equilibrium import Rest, equilibria
-from ..shared.force_solution import curve_force, elastic_torque
+from ..shared.force_solution import elastic_force, elastic_forces, elastic_torque
 from ..shared.poses import frame_along
 from .exudyn import Exudyn, Loads
 from .solvers import Coordinates, DriverTable, Solver
@@ -44,7 +44,7 @@ class StaticLoads(Loads):
                 items.ObjectConnectorRigidBodySpringDamper(
                     markerNumbers=markers,
                     stiffness=stiffness,
-                    springForceTorqueUserFunction=self._law(each, markers),
+                    springForceTorqueUserFunction=self._bushing(each, markers),
                 )
             )
             if not self.mechanism.is_fixed(each.i):
@@ -60,13 +60,13 @@ class StaticLoads(Loads):
                     ],
                     referenceLength=each.free_length,
                     stiffness=each.stiffness,
-                    springForceUserFunction=_tension(each),
+                    springForceUserFunction=_law(each, 0.0),
                 )
             )
         elif isinstance(each, TorsionSpringDamper):
             joint: Any = self.mechanism.joint(each.joint)
             turns = items.NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[0.0])
-            curved = {"springTorqueUserFunction": _torque(each)} if each.curve else {}
+            curved = {"springTorqueUserFunction": _law(each, each.free_angle)} if each.curve else {}
             self.mbs.AddObject(
                 items.ObjectConnectorTorsionalSpringDamper(
                     markerNumbers=rows.markers(joint, joint.point, frame_along(joint.axis, 2)),
@@ -79,7 +79,7 @@ class StaticLoads(Loads):
         else:
             super().add(each)
 
-    def _law(self, each: Bushing, markers: Sequence[int]) -> Any:
+    def _bushing(self, each: Bushing, markers: Sequence[int]) -> Any:
         """Return force and torque on the first body, as a user function of Exudyn."""
 
         def law(mbs: Any, t: float, item: int, displacement: Any, *others: Any) -> list[float]:
@@ -87,7 +87,7 @@ class StaticLoads(Loads):
                 np.array(mbs.GetMarkerOutput(marker, self.kinds.RotationMatrix)).reshape(3, 3)
                 for marker in markers
             )
-            return [*_force(each, np.array(displacement)), *elastic_torque(each, i.T @ j)]
+            return [*elastic_forces(each, np.array(displacement)), *elastic_torque(each, i.T @ j)]
 
         return law
 
@@ -100,31 +100,18 @@ class StaticLoads(Loads):
             i, j = (np.array(mbs.GetMarkerOutput(k, self.kinds.Position)) for k in markers)
             turned = mbs.GetMarkerOutput(markers[0], self.kinds.RotationMatrix)
             axes = np.array(turned).reshape(3, 3)
-            return [*np.cross(j - i, axes @ _force(each, axes.T @ (j - i)))]
+            return [*np.cross(j - i, axes @ elastic_forces(each, axes.T @ (j - i)))]
 
         return couple
 
 
-def _force(each: Bushing, x: Array) -> Array:
-    """Return the force along the axes at a displacement along them."""
-    tables = each.curve or ((), (), ())
-    curves = [curve_force(table, s) for table, s in zip(tables, x.tolist(), strict=True)]
-    return np.array(each.stiffness) * x + np.array(each.preload) + np.array(curves)
+def _law(each: SpringDamper | TorsionSpringDamper, free: float) -> Any:
+    """Return the force of a spring as a user function of Exudyn, of deflection plus `free`."""
 
+    def law(mbs: Any, t: float, item: int, value: float, *others: Any) -> float:
+        return elastic_force(each, value - free)
 
-def _tension(each: SpringDamper) -> Any:
-    def tension(mbs: Any, t: float, item: int, deflection: float, *others: Any) -> float:
-        return each.stiffness * deflection + curve_force(each.curve, deflection)
-
-    return tension
-
-
-def _torque(each: TorsionSpringDamper) -> Any:
-    def torque(mbs: Any, t: float, item: int, angle: float, *others: Any) -> float:
-        deflection = angle - each.free_angle
-        return each.stiffness * deflection + curve_force(each.curve, deflection)
-
-    return torque
+    return law
 
 
 def _sizes(case: Case) -> list[float]:

@@ -1,9 +1,10 @@
 """Equilibria by a simulator's own kinematics, gravity and rows: J^T lambda = demand, at rest.
 
-Newton's method walks from the design position, where it takes away what is out of balance, through
-the samples outwards. Its unknowns are motions that the rows leave, so redundant rows do no harm;
-the stiffness along them comes from central differences of demand - J^T lambda. Differences only
-slow the convergence: the result is where the simulator's own forces balance.
+Newton's method begins at the design position. There it takes away the forces that are out of
+balance; then it walks outwards through the samples. Its unknowns are the motions that the rows
+leave free, so redundant rows do no harm. The stiffness along these motions comes from central
+differences of demand - J^T lambda; their errors only slow the convergence, because the result is
+where the simulator's own forces balance.
 
 A step of the walk is accepted if it is short, Newton's corrections contract, and the stiffness
 keeps its number of negative eigenvalues; otherwise it is halved. So no walk leaps to an
@@ -145,8 +146,8 @@ class Walk:
         near = [(design, self.model.save())] if self._advance(design, design, 0.0) else []
         if not near:
             messages.append(
-                f"at the design position the walk follows {self.share:.3g} of the forces out of"
-                " balance, and finds no equilibrium"
+                "no equilibrium is found at the design position: the walk takes away only"
+                f" {self.share:.3g} of the forces that are out of balance there"
             )
         size = np.linalg.norm(self.values, axis=1)
         for k in sorted(group if near else (), key=lambda k: float(size[k])):

@@ -80,8 +80,7 @@ class Element:
             along = d / length
             rate = float(along @ (j.velocity - i.velocity)[:3])
             deflection = length - (each.free_length or 0.0)
-            tension = each.stiffness * deflection + each.damping * rate
-            tension += curve_force(each.curve, deflection)
+            tension = elastic_force(each, deflection) + each.damping * rate
             pull = np.concatenate([tension * along, np.zeros(3)])
             return tension, (pull, -pull)
         if isinstance(each, TorsionSpringDamper):
@@ -89,8 +88,7 @@ class Element:
             axis = i.rotation @ self.axis
             rate = float(axis @ (j.velocity - i.velocity)[3:])
             deflection = self.angle() - each.free_angle
-            elastic = each.stiffness * deflection + curve_force(each.curve, deflection)
-            amount = -(elastic + each.damping * rate)
+            amount = -(elastic_force(each, deflection) + each.damping * rate)
             twist = np.concatenate([np.zeros(3), amount * axis])
             return amount, (-twist, twist)
         if isinstance(each, Bushing):
@@ -102,7 +100,21 @@ class Element:
         return float(np.linalg.norm(vector)), (np.concatenate(parts),)
 
 
-def curve_force(table: Curve | None, deflection: float) -> float:
+def elastic_force(each: SpringDamper | TorsionSpringDamper, deflection: float) -> float:
+    """Return the tension or torque of a spring at a deflection, without damping [N or N m]."""
+    return each.stiffness * deflection + _curve_force(each.curve, deflection)
+
+
+def elastic_forces(each: Bushing, x: Array) -> Array:
+    """Return the forces on the first body along the bushing's axes at a displacement along them,
+    without damping [N].
+    """
+    tables = each.curve or ((), (), ())
+    curves = [_curve_force(table, s) for table, s in zip(tables, x.tolist(), strict=True)]
+    return np.array(each.stiffness) * x + np.array(each.preload) + np.array(curves)
+
+
+def _curve_force(table: Curve | None, deflection: float) -> float:
     """Return the force of a curve at a deflection; straight beyond its ends."""
     if not table:
         return 0.0
@@ -131,10 +143,7 @@ def bushing_at_work(
     v, w = i.velocity[:3], i.velocity[3:]
     rates = axes.T @ (j.velocity[:3] - v - np.cross(w, d))
     x = axes.T @ d
-    tables = each.curve or ((), (), ())
-    curves = np.array([curve_force(table, s) for table, s in zip(tables, x.tolist(), strict=True)])
-    loads = np.array([each.stiffness, each.preload, each.damping])
-    force = axes @ (loads[0] * x + loads[1] + curves + loads[2] * rates)
+    force = axes @ (elastic_forces(each, x) + np.array(each.damping) * rates)
     turn = np.array(each.triad) @ i.rotation.T @ j.rotation @ np.array(each.triad).T
     torque = elastic_torque(each, turn)
     torque += np.array(each.turning_damping) * (axes.T @ (j.velocity[3:] - w))

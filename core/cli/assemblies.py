@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from . import import_options
 from .export import formats, keep_texts
-from .option_types import measured, whole
+from .option_types import add_json, measured, whole
 from .registry import Registry, Status, given
 
 if TYPE_CHECKING:
@@ -57,11 +57,7 @@ def add(commands: Any) -> None:
         metavar="N",
         help="seed of the random starts; default %(default)s",
     )
-    listing.add_argument(
-        "--json",
-        metavar="FILE",
-        help="write the assemblies with all poses as JSON; - for standard output",
-    )
+    add_json(listing, "the assemblies with all poses")
     listing.add_argument(
         "--export",
         metavar="FORMAT",

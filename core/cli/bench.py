@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from ..extras import how_to_install
 from ..report.progress import complain
-from .option_types import whole
+from .option_types import add_json, whole
 from .registry import Registry, Status, add_joint_types
 from .run_options import TOL
 from .verbosity import add_verbosity
@@ -47,9 +47,7 @@ def add(commands: Any) -> None:
     bench.add_argument(
         "--out", type=Path, metavar="DIR", help="write bench.json and bench.html there"
     )
-    bench.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
+    add_json(bench)
     add_verbosity(bench, quiet="print no progress")
     benchmarks = bench.add_subparsers(title="benchmarks", metavar="BENCHMARK")
     engines = benchmarks.add_parser(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from ..harness.resource_limits import TIMEOUT
-from .option_types import positive, whole
+from .option_types import add_several, positive, whole
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
@@ -28,22 +28,8 @@ def add(commands: Any) -> None:
         description=_board.__doc__,
     )
     board.set_defaults(do=_board)
-    board.add_argument(
-        "--engine",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="engines to step with; default: all",
-    )
-    board.add_argument(
-        "--case",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="built-in cases or files with [free]; default: all built-in ones",
-    )
+    add_several(board, "--engine", "engines to step with; default: all")
+    add_several(board, "--case", "built-in cases or files with [free]; default: all built-in ones")
     board.add_argument(
         "--out",
         type=Path,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from . import import_options
+from .option_types import add_json
 from .registry import Registry, Status
 from .run_options import TOL, add_curve_files
 
@@ -47,9 +48,7 @@ def add(commands: Any) -> None:
         ),
     )
     command.add_argument("--out", type=Path, metavar="DIR", help="write the page DIR/compare.html")
-    command.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
+    add_json(command)
     add_curve_files(command, "a column for each output, design and difference")
     import_options.add_options(command)
 

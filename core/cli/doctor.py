@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from .option_types import add_json
 from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
@@ -27,9 +28,7 @@ def add(commands: Any) -> None:
         description=_doctor.__doc__,
     )
     doctor.set_defaults(do=_doctor)
-    doctor.add_argument(
-        "--json", metavar="FILE", help="write the findings as JSON; - for standard output"
-    )
+    add_json(doctor, "the findings")
     add_verbosity(doctor, quiet="print only the verdict and the essential missing parts")
 
 

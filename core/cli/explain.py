@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from . import import_options
-from .option_types import positive, whole
+from .option_types import add_json, positive, whole
 from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
@@ -40,9 +40,7 @@ def add(commands: Any) -> None:
         metavar="X",
         help=f"largest residual that engines may leave [m or -]; default {TOL:g}",
     )
-    explaining.add_argument(
-        "--json", metavar="FILE", help="write the diagnosis as JSON; - for standard output"
-    )
+    add_json(explaining, "the diagnosis")
     add_verbosity(
         explaining,
         quiet="print only the verdict, the findings and the notes",

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import KincheckError
 from . import import_options
-from .option_types import positive, whole
+from .option_types import add_json, positive, whole
 from .registry import Registry, Status
 
 
@@ -43,9 +43,7 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="write time and outputs as columns, SI units",
     )
-    freeing.add_argument(
-        "--json", metavar="FILE", help="write outputs and errors as JSON; - for standard output"
-    )
+    add_json(freeing, "outputs and errors")
     import_options.add_options(freeing)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from ..report.progress import complain
-from .option_types import whole
+from .option_types import add_several, whole
 from .registry import Registry, Status
 from .run_options import HISTORY
 
@@ -32,22 +32,8 @@ def add(commands: Any) -> None:
     )
     history.set_defaults(do=_history)
     add_history(history, "history file")
-    history.add_argument(
-        "--case",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="trends of these cases only",
-    )
-    history.add_argument(
-        "--engine",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="trends of these engines only",
-    )
+    add_several(history, "--case", "trends of these cases only")
+    add_several(history, "--engine", "trends of these engines only")
     history.add_argument(
         "--last",
         type=whole(0),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.io.reader_options import LEFT_OUT, Supplied
 from ..errors import KincheckError
 from ..report.progress import complain
-from .option_types import positive
+from .option_types import add_several, positive
 from .registry import add_joint_types
 
 if TYPE_CHECKING:
@@ -158,40 +158,24 @@ def add_options(command: argparse.ArgumentParser) -> None:
             " move together"
         ),
     )
-    model.add_argument(
-        "--hold",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="joints or free bodies that do not move",
-    )
+    add_several(model, "--hold", "joints or free bodies that do not move")
     model.add_argument(
         "--hold-rest",
         action="store_true",
         help="hold as many joints as needed: free bodies, joints with an actuator, others",
     )
-    model.add_argument(
+    add_several(
+        model,
         "--without",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help=(
-            "elements of a model to leave out, by tag, name or TAG/NAME, or statements of a dataset"
-            " of Adams, as BUSHING or BUSHING/3; a note beside every verdict says so"
-        ),
+        "elements of a model to leave out, by tag, name or TAG/NAME, or statements of a dataset"
+        " of Adams, as BUSHING or BUSHING/3; a note beside every verdict says so",
     )
-    model.add_argument(
+    add_several(
+        model,
         "--start",
-        nargs="+",
-        action="extend",
-        default=[],
+        "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
+        " the start is assembled to close, and a note says by how far joints moved",
         metavar="WHERE",
-        help=(
-            "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
-            " the start is assembled to close, and a note says by how far joints moved"
-        ),
     )
 
 

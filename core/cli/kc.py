@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from . import execution_options, import_options
-from .option_types import positive
+from .option_types import add_several, positive
 from .registry import Registry, Status
 from .run_options import TOL
 
@@ -22,10 +21,8 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
 
-_UNITS = {
-    "": 1.0, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "rad": 1.0, "deg": math.pi / 180.0,
-    "N": 1.0, "kN": 1e3, "Nm": 1.0, "kNm": 1e3,
-}  # fmt: skip
+LOADS = {"N": 1.0, "kN": 1e3, "Nm": 1.0, "kNm": 1e3}
+"""Units of forces and torques, by their sizes in SI."""
 MOST = 100_000
 
 
@@ -63,16 +60,11 @@ def add(commands: Any) -> None:
             " [joints.NAME.bushings.X] as in case files"
         ),
     )
-    command.add_argument(
+    add_several(
+        command,
         "--engine",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help=(
-            "check the equilibria by these engines: each finds them by its own kinematics, gravity"
-            " and rows, exudyn-static by its own solver, and gets a verdict against native"
-        ),
+        "check the equilibria by these engines: each finds them by its own kinematics, gravity"
+        " and rows, exudyn-static by its own solver, and gets a verdict against native",
     )
     command.add_argument(
         "--history",
@@ -80,7 +72,9 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="store the records of native and of these engines in this file, as kincheck run does",
     )
-    command.add_argument("--csv", metavar="FILE", help="write the curves, in mm, deg, N, kN")
+    command.add_argument(
+        "--csv", type=Path, metavar="FILE", help="write the curves, in mm, deg, N, kN"
+    )
     command.add_argument(
         "--json", metavar="FILE", help="write the results in SI; - for standard output"
     )
@@ -101,7 +95,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     ends in an error; 2 a sample has no equilibrium, and its message gives the last load that has
     one, or the tool could not do its work.
     """
-    from ..case.io.atomic_files import require_writable, write
+    from ..case.io.atomic_files import write
     from ..case.models.files import is_table
     from ..harness.record import to_json
     from ..harness.standard import STANDARD
@@ -109,6 +103,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     from ..report.table import print_table
     from ..report.terminal import with_json
     from ..studies.compliance import study, views
+    from .destinations import Destinations
 
     problems = execution_options.contradictions(options)
     engines = _engines(options, registry, problems)
@@ -128,22 +123,18 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
         from ..case.io.mechanism_sections import with_bushings
 
         case = with_bushings(case, own)
-    page = None if options.out is None else options.out / "kc.html"
-    if page is not None:
-        page.parent.mkdir(parents=True, exist_ok=True)
-    of_engines = None if page is None or not engines else page.with_name("results.json")
-    require_writable(
-        [("--json", options.json), ("--csv", options.csv), ("--out", page), ("--out", of_engines)]
-    )
+    to = Destinations.of(options)
+    if unwritable := to.problems(["kc.html", *(["results.json"] if engines else [])]):
+        raise KincheckError("\n".join(unwritable))
     loads = dict(map(_load, options.load))
     results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
-    if options.csv is not None:
-        write("--csv", Path(options.csv), views.table(results).encode())
+    if to.csv is not None:
+        write("--csv", to.csv, views.table(results).encode())
     checked = _checked(options, engines, results.cases, problems) if engines else None
-    if checked is not None and of_engines is not None:
-        write("--out", of_engines, to_json(checked))
-    if page is not None:
-        write("--out", page, views.page(results, checked).encode())
+    if to.out is not None:
+        if checked is not None:
+            write("--out", to.out / "results.json", to_json(checked))
+        write("--out", to.out / "kc.html", views.page(results, checked).encode())
     out = sys.stderr if options.json == "-" else sys.stdout
     with with_json(views.as_data(results, checked), options.json):
         print(*views.lines(results), sep="\n", file=out)
@@ -181,11 +172,21 @@ def _checked(
     solver, settings = execution_options.solver(options, engines)
     keeping = None
     if options.history is not None:
-        names = {"cases": [each.name for each in cases], "engines": [x.name for x in engines]}
-        settings["selection"] = {**names, "options": {}}
-        about: dict[str, Any] = {"tol": TOL, "command": options.command, "resume": False}
+        settings["selection"] = {
+            "cases": [each.name for each in cases],
+            "engines": [each.name for each in engines],
+            "options": {},
+        }
         try:
-            keeping = keep(options.history, cases, engines, settings=settings, **about)
+            keeping = keep(
+                options.history,
+                cases,
+                engines,
+                tol=TOL,
+                command=options.command,
+                settings=settings,
+                resume=False,
+            )
         except HistoryError as error:
             problems.append(f"{error}; the run is not in the history")
 
@@ -213,21 +214,20 @@ def _load(text: str) -> tuple[str, Any]:
 
 def _values(option: str, text: str) -> list[float]:
     """Return the samples A:B:N, or one number, in SI."""
+    from ..case.io.document import interval
+    from ..case.units import ANGLES, LENGTHS, Unit
+
+    loads = {name: Unit(name, size, lambda x, size=size: size * x) for name, size in LOADS.items()}
     parts = text.split(":")
-    numbers = [_number(each) for each in parts[:2]]
-    known = [x for x in numbers if x is not None]
     count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else ""
-    if len(known) < len(numbers) or not count.isdecimal() or not 1 <= int(count) <= MOST:
+    try:
+        ends, _ = interval(parts[:2], {**LENGTHS, **ANGLES, **loads}, "m")
+    except ValueError:
+        ends = [math.nan]
+    if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
             f"{option} {text}: expected START:STOP:SAMPLES, numbers with a unit such as mm, deg or"
             f" kN or none for SI, and 1 to {MOST} samples; write -60mm:60mm:25"
         )
-    start, stop, steps = known[0], known[-1], max(1, int(count) - 1)
+    start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
     return [start + (stop - start) * (k / steps) for k in range(int(count))]
-
-
-def _number(text: str) -> float | None:
-    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z]*)\s*", text)
-    if found is None or found[2] not in _UNITS:
-        return None
-    return float(found[1]) * _UNITS[found[2]]

@@ -1,4 +1,4 @@
-"""Readers of the numbers in options."""
+"""Readers of the numbers in options, and options that several commands have."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable
+from typing import Any
 
 
 def whole(least: int, most: int | None = None) -> Callable[[str], int]:
@@ -54,3 +55,23 @@ def measured(text: str) -> str:
             f"{text!r} is not a number; give one such as 0.02, 20mm or -3deg"
         )
     return text
+
+
+def add_several(
+    command: Any, option: str, meaning: str, metavar: str = "NAME", type: Callable[[str], Any] = str
+) -> None:
+    """Add an option that takes several values, and may be repeated; default: an empty list.
+
+    Args:
+        command: its parser, or a group of its options.
+    """
+    command.add_argument(
+        option, nargs="+", action="extend", default=[], metavar=metavar, type=type, help=meaning
+    )
+
+
+def add_json(command: argparse.ArgumentParser, what: str = "the results") -> None:
+    """Add the option --json."""
+    command.add_argument(
+        "--json", metavar="FILE", help=f"write {what} as JSON; - for standard output"
+    )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from ..report.progress import complain
 from .history import add_history
+from .option_types import add_json
 from .registry import Registry, Status
 from .verbosity import add_verbosity
 
@@ -58,9 +59,7 @@ def add(commands: Any) -> None:
     )
     add_history(report, "history of the runs, their steps and their spread")
     report.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(OUT)} there")
-    report.add_argument(
-        "--json", metavar="FILE", help="write the changes as JSON; - for standard output"
-    )
+    add_json(report, "the changes")
     report.add_argument(
         "--junit",
         type=Path,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import KincheckError
 from . import execution_options, import_options, recorded_options
-from .option_types import positive
+from .option_types import add_json, add_several, positive
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
         "only these, by name or MODULE:CLASS; all must be installed (else status 2); default: all"
         " engines"
     )
-    run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help=must)
+    add_several(run, "--engine", must)
     run.add_argument(
         "--mode",
         choices=MODES,
@@ -70,9 +70,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="show the work-precision data of this bench.json in the report",
     )
-    run.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
+    add_json(run)
     add_curve_files(run, "the curves of all engines and references")
     run.add_argument(
         "--long",
@@ -89,30 +87,21 @@ def add_options(run: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the table of cases and engines as Markdown",
     )
-    run.add_argument(
+    add_several(
+        run,
         "--reference",
-        nargs="+",
-        action="extend",
-        default=[],
-        type=Path,
+        "judge cases by these files instead of by their own references: proved references of"
+        " kincheck reference (.json), or one measured curve (.csv, .xlsx, ...)",
         metavar="FILE",
-        help=(
-            "judge cases by these files instead of by their own references: proved references of"
-            " kincheck reference (.json), or one measured curve (.csv, .xlsx, ...)"
-        ),
+        type=Path,
     )
     run.add_argument(
         "--explain",
         action="store_true",
         help="print what the native engine computes for each case, and what it leaves out",
     )
-    run.add_argument(
-        "--require",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="engines that must be installed and support every case (else status 2)",
+    add_several(
+        run, "--require", "engines that must be installed and support every case (else status 2)"
     )
     add_verbosity(
         run,

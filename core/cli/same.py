@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from ..extras import THREADS
+from .option_types import add_json
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
@@ -67,9 +68,7 @@ def add(commands: Any) -> None:
         metavar="NAME",
         help="elements to leave out of all models, by tag, name or TAG/NAME; a note says so",
     )
-    same.add_argument(
-        "--json", metavar="FILE", help="write the verdict as JSON; - for standard output"
-    )
+    add_json(same, "the verdict")
 
 
 def _same(options: argparse.Namespace, registry: Registry) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
-from .option_types import positive, whole
+from .option_types import add_json, add_several, positive, whole
 from .registry import Registry, Status, given
 from .run_options import MODES, TOL
 from .verbosity import add_verbosity
@@ -33,14 +33,7 @@ def add(commands: Any) -> None:
         description=_stress.__doc__,
     )
     stress.set_defaults(do=_stress)
-    stress.add_argument(
-        "--family",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="default: all families",
-    )
+    add_several(stress, "--family", "default: all families")
     stress.add_argument("--list", action="store_true", help="list the families")
     stress.add_argument(
         "--samples",
@@ -51,9 +44,7 @@ def add(commands: Any) -> None:
     stress.add_argument(
         "--seed", type=whole(0), metavar="S", help="seed of the random mechanisms; default 0"
     )
-    stress.add_argument(
-        "--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native"
-    )
+    add_several(stress, "--engine", "default: native")
     stress.add_argument(
         "--mode",
         choices=MODES,
@@ -65,23 +56,13 @@ def add(commands: Any) -> None:
         metavar="DIR",
         help="write the tables there, and the smallest bad cases as reduced case files",
     )
-    stress.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
+    add_json(stress)
     stress.add_argument(
         "--no-proofs",
         action="store_true",
         help="skip the proof of a share of the reference motions, which needs python-flint",
     )
-    stress.add_argument(
-        "--replay",
-        nargs="+",
-        action="extend",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help="judge case files instead",
-    )
+    add_several(stress, "--replay", "judge case files instead", metavar="FILE", type=Path)
     stress.add_argument(
         "--tol",
         type=positive,

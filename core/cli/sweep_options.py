@@ -8,7 +8,7 @@ from pathlib import Path
 from ..studies.variation.study_choices import Incomplete, Sampling
 from . import import_options
 from .execution_options import SCHEDULER
-from .option_types import positive, whole
+from .option_types import add_json, add_several, positive, whole
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -74,14 +74,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
             " yield; default %(default)s"
         ),
     )
-    sweep.add_argument(
-        "--output",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="only these outputs; default: all",
-    )
+    add_several(sweep, "--output", "only these outputs; default: all")
     sweep.add_argument(
         "--order",
         type=int,
@@ -131,9 +124,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"write {', '.join(FILES)} there, and {LIMITS} if there are limits",
     )
-    sweep.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
+    add_json(sweep)
     sweep.add_argument(
         "--resume",
         action="store_true",

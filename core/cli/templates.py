@@ -34,12 +34,12 @@ def _templates(options: argparse.Namespace, registry: Registry) -> int:
     Its numbers are examples. Rows marked optional may be left out, and so may the column of
     meanings.
     """
+    from ..case.models.hardpoints.templates import sample_table, samples
+
     if options.bushings:
         from ..case.models.hardpoints.rubber import sample_bushings
 
-        print(*sample_bushings(options.template), sep="\n\n")
-        return Status.WITHIN
-    from ..case.models.hardpoints.templates import sample_tables
-
-    print(*sample_tables(options.template), sep="\n")
+        print(*samples(options.template, sample_bushings), sep="\n\n")
+    else:
+        print(*samples(options.template, sample_table), sep="\n")
     return Status.WITHIN

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from . import import_options
-from .option_types import positive
+from .option_types import add_json, positive
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
@@ -45,9 +45,7 @@ def add(commands: Any) -> None:
         metavar="L",
         help="length in each direction [mechanism sizes and radians]; default %(default)s",
     )
-    tracing.add_argument(
-        "--json", metavar="FILE", help="write the curve as JSON; - for standard output"
-    )
+    add_json(tracing, "the curve")
     import_options.add_options(tracing)
 
 

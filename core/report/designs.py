@@ -171,7 +171,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
         verdict.append(f"No difference: {', '.join(equal)}.")
     for label, own in curves.items():
         if lone := [name for name in own if not all(name in each for each in curves.values())]:
-            verdict.append(f"Not of every design, but of {label}: {named(lone)}.")
+            verdict.append(f"Not in every design, but in {label}: {named(lone)}.")
     verdict += [
         f"Not compared, because defined otherwise: {name} ({what})."
         for name, what in designs.other.items()

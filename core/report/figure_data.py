@@ -88,8 +88,8 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     """Return figures over the runs, on log axes: each motion's error in tolerances, and time; empty
     series are left out.
 
-    Failures are red, at the tolerance if no error tells them. Dashed lines are steps, dotted ones
-    other versions. An error of zero has no place on the axis: the page draws it on a labelled
+    Failures are red; those without an error are at the tolerance. Dashed lines are steps, dotted
+    ones other versions. An error of zero has no place on the axis: the page draws it on a labelled
     floor, as in the error figures.
     """
     runs = list(dict.fromkeys(each.run for each in history))
@@ -143,8 +143,8 @@ def _line(mark: Mark) -> Figure:
 
 
 def _failures(history: Sequence[Past], style: Style, motion: str) -> Figure:
-    """Return the marks of an engine's failures in a motion; in that of positions, also of those
-    that no error tells.
+    """Return the marks of an engine's failures in a motion; among positions, also of those without
+    an error.
     """
     over = {
         past.run: error if math.isfinite(error) else 1.0

@@ -12,7 +12,7 @@ import pytest
 from kincheck import cases, load
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.hardpoints.templates import sample_tables
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import LARGEST, POSES, scene, with_scenes
 from kincheck.core.report.axis import Axis, driver_axis
@@ -114,7 +114,7 @@ def test_scene_arrows_are_output_forces():
 
 
 def test_an_arm_has_both_pivots_of_its_table(tmp_path: Path):
-    (tmp_path / "car.csv").write_text(sample_tables(["double_wishbone"])[0], "utf-8")
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["double_wishbone"]), "utf-8")
     case = load(tmp_path / "car.csv")
     drawn = drawing(scene(case, poses=False), AXIS)
     names = [body["name"] for body in drawn.bodies]
@@ -133,7 +133,7 @@ def test_an_arm_has_both_pivots_of_its_table(tmp_path: Path):
 
 
 def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path: Path):
-    (tmp_path / "car.csv").write_text(sample_tables(["mcpherson"])[0], "utf-8")
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]), "utf-8")
     drawn = drawing(scene(load(tmp_path / "car.csv"), poses=False), AXIS)
     names = [body["name"] for body in drawn.bodies]
     [(tube, far)] = drawn.tubes
@@ -147,7 +147,7 @@ def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path: Path):
 def test_steering_in_the_sweep_leaves_no_centre(
     tmp_path: Path, axle: str | None, rack: str | None, middle: int
 ):
-    (tmp_path / "car.csv").write_text(sample_tables(["mcpherson"])[0], "utf-8")
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]), "utf-8")
     case = load(tmp_path / "car.csv", Supplied(axle=axle, rack=rack, travel="0.02:3"))
     assert [len(wheel.middle) for wheel in scene(case, poses=False).wheels] == [middle] * (
         1 if axle is None else 2

@@ -287,12 +287,21 @@ def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
         ("", ["--load", "vertical=0:1:2"], "'vertical' is none of"),
         ("", ["--travel=0:1"], "START:STOP:SAMPLES"),
         ("", ["--travel=0:1furlong:3"], "START:STOP:SAMPLES"),
+        ("", ["--travel=nan:1:3"], "START:STOP:SAMPLES"),
+        ("", ["--out", __file__], "cannot be made a folder"),
     ],
 )
 def test_study_that_lacks_facts_says_so(tmp_path, capsys, more, options, expected):
     (tmp_path / "strut.toml").write_text(strut_text(more))
     assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 2
     assert expected in capsys.readouterr().err
+
+
+def test_unit_of_one_end_holds_for_both(tmp_path):
+    (tmp_path / "strut.toml").write_text(strut_text())
+    out = tmp_path / "kc.json"
+    assert main(["kc", str(tmp_path / "strut.toml"), "--travel=-20:20mm:3", f"--json={out}"]) == 0
+    assert json.loads(out.read_text())["travel"] == [-0.02, 0.0, 0.02]
 
 
 def test_rig_is_written_as_read(tmp_path):

@@ -31,14 +31,14 @@ COLUMNS = (
 LABELS = 4
 NOTES = (
     "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
-    " Gap: largest opening of a loop. Energy: of motion, weight and springs, less the truth's at"
-    " the same time: what loads and dampers took is in both.",
-    "Errors are those of the shortest step, cost is wall time for a simulated second there, in one"
-    " process and one run on a machine that also does other things: costs within a factor of two"
-    " are alike. Where the loop over the steps is in Python, its time is in the cost.",
-    "Order: by least squares over steps that lower the error. Floor: an error that the last halving"
-    " does not lower, by softness or because steps are still too long. Default: the engine's"
-    " settings at these steps; best: best known ones.",
+    " Gap: largest opening of a loop. Energy: of motion, weight and springs, minus the truth's at"
+    " the same time; what loads and dampers take is in both.",
+    "Errors and costs are of the shortest step. Cost: wall time for a simulated second, in one"
+    " run and process. The machine also does other things: costs within a factor of two are"
+    " alike. Where the loop over the steps is in Python, its time is in the cost.",
+    "Order: by least squares over the steps that lower the error. Floor: an error that the last"
+    " halving does not lower, because constraints are soft or steps are still too long. Default:"
+    " the engine's own settings; best: the best known ones.",
 )
 
 
@@ -74,8 +74,8 @@ def _section(truth: TruthFacts, rows: Sequence[Row]) -> Section:
     verdict = [
         f"{truth.source}. {truth.duration:.6g} s, {truth.samples} samples, {truth.points} points,"
         f" {truth.freedoms} freedom{'s' * (truth.freedoms > 1)}, {truth.redundant} redundant rows.",
-        f"Truth: {truth.method}; halved steps change a point by {number(truth.error)} m, and energy"
-        f" less work by {number(truth.energy)} J.",
+        f"Truth: {truth.method}. Halving its steps moves a point by {number(truth.error)} m, and"
+        f" changes energy minus work by {number(truth.energy)} J.",
         *([truth.message] if truth.message else []),
         *_alike(rows),
     ]

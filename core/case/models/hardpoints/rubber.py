@@ -1,8 +1,8 @@
 """Bushings at the hardpoints of a suspension, by role, and masses and springs beside them.
 
-A bushing at a role stands under the joint there. Its axes are two across the joint's axis and the
-axis itself, the third; along it, and about it, are the third numbers. Joints without an axis have
-the global ones. The right side mirrors the left.
+A bushing at a role takes the place of the joint there. Its third axis is the joint's, and the first
+two are across it; so the third number of each key is along this axis or about it. Joints without an
+axis have the global axes. The right side mirrors the left.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import Any
 
 import msgspec
 
-from ....errors import CaseError, unknown
 from ....joints import Distance, Joint
 from ....joints.base import triad
 from ....mechanism.body import Body
@@ -25,7 +24,7 @@ from ...io.document import Section, explained, parse, read_text
 from ...io.mechanism_sections import LARGEST_BUSHINGS, with_bushings
 from ...units import LENGTHS
 from .table import HardpointTable, number
-from .templates import KNUCKLE, TEMPLATES, Template
+from .templates import KNUCKLE, Template
 
 Three = float | tuple[float, float, float]
 # A steel ball joint is stiff, rubber is not: numbers of a passenger car [N/m, N m/rad].
@@ -202,7 +201,7 @@ def of_chrono(
         inertias
     )
     notes += [
-        f"the inertia of {each!r} is left out: no body has it, its moments break the triangle rule"
+        f"the inertia of {each!r} is left out: no body has it, one moment exceeds the other two"
         for each in impossible
     ]
     return Rubber(bushings, {x: _together(parts) for x, parts in bodies.items()}, springs), notes
@@ -240,19 +239,8 @@ def with_file(
     return with_bushings(case, file) if root.at("joints").value is not None else case
 
 
-def sample_bushings(names: Sequence[str]) -> list[str]:
-    """Return files of bushings for the templates of these names, or of all.
-
-    Raises:
-        CaseError: there is no such template.
-    """
-    for name in names:
-        if name not in TEMPLATES:
-            raise CaseError(unknown("template", name, TEMPLATES))
-    return [_sample(TEMPLATES[name]) for name in names or TEMPLATES]
-
-
-def _sample(template: Template) -> str:
+def sample_bushings(template: Template) -> str:
+    """Return the text of a file of bushings to begin one's own with; its numbers are invented."""
     lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
     lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
     meanings = {role.name: role.meaning for role in template.roles}

@@ -11,7 +11,7 @@ import csv
 import io
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -303,8 +303,8 @@ ROLES = frozenset(
 """All names of all roles, in their compact form."""
 
 
-def sample_tables(names: Sequence[str]) -> list[str]:
-    """Return the sample tables of the templates of these names; of all templates without names.
+def samples(names: Sequence[str], sample: Callable[[Template], str]) -> list[str]:
+    """Return the samples of the templates of these names; of all templates without names.
 
     Raises:
         CaseError: there is no such template.
@@ -312,7 +312,7 @@ def sample_tables(names: Sequence[str]) -> list[str]:
     for name in names:
         if name not in TEMPLATES:
             raise CaseError(unknown("template", name, TEMPLATES))
-    return [sample_table(TEMPLATES[name]) for name in names or TEMPLATES]
+    return [sample(TEMPLATES[name]) for name in names or TEMPLATES]
 
 
 def sample_table(template: Template) -> str:

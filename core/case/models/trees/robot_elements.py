@@ -42,8 +42,9 @@ STRUT_LAW = ("stiffness", "damping", "free_length")
 BUSHING_LAW = ("force_stiffness", "torque_stiffness", "force_damping", "torque_damping")
 """Own keys of Drake's bushing."""
 HALFWAY = (
-    "its axes are those of its first frame, and its torque that of Euler parameters; Drake has the"
-    " axes halfway between both frames, and angles of roll, pitch and yaw: equal for small turns"
+    "its axes are those of its first frame, and its torque that of Euler parameters; in Drake the"
+    " axes are halfway between both frames, and the torque is that of roll, pitch and yaw; both are"
+    " equal for small turns"
 )
 
 # What is seen, touched or measured joins nothing.
