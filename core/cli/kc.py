@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,10 +21,10 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
 
-_UNITS = {
-    "": 1.0, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "rad": 1.0, "deg": math.pi / 180.0,
-    "N": 1.0, "kN": 1e3, "Nm": 1.0, "kNm": 1e3,
-}  # fmt: skip
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
+_FORCES = {"N": 1.0, "kN": 1e3}
+_TORQUES = {"Nm": 1.0, "kNm": 1e3}
+_END = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z]*)\s*")
 MOST = 100_000
 
 
@@ -114,7 +113,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     engines = _engines(options, registry, problems)
     if problems := problems or execution_options.unreachable(options):
         raise KincheckError("\n".join(problems))
-    travel = None if options.travel is None else _values("--travel", options.travel)
+    travel = None if options.travel is None else _values("--travel", options.travel, _LENGTHS)
     table = os.path.isfile(options.case) and is_table(Path(options.case))
     axle, given = options.axle, options.travel
     if not table:
@@ -207,27 +206,23 @@ def _load(text: str) -> tuple[str, Any]:
     name, _, values = text.partition("=")
     if not values:
         raise KincheckError(f"--load {text}: expected NAME=A:B:N, as lateral=-3000:3000:31")
-    found = _values(f"--load {name}", values)
+    found = _values(f"--load {name}", values, _TORQUES if name == "aligning" else _FORCES)
     return name, found if ":" in values else found[0]
 
 
-def _values(option: str, text: str) -> list[float]:
-    """Return the samples A:B:N, or one number, in SI."""
+def _values(option: str, text: str, units: Mapping[str, float]) -> list[float]:
+    """Return the samples A:B:N, or one number, in SI; the unit of one end holds for the other."""
     parts = text.split(":")
-    numbers = [_number(each) for each in parts[:2]]
-    known = [x for x in numbers if x is not None]
+    ends = [each for part in parts[:2] if (each := _END.fullmatch(part)) is not None]
+    bare = next(iter(units))
+    common = next((each[2] for each in ends if each[2]), bare)
+    scales = [units.get(each[2] or common) for each in ends]
+    numbers = [float(e[1]) * x for e, x in zip(ends, scales, strict=True) if x is not None]
     count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else ""
-    if len(known) < len(numbers) or not count.isdecimal() or not 1 <= int(count) <= MOST:
+    if len(numbers) < len(parts[:2]) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
-            f"{option} {text}: expected START:STOP:SAMPLES, numbers with a unit such as mm, deg or"
-            f" kN or none for SI, and 1 to {MOST} samples; write -60mm:60mm:25"
+            f"{option} {text}: expected START:STOP:SAMPLES, numbers in {' or '.join(units)}, {bare}"
+            f" without a unit, and 1 to {MOST} samples; write -60{[*units][1]}:60{[*units][1]}:25"
         )
-    start, stop, steps = known[0], known[-1], max(1, int(count) - 1)
+    start, stop, steps = numbers[0], numbers[-1], max(1, int(count) - 1)
     return [start + (stop - start) * (k / steps) for k in range(int(count))]
-
-
-def _number(text: str) -> float | None:
-    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z]*)\s*", text)
-    if found is None or found[2] not in _UNITS:
-        return None
-    return float(found[1]) * _UNITS[found[2]]
