@@ -6,7 +6,7 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
 
-LOADS = {"N": 1.0, "kN": 1e3, "Nm": 1.0, "kNm": 1e3}
-"""Units of forces and torques, by their sizes in SI."""
+_FORCES = {"N": 1.0, "kN": 1e3}
+_TORQUES = {"Nm": 1.0, "kNm": 1e3}
 MOST = 100_000
 
 
@@ -109,7 +109,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     engines = _engines(options, registry, problems)
     if problems := problems or execution_options.unreachable(options):
         raise KincheckError("\n".join(problems))
-    travel = None if options.travel is None else _values("--travel", options.travel)
+    travel = None if options.travel is None else _values("--travel", options.travel, {})
     table = os.path.isfile(options.case) and is_table(Path(options.case))
     axle, given = options.axle, options.travel
     if not table:
@@ -208,26 +208,27 @@ def _load(text: str) -> tuple[str, Any]:
     name, _, values = text.partition("=")
     if not values:
         raise KincheckError(f"--load {text}: expected NAME=A:B:N, as lateral=-3000:3000:31")
-    found = _values(f"--load {name}", values)
+    found = _values(f"--load {name}", values, _TORQUES if name == "aligning" else _FORCES)
     return name, found if ":" in values else found[0]
 
 
-def _values(option: str, text: str) -> list[float]:
+def _values(option: str, text: str, sizes: Mapping[str, float]) -> list[float]:
     """Return the samples A:B:N, or one number, in SI."""
     from ..case.io.document import interval
-    from ..case.units import ANGLES, LENGTHS, Unit
+    from ..case.units import LENGTHS, Unit
 
-    loads = {name: Unit(name, size, lambda x, size=size: size * x) for name, size in LOADS.items()}
-    parts = text.split(":")
+    units = {name: Unit(name, size, lambda x, size=size: size * x) for name, size in sizes.items()}
+    units, parts = units or dict(LENGTHS), text.split(":")
+    bare, other = [*units][:2]
     count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else ""
     try:
-        ends, _ = interval(parts[:2], {**LENGTHS, **ANGLES, **loads}, "m")
+        ends, _ = interval(parts[:2], units, bare)
     except ValueError:
         ends = [math.nan]
     if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
-            f"{option} {text}: expected START:STOP:SAMPLES, numbers with a unit such as mm, deg or"
-            f" kN or none for SI, and 1 to {MOST} samples; write -60mm:60mm:25"
+            f"{option} {text}: expected START:STOP:SAMPLES, numbers in {' or '.join(units)}, {bare}"
+            f" without a unit, and 1 to {MOST} samples; write -60{other}:60{other}:25"
         )
     start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
     return [start + (stop - start) * (k / steps) for k in range(int(count))]

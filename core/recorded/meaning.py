@@ -150,28 +150,34 @@ class Reader:
         numbers: dict[str, Use] = {}
         bodies: dict[str, Pose] = {}
         event = ""
-        moving = [body.name for body in self.case.mechanism.moving]
+        prefixes = {body.name: body.name for body in self.case.mechanism.moving}
         for text in texts:
             left, equals, right = (part.strip() for part in text.rpartition("="))
             if not (left and equals and right):
                 raise self._fault(f"found {shown(text)}, expected an equation; {FORM}")
-            if left in (*numbers, *bodies):
+            if left in (*numbers, *bodies) or prefixes.get(left, left) != left:
                 raise self._fault(f"found {shown(left)} twice, expected it once; leave one out")
             if left == EVENT and right in ("first", "last"):
                 event = right
-            elif left in moving and ("," in right or ":" in right):
+            elif left in prefixes and ("," in right or ":" in right):
                 bodies[left] = self._pose(right)
+            elif left in prefixes and left not in self.targets:
+                prefixes[left] = right
             else:
                 name, use = self._number(text, left, right)
                 numbers[name] = use
         taken = {use.column for use in Meaning(numbers, bodies).uses}
         numbers |= self._named(numbers, taken)
-        bodies |= {name: pose for name, pose in self._posed(moving) if name not in bodies}
+        bodies |= {name: pose for name, pose in self._posed(prefixes) if name not in bodies}
+        for body, prefix in prefixes.items():
+            if prefix != body and body not in bodies:
+                problem = f"found no pose of {body} in columns of known names below {shown(prefix)}"
+                raise self._fault(f"{problem}; {FORM}")
         if not {*numbers} - {TIME} and not bodies:
             listed = shortened([brief(shown(head.name)) for head in self.heads], MOST_NAMED)
             known = shortened([*map(brief, [n for n in self.targets if n != TIME][:6])], MOST_NAMED)
             problem = f"found the columns {listed or 'none'}, expected one of {known}, or poses"
-            raise fault(self.file, "", f"{problem} of {', '.join(moving)}; {FORM}")
+            raise fault(self.file, "", f"{problem} of {', '.join(prefixes)}; {FORM}")
         return Meaning(numbers, bodies, event)
 
     def _fault(self, problem: str) -> Exception:
@@ -286,16 +292,16 @@ class Reader:
             raise self._fault(f"found frame {shown(' '.join(words))}, expected {expected}")
         return found
 
-    def _posed(self, moving: Sequence[str]) -> Iterator[tuple[str, Pose]]:
-        """Yield the poses of columns by their names: of Adams, or BODY.x, .y, .z with the
-        parts of a quaternion.
+    def _posed(self, prefixes: Mapping[str, str]) -> Iterator[tuple[str, Pose]]:
+        """Yield the poses of columns by their names: of Adams, or PREFIX.x, .y, .z with the
+        parts of a quaternion; the prefix of a body is its name, or that of --map.
         """
         places = {head.name: k for k, head in enumerate(self.heads)}
-        for name in moving:
+        for name, prefix in prefixes.items():
             own = {
                 head.name.rpartition(".")[2]: k
                 for k, head in enumerate(self.heads)
-                if name in head.part
+                if prefix in head.part
             }
             if {*own}.issuperset((*_ADAMS["position"], *_ADAMS["attitude"])):
                 groups = {
@@ -306,7 +312,7 @@ class Reader:
                 yield name, Pose(groups, Reading("313"))
                 continue
             for order, parts in _QUATERNIONS.items():
-                names = [f"{name}.{each}" for each in ("x", "y", "z", *parts)]
+                names = [f"{prefix}.{each}" for each in ("x", "y", "z", *parts)]
                 if {*places}.issuperset(names) and not {*self.targets}.intersection(names):
                     uses = [Use(places[n], si) for n, si in zip(names, "mmm1111", strict=True)]
                     groups = {"position": (*uses[:3],), "attitude": (*uses[3:],)}

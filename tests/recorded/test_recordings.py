@@ -77,6 +77,17 @@ def test_recorded_poses_of_truth_pass(judged, file, options, gap):
     assert 0.0 < record["details"]["rows"]["position"] < gap
 
 
+def test_map_of_a_body_to_a_prefix_suffices(judged, capsys):
+    prefixes = [word for part, prefix in PARTS.items() for word in ("--map", f"{part}={prefix}")]
+    status, record = judged(DATA / "fourbar_xyzw.csv", *prefixes)
+    assert (status, record["outcome"]) == (0, "pass")
+    assert 0.0 < record["details"]["rows"]["position"] < 7.6e-10
+    assert judged(DATA / "fourbar_123.csv", *prefixes)[0] == 2
+    assert "found no pose of PART_2 in columns of known names below 'crank'" in (
+        capsys.readouterr().err
+    )
+
+
 def test_adams_results_are_judged_in_all_rates(judged):
     _, record = judged(DATA / "fourbar.res", "--analysis", "kinematic_001")
     assert largest(record) < 2e-15

@@ -95,6 +95,17 @@ def test_command_writes_what_six_simulators_have(tmp_path, capsys):
     assert "https:" not in page
 
 
+@pytest.mark.parametrize("travel", ["-10:10mm:3", "-10mm:10:3", "-0.01:0.01:3"])
+def test_unit_of_one_end_holds_for_both(tmp_path, travel):
+    (tmp_path / "strut.toml").write_text(strut_text())
+    out = tmp_path / "out.json"
+    loads = ["--load", "lateral=-1:1kN:3", "--json", str(out)]
+    assert main(["kc", str(tmp_path / "strut.toml"), f"--travel={travel}", *loads]) == 0
+    found = json.loads(out.read_text())
+    assert found["travel"] == [-0.01, 0.0, 0.01]
+    assert found["loads"]["lateral"]["lateral"] == [-1000.0, 0.0, 1000.0]
+
+
 def test_constant_load_acts_over_all_travel(tmp_path):
     """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
     row = STRUT["results"][2]
@@ -289,19 +300,15 @@ def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
         ("", ["--travel=0:1furlong:3"], "START:STOP:SAMPLES"),
         ("", ["--travel=nan:1:3"], "START:STOP:SAMPLES"),
         ("", ["--out", __file__], "cannot be made a folder"),
+        ("", ["--travel=0:3deg:3"], "numbers in m or mm or cm"),
+        ("", ["--load", "lateral=0:3Nm:3"], "numbers in N or kN"),
+        ("", ["--load", "aligning=0:3N:3"], "numbers in Nm or kNm"),
     ],
 )
 def test_study_that_lacks_facts_says_so(tmp_path, capsys, more, options, expected):
     (tmp_path / "strut.toml").write_text(strut_text(more))
     assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 2
     assert expected in capsys.readouterr().err
-
-
-def test_unit_of_one_end_holds_for_both(tmp_path):
-    (tmp_path / "strut.toml").write_text(strut_text())
-    out = tmp_path / "kc.json"
-    assert main(["kc", str(tmp_path / "strut.toml"), "--travel=-20:20mm:3", f"--json={out}"]) == 0
-    assert json.loads(out.read_text())["travel"] == [-0.02, 0.0, 0.02]
 
 
 def test_rig_is_written_as_read(tmp_path):
