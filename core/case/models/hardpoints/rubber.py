@@ -241,21 +241,30 @@ def with_file(
 
 
 def sample_bushings(names: Sequence[str]) -> list[str]:
-    """Return files of bushings for the templates of these names, or of all.
+    """Return files of bushings for the templates of these names, or of all that take bushings.
 
     Raises:
-        CaseError: there is no such template.
+        CaseError: there is no such template, or it takes no bushings.
     """
+    found = {name: _sample(TEMPLATES[name]) for name in TEMPLATES}
     for name in names:
-        if name not in TEMPLATES:
+        if name not in found:
             raise CaseError(unknown("template", name, TEMPLATES))
-    return [_sample(TEMPLATES[name]) for name in names or TEMPLATES]
+        if not found[name]:
+            raise CaseError(
+                f"template {name}: its links are rods without joints, so no role takes a bushing;"
+                " kincheck import TABLE writes a case file, and [forces.NAME] type = "
+                '"bushing" is a bushing there'
+            )
+    return [each for name in names or found if (each := found[name])]
 
 
 def _sample(template: Template) -> str:
+    """Return the file of a template, empty if no role of its sample table takes a bushing."""
     lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
     lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
-    meanings = {role.name: role.meaning for role in (*template.roles, *template.optional)}
+    roles = (*template.roles, *template.optional)
+    meanings = {role.name: role.meaning for role in roles if role.name in template.sample}
     for role in meanings:
         name = joint_at(template, role)
         if name is None or GROUND not in template.joint_rows[name][1:3]:
@@ -264,4 +273,4 @@ def _sample(template: Template) -> str:
         turning = [SAMPLE_TURNING, SAMPLE_TURNING, 0.0] if axial else [SAMPLE_TURNING] * 3
         lines += ["", f"[bushings.{role}]  # {meanings[role]}"]
         lines += [f"stiffness = {SAMPLE_STIFFNESS:g}  # N/m", f"turning_stiffness = {turning}"]
-    return "\n".join(lines)
+    return "\n".join(lines) if len(lines) > 2 else ""
