@@ -111,10 +111,12 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
         raise KincheckError("\n".join(problems))
     travel = None if options.travel is None else _values("--travel", options.travel, {})
     table = os.path.isfile(options.case) and is_table(Path(options.case))
-    axle, given = options.axle, options.travel
+    axle = options.axle
     if not table:
         options.axle = options.travel = None
-    elif given is not None and travel is not None:
+    elif travel is not None and travel[0] == travel[-1]:
+        options.travel = None  # the sweep of the table's case, of which this sample is none
+    elif travel is not None:
         options.travel = f"{travel[0]}:{travel[-1]}:{len(travel)}"
     own, options.bushings = options.bushings, options.bushings if table else None
     case = registry.find_case(options.case, import_options.supplied(options), driven=False)

@@ -157,6 +157,11 @@ def readable_connection(path: Path) -> sqlite3.Connection:
         except BaseException:
             connection.close()
             raise
+        if not version:
+            connection.close()
+            raise HistoryError(
+                f"history {path}: it is empty; `kincheck run --history FILE` stores runs in it"
+            )
         if version < len(MIGRATIONS):
             connection.close()
             return writable_connection(path)

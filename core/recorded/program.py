@@ -64,6 +64,11 @@ class ProgramEngine:
                 f"{OPTION}: found {self.command!r}, expected a program, {{out}}, and no other"
                 f" braces than {{case}} and {{samples}}; {form}"
             )
+        if shutil.which(words[0]) is None:
+            raise KincheckError(
+                f"{OPTION}: there is no program {words[0]!r} that can be run; correct its name, or"
+                " give its path"
+            )
 
     @property
     def name(self) -> str:

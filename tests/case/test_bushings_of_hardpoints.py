@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.studies.compliance.study import compliance
@@ -90,6 +91,22 @@ def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
     assert front.triad[2] == pytest.approx(hinge / np.linalg.norm(hinge))
     assert front.turning_stiffness == (100.0, 100.0, 0.0)
     assert (top.joint, top.axes) == ("strut_top", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+
+
+RODS = ["five_link", "reduced_double_wishbone"]
+
+
+@pytest.mark.parametrize("template", [name for name in TEMPLATES if name not in RODS])
+def test_sample_bushings_have_roles_of_sample_table(tmp_path, capsys, template):
+    rubber = sample(tmp_path, capsys, template, "--bushings")
+    case = load(sample(tmp_path, capsys, template), Supplied(bushings=rubber))
+    assert len(case.mechanism.bushings) == len(tomllib.loads(rubber.read_text())["bushings"])
+
+
+@pytest.mark.parametrize("template", RODS)
+def test_template_without_bushings_says_so(template, capsys):
+    assert main(["templates", template, "--bushings"]) == 2
+    assert f"template {template}: its links are rods" in capsys.readouterr().err
 
 
 def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):

@@ -3,6 +3,7 @@
 import sqlite3
 
 import pytest
+from kincheck.core.cli.main import main
 from kincheck.core.harness.run import run
 from kincheck.core.history import schema
 from kincheck.core.history.run_recorder import keep
@@ -37,6 +38,14 @@ def test_a_file_of_another_program_is_left_alone(path):
     path.write_bytes(b"not a database at all" * 100)
     with pytest.raises(HistoryError, match="file is not a database; give another file"):
         Store(path)
+
+
+@pytest.mark.parametrize("command", ["history", "report"])
+def test_an_empty_file_is_left_empty(path, command, capsys):
+    path.touch()
+    assert main([command, "--history", str(path)]) == 2
+    assert "it is empty; `kincheck run --history FILE` stores runs" in capsys.readouterr().err
+    assert not path.read_bytes()
 
 
 def test_impossible_history_files_are_refused(tmp_path):

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 from kincheck.adapters import engine
+from kincheck.core.cli.main import main
 
 from ..support.crank import MECHANISM
 
@@ -133,6 +134,11 @@ open(sys.argv[2], "w").write("tip.z,tip.x\\n" + "0,\\n" * 20 + "nan,nan\\n")
 def test_commands_of_another_form_are_refused(judged, capsys, words):
     assert judged("prog", words)[0] == 2
     assert 'say --engine-command "prog {case} {samples} {out}"' in capsys.readouterr().err
+
+
+def test_missing_program_is_refused(judged, capsys):
+    assert main(["run", "five_bar", "--engine-command", "no-such-program {case} {out}"]) == 2
+    assert "there is no program 'no-such-program' that can be run" in capsys.readouterr().err
 
 
 def test_slow_program_is_ended_in_time(judged):

@@ -347,11 +347,16 @@ def test_bushings_in_a_file_serve_a_hardpoint_table(tmp_path, capsys):
     out = tmp_path / "out.json"
     options = ["--bushings", str(rubber), "--travel=-0.03:0.03:3", "--json", str(out)]
     assert main(["kc", str(table), *options]) == 0
+    assert "  -0  " not in capsys.readouterr().out
     found = json.loads(out.read_text())
     assert found["wheel_load"][1] == pytest.approx(0.0, abs=1e-6)  # it has no spring and no mass
     C = np.array(found["compliance"][1])
     assert np.abs(C - C.T).max() <= 1e-12 * np.abs(C).max()
     assert C[1, 1] > 1e-8
+    assert main(["kc", str(table), *options, "--travel=30mm"]) == 0
+    alone = json.loads(out.read_text())
+    assert alone["travel"] == [0.03]
+    assert alone["wheel_center"][0] == pytest.approx(found["wheel_center"][2], abs=1e-12)
     rubber.write_text(rubber.read_text().replace("lca_pivot", "lower_pivot"))
     assert main(["kc", str(table), *options]) == 2
     assert "'lower_pivot'" in capsys.readouterr().err

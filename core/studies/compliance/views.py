@@ -155,8 +155,8 @@ def lines(results: ComplianceResults) -> Iterator[str]:
         if not np.isfinite(each.values).any():
             yield f"  {with_unit(name, shown)}  –"
             continue
-        low, high = (size * end(each.values) for end in (np.nanmin, np.nanmax))
-        value = size * each.values[k]
+        low, high = (size * end(each.values) + 0.0 for end in (np.nanmin, np.nanmax))
+        value = size * each.values[k] + 0.0  # no -0
         yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
 
 

@@ -240,11 +240,15 @@ def with_file(
 
 
 def sample_bushings(template: Template) -> str:
-    """Return the text of a file of bushings to begin one's own with; its numbers are invented."""
+    """Return the text of a file of bushings to begin one's own with; its numbers are invented.
+
+    It is empty if no role of the sample table takes a bushing.
+    """
     lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
     lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
-    # of points that every table has: a role that a table lacks is refused
-    for role in template.roles:
+    for role in (*template.roles, *template.optional):
+        if role.name not in template.sample:
+            continue
         name = joint_at(template, role.name)
         if name is None or GROUND not in template.joint_rows[name][1:3]:
             continue
@@ -252,4 +256,4 @@ def sample_bushings(template: Template) -> str:
         turning = [SAMPLE_TURNING, SAMPLE_TURNING, 0.0] if axial else [SAMPLE_TURNING] * 3
         lines += ["", f"[bushings.{role.name}]  # {role.meaning}"]
         lines += [f"stiffness = {SAMPLE_STIFFNESS:g}  # N/m", f"turning_stiffness = {turning}"]
-    return "\n".join(lines)
+    return "\n".join(lines) if len(lines) > 2 else ""
