@@ -100,7 +100,9 @@ class Registry:
             case = load(Path(name), supplied)
         else:
             raise KincheckError(
-                unknown("case", name, known) + "; a case file ends in .toml or .json"
+                unknown("case", name, known)
+                + "; case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
+                " .urdf, .sdf or .adm"
             )
         # a dataset says itself which freedoms are left to a recording
         if not driven or (supplied.recorded and Path(name).suffix.lower() in DATASETS):

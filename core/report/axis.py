@@ -21,6 +21,7 @@ DISPLAY = {
     "rad": ("°", 180 / math.pi),
     "s": ("s", 1.0),
     "rad/m": ("°/m", 180 / math.pi),
+    "m/m": ("mm/m", 1e3),
 }
 """Display unit and factor by the unit of results."""
 

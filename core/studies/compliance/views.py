@@ -26,6 +26,7 @@ SHOWN: Mapping[str, tuple[str, float]] = {
     "m": ("mm", 1e3),
     "rad": ("deg", DEGREE),
     "rad/m": ("deg/m", DEGREE),
+    "m/m": ("mm/m", 1e3),
     "m/N": ("mm/kN", 1e6),
     "rad/N": ("deg/kN", 1e3 * DEGREE),
     "1/N": ("1/kN", 1e3),
