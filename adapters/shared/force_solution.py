@@ -102,7 +102,7 @@ class Element:
 
 def elastic_force(each: SpringDamper | TorsionSpringDamper, deflection: float) -> float:
     """Return the tension or torque of a spring at a deflection, without damping [N or N m]."""
-    return each.stiffness * deflection + _curve_force(each.curve, deflection)
+    return each.stiffness * deflection + curve_force(each.curve, deflection)
 
 
 def elastic_forces(each: Bushing, x: Array) -> Array:
@@ -110,11 +110,11 @@ def elastic_forces(each: Bushing, x: Array) -> Array:
     without damping [N].
     """
     tables = each.curve or ((), (), ())
-    curves = [_curve_force(table, s) for table, s in zip(tables, x.tolist(), strict=True)]
+    curves = [curve_force(table, s) for table, s in zip(tables, x.tolist(), strict=True)]
     return np.array(each.stiffness) * x + np.array(each.preload) + np.array(curves)
 
 
-def _curve_force(table: Curve | None, deflection: float) -> float:
+def curve_force(table: Curve | None, deflection: float) -> float:
     """Return the force of a curve at a deflection; straight beyond its ends."""
     if not table:
         return 0.0
