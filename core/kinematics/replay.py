@@ -205,8 +205,13 @@ def judged_part(mechanism: Mechanism, known: Iterable[str]) -> tuple[Mechanism, 
 
 def count_turns(angle: Array) -> Array:
     """Return an angle known up to whole turns [rad], counted from sample to sample, from the first
-    that is as near to zero as any.
+    that is as near to zero as any; NaN where it is.
     """
+    there = np.isfinite(angle)
+    if not there.all():
+        found = np.full(angle.shape, np.nan)
+        found[there] = count_turns(angle[there])
+        return found
     whole = np.unwrap(angle)
     off = np.abs(np.sin(0.5 * whole))
     first = np.flatnonzero(off <= off.min(initial=1.0) + NEAR)[:1]
@@ -221,14 +226,6 @@ def begun_turns(mechanism: Mechanism, motions: Mapping[str, BodyMotion]) -> dict
     rows = _Rows(part, 1)
     rows.left(motions)
     return rows.whole
-
-
-def _counted(x: Array) -> Array:
-    """Return an angle with its turns counted, zero where it is unknown."""
-    there = np.isfinite(x)
-    found = np.zeros(len(x))
-    found[there] = count_turns(x[there])
-    return found
 
 
 class _Rows:
@@ -277,7 +274,7 @@ class _Rows:
         """Return a state with all turns of coupled joints."""
         turning = [name for name in self.formulation.coordinates if "rotation" in name]
         if not self.turns:
-            self.turns = {name: _counted(state[f"x {name}"][0]) for name in turning}
+            self.turns = {name: count_turns(state[f"x {name}"][0]) for name in turning}
             slides = {name: state[f"x {name}"][0] for name in self.formulation.coordinates}
             for c in self.formulation.constraints:
                 if isinstance(c, Relation):

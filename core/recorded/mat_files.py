@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..case.io.document import fault
-from ..errors import brief
+from ..errors import CaseError, brief
 from ..trajectory import Array
 from .recording import Choose, Column, Head, Recording
 
@@ -29,11 +29,12 @@ _INT8, _INT32, _UINT32 = 1, 5, 6
 _NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
 
 
-def of_mat(file: Path, choose: Choose, data: bytes, largest: int) -> Recording:
+def of_mat(file: Path, choose: Choose, data: bytes, largest: int, less: str) -> Recording:
     """Read a MAT-file.
 
     Args:
         largest: most bytes of its contents when unpacked.
+        less: what to do with a larger one.
 
     Raises:
         CaseError: it is of another version, damaged, or too large.
@@ -41,12 +42,15 @@ def of_mat(file: Path, choose: Choose, data: bytes, largest: int) -> Recording:
     if data.startswith(_V73):
         raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
     try:
-        if data[:4].count(0) == 0:  # scipy tells the level so
-            _require_sound(data, largest)
+        # scipy tells the level so
+        if data[:4].count(0) == 0 and _unpacked(data, largest) > largest:
+            raise fault(file, "", f"found more than {largest} bytes when unpacked; {less}")
         scipy_io: Any = import_module("scipy.io")  # slow to import
         found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
         modelica = "Aclass" in found and "dataInfo" in found
         series = [*(_of_modelica(found) if modelica else _of_matlab(found))]
+    except CaseError:
+        raise
     except Exception as error:  # scipy raises many errors for a damaged file
         what = brief(f"{type(error).__name__}: {error}")
         expected = "expected one of MATLAB (save with -v7) or of a Modelica tool; or give CSV"
@@ -56,19 +60,25 @@ def of_mat(file: Path, choose: Choose, data: bytes, largest: int) -> Recording:
     return Recording(file, columns, "Modelica" if modelica else "MATLAB")
 
 
-def _require_sound(data: bytes, largest: int) -> None:
-    """Refuse elements of level 5 with which scipy 1.17 ends the process or takes all memory."""
+def _unpacked(data: bytes, largest: int) -> int:
+    """Return the size of the compressed elements of level 5, unpacked to just above the largest.
+
+    Raises:
+        ValueError: with such an element scipy 1.17 ends the process or takes all memory.
+    """
+    total = 0
     order = "<" if data[126:128] == b"IM" else ">"
     for kind, part in _elements(data[_HEAD:], order):
         if kind == _COMPRESSED:
-            part = zlib.decompressobj().decompress(part, largest)
-            largest -= len(part)
-            if largest <= 0:
-                raise ValueError("too many bytes when unpacked")
+            part = zlib.decompressobj().decompress(part, largest + 1 - total)
+            total += len(part)
+            if total > largest:
+                break
             for inner, each in _elements(part, order):
                 _require_sound_matrix(inner, each, order, 0)
         else:
             _require_sound_matrix(kind, part, order, 0)
+    return total
 
 
 def _require_sound_matrix(kind: int, data: bytes, order: str, depth: int) -> None:

@@ -59,7 +59,7 @@ def read_recording(
     if analysis is not None:
         raise fault(file, "--analysis", "found for a file without analyses; leave it out")
     if suffix == ".mat":
-        return of_mat(file, choose, read_bytes(file, LARGEST_FILE, LESS), LARGEST_FILE)
+        return of_mat(file, choose, read_bytes(file, LARGEST_FILE, LESS), LARGEST_FILE, LESS)
     return _of_table(file, choose, sheet)
 
 

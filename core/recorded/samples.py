@@ -346,7 +346,4 @@ def driver_motion(samples: Samples, mechanism: Mechanism, driver: Driver) -> Jet
     if found is None:
         return None
     x: Array = np.array(found.x, dtype=np.float64)
-    there = np.isfinite(x)
-    if measure.period:
-        x[there] = count_turns(x[there])
-    return Jet(x, found.v, found.a)
+    return Jet(count_turns(x) if measure.period else x, found.v, found.a)
