@@ -311,6 +311,17 @@ def test_study_that_lacks_facts_says_so(tmp_path, capsys, more, options, expecte
     assert expected in capsys.readouterr().err
 
 
+def test_table_without_rubber_is_said_to_be_rigid(tmp_path, capsys):
+    assert main(["templates", "double_wishbone"]) == 0
+    table = tmp_path / "car.csv"
+    table.write_text(capsys.readouterr().out)
+    rubber = tmp_path / "rubber.toml"
+    rubber.write_text("[bushings.lca_front]\nstiffness = 1e6\nturning_stiffness = 100.0\n")
+    for options, rigid in (([], True), ([f"--bushings={rubber}"], False)):
+        assert main(["kc", str(table), "--travel=0:10mm:2", *options]) == 0
+        assert ("note: nothing is elastic" in capsys.readouterr().err) == rigid
+
+
 def test_rig_is_written_as_read(tmp_path):
     table = '[compliance]\nwheel = "knuckle"\nloads = ["lateral"]\ntire_stiffness = 2e5\n'
     case = strut(tmp_path, table)

@@ -273,6 +273,11 @@ class _Study:
             if way and ok
         ]
         notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
+        if not self.mechanism.forces:
+            notes.append(
+                "nothing is elastic: there is no bushing and no spring, so nothing gives way to a"
+                " load; give [joints.NAME.bushings.X], or --bushings FILE"
+            )
         if self.model.equations.dropped:
             notes.append(
                 f"{len(self.model.equations.dropped)} redundant rows are left out: displacements"
