@@ -73,6 +73,14 @@ LENGTHS: Mapping[str, Unit] = {
     "inch": Unit("inch", 0.0254, lambda x: x * 0.0254),
     "foot": Unit("foot", 0.3048, lambda x: x * 0.3048),
 }
+FORCES: Mapping[str, Unit] = {
+    "N": Unit("N", 1.0, lambda x: x),
+    "kN": Unit("kN", 1e3, lambda x: x * 1e3),
+}
+TORQUES: Mapping[str, Unit] = {
+    "Nm": Unit("Nm", 1.0, lambda x: x),
+    "kNm": Unit("kNm", 1e3, lambda x: x * 1e3),
+}
 ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
 
 

@@ -18,11 +18,10 @@ from .run_options import TOL
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.units import Unit
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
 
-_FORCES = {"N": 1.0, "kN": 1e3}
-_TORQUES = {"Nm": 1.0, "kNm": 1e3}
 MOST = 100_000
 
 
@@ -97,6 +96,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     """
     from ..case.io.atomic_files import write
     from ..case.models.files import is_table
+    from ..case.units import LENGTHS
     from ..harness.record import to_json
     from ..harness.standard import STANDARD
     from ..report.progress import complain, lacking
@@ -109,7 +109,7 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     engines = _engines(options, registry, problems)
     if problems := problems or execution_options.unreachable(options):
         raise KincheckError("\n".join(problems))
-    travel = None if options.travel is None else _values("--travel", options.travel, {})
+    travel = None if options.travel is None else _values("--travel", options.travel, LENGTHS)
     table = os.path.isfile(options.case) and is_table(Path(options.case))
     axle = options.axle
     if not table:
@@ -207,20 +207,21 @@ def _checked(
 
 
 def _load(text: str) -> tuple[str, Any]:
+    from ..case.units import FORCES, TORQUES
+
     name, _, values = text.partition("=")
     if not values:
         raise KincheckError(f"--load {text}: expected NAME=A:B:N, as lateral=-3000:3000:31")
-    found = _values(f"--load {name}", values, _TORQUES if name == "aligning" else _FORCES)
+    units = TORQUES if name == "aligning" else FORCES
+    found = _values(f"--load {name}", values, units)
     return name, found if ":" in values else found[0]
 
 
-def _values(option: str, text: str, sizes: Mapping[str, float]) -> list[float]:
+def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
     """Return the samples A:B:N, or one number, in SI."""
     from ..case.io.document import interval
-    from ..case.units import LENGTHS, Unit
 
-    units = {name: Unit(name, size, lambda x, size=size: size * x) for name, size in sizes.items()}
-    units, parts = units or dict(LENGTHS), text.split(":")
+    parts = text.split(":")
     bare, other = [*units][:2]
     count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else ""
     try:
