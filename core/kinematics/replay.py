@@ -60,6 +60,7 @@ class Residuals:
             without these rates.
         allowed: by quantity, what printed digits allow, shape (n, rows); empty without digits.
         not_judged: joints that need a body without poses, and the body.
+        begun: whole turns at which coupled joints begin, by coordinate; see `count_turns`.
     """
 
     joints: Sequence[str]
@@ -69,6 +70,7 @@ class Residuals:
     acceleration: Array | None
     allowed: Mapping[str, Array]
     not_judged: Mapping[str, str]
+    begun: Mapping[str, int]
 
     def worst(self, quantity: str, tolerance: float = 0.0) -> Worst | None:
         """Return the row and sample with the largest residual over what is allowed.
@@ -153,10 +155,12 @@ def replayed(
     mechanism: Mechanism,
     motions: Mapping[str, BodyMotion],
     moved: Mapping[str, Sequence[BodyMotion]] | None = None,
+    angles: Mapping[str, Array] | None = None,
 ) -> Residuals:
     """Return what motions of bodies leave of the native rows; see `residuals`.
 
     Args:
+        angles: from design of joints that are known with all turns, by coordinate [rad].
         motions: by body; rates are judged as far as all bodies have them.
         moved: by body, its motion after each recorded number is moved by half its last digit.
 
@@ -167,7 +171,7 @@ def replayed(
         raise SolveError("residuals: there is no pose of a body; give those of some")
     part, not_judged = judged_part(mechanism, motions)
     orders = min(1 + (m.v is not None) * (1 + (m.a is not None)) for m in motions.values())
-    rows = _Rows(part, orders)
+    rows = _Rows(part, orders, angles or {})
     with np.errstate(invalid="ignore"):
         left = rows.left(motions)
         limits = rows.changes(motions, left, moved) if moved else []
@@ -176,7 +180,7 @@ def replayed(
     names = [mechanism.given_name(owner) for owner, _ in rows.formulation.owners]
     allowed: dict[str, Array] = dict(zip(QUANTITIES, limits, strict=False))
     found = position, velocity, acceleration
-    return Residuals(names, rows.bodies, *found, allowed, not_judged)
+    return Residuals(names, rows.bodies, *found, allowed, not_judged, rows.whole)
 
 
 def judged_part(mechanism: Mechanism, known: Iterable[str]) -> tuple[Mechanism, dict[str, str]]:
@@ -223,7 +227,7 @@ def begun_turns(mechanism: Mechanism, motions: Mapping[str, BodyMotion]) -> dict
     part, _ = judged_part(mechanism, motions)
     if not part.couplers:
         return {}
-    rows = _Rows(part, 1)
+    rows = _Rows(part, 1, {})
     rows.left(motions)
     return rows.whole
 
@@ -231,8 +235,8 @@ def begun_turns(mechanism: Mechanism, motions: Mapping[str, BodyMotion]) -> dict
 class _Rows:
     """The native rows of a mechanism without drivers, and of their rates as far as wanted."""
 
-    def __init__(self, mechanism: Mechanism, orders: int) -> None:
-        self.mechanism, self.orders = mechanism, orders
+    def __init__(self, mechanism: Mechanism, orders: int, angles: Mapping[str, Array]) -> None:
+        self.mechanism, self.orders, self.angles = mechanism, orders, angles
         self.turns: dict[str, Array] = {}
         self.whole: dict[str, int] = {}
         self.formulation = Cartesian.of(mechanism, frames(mechanism))
@@ -275,6 +279,10 @@ class _Rows:
         turning = [name for name in self.formulation.coordinates if "rotation" in name]
         if not self.turns:
             self.turns = {name: count_turns(state[f"x {name}"][0]) for name in turning}
+            for name in self.turns.keys() & self.angles.keys():
+                off = (self.angles[name] - self.turns[name]) / TURN
+                if np.isfinite(off).any():
+                    self._add(name, round(float(np.nanmedian(off))))
             slides = {name: state[f"x {name}"][0] for name in self.formulation.coordinates}
             for c in self.formulation.constraints:
                 if isinstance(c, Relation):
@@ -305,8 +313,12 @@ class _Rows:
         fits = np.flatnonzero(left <= 2.0 * left.min() + SMALL)
         begun = fewest[int(fits[0])] if left.min() < NEAR else (0,) * len(free)
         for name, number in zip(free, begun, strict=True):
-            self.whole[name] = number
-            self.turns[name] = self.turns[name] + TURN * number
+            self._add(name, number)
+
+    def _add(self, name: str, number: int) -> None:
+        """Add the whole turns at which a joint begins."""
+        self.whole[name] = number
+        self.turns[name] = self.turns[name] + TURN * number
 
     def changes(
         self,

@@ -98,6 +98,11 @@ class RecordedEngine:
         if gaps := self.samples.gaps:
             listed = ", ".join(f"{name} at {number_of(n, 'sample')}" for name, n in gaps.items())
             notes.append(f"not judged where nothing is recorded: {listed}")
+        if judged.begun:
+            listed = ", ".join(f"{name} {turns:+d}" for name, turns in judged.begun.items())
+            notes.append(
+                f"coupled joints begin after whole turns, which poses leave open: {listed}"
+            )
         if judged.not_judged:
             joints = ", ".join(f"{name} ({body})" for name, body in judged.not_judged.items())
             notes.append(f"joints not judged, without the pose of a body: {joints}")

@@ -16,7 +16,7 @@ from ..trajectory import PER_TIME, QUANTITIES, Array
 from ..unit_text import value_text
 from .attitudes import readings
 from .meaning import Accuracy, Meaning
-from .samples import Samples, samples_of
+from .samples import Samples, driven_angles, samples_of
 
 # A wrong reading leaves far more than a right one: the digits of those that leave less than this
 # part of the stated one are counted.
@@ -33,18 +33,21 @@ class Judged:
         largest: by quantity, the largest residual [m, m/s, m/s^2].
         faults: sentences on residuals out of tolerance.
         not_judged: joints of a body without poses, and the body.
+        begun: coupled joints that begin after whole turns, and how many.
     """
 
     largest: Mapping[str, float] = field(default_factory=dict[str, float])
     faults: Sequence[str] = ()
     not_judged: Mapping[str, str] = field(default_factory=dict[str, str])
+    begun: Mapping[str, int] = field(default_factory=dict[str, int])
 
 
 def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
     """Judge recorded poses, and their rates, by the rows of joints and couplers."""
     if not samples.motions:
         return Judged()
-    found = replayed(case.mechanism, samples.motions, samples.moved)
+    angles = driven_angles(case, samples)
+    found = replayed(case.mechanism, samples.motions, samples.moved, angles)
     allowed = _tolerances(case, samples, accuracy)
     largest: dict[str, float] = {}
     faults: list[str] = []
@@ -59,7 +62,8 @@ def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
             faults.append(
                 _sentence(found, quantity, worst, allowed[quantity], f"m{per_time}") + fits
             )
-    return Judged(largest, faults, found.not_judged)
+    turned = {name.rpartition(".")[0]: n for name, n in found.begun.items() if n}
+    return Judged(largest, faults, found.not_judged, turned)
 
 
 def _tolerances(case: Case, samples: Samples, accuracy: Accuracy) -> dict[str, float]:
@@ -114,7 +118,8 @@ def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
     """Return a phrase with all other readings of the attitudes, and units of the positions, with
     which the poses satisfy the rows; empty without any.
     """
-    stated = replayed(case.mechanism, samples.motions).position
+    angles = driven_angles(case, samples)
+    stated = replayed(case.mechanism, samples.motions, angles=angles).position
     limit = _LESS * float(np.nanmax(np.abs(stated)))
     meaning = samples.meaning
     changes: dict[str, Meaning] = {}
@@ -135,10 +140,12 @@ def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
         if change == meaning:
             continue
         other = samples_of(case, samples.recording, change, digits=False)
-        if not np.nanmax(np.abs(replayed(case.mechanism, other.motions).position)) <= limit:
+        tried = replayed(case.mechanism, other.motions, angles=angles).position
+        if not np.nanmax(np.abs(tried)) <= limit:
             continue
         other = samples_of(case, samples.recording, change)
-        worst = replayed(case.mechanism, other.motions, other.moved).worst("position", tolerance)
+        whole = replayed(case.mechanism, other.motions, other.moved, angles)
+        worst = whole.worst("position", tolerance)
         if worst is not None and worst.value <= worst.allowed:
             found.append(words)
     if not found:

@@ -327,6 +327,20 @@ def jet_of(
         return measure.of(at, design)
 
 
+def driven_angles(case: Case, samples: Samples) -> dict[str, Array]:
+    """Return the angles of joints from design by columns of their drivers, with all turns, by
+    coordinate [rad].
+    """
+    mechanism = case.mechanism
+    return {
+        f"{driver.joint}.rotation": column.values - mechanism.design_value(driver.name)
+        for driver in mechanism.drivers
+        if isinstance(driver, JointDriver)
+        and driver.turns
+        and (column := samples.numbers.get(driver.name)) is not None
+    }
+
+
 def driver_motion(samples: Samples, mechanism: Mechanism, driver: Driver) -> Jet | None:
     """Return the value of a driver from design, and its rates, by the recorded poses; see `jet_of`.
 

@@ -505,6 +505,27 @@ def test_coupled_joints_pass_after_several_turns(kincheck_main, tmp_path, kind, 
     case, file = tmp_path / "case.toml", tmp_path / "run.csv"
     case.write_text({"gears": GEARS, "rack": RACK}[kind])
     file.write_text("\n".join(rows))
-    assert kincheck_main("run", case, "--recorded", file, "--quiet", engines=[NATIVE]) == 0
+    given = ["run", case, "--recorded", file, "--quiet"]
+    out = tmp_path / "out.json"
+    assert kincheck_main(*given, "--json", out, engines=[NATIVE]) == 0
+    message = json.loads(out.read_text())["records"][-1]["message"]
+    assert ("coupled joints begin after whole turns" in message) == (first > 0)
     case.write_text(case.read_text().replace("-0.4", "-0.40001").replace("0.05", "0.05001"))
-    assert kincheck_main("run", case, "--recorded", file, "--quiet", engines=[NATIVE]) == 1
+    assert kincheck_main(*given, engines=[NATIVE]) == 1
+
+
+def test_wheel_half_a_turn_off_fails_where_turns_are_known(kincheck_main, tmp_path):
+    """A turn more of the driver would explain it; the driver's column says that there is none."""
+    turn = np.linspace(0.0, 2.0, 11)
+    rows = ["turn," + ",".join(f"b.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))]
+    rows[0] += "," + ",".join(f"a.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))
+    for a in turn.tolist():
+        b = -2.5 * a - np.pi
+        wheel = (0.3, 0, 0, np.cos(b / 2), 0, 0, np.sin(b / 2))
+        crank = (0, 0, 0, np.cos(a / 2), 0, 0, np.sin(a / 2))
+        rows.append(",".join(f"{x:.9f}" for x in (a, *wheel, *crank)))
+    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
+    case.write_text(GEARS.replace('body = "b"\nposition = [0.4', 'body = "a"\nposition = [0.1'))
+    file.write_text("\n".join(rows))
+    given = ["run", case, "--recorded", file, "--quiet"]
+    assert kincheck_main(*given, engines=[NATIVE]) == 1
