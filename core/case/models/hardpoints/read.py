@@ -28,7 +28,7 @@ from ...units import plain
 from .axle import AxleMotion, mechanism_of, read_travels, sides_of
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
 from .rubber import of_chrono, with_file, with_rubber
-from .shims import shims
+from .shims import level, shims
 from .table import Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
     TEMPLATE_NAMES,
@@ -131,9 +131,11 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    turned = shims(template, at, vehicle.static_toe, vehicle.static_camber)
+    turned, levels = (
+        each(template, at, vehicle.static_toe, vehicle.static_camber) for each in (shims, level)
+    )
     hardpoints = hardpoints_of(
-        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned
+        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, levels
     )
     case, sides = replace(case, hardpoints=hardpoints), sides_of(supplied.axle, side)
     rubber, left_out = of_chrono(table, template, named)
@@ -148,10 +150,10 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
     """Return the outputs of optional data that are not there, each with what to add."""
     axle = supplied.axle is not None
-    across = {name: (role,) for name, role in template.across.items()} if axle else {}
+    across = template.across if axle else {}
     wanted = {**template.springs, **template.twists, **across}
     found = [
-        f"{name} (add {', '.join(role for role in roles if role not in at)})"
+        f"{name} (add {', '.join(role for role in dict.fromkeys(roles) if role not in at)})"
         for name, roles in wanted.items()
         if not {*roles} <= at.keys()
     ]
