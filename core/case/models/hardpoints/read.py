@@ -150,8 +150,8 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
     """Return the outputs of optional data that are not there, each with what to add."""
     axle = supplied.axle is not None
-    across = template.across if axle else {}
-    wanted = {**template.springs, **template.twists, **across}
+    across = template.across.items() if axle else ()
+    wanted = dict([*template.springs.items(), *template.twists.items(), *across])
     found = [
         f"{name} (add {', '.join(role for role in dict.fromkeys(roles) if role not in at)})"
         for name, roles in wanted.items()

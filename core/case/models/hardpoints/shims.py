@@ -45,8 +45,8 @@ def shims(
     found: dict[str, Array] = {}
     for role in moved:
         right = np.array([movers.get(role, 0.0) * n for _, n, movers in held])
-        solution: Array = np.linalg.solve(_rows(held, places), right)  # by x, y and z of the joint
-        v, turns = solution[:3], solution[3:]
+        solved = np.asarray(np.linalg.solve(_rows(held, places), right), float)
+        v, turns = solved.reshape(2, 3, 3)  # by x, y and z of the joint
         dx, dy, dz = np.cross(turns.T, (x, y, z)).T
         angles = [(y * dx - x * dy) / (x * x + y * y), -dz / np.hypot(x, y)]
         if ends := [end for end in template.kingpin or () if isinstance(end, str)]:
@@ -74,7 +74,7 @@ def level(
         return {}
     rod, outer = rods[0], held[rods[0]][0]
     spin, along = _spin(places, toe, camber), places[outer] - places[TIEROD_INNER]
-    moving: Array = np.linalg.solve(_rows(held, places), np.eye(6)[:, [5, rod]])
+    moving = np.linalg.solve(_rows(held, places), np.eye(6)[:, [5, rod]])
     dx, dy, _ = np.cross(moving[3:].T, spin).T
     by_travel, by_rod = (spin[1] * dx - spin[0] * dy) / (spin[0] ** 2 + spin[1] ** 2)
     v, w = moving[:3, 0], moving[3:, 0]
