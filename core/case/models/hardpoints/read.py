@@ -127,7 +127,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         source += f"; not computed: {', '.join(lacking)}"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = replace(case, length_unit=unit.name, assembly=(*told, *of_side))
+    case = replace(case, length_unit=unit.name, angle_unit="deg", assembly=(*told, *of_side))
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
