@@ -128,6 +128,7 @@ class Template:
     ahead: Sequence[tuple[str, str]]
     kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None
     steered: str
+    guessed: bool
 
     def joints(self, at: Mapping[str, Vector]) -> list[Joint]:
         """Return the joints for the places of the roles; they name the bodies."""
@@ -280,6 +281,7 @@ def _read_templates() -> dict[str, Template]:
             ahead=keys.get("ahead", ()),
             kingpin=kingpin or None,
             steered=keys.get("steered", ""),
+            guessed=own.get("guessed", True),
         )
     return templates
 
