@@ -9,15 +9,14 @@ from kincheck.core.caches import clear_caches
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.harness.execution import Answer, Pair
-from kincheck.core.studies.stress.families import Family
+from kincheck.core.studies.stress.families import FAMILIES, Family
+from kincheck.core.studies.stress.reduction import judge as judge_file
 from kincheck.core.studies.stress.report import report
-from kincheck.core.studies.stress.reproducers import judge as judge_file
 from kincheck.core.studies.stress.run import specimen, specimens, stress
 from kincheck.core.studies.stress.solving import interpreted, once
 from kincheck.core.studies.stress.verdicts import Verdict, judged
 
 NATIVE = engine("native")
-FAMILIES = Family.registry
 
 
 def test_corner_beside_small_loop_is_followed():
@@ -27,8 +26,8 @@ def test_corner_beside_small_loop_is_followed():
     rng = np.random.default_rng(164)
     samples = int(rng.choice([2, 3, 4, 5, 7]))
     made = FAMILIES["corners"].specimen(rng, samples)
-    assert dict(made.facts)["ratio"] == pytest.approx(0.014, rel=0.05)
-    case = made.describe()
+    case = made.case
+    assert "beside a loop of 0.014" in made.name
     found = judged(made, case, made.truth(case), once(Pair(case, interpreted(NATIVE), made.tol)))
     assert found.counts[Verdict.RIGHT] == samples
 
@@ -43,12 +42,11 @@ def test_specimens_repeat_and_save_as_files(name, tmp_path):
             FAMILIES[name].specimen(np.random.default_rng([4, number]), 6) for _ in range(2)
         )
         assert one.name == again.name
-        try:
-            case = one.describe()
-        except KincheckError:  # a description that makes no sense is refused before there is a case
+        case = one.case
+        if isinstance(case, KincheckError):  # the description is refused before there is a case
             assert one.truth is None
             continue
-        assert case.mechanism == again.describe().mechanism
+        assert case.mechanism == again.case.mechanism
         assert np.ptp(case.sweep.path.values(case.sweep.path.times), axis=1).max() > 0.0
         file = tmp_path / f"{number}.toml"
         file.write_text(case_text(case, ["a comment"]), encoding="utf-8")
@@ -136,15 +134,13 @@ def test_former_silent_errors_stay_fixed(name):
     assert judge_file(load_case(file), NATIVE, 1e-12).counts[Verdict.SILENTLY_WRONG] == 0
 
 
-def test_failing_family_costs_no_other(monkeypatch):
+def test_failing_family_costs_no_other():
     def defective(rng, samples):
         raise KincheckError("cannot be made")
 
-    monkeypatch.setattr(FAMILIES["units"], "specimen", defective, raising=False)
-    found, _ = stress(
-        [FAMILIES["units"], FAMILIES["offset"]], [NATIVE], samples=20, seed=0, prove=False
-    )
-    assert found.unfinished == {"units": "cannot be made"}
+    families = [Family("defective", "", defective), FAMILIES["offset"]]
+    found, _ = stress(families, [NATIVE], samples=20, seed=0, prove=False)
+    assert found.unfinished == {"defective": "cannot be made"}
     assert [cell.family for cell in found.cells] == ["offset"]
 
 

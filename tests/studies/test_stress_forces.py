@@ -11,16 +11,15 @@ from kincheck.core.forces import Forces
 from kincheck.core.harness.execution import Pair
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.joints.base import AxialJoint, unit
-from kincheck.core.studies.stress.families import Family
-from kincheck.core.studies.stress.reproducers import judge
+from kincheck.core.studies.stress.families import FAMILIES
+from kincheck.core.studies.stress.reduction import judge, rounded
 from kincheck.core.studies.stress.run import specimen
-from kincheck.core.studies.stress.shrink import rounded
 from kincheck.core.studies.stress.solving import interpreted, once
 from kincheck.core.studies.stress.verdicts import Verdict, judged
 from kincheck.core.studies.truth.forces import known_forces
 
 demand = importlib.import_module("kincheck.core.kinematics.forces.equations")
-FORCES = Family.registry["forces"]
+FORCES = FAMILIES["forces"]
 # Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast arm, a driven slide.
 TWICE, FOUR_BAR, SPINNING, SLIDING = 21, 4, 5, 12
 NATIVE = interpreted(NativeEngine())

@@ -5,28 +5,23 @@ import pytest
 from kincheck.core import solve
 from kincheck.core.errors import KincheckError
 from kincheck.core.studies.stress.families.base import as_case
-from kincheck.core.studies.stress.families.dimensions import crank_rocker
-from kincheck.core.studies.stress.families.planar import any_plane, four_bar
-from kincheck.core.studies.stress.shrink import fewer_samples, reduced, rounded
+from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
+from kincheck.core.studies.stress.reduction import fewer_samples, reduced, rounded
 from kincheck.core.trajectory import PointMotion
 
 
 @pytest.fixture(scope="module")
 def case():
     rng = np.random.default_rng(8)
-    return as_case(
-        four_bar(any_plane(rng), *crank_rocker(rng), "rod"), "turn", np.linspace(-1.0, 1.0, 5)
-    )
+    mechanism, _ = four_bar(any_plane(rng), *crank_rocker(rng), "rod")
+    return as_case(mechanism, "turn", np.linspace(-1.0, 1.0, 5))
 
 
 def test_a_bad_case_is_made_small():
     """Bad is whatever has a crank longer than 0.1 m that is turned by more than 0.3 rad."""
     rng = np.random.default_rng(8)
-    case = as_case(
-        four_bar(any_plane(rng), *crank_rocker(rng), "revolutes"),
-        "turn",
-        np.linspace(-1.0, 1.0, 41),
-    )
+    mechanism, _ = four_bar(any_plane(rng), *crank_rocker(rng), "revolutes")
+    case = as_case(mechanism, "turn", np.linspace(-1.0, 1.0, 41))
 
     def bad(case):
         pivot = case.mechanism.joint("pivot").point

@@ -11,10 +11,9 @@ from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.stress.families import Specimen
 from kincheck.core.studies.stress.families.base import as_case
-from kincheck.core.studies.stress.families.dimensions import crank_rocker
-from kincheck.core.studies.stress.families.planar import any_plane, four_bar
+from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
 from kincheck.core.studies.stress.solving import once
-from kincheck.core.studies.stress.verdicts import Verdict, described_wrong, judged
+from kincheck.core.studies.stress.verdicts import Verdict, judged, refused_description
 from kincheck.core.studies.truth.motion import Reach, followed
 
 from .test_stress import NATIVE
@@ -25,9 +24,8 @@ ROUNDING = frozenset({FailureKind.BELOW_ROUNDING})
 @pytest.fixture(scope="module")
 def case():
     rng = np.random.default_rng(8)
-    return as_case(
-        four_bar(any_plane(rng), *crank_rocker(rng), "rod"), "turn", np.linspace(-1.0, 1.0, 5)
-    )
+    mechanism, _ = four_bar(any_plane(rng), *crank_rocker(rng), "rod")
+    return as_case(mechanism, "turn", np.linspace(-1.0, 1.0, 5))
 
 
 @pytest.fixture(scope="module")
@@ -61,9 +59,7 @@ class Fake:
 
 
 def judge(case, truth, engine, **about):
-    return judged(
-        Specimen("one", lambda: case, **about), case, truth, once(Pair(case, engine, 1e-12))
-    )
+    return judged(Specimen("one", case, **about), case, truth, once(Pair(case, engine, 1e-12)))
 
 
 def moved(by, quantity="position", samples=slice(None)):
@@ -141,25 +137,26 @@ def test_errors_and_crashes_as_refusals(case):
     free = SolveError("a body can turn", FailureKind.FREE)
     reasons = frozenset({FailureKind.FREE})
     assert judge(case, None, Fake(fails=free), reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5
-    one = Specimen("one", lambda: case, None, reasons=reasons)
+    one = Specimen("one", case, None, reasons=reasons)
     for outcome, verdict in (
         (Outcome.CRASHED, Verdict.REFUSED_WRONGLY),
         (Outcome.UNSUPPORTED, Verdict.UNSUPPORTED),
     ):
         failure = Failure(outcome, "free", kind=FailureKind.FREE)
         assert judged(one, case, None, failure).counts[verdict] == 5
-    assert described_wrong(one, 3, free).counts[Verdict.REFUSED_RIGHTLY] == 3
-    assert described_wrong(one, 3, SolveError("odd")).counts[Verdict.REFUSED_WRONGLY] == 3
-    assert (
-        described_wrong(Specimen("one", lambda: case), 3, free).counts[Verdict.REFUSED_WRONGLY] == 3
-    )
+    for refused, verdict in (
+        (Specimen("one", free, None, reasons=reasons), Verdict.REFUSED_RIGHTLY),
+        (Specimen("one", SolveError("odd"), None, reasons=reasons), Verdict.REFUSED_WRONGLY),
+        (Specimen("one", free), Verdict.REFUSED_WRONGLY),
+    ):
+        assert refused_description(refused, 3).counts[verdict] == 3
 
 
 def test_a_contradiction_must_be_told(case, truth):
     answer = once(Pair(case, NATIVE, 1e-12))
     assert isinstance(answer, Answer)
     one, violated = (
-        Specimen("one", lambda: case, reported=True),
+        Specimen("one", case, tilt=0.0),
         replace(truth, violated=np.array([0.0, 1e-10, 0.0, 0.0, 0.0])),
     )
     told = replace(answer, details={"redundant_residual": 5e-11})
