@@ -13,9 +13,9 @@ from kincheck.core.case.case import Truth
 from kincheck.core.harness.engine import Floor
 from kincheck.core.harness.record import Outcome
 from kincheck.core.report.sections import page
-from kincheck.core.studies.bench import engines, loop_times, precision, rounds
+from kincheck.core.studies.bench import engines, precision, rounds
 from kincheck.core.studies.bench.diagrams import precision_diagram
-from kincheck.core.studies.bench.engines_report import report
+from kincheck.core.studies.bench.report import report
 
 from ..support.fakes import Fake, crank, off, partial, raising, solution
 
@@ -253,7 +253,7 @@ def test_loop_times_are_ratios_to_base(monkeypatch):
         return answer
 
     two = [crank("short"), crank("long")]
-    found = loop_times.measure_loops(
+    found = precision.measure_loops(
         two,
         [
             Fake("slow", answer=taking(0.4)),

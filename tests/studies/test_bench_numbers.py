@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from kincheck.core.harness.record import to_json
 from kincheck.core.report.sections import page
-from kincheck.core.studies.bench.cold_start import STAGES
 from kincheck.core.studies.bench.engines import Bench
-from kincheck.core.studies.bench.engines_report import report
+from kincheck.core.studies.bench.processes import STAGES
+from kincheck.core.studies.bench.report import report
 
 from ..report.page import Page
 from ..support.printed import assert_row
