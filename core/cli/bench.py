@@ -158,7 +158,7 @@ def _measured(options: argparse.Namespace, registry: Registry, *, formulation: b
     from ..report.meter import Meter
     from ..report.sections import deliver
     from ..studies.bench import engines as bench_engines
-    from ..studies.bench.engines_report import report
+    from ..studies.bench.report import report
     from ..studies.paper import formulation as bench_formulation
     from .destinations import json_only
 

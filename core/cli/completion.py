@@ -44,12 +44,12 @@ def _complete(options: argparse.Namespace, registry: Registry) -> int:
 
     from ..case.models.hardpoints.templates import TEMPLATES
     from ..joints import Joint
-    from ..studies.stress.families import Family
+    from ..studies.stress.families import FAMILIES
     from .main import parser
 
     names = {
         **{each: [*dict.fromkeys((*registry.engines, *registry.simulations))] for each in ENGINES},
-        "family": [*Family.registry],
+        "family": [*FAMILIES],
         "template": [*TEMPLATES],
         "to": [*registry.writers],
         "joint": sorted(Joint.registry),

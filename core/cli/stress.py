@@ -81,7 +81,7 @@ def _stress(options: argparse.Namespace, registry: Registry) -> int:
     from ..harness.standard import STANDARD
     from ..report.sections import deliver
     from ..report.terminal import page, unheaded
-    from ..studies.stress.families import Family
+    from ..studies.stress.families import FAMILIES
     from ..studies.stress.report import idle, markdown, report
     from ..studies.stress.verdicts import BAD
     from . import destinations as delivery
@@ -91,7 +91,7 @@ def _stress(options: argparse.Namespace, registry: Registry) -> int:
             options, [name for name in vars(options) if name not in ("list", "command", "do")]
         ):
             raise KincheckError(f"--list runs nothing; leave out {found}")
-        rows = [(name, family.about) for name, family in Family.registry.items()]
+        rows = [(name, family.about) for name, family in FAMILIES.items()]
         page(None).print(unheaded(rows))
         return Status.WITHIN
     problems: list[str] = []
@@ -109,18 +109,13 @@ def _stress(options: argparse.Namespace, registry: Registry) -> int:
             "--tol is for replayed files, and families have their own tolerances; leave it out,"
             " or give --replay"
         )
-    known = Family.registry
-    problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
+    wanted = dict.fromkeys(options.family or FAMILIES)
+    problems += [unknown("family", name, [*FAMILIES]) for name in wanted if name not in FAMILIES]
     problems += delivery.Destinations.of(options).problems(FILES)
     if problems:
         raise KincheckError("\n".join(problems))
     with delivery.json_only() if options.json == "-" else nullcontext():
-        found = _run(
-            options,
-            [known[name] for name in dict.fromkeys(options.family or known)],
-            engines,
-            problems,
-        )
+        found = _run(options, [FAMILIES[name] for name in wanted], engines, problems)
     made = report(found)
     problems += [
         *(f"family {name} was not finished: {why}" for name, why in found.unfinished.items()),
@@ -146,7 +141,7 @@ def _run(
     from msgspec.structs import replace
 
     from ..report.meter import Meter
-    from ..studies.stress.reproducers import save
+    from ..studies.stress.reduction import save
     from ..studies.stress.run import stress
 
     with Meter("stress", quiet=options.quiet) as meter:
@@ -167,7 +162,7 @@ def _run(
 
 def _replay(options: argparse.Namespace, registry: Registry, engines: list[Engine]) -> int:
     """Judge case files by following their motion from the design."""
-    from ..studies.stress.reproducers import judge
+    from ..studies.stress.reduction import judge
     from ..studies.stress.verdicts import BAD, Verdict
 
     bad, examined = False, set[str]()

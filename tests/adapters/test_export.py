@@ -1,23 +1,41 @@
-"""What writers refuse, and the command that exports."""
+"""Exports: the command, the writers, and exports read again."""
 
+import os
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
-from kincheck import adapters
+from kincheck import adapters, cases
+from kincheck.adapters.shared.poses import at_start
 from kincheck.core import (
+    GROUND,
+    Body,
     Gear,
+    JointAngle,
     KincheckError,
+    Mechanism,
     Point,
+    Polynomial,
+    Revolute,
     SolveError,
     Spherical,
 )
-from kincheck.core.case.io.model_writer import way_to
+from kincheck.core.case.case import Case
+from kincheck.core.case.io.model_writer import way_to, written
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.joint_probe import probes
+from kincheck.core.case.models.files import load
 from kincheck.core.cli import main
 from kincheck.core.cli.export import FORMATS
+from kincheck.core.kinematics import NativeSolver, largest_residual
+from kincheck.core.mechanism.tree import Branch, SpanningTree, spanning_tree
+from kincheck.core.trajectory import BodyMotion
 
-from ..support.exported import read
+from ..oracles.naive import A
+from ..support.exported import READERS, read
 from ..support.mechanisms import mcpherson, slider_crank
-from ..support.written_mechanisms import CASES, assert_read, coupled_loop, way
+from ..support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
 
 
 @pytest.mark.parametrize("to", adapters.WRITERS)
@@ -148,3 +166,169 @@ def test_help_names_the_formats_that_there_are(capsys):
         assert main.main([command, "--help"]) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert "mjcf (MuJoCo), exudyn (a Python script), urdf (Pinocchio), sdf (Drake) or" in said
+
+
+# Written models, read by their simulators alone: they close at the design and elsewhere, and move
+
+
+def reading(to, name, folder, elsewhere=True):
+    mechanism, path = CASES[name].mechanism, way(name, elsewhere)
+    return read(to, adapters.writer(to)(mechanism, path, {}), mechanism, folder), path
+
+
+NO_POLYNOMIAL = {"exudyn": "Exudyn", "sdf": "SDF"}
+
+
+@pytest.mark.parametrize("elsewhere", [False, True], ids=["design", "elsewhere"])
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("to", READERS)
+def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere, tmp_path):
+    if name == "polynomial" and to in NO_POLYNOMIAL:
+        with pytest.raises(KincheckError, match=f"has no counterpart in {NO_POLYNOMIAL[to]}"):
+            reading(to, name, tmp_path, elsewhere)
+        return
+    found, path = reading(to, name, tmp_path, elsewhere)
+    assert_read(found, CASES[name].mechanism, path, elsewhere)
+
+
+def test_polynomials_count_from_the_start():
+    """With y = x + 0.2 x^2, and x = 0.5 at the start."""
+    hinges = [
+        Revolute(name, "ground", name.upper(), (k, 0.0, 0.0), Z) for k, name in enumerate("ab")
+    ]
+    cam = Polynomial("cam", ("b", "a"), (0.0, 1.0, 0.2))
+    bodies, turn = [Body("A"), Body("B", (1.0, 0.0, 0.0))], JointAngle("turn", "a")
+    mechanism = Mechanism("cams", bodies, hinges, [], [turn], [cam])
+    (moved,) = at_start(mechanism, way_to(case(mechanism, 0.5), 0.5)).couplers
+    np.testing.assert_allclose(moved.coefficients, [0.0, 1.2, 0.2], rtol=0.0, atol=1e-15)
+
+
+def cut_elsewhere(mechanism, first=()):
+    """The tree without the joint that is probed: what it carried is free, and it closes the
+    loop.
+    """
+    tree = spanning_tree(mechanism, first)
+    tested = [
+        joint
+        for joint in mechanism.joints
+        if joint.name in ("tested", "second") and joint not in tree.cut
+    ]
+    branches = [
+        Branch(GROUND, each.child, None) if each.joint in tested else each for each in tree.branches
+    ]
+    return SpanningTree(tuple(branches), (*tree.cut, *tested))
+
+
+@pytest.mark.parametrize("name", [each.name for each in probes()])
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf", "osim"])
+def test_a_joint_closes_a_loop_as_it_carries_a_body(to, name, tmp_path, monkeypatch):
+    if name == "polynomial" and to in NO_POLYNOMIAL:
+        return  # refused above
+    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", cut_elsewhere)
+    found, path = reading(to, name, tmp_path)
+    assert_read(found, CASES[name].mechanism, path, True)
+
+
+def test_the_cases_move_and_count_turns():
+    for name in CASES:
+        assert (
+            max(
+                np.abs(motion.r[-1] - motion.r[0]).max() + np.abs(motion.p[-1] - motion.p[0]).max()
+                for motion in way(name, True).values()
+            )
+            > 0.01
+        )
+    # 150 rad of 0.01 m a turn
+    assert abs(way("gear_train", True)["nut"].r[-1, 2] - 0.3 + 1.5 / (2.0 * np.pi)) <= 1e-14
+
+
+@pytest.mark.parametrize("to", READERS)
+def test_a_start_of_another_mechanism_is_seen(to, tmp_path):
+    """The tie rod a millimetre longer than where the poses are from."""
+    mechanism = mcpherson()
+    rod = mechanism.joint("tie_rod")
+    longer = replace(
+        mechanism, joints=[*mechanism.joints[:-1], replace(rod, length=rod.design_distance + 1e-3)]
+    )
+    texts = adapters.writer(to)(longer, way("mcpherson", True), {})
+    found = read(to, texts, longer, tmp_path)
+    assert np.linalg.norm(found.residuals) == pytest.approx(1e-3, abs=1e-14)
+
+
+# Built-in cases, exported as models and read again: the motion that is read satisfies all joints
+
+
+TREES = ("mjcf", "urdf", "sdf")
+NAMES = cases.names()
+ALL = os.environ.get("KINCHECK_EXPORTS") == "all"
+PAIRS = [
+    (name, each)
+    for k, name in enumerate(NAMES)
+    for each in (TREES if ALL else [TREES[k % len(TREES)]])
+]
+# Round-off of metre-sized coordinates, and of angles between links at arms of their size.
+EXACT = 1e-10
+STEP = 0.02
+"""End of the motion [rad or m]: far from any singular pose of the built-in cases."""
+
+
+def exported(case: Case, kind: str, folder: Path) -> Path:
+    """Write a model and the files beside it; return its file."""
+    texts = written(case, adapters.writer(kind))
+    files = [folder / f"model{ending}" for ending in texts]
+    for file, text in zip(files, texts.values(), strict=True):
+        file.write_text(text)
+    return files[0]
+
+
+def read_again(case: Case, file: Path) -> Case:
+    """Return the case of a model, driven by the first joint of the original that moves it."""
+    reasons: list[str] = []
+    for joint in case.mechanism.joints:
+        for name in (joint.name, f"{joint.name}.rotation", f"{joint.name}.1"):
+            try:
+                return load(file, Supplied(drive=(f"{name}:0:{STEP}:2",), hold_rest=True))
+            except KincheckError as error:
+                reasons.append(str(error))
+    raise AssertionError(reasons)
+
+
+def carried(case: Case, again: Case) -> dict[str, BodyMotion]:
+    """Return the motions of the bodies of a case, from those of the frames of another one."""
+    names = tuple(body.name for body in again.mechanism.moving)
+    solver = NativeSolver(order=0, compiled=False)
+    found = solver.prepare(again.mechanism, again.sweep.path, bodies=names)(1e-12)
+    assert found.solved.all(), found.message
+    motions: dict[str, BodyMotion] = {}
+    for body in case.mechanism.moving:
+        other, motion = again.mechanism.body(body.name), found.bodies[body.name]
+        turns = [A(p) @ A(np.array(other.euler_parameters)).T for p in motion.p]
+        arm = np.subtract(body.origin, other.origin)
+        r = np.array([at + turn @ arm for at, turn in zip(motion.r, turns, strict=True)])
+        p = np.array([quaternion(turn @ A(np.array(body.euler_parameters))) for turn in turns])
+        motions[body.name] = BodyMotion(r, p, None, None)
+    return motions
+
+
+def quaternion(R: np.ndarray) -> np.ndarray:
+    """Return the Euler parameters of a rotation matrix: the largest column of their products."""
+    e = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
+    products = np.empty((4, 4))
+    products[0, 0] = 1.0 + np.trace(R)
+    products[0, 1:] = products[1:, 0] = e
+    products[1:, 1:] = R + R.T + (1.0 - np.trace(R)) * np.eye(3)
+    column = products[:, np.argmax(np.diag(products))]
+    return column / np.linalg.norm(column)
+
+
+@pytest.mark.parametrize(("name", "kind"), PAIRS)
+def test_an_export_is_read_and_moves_alike(name: str, kind: str, tmp_path: Path):
+    case = cases.load(name)
+    again = read_again(case, exported(case, kind, tmp_path))
+    motions = carried(case, again)
+    parts = [*case.mechanism.joints, *case.mechanism.couplers]
+    assert largest_residual(case.mechanism, parts, motions) < EXACT
+    assert max(np.ptp(motion.p, axis=0).max() for motion in motions.values()) > 1e-5
+    for body in case.mechanism.moving:
+        there = again.mechanism.body(body.name)
+        assert there.mass == pytest.approx(body.mass, abs=EXACT)

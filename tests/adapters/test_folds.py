@@ -9,9 +9,9 @@ from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.harness.execution import Pair
 from kincheck.core.kinematics import continued, continuous, regular_between
+from kincheck.core.studies.stress.families import FAMILIES
 from kincheck.core.studies.stress.families.base import as_case
-from kincheck.core.studies.stress.families.folds import Folds
-from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
+from kincheck.core.studies.stress.families.linkages import any_plane, polar, slider_crank
 from kincheck.core.studies.stress.run import specimen
 from kincheck.core.studies.stress.solving import once
 from kincheck.core.studies.stress.verdicts import Verdict, judged
@@ -51,12 +51,13 @@ def test_two_continuations_find_the_same_fold():
 def test_the_end_of_a_stroke_is_a_fold():
     """A slider-crank driven at its slider, where the rod is stretched and where it is folded."""
     crank, rod = 0.3, 1.0
-    b = (crank * np.cos(0.4), crank * np.sin(0.4))
-    c = (float(b[0] + np.sqrt(rod**2 - b[1] ** 2)), 0.0)
+    b = polar(crank, 0.4)
+    c = float(b.real + np.sqrt(rod**2 - b.imag**2))
     plane = any_plane(np.random.default_rng(2))
-    case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([0.1]))
-    assert first_fold(case, 1.0) == pytest.approx(crank + rod - c[0], abs=1e-8)
-    assert first_fold(case, -1.0) == pytest.approx(rod - crank - c[0], abs=1e-8)
+    mechanism, _ = slider_crank(plane, b, complex(c), "rod", "slide")
+    case = as_case(mechanism, "slide", np.array([0.1]))
+    assert first_fold(case, 1.0) == pytest.approx(crank + rod - c, abs=1e-8)
+    assert first_fold(case, -1.0) == pytest.approx(rod - crank - c, abs=1e-8)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,7 @@ def past_folds():
     """Of the mechanisms of `kincheck stress --family folds --seed 0`, two with another assembly
     that a step can meet, and one without.
     """
-    return [specimen(Folds(), 0, number, 5) for number in (0, 16, 21)]
+    return [specimen(FAMILIES["folds"], 0, number, 5) for number in (0, 16, 21)]
 
 
 @pytest.mark.nightly
@@ -122,5 +123,5 @@ def test_a_step_is_compared_with_itself_and_not_with_its_rates():
 @pytest.mark.parametrize(("seed", "number", "passed"), [(101, 364, 0), (109, 192, 2)])
 def test_a_singular_pose_that_the_motion_passes_is_no_fold(seed, number, passed):
     """Rates stay finite there, and `trace` goes on through a branch point or without an event."""
-    truth = specimen(Folds(), seed, number, 4).truth
+    truth = specimen(FAMILIES["folds"], seed, number, 4).truth
     assert truth.reach[passed] == Reach.UNKNOWN

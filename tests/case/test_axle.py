@@ -1,5 +1,5 @@
-"""Whole axles: both wheels and a rack, in heave, roll and steer, against two independent carriers
-on rods; and both wheels with the rack moving besides, against distances alone.
+"""Whole axles: both wheels and a rack, in heave, roll and steer, and with the rack moving besides,
+against two independent carriers on rods.
 """
 
 import json
@@ -19,8 +19,6 @@ from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
 
-from ..oracles.distances import Carrier as DistanceCarrier
-from ..oracles.distances import turn
 from ..oracles.rods import Carrier
 from ..support.rods_of_templates import RODS as ALL_RODS
 
@@ -60,7 +58,10 @@ class Wheel:
         radius = np.linalg.norm(at["wheel_center"] - at["wheel_contact"])
         rise = np.array([0.0, 0.0, 1.0]) - self.s[2] * self.s
         self.contact = self.carrier.at(at["wheel_center"]) - radius * rise / np.linalg.norm(rise)
-        self.velocity = self.carrier.velocity(self.contact, moved)
+        self.velocity, self.of_center = (
+            self.carrier.velocity(place, moved)
+            for place in (self.contact, self.carrier.at(at["wheel_center"]))
+        )
 
     @property
     def cotangent(self):
@@ -287,8 +288,6 @@ CAR = {
     "brake_share": str(SHARE),
     "drive_share": "1",
 }
-# Distances are solved to 1e-13 of their squares; quotients of differences lose the rest.
-POSE, RATE = 1e-11, 1e-8
 
 
 def table(folder, name="double_wishbone"):
@@ -297,35 +296,12 @@ def table(folder, name="double_wishbone"):
     return file
 
 
-class SteeredWheel:
-    """A wheel of either side, where left is 1 and right -1."""
-
-    def __init__(self, side, travel, rack):
-        at = {
-            role: np.array(place) * (1.0, side, 1.0)
-            for role, place in TEMPLATES["double_wishbone"].sample.items()
-        }
-        carrier = DistanceCarrier(
-            at["wheel_center"], [(at[p], at[q]) for p, q in RODS["double_wishbone"]]
-        )
-        pose = carrier.pose(travel, rack)
-        self.s = turn(pose[3:]) @ (0.0, side, 0.0)
-        radius = np.linalg.norm(at["wheel_center"] - at["wheel_contact"])
-        rise = np.array([0.0, 0.0, 1.0]) - self.s[2] * self.s
-        center = carrier.at(pose, at["wheel_center"])
-        self.contact = center - radius * rise / np.linalg.norm(rise)
-        self.v, self.v_center = carrier.velocities(pose, travel, rack, self.contact, center)
-        # to the left, of the horizontal line in the wheel plane
-        self.steer = np.arctan(-self.s[0] / self.s[1])
-
-
 def expected_while_steering(motion, position, travel, rack):
-    a, b = (
-        SteeredWheel(1, travel, rack),
-        SteeredWheel(-1, travel if motion == "heave" else -travel, rack),
-    )
-    lines = np.array([a.v[1:], b.v[1:]])
-    y, z = np.linalg.solve(lines, [a.v[1:] @ a.contact[1:], b.v[1:] @ b.contact[1:]])
+    a = Wheel("double_wishbone", 1, travel, rack)
+    b = Wheel("double_wishbone", -1, travel if motion == "heave" else -travel, rack)
+    steer_a, steer_b = (np.arctan(1.0 / wheel.cotangent) for wheel in (a, b))
+    lines = np.array([a.velocity[1:], b.velocity[1:]])
+    y, z = np.linalg.solve(lines, [a.velocity[1:] @ a.contact[1:], b.velocity[1:] @ b.contact[1:]])
     road = a.contact - b.contact
     normal = np.array([-road[2], road[1]]) / np.hypot(*road[1:])
     pose = {
@@ -333,20 +309,19 @@ def expected_while_steering(motion, position, travel, rack):
         "right_toe": np.arctan2(b.s[0], -b.s[1]),
         "track": road[1],
     }
-    if min(a.steer * b.steer, abs(a.steer) - 0.01, abs(b.steer) - 0.01) > 0.0:
-        pose["ackermann"] = WHEELBASE / road[1] * (1 / np.tan(b.steer) - 1 / np.tan(a.steer))
-        pose["ackermann"] = float(pose["ackermann"])
+    if min(steer_a * steer_b, abs(steer_a) - 0.01, abs(steer_b) - 0.01) > 0.0:
+        pose["ackermann"] = float(WHEELBASE / road[1] * (b.cotangent - a.cotangent))
     rate = {
         "axle_roll_center_height": ((y, z) - a.contact[1:]) @ normal,
         "axle_roll_center_offset": y,
     }
     for side, wheel in (("left", a), ("right", b)):
-        slope = SHARE * WHEELBASE / CG_HEIGHT * wheel.v[0] / wheel.v[2]
+        slope = SHARE * WHEELBASE / CG_HEIGHT * wheel.velocity[0] / wheel.velocity[2]
         if position == "front":
             rate[f"{side}_anti_dive"] = slope
         else:
             rate[f"{side}_anti_lift"] = -slope
-            squat = -WHEELBASE / CG_HEIGHT * wheel.v_center[0] / wheel.v_center[2]
+            squat = -WHEELBASE / CG_HEIGHT * wheel.of_center[0] / wheel.of_center[2]
             rate[f"{side}_anti_squat"] = squat
     return pose, rate
 
@@ -360,8 +335,8 @@ def test_an_axle_that_steers_while_it_travels(tmp_path, motion, position):
         pose, rate = expected_while_steering(
             motion, position, travel, 0.005 + travel * 0.025 / 0.03
         )
-        assert {each: found[each][k] for each in pose} == pytest.approx(pose, abs=POSE, rel=1e-8)
-        assert {each: found[each][k] for each in rate} == pytest.approx(rate, abs=RATE, rel=1e-8)
+        assert {each: found[each][k] for each in pose} == pytest.approx(pose, abs=CLOSE, rel=1e-11)
+        assert {each: found[each][k] for each in rate} == pytest.approx(rate, abs=1e-11, rel=1e-11)
     assert np.isfinite(found["ackermann"]).any()
 
 

@@ -31,10 +31,9 @@ from kincheck.core.studies.verified_reference import prove_case
 from ..kinematics.test_chain import chain
 from ..kinematics.test_singular import BRANCH
 from ..oracles import naive
-from ..oracles.four_bar_forces import forces
 from ..support.case_texts import complains, write
 from ..support.engine_forces import Beside, every_force, force_case, values
-from ..support.four_bar_within_digits import ANGLES, solved, written
+from ..support.four_bar_within_digits import solved, truth, written
 from ..support.loaded import loaded
 from ..support.loads import loaded as with_loads
 
@@ -292,8 +291,6 @@ def test_what_is_written_reads_as_the_same(tmp_path: Path, data: st.DataObject):
 
 
 TILTED = naive.A(np.array([0.8, 0.36, 0.48, 0.0]))
-TRUTH = [forces(angle) for angle in ANGLES]
-REACTIONS, EFFORTS = (np.array(each) for each in zip(*TRUTH, strict=True))
 
 
 def off_by(digits, axis=0):
@@ -303,11 +300,11 @@ def off_by(digits, axis=0):
     return tuple(found)
 
 
-def within(found, digits, truth=(REACTIONS, EFFORTS)):
+def within(found, digits, expected=None):
     """Check components and efforts against the true ones but for digits: reactions are some 16 N,
     and digits shift them by one or two times the largest of it.
     """
-    for each, right in zip(found, truth, strict=True):
+    for each, right in zip(found, expected or truth(), strict=True):
         assert (np.isnan(each) == np.isnan(right)).all()
         assert np.nanmax(np.abs(each - right)) <= 32.0 * digits + 1e-12
 
@@ -376,8 +373,7 @@ def test_a_cross_turns_with_both_bodies(tmp_path, carrying):
     more = {"turn": TILTED, "cross": cross, "closure": closure}
     case, found = solved(written(tmp_path, {"b": off_by(1e-6)}, **more), TILTED)
     assert [each.joint.name for each in case.mechanism.reduced] == [*{*"bcd"}.difference(carrying)]
-    truth = [forces(angle, cross) for angle in ANGLES]
-    within(found, 1e-6, [np.array(each) for each in zip(*truth, strict=True)])
+    within(found, 1e-6, truth(cross))
 
 
 def test_a_joint_without_a_row_left_is_undetermined(tmp_path):
@@ -388,9 +384,10 @@ def test_a_joint_without_a_row_left_is_undetermined(tmp_path):
     case, (reactions, efforts) = solved(file)
     kept = {each.joint.name: each.kept for each in case.mechanism.reduced}
     assert kept["twin"] == ()
-    right = REACTIONS.copy()
+    right, expected = truth()
+    right = right.copy()
     right[:, 3, [0, 2]] = np.nan
-    within((reactions, efforts), 1e-6, (right, EFFORTS))
+    within((reactions, efforts), 1e-6, (right, expected))
     found = solve(case.mechanism, "turn", case.sweep.values, forces=["twin"]).forces.joints["twin"]
     assert found.determined() == (0, 1, 1)
     assert np.abs(found.along((0.0, 1.0, 0.0), moment=True)).max() < 1e-12
@@ -523,7 +520,7 @@ def test_proofs_print_determined_components_only(tmp_path):
     case = load_case(file)
     made, _ = prove_case(case, digits=20, numbers="double", tol=1e-12)
     assert all(sample.proved for sample in made.samples)
-    for joint, row in zip("abcd", np.moveaxis(REACTIONS, 1, 0), strict=True):
+    for joint, row in zip("abcd", np.moveaxis(truth()[0], 1, 0), strict=True):
         for k, (kind, axis) in enumerate(product(("force", "moment"), "xyz")):
             found = made.outputs[f"{joint} {kind} {axis}"]
             if np.isnan(row[:, k]).any():
@@ -549,6 +546,6 @@ def test_variants_of_a_design_leave_the_same_undetermined(tmp_path):
     every = designs.forces(found, geometry, 1e-12)
     for name, moment, k in product("abcd", (False, True), range(3)):
         read = every.read(partial(component, name, k, moment))
-        right = REACTIONS[:, "abcd".index(name), 3 * moment + k]
+        right = truth()[0][:, "abcd".index(name), 3 * moment + k]
         assert (np.isnan(read) == np.isnan(right)[:, None]).all()
         assert not np.nanmax(np.abs(read[:, 0] - right), initial=0.0) > 32e-6

@@ -18,6 +18,8 @@ from kincheck.core.cli.main import main
 from kincheck.core.harness.execution import Answer, Pair, attempt
 from scipy.optimize import least_squares
 
+from ..oracles.rods import rotation
+
 DATA = Path(__file__).parents[1] / "data" / "hardpoints"
 # A tyre 270/55 on a 13 inch rim: 0.5 * 13 * 25.4 + 0.55 * 270 mm.
 RADIUS = 0.3136
@@ -88,20 +90,12 @@ def test_the_published_camber(explorer, published):
     assert np.abs(slope * np.cos(seen) ** 2 - theirs).max() < SLOPE
 
 
-def turn(w):
-    """A rotation matrix from a quaternion of which only the vector is given."""
-    x, y, z = w
-    s = np.sqrt(1.0 - np.dot(w, w))
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + 2.0 * s * k + 2.0 * k @ k
-
-
 def corner(at, travel, start):
     """Wheel and rocker at a travel, by distances alone: the upright on five rods, the pushrod, and
     two distances that hold each rocker point to the rocker's axis.
 
     Returns:
-        unknowns: shift and quaternion vector of the upright, place of two points of the rocker.
+        unknowns: shift and rotation vector of the upright, place of two points of the rocker.
     """
     rods = [
         ("lower_wishbone_inboard_front", "lower_wishbone_outboard"),
@@ -116,7 +110,7 @@ def corner(at, travel, start):
 
     def gaps(u):
         def moved(point):
-            return wheel + u[:3] + turn(u[3:6]) @ (point - wheel)
+            return wheel + u[:3] + rotation(u[3:6]) @ (point - wheel)
 
         a, b = u[6:9], u[9:12]
         pairs = [(at[p], moved(at[q]), at[p], at[q]) for p, q in rods]
@@ -142,7 +136,7 @@ def test_a_formula_student_corner_with_pushrod_and_rocker():
     step = 1e-4
     for k, travel in enumerate(case.sweep.values):
         u = corner(at, travel, rest)
-        s = turn(u[3:6]) @ (0.0, 1.0, 0.0)
+        s = rotation(u[3:6]) @ (0.0, 1.0, 0.0)
         lengths = [
             np.linalg.norm(corner(at, travel + d, u)[9:] - at["strut_top"])
             for d in (-2 * step, -step, step, 2 * step)

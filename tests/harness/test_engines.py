@@ -1,9 +1,8 @@
-"""Every built-in case in every engine, against its truth; and what must not pass: a moved
-hardpoint, a stroke out of reach.
-"""
+"""Engines of a run, and their versions."""
 
-from __future__ import annotations
-
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,9 +12,14 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core import Distance
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.cli import main
+from kincheck.core.cli.registry import Status
+from kincheck.core.harness.engine_versions import versions
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
+from kincheck.core.harness.unloadable import Unloadable
 
+from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 from ..support.mechanisms import placed
 
 # What each engine reaches on the strut, per unit stroke rate [m, m/s, m/s^2]: round-off of
@@ -149,3 +153,53 @@ def test_round_off_near_singular_pose_passes(name):
     )
     assert worst.max_abs < 1e-12 * 1855.0
     assert worst.within
+
+
+# Engines are asked for their versions in processes of their own: whatever loading them does, it
+
+
+def test_versions_keep_order_of_engines(monkeypatch):
+    # where the processes find the engines
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+    found = versions([*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")])
+    assert found == ["1.2", "3", *[None] * 5]
+
+
+def test_an_engine_that_hangs_has_no_version(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+    assert versions([Loading("hangs")], patience=1.0) == [None]
+
+
+def test_version_is_read_in_process_on_request(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+    ours, foreign = versions([Ours("any"), Foreign("native")])
+    assert ours == str(os.getpid())
+    assert foreign not in (ours, None)
+
+
+def test_run_survives_crashing_simulator_imports(tmp_path):
+    (tmp_path / "exudyn.py").write_text("import sys; sys.exit(0)")
+    (tmp_path / "mujoco.py").write_text("import os; os.abort()")
+    command = "run rssr --engine native exudyn mujoco".split()
+    files = "--history h.sqlite --json r.json".split()
+    code = "import sys; from kincheck.core.cli import main as cli; sys.exit(cli.main(sys.argv[1:]))"
+    env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    found = subprocess.run(
+        [sys.executable, "-c", code, *command, *files],
+        cwd=tmp_path,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120.0,
+    )
+    assert "/3] rssr native: pass" in found.stderr
+    assert "/3] rssr exudyn: unavailable" in found.stderr
+    assert "/3] rssr mujoco: crashed" in found.stderr
+    assert (tmp_path / "r.json").exists()
+    assert (tmp_path / "h.sqlite").exists()
+
+
+def test_exit_inside_command_is_failure(monkeypatch, capsys):
+    monkeypatch.setattr(main, "registry", lambda: sys.exit(0))
+    assert main.main(["list"]) == Status.FAILED
+    assert "ended the program with status 0" in capsys.readouterr().err

@@ -1,14 +1,21 @@
-"""Where all engines agree and the reference does not fit, it is the reference that is suspected,
-with the slip that explains it.
-"""
+"""Samples that are suspect, in any engine and in the native one, and the evidence for them."""
 
+import hashlib
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.case.case import Series
+from kincheck import adapters, cases
+from kincheck.adapters import engine
+from kincheck.core.case.case import Origin, Series, Truth
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.notes import notes
 from kincheck.core.case.suspension import camber_of_front_view
+from kincheck.core.cli import main
+from kincheck.core.harness.evidence import digest
+from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.harness.slips import FACTORS, Held, slips
@@ -17,8 +24,13 @@ from kincheck.core.report.junit import to_junit
 from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
 from kincheck.core.report.table import messages
+from kincheck.core.trajectory import Trajectory
 
-from ..support.fakes import Fake, crank, off
+from ..support.case_texts import BASE, CSV, INLINE, complains, write
+from ..support.engine_faults import changed
+from ..support.engine_forces import force_case
+from ..support.fakes import Fake, crank, exact, off
+from ..support.loaded import loaded
 
 ENGINES = [Fake("native"), Fake("other"), Fake("third")]
 S = np.linspace(-1.0, 1.3, 24)
@@ -261,3 +273,302 @@ def test_nothing_is_invented(values, reference):
 def test_samples_that_are_not_known_do_not_count():
     values = np.where(np.arange(24) == 5, np.nan, WAVY)
     assert words(values, -np.where(np.arange(24) == 7, np.nan, WAVY)) == ["with the other sign"]
+
+
+# Where most engines agree with each other and not with native, it is native that is suspected
+
+
+ATOL = 1e-9
+WRONG = Fake("native", off("velocity", lambda v: -v))
+OTHERS = [Fake(name) for name in ("one", "two", "three")]
+
+
+def shifted(name, part):
+    """An engine with its positions off by a part of the tolerance."""
+    return Fake(name, off("position", lambda p: p + part * ATOL))
+
+
+def found_by(engines, case=None):
+    results = run([case or crank(reference=False)], engines, tol=1e-12)
+    return results, results.suspects.get("crank")
+
+
+def test_native_against_all_others_is_suspected():
+    results, found = found_by([WRONG, *OTHERS])
+    assert found is not None
+    assert (found.subject, found.engines) == ("native", ["one", "two", "three"])
+    assert {*found.outputs} == {"x", "y"}
+    assert found.outputs["x"] == ["velocity"]
+    assert "3 of 3 other engines agree with each other within 0 m/s (one, two, three)" in (
+        found.message
+    )
+    assert "native differs by" in found.message
+    assert "suspect native" in found.message
+    assert "x (velocity): native with the other sign" in found.message
+    outcomes = [record.outcome for record in results.records]
+    assert outcomes == [Outcome.UNJUDGED, *[Outcome.FAIL] * 3]
+    assert from_json(to_json(results)) == results
+
+
+def test_native_is_suspected_once_on_every_surface(tmp_path):
+    results, _ = found_by([WRONG, *OTHERS])
+    assert [outcome for _, outcome, _ in messages(results)] == [Outcome.UNJUDGED]
+    assert to_markdown(results).count("Suspect: crank: 3 of 3 other engines agree") == 1
+    assert "Fail: crank" not in to_markdown(results)
+    assert headline(results).endswith("; suspect native in crank")
+    write_report(results, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("3 of 3 other engines agree with each other") == 1
+    assert "Worst: engine" not in page
+    junit = to_junit(results).decode()
+    assert junit.count("suspect: 3 of 3 other engines") == 1
+    assert junit.count("suspect native rather than the engine") == 6
+
+
+def test_native_outside_the_run_is_suspected():
+    """It is the standard without a record."""
+    results = run([crank(reference=False)], OTHERS, tol=1e-12, baseline=WRONG)
+    assert results.suspects["crank"].subject == "native"
+    assert "with the other sign" in results.suspects["crank"].message
+
+
+@pytest.mark.parametrize(
+    "engines",
+    [
+        [WRONG, OTHERS[0]],
+        [WRONG, OTHERS[0], Fake("wrong too", off("velocity", lambda v: 2.0 * v))],
+        [WRONG, *OTHERS[:2], Fake("as native", off("velocity", lambda v: -v))],
+        [Fake("native"), Fake("mujoco", WRONG.answer), Fake("mujoco-default", WRONG.answer)],
+        [Fake("native"), Fake("one", WRONG.answer), *OTHERS[1:]],
+    ],
+    ids=["one other", "three answers", "two against two", "variants", "one astray"],
+)
+def test_without_a_majority_nobody_is_suspected(engines):
+    results, found = found_by(engines)
+    assert found is None
+    assert any(outcome is Outcome.FAIL for _, outcome, _ in messages(results))
+
+
+def test_majority_suspects_native():
+    odd = Fake("odd", off("velocity", lambda v: 3.0 * v))
+    results, found = found_by([WRONG, *OTHERS, odd])
+    assert found.engines == ["one", "two", "three"]
+    assert "3 of 4 other engines agree" in found.message
+    assert {name for name, outcome, _ in messages(results) if outcome is Outcome.FAIL} == {"odd"}
+
+
+def test_modes_of_one_simulator_count_once():
+    twice = [Fake("one"), Fake("one", mode="simulate")]
+    assert found_by([WRONG, *twice])[1] is None
+    assert found_by([WRONG, *twice, OTHERS[1]])[1].engines == ["one", "two"]
+
+
+def test_agreement_is_within_the_sum_of_tolerances():
+    """Engines at three and at less than five tolerances from native agree; at six they do not."""
+    native = Fake("native")
+    assert found_by([native, shifted("one", 3.0), shifted("two", 4.9)])[1] is not None
+    assert found_by([native, shifted("one", 3.0), shifted("two", 6.0)])[1] is None
+    assert found_by([native, shifted("one", 0.9), shifted("two", 0.8)])[1] is None
+
+
+def test_suspect_keeps_other_faults_of_engines():
+    """Its residual, or another output, is no fault of native."""
+
+    def unconverged(case):
+        found = OTHERS[0].answer(case)
+        return Trajectory(found.points, found.solved, found.iterations, 1e-3)
+
+    def also_accelerations(case):
+        return off("acceleration", lambda a: 1.1 * a)(case)
+
+    for answer in (unconverged, also_accelerations):
+        results, found = found_by([WRONG, *OTHERS, Fake("odd", answer)])
+        assert found.engines == ["one", "two", "three", "odd"]
+        assert [name for name, outcome, _ in messages(results) if outcome is Outcome.FAIL] == [
+            "odd"
+        ]
+
+
+def test_reference_clears_native():
+    """All pass by the reference, except native."""
+    results, found = found_by([WRONG, *OTHERS], crank())
+    assert found is None
+    assert [record.outcome for record in results.records][1:] == [Outcome.PASS] * 3
+
+
+def test_native_is_suspected_beside_position_reference():
+    case = crank()
+    case = replace(case, reference={k: Series(each.position) for k, each in case.reference.items()})
+    results, found = found_by([WRONG, *OTHERS], case)
+    assert found.subject == "native"
+    assert results.records[0].outcome is Outcome.PASS
+
+
+class OtherMoments(NativeEngine):
+    """The native engine with a moment of a thousandth of the force added to every reaction."""
+
+    def solve(self, model, case, tol):
+        found = super().solve(model, case, tol)
+        joints = {
+            name: replace(each, moment=each.moment + 1e-3 * np.roll(each.force, 1, axis=1))
+            for name, each in found.forces.joints.items()
+        }
+        return changed(found, forces=replace(found.forces, joints=joints))
+
+
+def test_simulators_suspect_native_moments():
+    case = force_case(loaded(), [0.0, 0.25, 0.5])
+    case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
+    simulators = [engine(name) for name in ("mujoco", "pinocchio", "exudyn")]
+    results = run([case], [OtherMoments(), *simulators], tol=1e-12)
+    found = results.suspects[case.name]
+    assert found.engines == ["mujoco", "pinocchio", "exudyn"]
+    assert all(" joint_moment " in name for name in found.outputs)
+    assert found.difference > 1e-3
+
+
+# Validated is said with evidence only: a citation, the digest of what was judged against, and data
+
+
+CITED = '\ncitation = "A. Uthor: On slides, table 3"'
+THIRD_PARTY = BASE.replace('"closed_form"', '"third_party_data"')
+
+
+def results_of(tmp_path, text, *engines):
+    file = write(tmp_path, text)
+    names = engines or ("native",)
+    # in this process: a worker takes longer to begin than to solve
+    argv = ["run", str(file), "--jobs", "0", "--engine", *names]
+    status = main.main([*argv, "--json", str(tmp_path / "r.json")])
+    return status, from_json((tmp_path / "r.json").read_bytes())
+
+
+@pytest.mark.parametrize("truth", ["closed_form", "third_party_data"])
+@pytest.mark.parametrize("cited", [True, False])
+def test_validation_needs_a_citation(tmp_path, capsys, truth, cited):
+    text = BASE.replace('"closed_form"', f'"{truth}"') + INLINE + (CITED if cited else "")
+    status, results = results_of(tmp_path, text, "mujoco")
+    (record,) = results.records
+    assert (status, record.outcome, record.validated) == (0, Outcome.PASS, cited)
+    out = capsys.readouterr().out
+    assert ("(validated)" in out) is cited
+    assert ("(uncited)" in out) is ("judged against an uncited reference" in out) is not cited
+    assert ('add citation = "author, title, page or address" to [reference]' in out) is not cited
+    assert record.evidence.citation == ("A. Uthor: On slides, table 3" if cited else "")
+    assert record.evidence.of == "values"
+    assert record.evidence.sha256 == digest(load_case(tmp_path / "case.toml").reference)
+
+
+def test_the_digest_of_a_file_is_that_of_its_bytes(tmp_path):
+    (tmp_path / "x.csv").write_bytes(b"\xef\xbb\xbf" + CSV.encode())
+    _, results = results_of(tmp_path, BASE + f'[reference]\nfile = "x.csv"{CITED}')
+    evidence = results.records[0].evidence
+    assert (evidence.of, evidence.sha256) == (
+        "x.csv",
+        hashlib.sha256((tmp_path / "x.csv").read_bytes()).hexdigest(),
+    )
+    assert (
+        json.loads((tmp_path / "r.json").read_bytes())["records"][0]["evidence"]["sha256"]
+        == evidence.sha256
+    )
+
+
+def test_pinned_reference_digest_must_match(tmp_path):
+    (tmp_path / "x.csv").write_text(CSV)
+    right = hashlib.sha256(CSV.encode()).hexdigest()
+    text = BASE + '[reference]\nfile = "x.csv"\ndigest = "sha256:DIGEST"'
+    assert load_case(write(tmp_path, text.replace("DIGEST", right))).origin.sha256 == right
+    complains(write(tmp_path, text.replace("DIGEST", "0" * 64)), ["reference.digest", right])
+    complains(
+        write(tmp_path, text.replace("DIGEST", "12")), ["reference.digest", "64 hexadecimal digits"]
+    )
+    complains(
+        write(tmp_path, BASE + INLINE + f'digest = "sha256:{right}"'), ["reference.digest", "rows"]
+    )
+
+
+@pytest.mark.parametrize("citation", ['""', '"  "', "3"])
+def test_a_citation_says_something(tmp_path, citation):
+    complains(
+        write(tmp_path, BASE + INLINE + f"citation = {citation}"),
+        ["reference.citation", "where the true values come from"],
+    )
+
+
+def test_the_digest_tells_values_apart():
+    one, other = crank().reference, crank(rate=2.5).reference
+    assert digest(one) == digest(dict(reversed(one.items())))
+    assert digest(one) != digest(other)
+    assert digest(one) != digest({"x": one["x"]})
+    assert digest({"x": one["x"]}) != digest({"y": one["x"]})
+
+
+def test_the_built_in_closed_forms_cite_their_modules():
+    for name in cases.names():
+        case = cases.load(name)
+        assert case.origin is not None
+        if case.truth is Truth.CLOSED_FORM:
+            assert "kincheck.cases." in case.origin.citation
+        assert not [note for note in notes(case) if "uncited" in note]
+    (record,) = run([cases.load("rssr")], [adapters.engine("native")], tol=1e-12).records
+    assert record.validated
+
+
+OWN = [Fake("native"), Fake("other")]
+
+
+def third_party(change=lambda series: series, **changes):
+    case = crank(truth=Truth.THIRD_PARTY_DATA)
+    origin = Origin("somebody")
+    return replace(
+        case,
+        reference={name: change(each) for name, each in case.reference.items()},
+        origin=origin,
+        **changes,
+    )
+
+
+@pytest.mark.parametrize("engines", [OWN, OWN[::-1]])
+def test_own_result_as_reference_is_recognised(engines):
+    results = run([third_party()], engines, tol=1e-12)
+    assert [record.outcome for record in results.records] == [Outcome.PASS] * 2
+    assert not any(record.validated for record in results.records)
+    assert all(record.evidence.own for record in results.records)
+    (note,) = results.run["cases"]["crank"]["notes"]
+    assert "equals native's own result in every bit" in note
+    assert from_json(to_json(results)) == results
+
+
+def test_own_result_is_recognised_by_baseline():
+    (record,) = run([third_party()], [Fake("other")], tol=1e-12, baseline=Fake("native")).records
+    assert not record.validated
+    (record,) = run([third_party()], [Fake("other")], tol=1e-12).records
+    assert record.validated  # nobody can tell
+
+
+def test_one_bit_makes_it_another_result():
+    def bump(series):
+        moved = series.position.copy()
+        moved[3] = np.nextafter(moved[3], 9.0)
+        return Series(moved, series.velocity, series.acceleration)
+
+    assert all(record.validated for record in run([third_party(bump)], OWN, tol=1e-12).records)
+
+
+def test_closed_forms_may_be_met_in_every_bit():
+    assert all(record.validated for record in run([crank()], OWN, tol=1e-12).records)
+
+
+@pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)])
+def test_few_samples_tell_nothing(taken):
+    case = third_party()
+    case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[taken]))
+    p, v, a = exact(case)
+    case = replace(case, reference={"y": Series(p[:, 1].copy(), v[:, 1].copy(), a[:, 1].copy())})
+    assert not any(record.evidence.own for record in run([case], OWN, tol=1e-12).records)
+
+
+def test_a_driven_coordinate_tells_nothing(tmp_path):
+    """The slide's tip is where its driver puts it: everybody's data are the same."""
+    _, results = results_of(tmp_path, THIRD_PARTY + INLINE + CITED)
+    assert results.records[0].validated

@@ -1,9 +1,11 @@
-"""kincheck history: lists, trends, plots and exports; and files of an earlier schema."""
+"""Histories, their exports and compared runs."""
 
+import csv
 import json
 import math
 import shutil
 import sqlite3
+import sys
 import zlib
 from base64 import b64decode
 from pathlib import Path
@@ -11,13 +13,15 @@ from pathlib import Path
 import msgspec
 import pytest
 from kincheck.core.cli import main
-from kincheck.core.harness.record import Outcome
+from kincheck.core.errors import KincheckError
+from kincheck.core.harness.record import Outcome, Results, to_json
+from kincheck.core.history.export import NUMBERS, export
 from kincheck.core.history.queries import faultless, read
-from kincheck.core.history.store import Store
+from kincheck.core.history.store import HistoryError, Store
 from kincheck.core.report.figure_data import Past, trend_figures
 from kincheck.core.report.trends import trends
 
-from ..support.nights import changed, keep, nights, records, times
+from ..support.nights import changed, keep, nights, records, reported, times
 
 FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
 """Two runs of a crank in three and four engines, made by schema 1."""
@@ -266,3 +270,143 @@ def test_close_times_span_a_decade():
             low, high = axis["range"]
             assert high - low == pytest.approx(spread)
             assert low < math.log10(2.0) < math.log10(2.2) < high
+
+
+# Rules for the run to compare with, and files without a history
+
+
+def test_rules_find_the_run_to_compare_with(path):
+    keep(path, records())
+    keep(path, records(), git={"commit": "b" * 40, "branch": "topic", "changed": False})
+    keep(path, records(), status="interrupted")
+    keep(path, changed(records(), outcome=Outcome.FAIL))
+    keep(path, records(), git={"commit": "c" * 40, "branch": "main", "changed": True})
+    keep(path, [msgspec.structs.replace(each, case="other") for each in records()])
+    keep(path, records())
+    assert reported(path).against.name == "run 5 (last green)"
+    assert reported(path, against="topic-baseline").against.name == "run 2 (topic baseline)"
+    assert reported(path, against="main-baseline").against.name == "run 4 (main baseline)"
+    assert reported(path, against="3").against.name == "run 3, interrupted"
+    assert reported(path, run="2").against.number == 1
+    nothing = reported(path, run="4", against="none-baseline")
+    assert nothing.against is None
+    assert nothing.regressed  # it has a failure, and nothing to excuse it
+    with pytest.raises(KincheckError, match="run 7 cannot be compared with itself"):
+        reported(path, against="7")
+    with pytest.raises(KincheckError, match="there is no run 8"):
+        reported(path, against="8")
+    with pytest.raises(
+        KincheckError,
+        match=(
+            r"there is no run 'green'; give a number of the history, a results.json, last-green or"
+        ),
+    ):
+        reported(path, against="green")
+
+
+def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
+    monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
+    facts = {
+        "host": "a-host",
+        "processor": "a processor",
+        "started": "now",
+        "calibration_seconds": 0.02,
+    }
+    for name, made in {
+        "before.json": records(),
+        "now.json": changed(records(), **times(2.0)),
+    }.items():
+        (tmp_path / name).write_bytes(to_json(Results(run=facts, records=made)))
+    before, now = str(tmp_path / "before.json"), str(tmp_path / "now.json")
+    assert main.main(["report", now, "--against", before]) == 1
+    assert (
+        "10 → 20 ms a sweep (×2; by the spread from run to run, ×1.75 may be chance)"
+        in capsys.readouterr().out
+    )
+    assert main.main(["report", before, "--against", now]) == 0
+    assert main.main(["report", before]) == 0
+    assert (
+        "nothing to compare with: last-green needs a history, and none is given"
+        in capsys.readouterr().out
+    )
+    assert main.main(["report"]) == 2
+    assert (
+        "no run without a history; give --history FILE, or a results.json"
+        in capsys.readouterr().err
+    )
+
+
+# Exports of a history hold every number
+
+
+def exported(path, file):
+    assert history(path, "--export", file) == 0
+    if file.suffix == ".csv":
+        with file.open(encoding="utf-8", newline="") as lines:
+            return list(csv.DictReader(lines))
+    return pytest.importorskip("pyarrow.parquet").read_table(file).to_pylist()
+
+
+def test_exports_hold_every_number(path, tmp_path):
+    nights(path, 2)
+    keep(
+        path,
+        changed(records(), outcome=Outcome.UNAVAILABLE, errors={}, seconds=None, version=None),
+        git=None,
+    )
+    table, text = exported(path, tmp_path / "all.parquet"), exported(path, tmp_path / "all.csv")
+    # two runs of 4 pairs, 2 outputs, 3 motions, and one in which a pair has nothing but its outcome
+    assert len(table) == len(text) == 2 * 24 + 18 + 3
+    for typed, plain in zip(table, text, strict=True):
+        for name, value in typed.items():
+            assert plain[name] == (
+                ""
+                if value is None
+                else str(value).lower()
+                if isinstance(value, bool)
+                else str(value)
+            )
+            assert isinstance(value, float | None) is (name in NUMBERS) or value is None
+    expected = records()[1].errors["x"].velocity
+    row = next(
+        row
+        for row in table
+        if (row["run"], row["engine"], row["output"], row["motion"])
+        == (1, "mujoco", "x", "velocity")
+    )
+    assert (row["max_abs"], row["rms"], row["tolerance"]) == (
+        expected.max_abs,
+        expected.rms,
+        expected.tolerance,
+    )
+    assert (row["within"], row["git_branch"], row["calibration_seconds"]) == (True, "main", 0.02)
+    missing = [row for row in table if row["outcome"] == "unavailable"]
+    assert {
+        (row["max_abs"], row["warm_seconds"], row["git_commit"], row["output"]) for row in missing
+    } == {(None, None, None, None)}
+
+
+def test_an_export_can_be_of_a_case_and_an_engine(path, tmp_path):
+    nights(path, 1)
+    with Store(path) as store:
+        assert (
+            export(store, tmp_path / "some.csv", cases=["first"], engines=["native", "mujoco"])
+            == 12
+        )
+
+
+def test_impossible_exports_are_refused(path, tmp_path, monkeypatch):
+    nights(path, 1)
+    with Store(path) as store:
+        with pytest.raises(
+            KincheckError, match=r"ends in '.xlsx'; give a file that ends in .parquet or .csv"
+        ):
+            export(store, tmp_path / "all.xlsx")
+        with pytest.raises(KincheckError, match="cannot be written"):
+            export(store, tmp_path / "no" / "all.csv")
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+        with pytest.raises(KincheckError, match="which is not installed: pip install 'pyarrow>="):
+            export(store, tmp_path / "all.parquet")
+        store.connection.execute("DROP VIEW measured")
+        with pytest.raises(HistoryError, match="no such table: measured"):
+            export(store, tmp_path / "all.csv")

@@ -1,15 +1,22 @@
-"""Regression reports: what is planted in a history is reported and named, what is noise is not."""
+"""Regressions: of times and motions, and their formats."""
 
+import math
 import random
+import xml.etree.ElementTree as ET
 
 import msgspec
 import pytest
 from kincheck.core.cli import main
-from kincheck.core.harness.record import Outcome, Seconds, to_json
-from kincheck.core.history.findings import Kind
+from kincheck.core.harness.record import Outcome, OutputSeries, Seconds, to_json
+from kincheck.core.history.findings import Kind, Regressions
+from kincheck.core.history.store import Store
+from kincheck.core.report.regression_junit import to_regression_junit
+from kincheck.core.report.regression_labels import headline, rows
 from kincheck.core.report.regression_summary import to_markdown
+from kincheck.core.report.regression_text import print_regressions
 
 from ..support.nights import FACTS, RESULTS, changed, keep, nights, records, reported, times, worse
+from ..support.printed import Terminal, coloured
 
 
 def kinds(found):
@@ -258,3 +265,202 @@ def test_loose_tolerances_are_named(path):
         "firsty",
         "secondy",
     ]
+
+
+# What a regression report is written as: Markdown, JSON, JUnit and a page, from one comparison
+
+
+def test_the_command_writes_every_format(path, tmp_path, capsys):
+    nights(path, 6)
+    keep(path, changed(records(), **worse(20.0), message="<script>alert(1)</script> | *x*"))
+    out = tmp_path / "report"
+    assert main.main(f"report --history {path} --out {out}".split()) == 1
+    text = (out / "regressions.md").read_text()
+    assert capsys.readouterr().out == text
+    found = msgspec.json.decode((out / "regressions.json").read_bytes(), type=Regressions)
+    assert found == reported(path)
+    assert found.findings[0].since == 7
+    page = (out / "report.html").read_text()
+    assert page.index("1 less accurate") < page.index('id="overview"')
+    assert "x position error 5e-13 → 1e-11 m" in page
+    assert "case-0-trend-time" in page
+    root = ET.parse(out / "junit.xml").getroot()
+    failed = [
+        (test.get("classname"), test.get("name"))
+        for test in root.iter("testcase")
+        if test.find("failure") is not None
+    ]
+    assert failed == [("first.mujoco.projection", "x")]
+    assert len(list(root.iter("testcase"))) == 8
+
+
+def test_regression_junit_keeps_skips(path):
+    nights(path, 6)
+    made = changed(
+        changed(records(), **times(2.0)),
+        case="second",
+        outcome=Outcome.UNAVAILABLE,
+        message="not installed",
+        seconds=None,
+    )
+    keep(
+        path,
+        changed(made, case="first", engine="native", outcome=Outcome.CRASHED, message="signal 11"),
+    )
+    found = reported(path)
+    with Store(path) as store:
+        root = ET.fromstring(to_regression_junit(store.results(7), found))
+    failed = {
+        f"{test.get('classname')} {test.get('name')}"
+        for test in root.iter("testcase")
+        if test.find("failure") is not None
+    }
+    assert failed == {"first.mujoco.projection slower", "second.mujoco.projection lost"}
+    assert [suite.get("failures") for suite in root] == ["1", "1"]
+    assert [suite.get("skipped") for suite in root] == ["0", "2"]
+    assert [(suite.get("tests"), suite.get("errors")) for suite in root] == [("5", "2"), ("5", "0")]
+
+
+def test_regression_markdown_escapes_and_folds(path):
+    nights(path, 1)
+    message = "</details> | `x` @team"
+    keep(
+        path,
+        [
+            msgspec.structs.replace(each, outcome=Outcome.ERROR, message=message)
+            for each in records()
+        ],
+    )
+    text = to_markdown(reported(path))
+    assert (
+        "| native, mujoco | first, second | pass → error: &lt;/details&gt; \\| \\`x\\` @\u2060team"
+        in text
+    )
+    assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")
+
+
+def test_pairs_that_no_engine_can_solve_are_not_right(path):
+    first, *others = records()
+    gone = [msgspec.structs.replace(each, outcome=Outcome.UNAVAILABLE) for each in others]
+    keep(path, [first, *gone])
+    assert f": all 1 right, {len(others)} unavailable or unsupported;" in headline(reported(path))
+
+
+def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
+    nights(path, 6)
+    keep(path, changed(records(), **worse(20.0), message="<script> | *x*")[:-1])
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("TERM", "dumb")  # no colours
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main.main(["report", "--history", str(path)]) == 1
+    shown = capsys.readouterr().out
+    for mark in ("<details>", "<summary>", "## ", "| ", "**", "&lt;"):
+        assert mark not in shown
+    found = reported(path)
+    assert shown.startswith(headline(found))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    print_regressions(found, screen := Terminal())
+    kinds = dict.fromkeys(each.kind for each in found.findings)
+    red = [kind for kind in kinds if found.fails(kind)]
+    assert len(red) == 1 < len(kinds)
+    assert [line.split(" (")[0] for line in coloured(screen.getvalue())["red"]] == red
+    for row in rows(found.findings):
+        assert row.engine in shown
+        assert row.where in shown
+        assert " ".join(row.what.split()) in " ".join(shown.split())
+
+
+# A motion that is another than it was is reported: where there is no reference nothing else would
+
+
+SERIES = OutputSeries(
+    position=[0.0, 0.5, None], velocity=[1.0, 1.0, None], acceleration=None, unit="m"
+)
+DRIVER = {"turn": [0.0, 0.5, 1.0]}
+
+
+def night(path, unjudged=True, driver=DRIVER, **values):
+    """A run in which the first pair has that output, judged by nothing unless said otherwise."""
+    outputs = {"y": msgspec.structs.replace(SERIES, **values)}
+    errors = {"errors": {}} if unjudged else {}
+    keep(path, changed(records(), driver=driver, outputs=outputs, **errors))
+
+
+def found_after(path, **now):
+    night(path, unjudged=now.get("unjudged", True))
+    night(path, **now)
+    found = reported(path, against="1")
+    return (
+        [(each.kind, each.case, each.engine) for each in found.findings],
+        [each.message for each in found.findings],
+        found,
+    )
+
+
+@pytest.mark.parametrize(
+    "values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}]
+)
+def test_other_values_at_the_same_samples(path, values):
+    kinds, messages, found = found_after(path, **values)
+    assert kinds == [(Kind.MOVED, *FIRST)]
+    assert found.regressed
+    assert (
+        f"y {next(iter(values))} differs by up to {'1 m ' if 'position' in values else '1e-3 m/s '}"
+        in messages[0]
+    )
+
+
+@pytest.mark.parametrize(("off", "kinds"), [(1e-6, [Kind.MOVED]), (0.0, [])])
+def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
+    """Of an output without a standard, the scale is that of the outputs of its unit."""
+    for moved in (0.0, off):
+        force = OutputSeries(position=[9e5, 1e6, 0.0], velocity=None, acceleration=None, unit="N")
+        y = msgspec.structs.replace(SERIES, position=[0.0, 0.5 + moved, None])
+        outputs = {"y": y, "load": force}
+        keep(path, changed(records(), driver=DRIVER, outputs=outputs, errors={}))
+    assert [each.kind for each in reported(path, against="1").findings] == kinds
+
+
+def test_round_off_is_no_other_motion(path):
+    kinds, messages, _ = found_after(
+        path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]
+    )
+    assert kinds == [(Kind.GONE, *FIRST)]
+    assert messages == [
+        "y velocity has no value at 1 of 2 samples that had one, first at turn = 0.5: no reason is"
+        " given"
+    ]
+
+
+@pytest.mark.parametrize(("off", "kinds"), [(1.9e-9, []), (2.1e-9, [(Kind.MOVED, *FIRST)])])
+def test_values_within_tolerances_are_no_motion(path, off, kinds):
+    assert found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])[0] == kinds
+
+
+def test_another_sweep_is_said(path):
+    kinds, messages, _ = found_after(path, driver={"turn": [0.0, 0.25, 0.5]})
+    assert kinds == [(Kind.MOVED, *FIRST)]
+    assert messages == ["solved at other values of the drivers than before"]
+
+
+def test_the_last_digit_of_a_driver_is_no_other_sweep(path):
+    assert found_after(path, driver={"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]})[0] == []
+
+
+def test_another_driver_is_another_sweep(path):
+    assert found_after(path, driver={"push": DRIVER["turn"]})[0] == [(Kind.MOVED, *FIRST)]
+
+
+def test_fewer_samples_are_reported_lost(path):
+    keep(path, records())
+    keep(path, changed(records(), solved=2, samples=2))
+    (finding,) = reported(path, against="1").findings
+    assert finding.kind is Kind.LOST
+    assert finding.message == "2 of 2 samples solved, 9 of 9 before"
+
+
+def test_grown_error_is_reported_as_drift(path):
+    keep(path, changed(records(), driver=DRIVER, outputs={"x": SERIES}))
+    keep(path, changed(records(), driver=DRIVER, outputs={"x": SERIES}, **worse(20.0)))
+    assert [each.kind for each in reported(path, against="1").findings] == [Kind.DRIFTED]

@@ -1,20 +1,24 @@
-"""History: what was kept stays, whatever ends the run, the disk or the process; and files of
-another time or kind.
-"""
+"""The store of runs, its files, and the runs that are kept."""
 
 import os
+import random
+import signal
 import sqlite3
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
+from kincheck.core.cli.main import main
+from kincheck.core.harness.provenance import calibration, git_state
 from kincheck.core.harness.run import run
 from kincheck.core.history import schema
-from kincheck.core.history.run_recorder import keep
-from kincheck.core.history.store import Store, alive, owner
+from kincheck.core.history.run_recorder import digest, keep
+from kincheck.core.history.store import HistoryError, Store, alive, owner
 
 from ..harness.test_workers import timeless
 from ..support.fakes import Fake, crank, off, partial, raising
@@ -252,3 +256,234 @@ def test_schema_check_is_one_statement(path):
     connection.close()
     # those of the functions inside a statement are comments
     assert len([each for each in statements if not each.startswith("--")]) == 1
+
+
+# History files of another time or kind, and full disks
+
+
+def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
+    keeping, results = kept(path, [crank()], ENGINES)
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            schema,
+            "MIGRATIONS",
+            (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
+        )
+        with pytest.raises(HistoryError, match="table runs already exists"):
+            Store(path)
+    with Store(path) as store:
+        assert store.results(keeping.run) == results
+
+
+def test_a_file_of_another_program_is_left_alone(path):
+    other = sqlite3.connect(path)
+    other.execute("CREATE TABLE bookmarks (url TEXT)")
+    other.close()
+    before = path.read_bytes()
+    with pytest.raises(HistoryError, match="a database of another program; give another file"):
+        Store(path)
+    assert path.read_bytes() == before
+    path.write_bytes(b"not a database at all" * 100)
+    with pytest.raises(HistoryError, match="file is not a database; give another file"):
+        Store(path)
+
+
+@pytest.mark.parametrize("command", ["history", "report"])
+def test_an_empty_file_is_left_empty(path, command, capsys):
+    path.touch()
+    assert main([command, "--history", str(path)]) == 2
+    assert "it is empty; `kincheck run --history FILE` stores runs" in capsys.readouterr().err
+    assert not path.read_bytes()
+
+
+def test_impossible_history_files_are_refused(tmp_path):
+    with pytest.raises(
+        HistoryError, match="unable to open database file; give a file in a folder that exists"
+    ):
+        Store(tmp_path / "no" / "history.sqlite")
+    with pytest.raises(HistoryError, match="there is no such file"):
+        Store(tmp_path / "none.sqlite", writable=False)
+    with (
+        Store(tmp_path / "empty.sqlite") as store,
+        pytest.raises(HistoryError, match="there is no run 7"),
+    ):
+        store.results(7)
+
+
+# Disks
+
+
+def full_after(path, pages):
+    """A history file that can grow by so many pages: SQLite then says what it says of a full
+    disk.
+    """
+    store = Store(path)
+    (count,) = store.connection.execute("PRAGMA page_count").fetchone()
+    store.connection.execute(f"PRAGMA max_page_count = {count + pages}")
+    return store
+
+
+def test_full_disk_keeps_stored_records(path):
+    cases = [crank(f"c{k}") for k in range(40)]
+    keeping = keep(path, cases, ENGINES[:1], tol=TOL, command="", settings={}, resume=False)
+    keeping.store.close()
+    keeping.store = full_after(path, pages=8)
+    results = run(cases, ENGINES[:1], tol=TOL, progress=lambda record, *_: keeping.add(record))
+    keeping.end(results, interrupted=False)
+    (problem,) = keeping.problems
+    assert problem.startswith(
+        f"history {path}: cannot be written: database or disk is full; make room; the records"
+        " before "
+    )
+    assert len(results.records) == 40  # the run went on
+    with Store(path) as store:
+        found = store.records(keeping.run)
+        assert 0 < len(found) < 40
+        assert found == results.records[: len(found)]
+        assert store.connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+
+
+# Runs of the command line that are kept in a history: killed at any moment, on a bad disk, and how
+
+
+MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
+"""At which a run is killed: KINCHECK_DRILL=50 for the full drill."""
+
+
+def kincheck(*arguments, limit=None, **environment):
+    """The command line with made-up cases and engines: see drill.py. limit: on the size of files
+    [bytes].
+    """
+    restrict = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit})); "
+        if limit
+        else ""
+    )
+    command = [
+        sys.executable,
+        "-c",
+        f"{restrict}import sys; from tests.support.drill import main; sys.exit(main())",
+        *map(str, arguments),
+    ]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(
+        command, cwd=ROOT, env={**os.environ, "KINCHECK_HISTORY": "", **environment}, **pipes
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits the size of files as POSIX does")
+def test_disk_error_during_run_keeps_results(path):
+    """The limit leaves room for some records."""
+    Store(path).close()
+    process = kincheck(
+        "run", "--jobs", 0, "--engine", "native", "--history", path, "--json", "-", limit=52_000
+    )
+    out, err = process.communicate()
+    assert process.returncode == 2
+    assert (
+        f"kincheck: history {path}: cannot be written: disk I/O error; check the disk: it may be"
+        " full" in err
+    )
+    assert len(msgspec.json.decode(out)["records"]) == 3
+    with Store(path) as store:
+        (row,) = store.runs()
+        assert 0 < len(store.records(row.id)) < 3
+
+
+def test_resume_takes_history_from_environment(path):
+    process = kincheck("run", "--resume")
+    assert (
+        "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"
+        in process.communicate()[1]
+    )
+    assert process.returncode == 2
+    process = kincheck("run", "first", "--engine", "native", "--resume", KINCHECK_HISTORY=str(path))
+    assert "no unfinished run to resume: run 1 is new" in process.communicate()[1]
+    assert process.returncode == 0
+    with Store(path) as store:
+        assert len(store.runs()) == 1
+
+
+# Kills
+
+
+@pytest.mark.nightly
+def test_killed_run_resumes_to_equal_records(tmp_path):
+    """The moments are drawn over the whole of a run and its ways in and out; one run in three is
+    killed twice.
+    """
+    arguments = "run --jobs 2 --history".split()
+    begin = time.monotonic()
+    undisturbed = kincheck(*arguments, tmp_path / "undisturbed.sqlite")
+    undisturbed.communicate()
+    lasted = time.monotonic() - begin
+    with Store(tmp_path / "undisturbed.sqlite") as store:
+        expected = store.results(1)
+    assert len(expected.records) == 6
+    moments = random.Random(943745)
+    for number in range(MOMENTS):
+        path = tmp_path / f"{number}.sqlite"
+        for _ in range(1 + (number % 3 == 0)):
+            process = kincheck(*arguments, path, "--resume")
+            time.sleep(moments.uniform(0.0, lasted))
+            process.send_signal(signal.SIGKILL)
+            process.communicate()
+        process = kincheck(*arguments, path, "--resume")
+        err = process.communicate()[1]
+        assert process.returncode == 1, err  # the segmentation fault
+        with Store(path) as store:
+            assert store.connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+            finished = [row for row in store.runs() if row.status == "finished"]
+            results = store.results(finished[0].id)
+            assert timeless(results.records) == timeless(expected.records)
+            assert results.references == expected.references
+            # begun at most once more than needed: where the kill came after the end
+            assert len(store.runs()) == len(finished)
+
+
+# What a run is told by
+
+
+def test_a_digest_is_of_content():
+    assert digest(crank()) == digest(crank())
+    assert digest({"a": 1}) != digest({"a": 1.0}) != digest({"a": True})
+    assert digest(np.array([0.0])) != digest(np.array([-0.0]))
+    assert digest([["a"], []]) != digest([["a", []]])
+    assert len({digest(crank(rate=rate)) for rate in (1.0, 2.0)}) == 2
+
+
+def test_the_state_of_a_repository(tmp_path):
+    def git(*arguments):
+        name = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "init.defaultBranch=trunk"]
+        return subprocess.run(
+            ["git", "-C", tmp_path, *name, *arguments], check=True, capture_output=True, text=True
+        ).stdout.strip()
+
+    assert git_state(tmp_path) is None
+    git("init")
+    (tmp_path / "case.toml").write_text("a")
+    git("add", ".")
+    git("commit", "-m", "first")
+    assert git_state(tmp_path) == {
+        "commit": git("rev-parse", "HEAD"),
+        "branch": "trunk",
+        "changed": False,
+    }
+    (tmp_path / "case.toml").write_text("b")
+    git("checkout", "--detach")
+    found = git_state(tmp_path)
+    edits = found.pop("edits")
+    assert found == {"commit": git("rev-parse", "HEAD"), "branch": None, "changed": True}
+    assert git_state(tmp_path)["edits"] == edits
+    (tmp_path / "case.toml").write_text("c")
+    assert git_state(tmp_path)["edits"] != edits
+    # programs that a repository's configuration names are not started
+    (tmp_path / ".gitattributes").write_text("* diff=own")
+    for option in ("core.fsmonitor", "diff.external", "diff.own.textconv"):
+        git("config", option, f"touch {tmp_path}/started #")
+    git_state(tmp_path)
+    assert not (tmp_path / "started").exists()
+
+
+def test_calibration_is_a_time():
+    assert 0.0 < calibration() < 60.0

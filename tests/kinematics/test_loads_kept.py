@@ -16,7 +16,7 @@ from kincheck.core.kinematics.verified.exact import exact_mechanism
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.studies.stress.shrink import reduced, rounded
+from kincheck.core.studies.stress.reduction import reduced, rounded
 
 from ..support.loaded import GRAVITY, loaded, pushed
 

@@ -8,7 +8,6 @@ them by known amounts.
 
 from dataclasses import fields, replace
 from functools import cache
-from unittest import mock
 
 import numpy as np
 from hypothesis import Phase, given, settings
@@ -17,7 +16,8 @@ from kincheck import adapters
 from kincheck.core import PointCoordinate
 from kincheck.core.joints import Kind
 from kincheck.core.mechanism.motions import Sine
-from kincheck.core.studies.stress.families import loops
+from kincheck.core.studies.stress.families.base import bodies, swept
+from kincheck.core.studies.stress.families.loops import random_mechanism
 from kincheck.core.studies.stress.solving import interpreted
 from scipy.spatial.transform import Rotation
 
@@ -36,15 +36,11 @@ EPS = 2.2e-16
 
 def loop(seed):
     """A random loop as a case, a little way to both sides of its design position."""
-    with mock.patch.object(loops, "LARGEST", LARGEST):
-        case = loops.Loops().specimen(np.random.default_rng(seed), SAMPLES).describe()
-    motions = {
-        name: replace(motion, amplitude=PART * motion.amplitude)
-        for name, motion in case.sweep.motions.items()
-    }
-    return replace(
-        case, sweep=replace(case.sweep, values=PART * case.sweep.values, motions=motions)
-    )
+    rng = np.random.default_rng(seed)
+    mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
+    motions = {d.name: Sine(PART * 0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
+    ends = -PART * reach, PART * reach
+    return swept("loop", mechanism, None, *ends, SAMPLES, motions=motions).case
 
 
 @cache

@@ -16,10 +16,7 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.structure.redundancy import independent_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
-from kincheck.core.studies.stress.families import planar
-from kincheck.core.studies.stress.families.dimensions import crank_rocker
-from kincheck.core.studies.stress.families.pairs import beside
-from kincheck.core.studies.stress.families.planar import any_plane
+from kincheck.core.studies.stress.families.linkages import any_plane, beside, crank_rocker, four_bar
 
 
 def test_independent_rows_of_a_known_matrix():
@@ -61,7 +58,7 @@ def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
     """
     rng = np.random.default_rng(seed)
     plane, bars = any_plane(rng), crank_rocker(rng)
-    mechanism = beside(planar.four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
+    mechanism, _ = beside(four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     selection = select_rows(mechanism, frame, formulation)
@@ -82,12 +79,12 @@ def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
     """
     rng = np.random.default_rng(seed)
     plane, bars = any_plane(rng), crank_rocker(rng)
-    mechanism = planar.four_bar(plane, *bars)
+    mechanism, motion = four_bar(plane, *bars)
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     kept = select_rows(mechanism, frame, formulation).chosen
     turns = np.linspace(-np.pi, np.pi, 37)
-    moved = planar.four_bar_motion(plane, *bars)(turns[None])
+    moved = motion(turns[None])
     for sample in range(37):
         state = dict(formulation.design)
         for name in frame.moving:

@@ -26,7 +26,6 @@ from kincheck.core.kinematics.one_design import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.kinematics.structure.sparse_lu import Pattern
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
-from kincheck.core.studies.bench import scaling
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring
 from scipy.sparse import linalg
 
@@ -173,17 +172,6 @@ def test_redundant_rows_of_many_loops_are_found_where_they_are():
     assert found.details["redundant_residual"] <= 1e-15
     expected = [[loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0] for turn in (-0.5, 0.5)]
     assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
-
-
-def test_costs_are_measured_with_residuals_and_errors():
-    rows = scaling.measure([2], [3], rounds=1)
-    assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [
-        ("chain", 2, 5, 30),
-        ("ring", 3, 5, 30),
-    ]
-    assert all(row.residual <= 1e-15 for row in rows)
-    assert all(row.error <= 1e-14 for row in rows)
-    assert all(row.us_per_value.median > 0.0 for row in rows)
 
 
 def test_samples_of_a_ring_are_factored_together(monkeypatch):

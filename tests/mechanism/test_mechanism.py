@@ -1,30 +1,31 @@
-"""A mechanism is data that does not change: numbers may be given as lists or arrays, and what is no
-point is told so.
-"""
-
-from __future__ import annotations
+"""Mechanisms: what is refused, their topology, and formulas of freedoms."""
 
 import pickle
+import random
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck.core import (
     Body,
+    Cylindrical,
     Distance,
+    Gear,
     JointAngle,
     Mechanism,
     MechanismError,
     Point,
     PointCoordinate,
     Revolute,
+    Spherical,
     UnknownNameError,
     solve,
 )
 from kincheck.core.caches import clear_caches
-from kincheck.core.joints import Gear, Joint, PerpendicularAxes, RackPinion, Screw, Universal
+from kincheck.core.joints import Fixed, Joint, PerpendicularAxes, RackPinion, Screw, Universal
 from kincheck.core.mechanism.loads import TorsionSpringDamper
-from kincheck.core.mechanism.motions import Ramp, Table
+from kincheck.core.mechanism.motions import Formula, Ramp, Table
+from kincheck.core.mechanism.tree import spanning_tree
 from kincheck.core.studies.checks.check_joint import specimens_of
 
 
@@ -309,3 +310,145 @@ def test_look_ups_through_a_mechanism_are_told_too():
     for asked in (mechanism.is_fixed, mechanism.design_value):
         with pytest.raises(UnknownNameError, match="there is no"):
             asked("tuned")
+
+
+# The spanning tree against a search through all joints at every step
+
+
+Z = (0.0, 0.0, 1.0)
+
+
+def searched(mechanism):
+    """Parent, child and joint of every branch: at each step the first of the best joints that lead
+    out of the tree.
+    """
+    named = {driver.joint for driver in mechanism.drivers} | {
+        name for each in mechanism.couplers for name in each.joints
+    }
+    placed = {"ground"} | {body.name for body in mechanism.bodies if body.fixed}
+    waiting = [body.name for body in mechanism.moving]
+    found = []
+    while waiting:
+        reaching = [
+            joint
+            for joint in mechanism.joints
+            if joint.rows >= 3 and (joint.i in placed) != (joint.j in placed)
+        ]
+        best = max(reaching, key=lambda joint: (joint.name in named, joint.rows), default=None)
+        parent, child = (
+            ("ground", waiting[0])
+            if best is None
+            else best.bodies
+            if best.i in placed
+            else best.bodies[::-1]
+        )
+        placed.add(child)
+        waiting.remove(child)
+        found.append(("ground" if mechanism.is_fixed(parent) else parent, child, best))
+    return found
+
+
+def scrambled(seed):
+    """Bodies, some fixed, with joints of all ranks between any two; parts may hang together loosely
+    or not at all.
+    """
+    pick = random.Random(seed)
+    bodies = [Body(f"b{k}", fixed=pick.random() < 0.15) for k in range(pick.randint(1, 14))]
+    still = {"ground", *(body.name for body in bodies if body.fixed)}
+    point = (0.1, 0.2, 0.3)
+    joints = []
+    for k in range(pick.randint(0, 25)):
+        i, j = pick.choices(["ground", *(body.name for body in bodies)], k=2)
+        if i != j and not {i, j} <= still:
+            kinds = [
+                (Revolute, point, Z),
+                (Spherical, point),
+                (Distance, (point, Z)),
+                (Cylindrical, point, Z),
+                (Fixed,),
+            ]
+            kind, *geometry = pick.choice(kinds)
+            joints.append(kind(f"j{k}", i, j, *geometry))
+    turning = [joint.name for joint in joints if isinstance(joint, Revolute | Cylindrical)]
+    pick.shuffle(turning)
+    drivers = [JointAngle("turn", name) for name in turning[:1]]
+    couplers = [Gear("gear", tuple(turning[1:3]), 2.0)] if len(turning) > 2 else []
+    return Mechanism("scrambled", bodies, joints, (), drivers, couplers)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_tree_is_that_of_a_full_search(seed):
+    mechanism = scrambled(seed)
+    tree = spanning_tree(mechanism)
+    assert [(branch.parent, branch.child, branch.joint) for branch in tree.branches] == searched(
+        mechanism
+    )
+    used = {branch.joint.name for branch in tree.branches if branch.joint is not None}
+    assert [joint.name for joint in tree.cut] == [
+        joint.name for joint in mechanism.joints if joint.name not in used
+    ]
+
+
+# Formulas over time, in the notation of Adams: values and rates by closed forms
+
+
+T = np.linspace(0.11, 1.87, 13)
+S, C = np.sin(2 * T), np.cos(2 * T)
+PART = (T - 0.5) / 0.8
+INSIDE = (PART > 0.0) & (PART < 1.0)
+W = np.clip(PART, 0.0, 1.0)
+FORMULAS = {
+    "SIN(2*TIME)**2": (S**2, 4 * S * C, 8 * (C**2 - S**2)),
+    "-2**2 + 3*TIME**2/6": (-4 + T**2 / 2, T, 1.0 + 0 * T),
+    "(1+TIME)*COS(2*time)": (
+        (1 + T) * C,
+        C - 2 * (1 + T) * S,
+        -4 * S - 4 * (1 + T) * C,
+    ),
+    "1/(1+TIME)": (1 / (1 + T), -1 / (1 + T) ** 2, 2 / (1 + T) ** 3),
+    "SQRT(4*TIME)": (2 * T**0.5, T**-0.5, -0.5 * T**-1.5),
+    "SHF(TIME, 0.1, 3, 2, 30D, 1)": (
+        1 + 3 * np.sin(2 * (T - 0.1) - np.pi / 6),
+        6 * np.cos(2 * (T - 0.1) - np.pi / 6),
+        -12 * np.sin(2 * (T - 0.1) - np.pi / 6),
+    ),
+    "POLY(TIME, 1, 1D0, 2, -3)": (
+        1 + 2 * (T - 1) - 3 * (T - 1) ** 2,
+        2 - 6 * (T - 1),
+        -6 + 0 * T,
+    ),
+    "STEP(TIME, 0.5, 1, 1.3, 3)": (
+        1 + 2 * W * W * (3 - 2 * W),
+        2 * 6 * W * (1 - W) / 0.8,
+        2 * (6 - 12 * W) * INSIDE / 0.64,
+    ),
+    "STEP(TIME, 0.5, 0, 1.3, TIME)": (
+        T * W * W * (3 - 2 * W),
+        W * W * (3 - 2 * W) + T * 6 * W * (1 - W) / 0.8,
+        2 * 6 * W * (1 - W) / 0.8 + T * (6 - 12 * W) * INSIDE / 0.64,
+    ),
+    "PI*DTOR*RTOD": (np.pi + 0 * T, 0 * T, 0 * T),
+}
+
+
+@pytest.mark.parametrize("formula", FORMULAS)
+def test_formula_has_exact_rates(formula):
+    for found, expected in zip(Formula(formula).at(T), FORMULAS[formula], strict=True):
+        assert found == pytest.approx(expected, rel=1e-12, abs=1e-13)
+
+
+def test_formula_scales_value_and_time():
+    found = Formula("TIME**2", 3.0, 0.5, 0.1).at(T)
+    for one, expected in zip(found, (0.5 + 300 * T**2, 600 * T, 600 + 0 * T), strict=True):
+        assert one == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    ["", "TIME +", "(TIME", "TIME)", "2 TIME", "FOO(1)", "TIME(1)", "STEP(1,2)", "TIME**TIME"]
+    + ["1/0", "9**9**9**9", "1E999", "STEP(TIME,1,0,1,1)", "SQRT(-1)", "(" * 60 + "1" + ")" * 60]
+    + ["().__class__", "1;2", "a=3", "TIME if 1 else 2", "x" * 20_000, "2**" * 3000 + "2"],
+)
+def test_formula_of_another_language_is_refused(formula):
+    with pytest.raises(MechanismError, match="formula motion: "):
+        Formula(formula)

@@ -14,14 +14,12 @@ from kincheck.core import SolveError
 from kincheck.core.case.case import without_forces
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.bench import (
-    batch,
+    designs,
     native_breakdown,
-    peak,
     precision,
     processes,
     rounds,
     size,
-    study_throughput,
 )
 
 from ..support.loads import loaded
@@ -90,19 +88,19 @@ def test_flops_of_a_sample():
 
 def test_the_peak_kernel_does_its_arithmetic():
     pytest.importorskip("llvmlite")
-    kernel = peak.prepare()
+    kernel = rounds.prepare()
     factor, term, *rest = kernel.memory.reshape(-1, kernel.width)[:, 0]
     assert (factor, term) == (0.5, 1.0)
     assert rest[0] == 1.0
     kernel()
     assert (kernel.memory[2 * kernel.width :] == 2.0).all()  # where x = 0.5 x + 1 ends
-    assert kernel.flops == 2 * kernel.width * peak.CHAINS * peak.STEPS
+    assert kernel.flops == 2 * kernel.width * rounds.CHAINS * rounds.STEPS
     assert kernel.rate(rounds.spread([1.0, 2.0])) == kernel.flops
 
 
 def test_batches(monkeypatch):
-    monkeypatch.setattr(batch, "SIZES", (1, 5))
-    one, five = batch.measure_batches(cases.load("mcpherson_strut"), TOL, 1, None)
+    monkeypatch.setattr(designs, "SIZES", (1, 5))
+    one, five = designs.measure_batches(cases.load("mcpherson_strut"), TOL, 1, None)
     assert (one.variants, five.variants) == (1, 5)
     assert (five.solved, five.retried, five.of_peak) == (1.0, 0, None)
     assert max(one.error, five.error) < 1e-15
@@ -110,16 +108,14 @@ def test_batches(monkeypatch):
 
 def test_a_study_takes_turns_on_one_thread_and_on_two(monkeypatch):
     pytest.importorskip("llvmlite")
-    monkeypatch.setattr(study_throughput, "VARIANTS", 128)
-    monkeypatch.setattr(study_throughput.os, "cpu_count", lambda: 4)
-    one, two = study_throughput.measure_studies(
-        cases.load("mcpherson_strut"), TOL, 3, peak.prepare()
-    )
+    monkeypatch.setattr(designs, "VARIANTS", 128)
+    monkeypatch.setattr(designs.os, "cpu_count", lambda: 4)
+    one, two = designs.measure_studies(cases.load("mcpherson_strut"), TOL, 3, rounds.prepare())
     assert (one.jobs, two.jobs, one.unsolved, two.unsolved) == (1, 2, 0, 0)
     assert (one.times.least, one.peak_times.median, one.us_per_sample.rounds) == (1.0, 1.0, 3)
     assert (two.times.rounds, two.peak_times.rounds) == (3, 3)
-    monkeypatch.setattr(study_throughput.os, "cpu_count", lambda: 1)
-    (alone,) = study_throughput.measure_studies(cases.load("mcpherson_strut"), TOL, 1, None)
+    monkeypatch.setattr(designs.os, "cpu_count", lambda: 1)
+    (alone,) = designs.measure_studies(cases.load("mcpherson_strut"), TOL, 1, None)
     assert (alone.variants, alone.peak_times) == (128, None)
 
 
@@ -140,6 +136,17 @@ def test_chains_are_solved_until_they_take_too_long(monkeypatch):
     _, second, *_ = size.measure_sizes([adapters.engine("native")], TOL, 1)
     assert (second.outcome, second.us_per_sample) == (None, None)
     assert second.message.startswith("not tried: 1 took")
+
+
+def test_costs_are_measured_with_residuals_and_errors():
+    rows = size.measure_scalings([3], TOL, rounds=1)
+    assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [
+        ("chain", 3, 7, 42),
+        ("ring", 3, 5, 30),
+    ]
+    assert all(row.residual <= 1e-15 for row in rows)
+    assert all(row.error <= 1e-14 for row in rows)
+    assert all(row.us_per_value.median > 0.0 for row in rows)
 
 
 def test_growth_is_that_of_the_largest():

@@ -1,20 +1,34 @@
-"""The check of joint types: sound joints pass, and every kind of mistake is caught by the check
-that is there for it.
-"""
+"""check-joint: what is checked, the command, the identity of joint types, and mutants of joints."""
 
 import dataclasses
+import importlib
+import math
+import os
+import random
+import re
+import shutil
+import sqlite3
+import sys
+import types
+import warnings
 from dataclasses import dataclass
+from pathlib import Path
 
+import kincheck.core
 import pytest
 from kincheck import adapters
 from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Spherical, Universal, check_joint
 from kincheck.core import primitives as p
-from kincheck.core.cli.joint_loading import load_joint
+from kincheck.core.caches import clear_caches
+from kincheck.core.cli.joint_loading import load_joint, sources
+from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError, MechanismError
+from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.fakes import Fake
+from ..support.joint_mutants import mutants
 from .test_check_joint_mistakes import mistaken
 
 BUILT_IN = sorted(
@@ -172,3 +186,366 @@ def test_report_names_what_was_not_checked(few):
     text = str(report)
     assert all(f"{check}: {message}" in text for check, message in skipped.items())
     assert str(Body("x")) not in text
+
+
+# Joint types of users on the command line: in case files, in check-joint, and what is refused
+
+
+# In case files
+
+SLOT = """
+schema = "kincheck-case/1"
+name = "slot"
+source = "made up"
+[bodies.block]
+[bodies.crank]
+[joints.guide]
+type = "translational"
+bodies = ["ground", "block"]
+point = [0, 0, 0]
+axis = [0, 1, 0]
+[joints.pivot]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[joints.slot]
+type = "pin_in_slot"
+bodies = ["block", "crank"]
+point = [0.5, 0, 0]
+axes = [[1, 0, 0], [0, 0, 1]]
+[points.tip]
+body = "block"
+position = [0, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pivot"
+[sweep]
+driver = "turn"
+start = -0.5
+stop = 0.5
+steps = 5
+"""
+
+
+def test_case_file_uses_joint_type_option(in_folder, capsys, tmp_path, monkeypatch):
+    """A Scotch yoke: the block is where the pin's height is, 0.5 sin(turn)."""
+    monkeypatch.delitem(Joint.registry, "pin_in_slot", raising=False)
+    monkeypatch.delitem(sys.modules, "pin_in_slot", raising=False)
+    file, out = tmp_path / "slot.toml", tmp_path / "slot.json"
+    file.write_text(SLOT)
+    run = f"run {file} --engine native pinocchio --json {out}".split()
+    assert main(run) == 2
+    assert "joints.slot.type: found 'pin_in_slot', expected a joint type" in capsys.readouterr().err
+    given = ["--joint-type", "pin_in_slot:PinInSlot"]
+    assert main([*run, *given]) == 0
+    native, other = read_results(out).records
+    expected = [0.5 * math.sin(angle) for angle in native.driver["turn"]]
+    assert native.outputs["tip.y"].position == pytest.approx(expected, abs=1e-15)
+    assert other.outcome == "pass"  # by the equivalent
+    assert other.outputs["tip.y"].position == pytest.approx(expected, abs=1e-12)
+    capsys.readouterr()
+    assert main(["list", "--joints", *given]) == 0
+    assert re.search(
+        r"^  pin_in_slot +point, axes +4 rows  2 free: slide, turn +Body i has",
+        capsys.readouterr().out,
+        re.MULTILINE,
+    )
+    assert main(f"explain {file} --joint-type pin_in_slot:PinSlot".split()) == 2
+    assert (
+        capsys.readouterr().err
+        == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (
+            'type = "revolute"',
+            (
+                "is taken by kincheck.core.joints.revolute.Revolute; give it another name (own.py,"
+                " line 2: class Mine("
+            ),
+        ),
+        (
+            'type = "gear"',
+            "own:Mine: the type 'gear' belongs to joints that couple two others; give it another",
+        ),
+        (
+            "pass",
+            (
+                'own:Mine has no type, the name of such joints in case files; write type = "..."'
+                " in the class"
+            ),
+        ),
+    ],
+)
+def test_check_joint_refuses_unusable_type_name(monkeypatch, tmp_path, capsys, body, message):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", ["", *sys.path])
+    monkeypatch.delitem(sys.modules, "own", raising=False)
+    Path("own.py").write_text(f"from kincheck.core import Joint\nclass Mine(Joint):\n    {body}\n")
+    importlib.invalidate_caches()
+    for argv in (["check-joint", "own:Mine"], "list --joints --joint-type own:Mine".split()):
+        assert main(argv) == 2
+        said = capsys.readouterr().err
+        assert message in said.replace(f"{tmp_path}{os.sep}", ""), said
+
+
+# The command
+
+
+def test_command(few, in_folder, capsys):
+    assert main("check-joint pin_in_slot:PinInSlot --seed 1".split()) == 0
+    said = capsys.readouterr().out
+    assert "spurious branches" in said
+    assert "(seed 1)" in said
+
+
+def test_command_tells_of_a_failure(loops_only, monkeypatch, capsys, tmp_path):
+    text = (Path(__file__).parents[1] / "user_joints" / "pin_in_slot.py").read_text(
+        encoding="utf-8"
+    )
+    text = text.replace('("slide", "turn")', '("slide",)')
+    (tmp_path / "faulty_joint.py").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["check-joint", "faulty_joint:PinInSlot"]) == 1
+    said = capsys.readouterr().out
+    assert (
+        "freedoms: leaves 2, names 1: slide; name each freedom that is left, or add the missing row"
+        in said
+    )
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ("no_such_module:Joint", "no module 'no_such_module'"),
+        ("rzeppa", "write MODULE:CLASS"),
+        ("rzeppa:Rzepa", "did you mean 'Rzeppa'"),
+        ("rzeppa:Nothing", "its joints: Rzeppa"),
+        ("rzeppa:np", "is no joint type"),
+        ("kincheck.core:Revolut", "did you mean 'Revolute'?"),
+        (
+            "kincheck.core:Xyz",
+            "its joints: ConstantVelocity, Cylindrical, Distance, Fixed, InPlane, Inline, ",
+        ),
+        (".rzeppa:Rzeppa", "module '.rzeppa' cannot be imported: TypeError: "),
+    ],
+)
+def test_check_joint_refuses_unknown_module_or_class(in_folder, capsys, where, message):
+    assert main(["check-joint", where]) == 2
+    assert message in capsys.readouterr().err
+
+
+RAISING = "def f():\n    return 1 / 0\n\nf()\n"
+ENDLESS = "def f():\n    f()\n\nf()\n"
+REFUSED = (
+    'from kincheck.core import Spherical\nball = Spherical("ball", "a", "a", (0.0, 0.0, 0.0))\n'
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("def f(:\n    pass\n",
+         "SyntaxError: invalid syntax ({file}, line 1: def f(:); correct it"),
+        ("\nx = 1\n  y = 2\n",
+         "IndentationError: unexpected indent ({file}, line 3: y = 2); correct it"),
+        (RAISING, "ZeroDivisionError: division by zero ({file}, line 2: return 1 / 0, called"
+                  " from {file}, line 4: f()); "),
+        ("import nowhere_to_be_found\n",
+         "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found); "),
+        ("import brok\n", "No module named 'brok' ({file}, line 1: import brok); correct it"),
+        ("import broken_too\n", "was never closed ({too}, line 2: x = (, called from {file},"
+                                " line 1: import broken_too); "),
+        (ENDLESS, "{file}, line 2: f(), called from {file}, line 2: f(), called from {file},"
+                  " line 4: f()); "),
+        (REFUSED, "joins 'a' with itself; a joint needs two different bodies ({file}, line 2:"
+                  " ball = Spherical("),
+    ],
+    ids=["syntax", "indent", "raises", "needs", "needs a name that begins its own", "imports",
+         "recursion", "refused"],
+)  # fmt: skip
+def test_failing_joint_module_reports_its_line(tmp_path, monkeypatch, capsys, text, said):
+    file, too = tmp_path / "broken_joint.py", tmp_path / "broken_too.py"
+    file.write_text(text, encoding="utf-8")
+    too.write_text("y = 1\nx = (\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main(["check-joint", "broken_joint:Own"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("kincheck: module 'broken_joint' cannot be imported: ")
+    assert said.format(file=file, too=too) in line
+    assert str(Path(kincheck.core.__file__).parent) not in line
+
+
+def test_joint_module_that_exits_is_refused(tmp_path, monkeypatch, capsys):
+    (tmp_path / "ends_at_once.py").write_text("import sys\nsys.exit(0)\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main(["check-joint", "ends_at_once:Joint"]) == 2
+    assert (
+        "module 'ends_at_once' ends the process when it is imported (status 0)"
+        in capsys.readouterr().err
+    )
+
+
+# A run is another one when the code of its joint types is: --resume never puts records of two
+
+
+HERE = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    shutil.copy(HERE / "user_joints" / "pin_in_slot.py", tmp_path)
+    text = (tmp_path / "pin_in_slot.py").read_text()
+    (tmp_path / "pin_in_slot.py").write_text(
+        "import beside\n" + text.replace("from __future__ import annotations\n", "")
+    )
+    (tmp_path / "beside.py").write_text("NUMBER = 1\n")
+    (tmp_path / "elsewhere.py").write_text("NUMBER = 1\n")
+    (tmp_path / "slot.toml").write_text(SLOT)
+    return tmp_path
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, own_joint_types, capsys):
+    """Returns what a run says, in the folder of the modules, which each run imports anew."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", ["", *sys.path])
+
+    def run(*arguments, status=2):
+        for module in ("pin_in_slot", "beside", "mine"):
+            monkeypatch.delitem(sys.modules, module, raising=False)
+        importlib.invalidate_caches()
+        clear_caches()
+        found = main(["run", *arguments, "--jobs", "0", "--history", "h.sqlite"])
+        said = capsys.readouterr().err
+        assert found == status, said
+        return said
+
+    return run
+
+
+def killed(folder):
+    """Leave the last run of the history without an end."""
+    connection = sqlite3.connect(folder / "h.sqlite")
+    connection.execute("UPDATE runs SET status = 'interrupted'")
+    connection.commit()
+    connection.close()
+
+
+EDITS = {
+    "elsewhere.py": "run 1 is resumed after 1 records",
+    "beside.py": "run 2 is new",
+    "pin_in_slot.py": "run 3 is new",
+}
+
+
+SLOTTED = "slot.toml --joint-type pin_in_slot:PinInSlot --engine native".split()
+
+
+def test_edited_joint_code_makes_new_run(folder, run):
+    # only native knows the joint, so nothing is compared
+    assert "nothing was compared" in run(*SLOTTED)
+    for edited, expected in EDITS.items():
+        killed(folder)
+        (folder / edited).write_text((folder / edited).read_text() + "\n# edited\n")
+        assert expected in run(*SLOTTED, "--resume"), edited
+
+
+ENGINE = """import kincheck.adapters
+native = kincheck.adapters.engine("native")
+
+class Mine:
+    name, mode, loop, settings = "mine", "projection", "compiled", {}
+    version, unsupported = native.version, native.unsupported
+    build, solve, in_process = native.build, native.solve, True
+"""
+
+
+def test_edited_engine_code_makes_new_run(tmp_path, run):
+    """Whatever version it gives."""
+    (tmp_path / "mine.py").write_text(ENGINE)
+    command = ["four_bar", "--engine", "mine:Mine"]
+    run(*command, status=0)
+    killed(tmp_path)
+    (tmp_path / "mine.py").write_text(ENGINE + "\n# edited\n")
+    assert "run 2 is new" in run(*command, "--resume", status=0)
+
+
+def test_installed_modules_and_kinchecks_own_are_not_among_the_sources():
+    assert sources([]) == {}
+    found = sources([f"{__name__}:Nothing", "numpy", "kincheck.adapters.native"])
+    assert __name__ in found
+    assert not any(name.split(".")[0] in ("kincheck", "scipy", "pytest") for name in found)
+    assert "numpy.linalg" not in found
+
+
+# One-term mutants of joint types with equations of their own, and check-joint that finds them
+
+
+SOURCE = (Path(__file__).parents[1] / "user_joints" / "telescope.py").read_text()
+EVERY = dict(mutants(SOURCE))
+CHOSEN, SEED = 16, 5
+SAME_AXIS = "the same wherever both bodies have one axis"
+HARMLESS = {
+    "Across.phi 20: i.turn(a) @ d -> 1.001": "the same zeros",
+    "Aligned.phi 2: i.turn(a) @ j.turn(self.h) -> 1.001": "the same zeros",
+    "Turn.phi 9: 2.0 * (": "the same zeros",
+    "Aligned.branch 1: i.turn(self.h) @ j.turn(self.h) -> 1.001": "the same signs",
+    "Turn.branch 10: ": "the same signs at both zeros",
+    "Turn.branch 11: ": "the same signs at both zeros",
+    "Turn.branch 15: self.h @ rho.e -> 1.001": "the same signs at both zeros",
+    "Turn.branch 9: self.drive.half_cos * rho.e0 + self.drive.half_sin * (self.h @ rho.e)"
+    " -> self.drive.half_cos * rho.e0": "the same signs at both zeros, but for half a turn",
+    "Across.gamma 83: vi -> vj": SAME_AXIS,
+    "Aligned.rows 4: j -> i": SAME_AXIS,
+    "Aligned.gamma 11: j -> i": SAME_AXIS,
+    "Aligned.gamma 13: vj -> vi": SAME_AXIS,
+    "Aligned.gamma 16: j -> i": SAME_AXIS,
+    "Aligned.gamma 53: vi -> vj": SAME_AXIS,
+    "Slide.phi 14: j -> i": SAME_AXIS,
+    "Slide.phi 16: i -> j": SAME_AXIS,
+    "Slide.rows 14: i -> j": SAME_AXIS,
+    "Slide.rows 46: cross(a, d) -> cross(d, a)": "zero along the axis",
+    "Slide.gamma 14: i -> j": SAME_AXIS,
+    "Slide.gamma 63: vi -> vj": SAME_AXIS,
+    "Slide.gamma 85: vi -> vj": SAME_AXIS,
+    "Turn.rows 14: i -> j": SAME_AXIS,
+    "Turn.gamma 1: self.drive.c_tt - cross(vi.w, i.turn(self.h)) @ (vj.w - vi.w)"
+    " -> self.drive.c_tt": "the term is zero: the relative spin is along the axis",
+    "Turn.gamma 3: ": "the same term",
+    "Turn.gamma 5: ": "the same term",
+    "Turn.gamma 6: ": "the same term",
+    "Turn.gamma 13: vi -> vj": "the same term",
+    "Turn.gamma 16: vj -> vi": "the same term",
+    "Turn.gamma 17: vi -> vj": "the same term",
+    "Turn.gamma 18: i -> j": "the same term",
+    "Threaded.relations 3: ": "another lead, which only the joint itself can know",
+    "Threaded.relations 5: ": "another lead",
+    "Threaded.relations 6: ": "another lead",
+    "Threaded.relations 8: ": "another lead",
+}
+"""Beginnings of the names of mutants that are no mistakes, with the reason."""
+
+HARMFUL = sorted(name for name in EVERY if not name.startswith(tuple(HARMLESS)))
+
+
+@pytest.mark.parametrize("mutant", random.Random(SEED).sample(HARMFUL, CHOSEN))
+def test_a_mutant_of_one_term_is_found(mutant, own_joint_types, monkeypatch):
+    module = types.ModuleType("mutant")
+    monkeypatch.setitem(sys.modules, "mutant", module)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        exec(compile(EVERY[mutant], "mutant", "exec"), module.__dict__)
+        reports = (check_joint(each, samples=8) for each in (module.Telescope, module.Threaded))
+        assert any(not report.passed for report in reports)
+
+
+def test_the_joints_without_a_mutation_pass(own_joint_types, in_folder):
+    from telescope import Telescope, Threaded
+
+    assert check_joint(Telescope, samples=8).passed
+    assert check_joint(Threaded, samples=8).passed

@@ -13,7 +13,7 @@ from kincheck.core.kinematics import NativeSolver, places
 from kincheck.core.studies.diagnosis import diagnose
 
 from ..support.mechanisms import four_bar, mcpherson
-from .test_diagnosis import case
+from .test_explain import case
 
 
 @pytest.mark.parametrize(

@@ -16,15 +16,14 @@ from kincheck.core.joints import Spherical
 from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.degenerate import SOUND, WRONG
-from kincheck.core.studies.stress.families.dimensions import crank_rocker
-from kincheck.core.studies.stress.families.pairs import beside, beside_motion
-from kincheck.core.studies.stress.families.planar import (
+from kincheck.core.studies.stress.families.linkages import (
     any_plane,
+    beside,
+    crank_rocker,
     flats,
     four_bar,
-    four_bar_motion,
+    polar,
     slider_crank,
-    slider_crank_motion,
 )
 from kincheck.core.studies.truth.motion import (
     ROUND_OFF,
@@ -140,18 +139,15 @@ def test_unknown_joint_type_is_named():
 
 def parallelogram(off, samples=9):
     """With the rocker longer by off, and how it moves."""
-    b = (CRANK * np.cos(1.2), CRANK * np.sin(1.2))
-    q = CRANK + off
+    b, q = polar(CRANK, 1.2), CRANK + off
     # C on the circles of the coupler, 1 m about B, and of the rocker about (1, 0), above both
-    d, at = np.subtract((1.0, 0.0), b), np.array(b)
-    e = d @ d
+    d = 1.0 - b
+    e = abs(d) ** 2
     along = (1.0 - q**2 + e) / (2.0 * e)
-    c = at + along * d + np.sqrt(1.0 / e - along**2) * np.array([-d[1], d[0]])
+    c = b + (along + 1j * np.sqrt(1.0 / e - along**2)) * d
     plane = any_plane(np.random.default_rng(1))
-    points = b, (1.0, 0.0), (float(c[0]), float(c[1]))
-    return as_case(
-        four_bar(plane, *points, "rod"), "turn", np.linspace(-3.0, 3.0, samples)
-    ), four_bar_motion(plane, *points)
+    mechanism, motion = four_bar(plane, b, 1.0 + 0j, c, "rod")
+    return as_case(mechanism, "turn", np.linspace(-3.0, 3.0, samples)), motion
 
 
 @pytest.mark.parametrize(("ratio", "seed"), [(1.0, 0), (1.0, 1), (1e-3, 2)])
@@ -161,12 +157,9 @@ def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
     """
     rng = np.random.default_rng(seed)
     plane, first, second = any_plane(rng), crank_rocker(rng), crank_rocker(rng, ratio)
-    mechanism = beside(four_bar(plane, *first), plane, *second, "rod", "second ")
+    mechanism, motion = beside(four_bar(plane, *first), plane, *second, "rod", "second ")
     case = as_case(mechanism, "turn", np.linspace(-3.0, 3.0, 7))
-    truth = closed(
-        case,
-        beside_motion(four_bar_motion(plane, *first), four_bar_motion(plane, *second), "second "),
-    )
+    truth = closed(case, motion)
     assert (truth.reach == Reach.REACHED).all()
     assert {"C", "second C"} < {*truth.points}
     assert worst(truth, {name: x for name, (x, _, _) in followed(case).points.items()}) < 1.0
@@ -196,22 +189,24 @@ def test_samples_past_a_gap_are_beyond(off):
 
 def test_the_end_of_a_stroke_is_found_to_the_last_digits():
     """A slider-crank driven at its slider: it ends where the rod is stretched."""
-    b = (CRANK * np.cos(0.4), CRANK * np.sin(0.4))
-    c = (float(b[0] + np.sqrt(ROD**2 - b[1] ** 2)), 0.0)
-    plane, left = any_plane(np.random.default_rng(2)), CRANK + ROD - c[0]
+    b = polar(CRANK, 0.4)
+    c = float(b.real + np.sqrt(ROD**2 - b.imag**2))
+    plane, left = any_plane(np.random.default_rng(2)), CRANK + ROD - c
+    mechanism, motion = slider_crank(plane, b, complex(c), "rod", "slide")
     for part, reach in ((1.0 - 1e-7, Reach.REACHED), (1.0 + 1e-7, Reach.BEYOND)):
-        case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([part * left]))
+        case = as_case(mechanism, "slide", np.array([part * left]))
         assert followed(case).reach[0] == reach
-        assert closed(case, slider_crank_motion(plane, b, c, "slide")).reach[0] == reach
+        assert closed(case, motion).reach[0] == reach
 
 
 @pytest.mark.parametrize(("off", "told"), [(1e-8, True), (1e-3, False)])
 def test_sample_behind_rounding_singularity_may_fail(off, told):
     """A kite's crank passes the rocker's pivot by a little, between two samples."""
-    plane, b, d = any_plane(np.random.default_rng(1)), (0.0, 0.4 * (1.0 - off)), (0.4, 0.0)
-    c = (0.2 + 0.9 / 2**0.5, 0.2 + 0.9 / 2**0.5)
-    case = as_case(four_bar(plane, b, d, c, "rod"), "turn", np.linspace(-2.5, 2.5, 4))
-    truth = closed(case, four_bar_motion(plane, b, d, c), nearest=flats(b, d))
+    plane, b, d = any_plane(np.random.default_rng(1)), 0.4j * (1.0 - off), 0.4 + 0j
+    c = (0.2 + 0.9 / 2**0.5) * (1.0 + 1j)
+    mechanism, motion = four_bar(plane, b, d, c, "rod")
+    case = as_case(mechanism, "turn", np.linspace(-2.5, 2.5, 4))
+    truth = closed(case, motion, nearest=flats(b, d))
     assert min(flats(b, d), key=abs) == pytest.approx(-np.pi / 2.0)
     assert (truth.reach == Reach.REACHED).all()
     assert truth.singular.tolist() == [told, False, False, False]
@@ -281,11 +276,11 @@ def failures(make):
         return (error.kind,)
 
 
-@pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
+@pytest.mark.parametrize(("make", "reasons"), WRONG.values(), ids=WRONG)
 def test_degenerate_mechanisms_name_their_failure(make, reasons):
     assert reasons.intersection(failures(make))
 
 
-@pytest.mark.parametrize("make", SOUND, ids=lambda make: make.__name__)
+@pytest.mark.parametrize("make", SOUND.values(), ids=SOUND)
 def test_unusual_but_sound_mechanisms_are_solved(make):
     assert failures(make) == ()

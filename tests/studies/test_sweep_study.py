@@ -1,8 +1,9 @@
-"""Sweeps over designs: held against closed forms, against runs of single variants, and against
-themselves in any number of jobs.
-"""
+"""Studies of designs: draws, chunks, and what is reduced."""
 
+from dataclasses import replace
+from importlib import import_module
 from io import StringIO
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,18 +14,29 @@ from kincheck import adapters
 from kincheck.cases import load
 from kincheck.core import SolveError, solve
 from kincheck.core.algebra import Vec3
-from kincheck.core.case.case import without_forces
+from kincheck.core.case.case import Output, without_forces
+from kincheck.core.case.measures import Component, JointAngle, Orientation
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.case.suspension.base import where_moving
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.jet import Jet
-from kincheck.core.studies.tolerance.statistics import QUANTILES
-from kincheck.core.studies.tolerance.study import Ready, Study
+from kincheck.core.studies.tolerance.statistics import (
+    QUANTILES,
+    merged,
+    nothing,
+    quantiles,
+    summary_of,
+)
+from kincheck.core.studies.tolerance.study import Ready, Study, gradients
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.tolerance.tables import print_sweep
+from kincheck.core.studies.variation.study_choices import Sampling
+from kincheck.core.studies.variation.variation import DRAWN, Law
+from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank, exact
-from .test_vary import vary
+from .test_vary import vary, vary_file
 
 TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
 PIVOT = {"at": "pivot", "half_width": [0.0, 5.0, 0.0]}
@@ -242,3 +254,278 @@ def test_unsolved_variants_are_counted_and_named(tmp_path):
     later = Ready.of(Study(case, variation, 128, 1)).chunk(1).unsolved
     assert later
     assert {each.variant for each in later} <= set(range(64, 128))
+
+
+# What is made of many variants: extremes, moments, quantiles and gradients, held against closed
+
+
+BALL = {"at": "ball", "sigma": 1.0}
+AXIS = {"at": "joints.lca_pivot.axis", "sigma": 0.1}
+
+
+def test_summaries_of_parts_are_the_summary_of_all():
+    """Ten thousand times as far from zero as they are apart: the sum of squares must not be a
+    difference of large numbers.
+    """
+    random = np.random.default_rng(1)
+    values = 1e4 + random.normal(size=(2, 3, 100))
+    values[0, 1, random.random(100) < 0.3] = np.nan
+    values[1, 2] = np.nan
+    values[1, 0, 40:70] = np.nan
+    for cuts in ([0, 100], [0, 1, 40, 70, 71, 100], [0, 55, 100]):
+        whole = nothing(2, 3)
+        for a, b in pairwise(cuts):
+            whole = merged(whole, summary_of(values[:, :, a:b], a))
+        np.testing.assert_array_equal(whole.count, (~np.isnan(values)).sum(axis=2))
+        some = whole.count > 0
+        with np.errstate(all="ignore"):
+            np.testing.assert_array_equal(whole.least[some], np.nanmin(values[some], axis=1))
+            np.testing.assert_array_equal(whole.most[some], np.nanmax(values[some], axis=1))
+            np.testing.assert_allclose(
+                whole.mean[some], np.nanmean(values[some], axis=1), rtol=1e-14
+            )
+            np.testing.assert_allclose(
+                whole.deviation[some], np.nanstd(values[some], axis=1, ddof=1), rtol=1e-9
+            )
+        assert np.isnan(
+            [each[1, 2] for each in (whole.least, whole.most, whole.mean, whole.deviation)]
+        ).all()
+        for q in range(2):
+            low, high = whole.extremes[q]
+            assert np.nanmin(values[q]) in values[q, :, low]
+            assert np.nanmax(values[q]) in values[q, :, high]
+    assert nothing(1, 2).extremes.tolist() == [[-1, -1]]
+
+
+def test_quantiles_and_their_standard_errors():
+    """The spread of quantiles over many samples is the standard error that each of them is given,
+    to the fifth of it.
+    """
+    random = np.random.default_rng(2)
+    kept = random.normal(size=(300, 1000))
+    found = quantiles([kept[:, :600], kept[:, 600:]], exact=False)
+    np.testing.assert_allclose(found.values, np.quantile(kept, QUANTILES, axis=1), rtol=1e-13)
+    np.testing.assert_allclose(found.errors.mean(axis=1), found.values.std(axis=1), rtol=0.2)
+    assert quantiles([kept], exact=True).errors is None
+    holes = kept[:4].copy()
+    holes[1, ::2], holes[2] = np.nan, np.nan
+    some = quantiles([holes], exact=True).values
+    np.testing.assert_allclose(some[:, 1], np.quantile(kept[1, 1::2], QUANTILES), rtol=1e-13)
+    assert np.isnan(some[:, 2]).all()
+
+
+def rotated(axis, angle, arm):
+    """Rodrigues' formula for complex numbers: an imaginary step in them gives derivatives to
+    round-off.
+    """
+    h = axis / np.sqrt(axis @ axis)
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return arm * c + np.cross(h, arm) * s + h * (h @ arm) * (1 - c)
+
+
+def test_gradients_are_the_closed_form(tmp_path):
+    """Of a crank by its tip, its pivot, and the components of its axis, at the samples and at
+    design.
+    """
+    case = crank()
+    case = replace(
+        case, outputs=(*case.outputs, Output("z", "tip", (0.0, 0.0, 1.0), False, 1e-9, 0.0, "test"))
+    )
+    variation = vary(
+        tmp_path, case, tip={"at": "tip", "sigma": 1}, axis={"at": "joints.pivot.axis", "sigma": 1}
+    )
+    ready = Ready.of(Study(case, variation, 1, 0))
+    found = gradients(ready)
+    angle = np.append(case.sweep.change, 0.0)
+    for k in range(6):
+        step = np.zeros(6, dtype=complex)
+        step[k] = 1e-30j
+        tip, axis = np.array([0.5, 0.0, 0.0]) + step[:3], np.array([0.0, 0.0, 1.0]) + step[3:]
+        at = rotated(axis, angle, tip)
+        right = np.stack([at[:, 0] - tip[0], at[:, 1], at[:, 2]]).imag / 1e-30
+        np.testing.assert_allclose(found.along[k], right[:, :-1], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(found.design[k], right[:, -1], rtol=0, atol=1e-10)
+    assert found.accurate.all()
+    assert (found.error < 1e-7).all()
+
+
+def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
+    """At the samples and at design, where gradients are read too."""
+    output = JointAngle("turned", 1e-9, 0.0, "test", "pivot")
+    attitude = Orientation("e0", 1e-9, 0.0, "test", "arm", Component.E0)
+    case, values = crank(), np.array([0.0, 20.0, 61.0])
+    case = replace(
+        case,
+        mechanism=with_markers(case.mechanism, [output, attitude]),
+        sweep=replace(case.sweep, values=values),
+        outputs=(output, attitude),
+        reference={},
+    )
+    ready = Ready.of(Study(case, vary(tmp_path, case, tip={"at": "tip", "sigma": 1}), 1, 0))
+    rows, *_ = ready.values(np.full((3, 2), 1e-3))
+    wanted = np.array([values, np.cos(0.5 * values)])[:, :, None] + np.zeros(2)
+    np.testing.assert_allclose(rows, wanted, rtol=0, atol=1e-12)
+    found = gradients(ready)
+    assert not np.abs(found.along).max() > 1e-9
+    assert not np.abs(found.design).max() > 1e-9
+
+
+def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
+    from kincheck.core.studies.tolerance import study as room
+
+    monkeypatch.setattr(room, "STEP", 0.2)
+    case = load("mcpherson_strut")
+    assert not gradients(
+        Ready.of(Study(case, vary(tmp_path, case, axis=AXIS), 1, 0))
+    ).accurate.all()
+
+
+def test_gradients_agree_with_differences_of_whole_sweeps(tmp_path):
+    """Of the strut, against `solve` of mechanisms made anew, over another step."""
+    case = load("mcpherson_strut")
+    study = Study(case, vary(tmp_path, case, ball=BALL), 1, 0)
+    found = gradients(Ready.of(study))
+    h, values = 1e-4, case.sweep.change
+    for k in range(3):
+        sides = []
+        for sign in (1, -1):
+            offset = np.zeros(3)
+            offset[k] = sign * h
+            joint = replace(
+                case.mechanism.joint("ball"),
+                point=tuple(np.array(case.mechanism.joint("ball").point) + offset),
+            )
+            joints = [joint if each.name == "ball" else each for each in case.mechanism.joints]
+            sides.append(
+                solve(replace(case.mechanism, joints=joints), "stroke", values)
+                .points["wheel_center"]
+                .position
+            )
+        rough = (sides[0] - sides[1]) / (2 * h)
+        np.testing.assert_allclose(found.along[k, 0], rough[:, 1], rtol=0, atol=1e-7)
+        np.testing.assert_allclose(found.along[k, 1], rough[:, 0], rtol=0, atol=1e-7)
+
+
+# Distributions, samplings and correlations of drawn variants, held against scipy's
+
+
+TIP_LAWS = {
+    "normal": {"at": "tip", "sigma": [0.0, 2.0, 0.0]},
+    "truncated_normal": {
+        "at": "tip",
+        "sigma": [0.0, 2.0, 0.0],
+        "half_width": 3.0,
+        "distribution": "truncated_normal",
+    },
+    "uniform": {"at": "tip", "half_width": [0.0, 2.0, 0.0]},
+    "triangular": {"at": "tip", "half_width": [0.0, 2.0, 0.0], "distribution": "triangular"},
+}
+
+
+@pytest.fixture(scope="module")
+def stats():
+    """It takes a second to import, and others collect these tests too."""
+    return import_module("scipy.stats")
+
+
+@pytest.fixture
+def of_scipy(stats, law):
+    """The law in mm."""
+    return {
+        "normal": stats.norm(scale=2.0),
+        "truncated_normal": stats.truncnorm(-1.5, 1.5, scale=2.0),
+        "uniform": stats.uniform(-2.0, 4.0),
+        "triangular": stats.triang(0.5, -2.0, 4.0),
+    }[law]
+
+
+def variation(tmp_path, tables=None, **hardpoints):
+    return read_variation(vary_file(tmp_path, hardpoints, **(tables or {})), crank())
+
+
+@pytest.mark.parametrize("law", TIP_LAWS)
+@pytest.mark.parametrize("sampling", [Sampling.LATIN, Sampling.SOBOL])
+def test_stratified_sampling_fills_every_interval(tmp_path, law, sampling, of_scipy):
+    """A Latin hypercube has that for any number, a Sobol sequence for powers of two."""
+    count = 1000 if sampling is Sampling.LATIN else 1024
+    found = variation(tmp_path, tip=TIP_LAWS[law]).sampled(sampling, count)
+    assert found.coordinates[0].law == Law(law)
+    shares = np.sort(of_scipy.cdf(1e3 * found.offsets(3, 0, count)[0]))
+    np.testing.assert_array_equal(np.floor(shares * count + 1e-9), np.arange(count))
+
+
+@pytest.mark.parametrize("law", ["truncated_normal", "triangular"])
+def test_random_draws_have_the_distribution(tmp_path, law, stats, of_scipy):
+    drawn = 1e3 * variation(tmp_path, tip=TIP_LAWS[law]).offsets(1, 0, 4 * DRAWN)[0]
+    assert stats.kstest(drawn, of_scipy.cdf).pvalue > 0.01  # of a fixed seed
+    assert np.abs(drawn).max() <= {"truncated_normal": 3.0, "triangular": 2.0}[law]
+
+
+def test_random_draws_equal_earlier_versions(tmp_path):
+    """Equal seeds give equal numbers: normal and uniform coordinates are drawn as ever."""
+    found = variation(
+        tmp_path, tip=TIP_LAWS["normal"], pivot={"at": "pivot", "half_width": [3.0, 0.0, 0.0]}
+    ).offsets(5, DRAWN, 2)
+    seed = np.random.SeedSequence(5, spawn_key=(1, 0))
+    random = np.random.Generator(np.random.Philox(seed))
+    normal = 0.001 * 2.0 * random.standard_normal((1, DRAWN))
+    uniform = 0.001 * 3.0 * random.uniform(-1.0, 1.0, (1, DRAWN))
+    np.testing.assert_array_equal(found, np.concatenate([normal, uniform])[:, :2])
+
+
+@pytest.mark.parametrize("sampling", Sampling)
+def test_variant_depends_on_seed_and_index(tmp_path, sampling):
+    found = variation(
+        tmp_path, tip=TIP_LAWS["triangular"], pivot={"at": "pivot", "sigma": 1.0}
+    ).sampled(sampling, 700)
+    whole = found.offsets(4, 0, 700)
+    assert len(np.unique(whole)) == whole.size
+    for first, count in ((513, 100), (0, 3), (250, 300), (699, 1)):
+        np.testing.assert_array_equal(
+            found.offsets(4, first, count), whole[:, first : first + count]
+        )
+    assert not np.isin(found.offsets(5, 0, 700), whole).any()
+    again = found.sampled(sampling, 1400).offsets(4, 0, 700)
+    assert (again == whole).all() == (sampling is not Sampling.LATIN)
+
+
+def correlated(tmp_path, law, r, count=8192):
+    keys = {
+        "normal": {"sigma": 2.0},
+        "uniform": {"half_width": 2.0},
+    }[law]
+    tables = {
+        "correlations": {"a": {"coordinates": ["tip.x", "tip.z"], "matrix": [[1, r], [r, 1]]}}
+    }
+    found = variation(tmp_path, tables, tip={"at": "tip", **keys})
+    return found.sampled(Sampling.SOBOL, count).offsets(1, 0, count)
+
+
+@pytest.mark.parametrize("r", [0.8, -0.5, 1.0])
+def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
+    x, y, z = correlated(tmp_path, "normal", r)
+    found = np.corrcoef([x, y, z])
+    assert found[0, 2] == pytest.approx(r, abs=5e-3)
+    assert found[0, 1] == pytest.approx(0.0, abs=5e-3)
+    assert [each.std() for each in (x, y, z)] == pytest.approx([2e-3] * 3, rel=5e-3)
+    if r == 1.0:
+        np.testing.assert_allclose(x, z, rtol=1e-12)
+
+
+def test_correlated_uniform_coordinates_follow_copula(tmp_path):
+    x, _, z = correlated(tmp_path, "uniform", 0.8)
+    assert np.corrcoef(x, z)[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=5e-3)
+    assert np.abs([x, z]).max() <= 2e-3
+    assert x.std() == pytest.approx(2e-3 / np.sqrt(3.0), rel=5e-3)
+
+
+def test_impossible_samplings_are_refused(tmp_path):
+    found = variation(tmp_path, tip={"at": "tip", "sigma": 1.0})
+    with pytest.raises(KincheckError, match="6 GB of memory, expected at most 1; take fewer"):
+        found.sampled(Sampling.LATIN, 500_000_000)
+    with pytest.raises(KincheckError, match="expected at most 4294967296; take fewer"):
+        found.sampled(Sampling.SOBOL, 2**32 + 1)
+    tables = {"mode": "grid"}
+    grid = variation(tmp_path, tables, tip={"at": "tip", "values": [-1, 1]})
+    with pytest.raises(KincheckError, match="--sampling latin: grid draws nothing"):
+        grid.sampled(Sampling.LATIN, 8)

@@ -1,14 +1,24 @@
-"""The four-bar of `oracles.four_bar_forces` as a case file, with axes off by digits."""
+"""A planar four-bar of four parallel hinges as a case file, with axes off by digits, and its
+forces: of the solver, and the independent ones of the stress run for exact axes.
+"""
 
 import json
+import tempfile
+from functools import cache
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.kinematics import solve
+from kincheck.core.studies.truth.forces import known_forces
+from kincheck.core.studies.truth.motion import followed
 
-from ..oracles.four_bar_forces import BODIES, CENTERS, GRAVITY, HINGES, INERTIA, MASS
-
+HINGES = {"a": (0.0, 0.0, 0.0), "b": (0.0, 0.0, 0.3), "c": (0.5, 0.0, 0.5), "d": (0.6, 0.0, 0.0)}
+BODIES = {"a": ("ground", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker")}
+BODIES["d"] = ("rocker", "ground")
+CENTERS = {"crank": (0.0, 0.05, 0.15), "coupler": (0.25, 0.02, 0.4), "rocker": (0.55, -0.03, 0.25)}
+MASS, INERTIA, GRAVITY = 1.0, 0.1, np.array([0.0, 0.0, -9.81])
 ANGLES = (-0.3, 0.0, 0.3)
 
 
@@ -113,3 +123,19 @@ def solved(file, turn=None, scale=1.0):
     found = solve(case.mechanism, "turn", case.sweep.values, forces=True)
     assert found.solved.all(), found.message
     return case, components(found.forces, turn, scale)
+
+
+@cache
+def truth(cross=None):
+    """Reactions and efforts of exact axes, as `components`: not a number where rigid bodies do not
+    determine them.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        case = load_case(written(Path(folder), cross=cross))
+    known = known_forces(case, followed(case))
+    found = {name: np.where(each.determined, each.values, np.nan) for name, each in known.items()}
+    reactions = [
+        [found[f"{joint} {kind} {axis}"] for kind in ("force", "moment") for axis in "xyz"]
+        for joint in "abcd"
+    ]
+    return np.array(reactions).transpose(2, 0, 1), found["effort"]

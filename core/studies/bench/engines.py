@@ -21,26 +21,24 @@ from ...program.llvm import compiler
 from ...program.llvm.jit import compiled_at_once
 from ...report.figure_data import Effort
 from ..paper.formulation import Formulation
-from . import native_breakdown, scaling
-from .batch import Batch, measure_batches
-from .loop_times import LoopTime, measure_loops
-from .peak import Peak, prepare
+from . import native_breakdown
+from .designs import Batch, StudyRate, measure_batches, measure_studies
 from .precision import (
     Contestant,
     Entry,
     FloorOf,
+    LoopTime,
     Needed,
     contestants,
     efforts_of,
     floors,
+    measure_loops,
     needed,
     with_truth,
 )
 from .processes import Process, measure_processes
-from .rounds import Spread, Work, take_turns
-from .scaling import Scaling
-from .size import Size, measure_sizes
-from .study_throughput import StudyRate, measure_studies
+from .rounds import Peak, Spread, Work, prepare, take_turns
+from .size import Scaling, Size, measure_scalings, measure_sizes
 
 NAME = "bench"
 PARTS = ("work", "loop", "batch", "study", "size", "processes")
@@ -153,7 +151,7 @@ def measure(
         add("sizes", measure_sizes(projections, tol, rounds))
         if native:
             begin("large mechanisms")
-            add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
+            add("scalings", measure_scalings(LARGE, tol, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
         begin(f"{first.name}: separate processes")
         # variants of a simulator need the same memory

@@ -1,5 +1,5 @@
 """Work and precision: error and run time of each engine on a case at each effort, judged as in a
-run.
+run; and the cost of its whole loop over the cases, as a multiple of another engine's.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from ...case.case import Case, Truth
 from ...case.io.reference_file import series
@@ -18,7 +19,7 @@ from ...harness.record import Outcome, Record
 from ...harness.run import run
 from ...trajectory import Trajectory
 from ..verified_reference import prove_case
-from .rounds import Spread
+from .rounds import Spread, take_turns
 
 # Digits of a proved reference: more than a double has.
 DIGITS = 20
@@ -245,3 +246,76 @@ def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
             )
         )
     return found
+
+
+# Base of the ratios: its simulator adds the least work to its kinematics.
+BASE = "pinocchio"
+
+
+class LoopTime(msgspec.Struct, frozen=True, kw_only=True):
+    """Time of an engine in projection mode over the cases that both it and the base solve.
+
+    Attributes:
+        base: name of the engine that the ratios refer to.
+        cases: number of the cases.
+        us_per_sample: warm time per sample, median over the cases [us].
+        ratio, lower, upper: ratio of the time to the base's time on the same case, median and
+            extremes.
+    """
+
+    engine: str
+    loop: str
+    base: str
+    cases: int
+    us_per_sample: float
+    ratio: float
+    lower: float
+    upper: float
+
+
+def measure_loops(
+    cases: Iterable[Case],
+    engines: Sequence[Engine],
+    tol: float,
+    rounds: int,
+    progress: Callable[[str], object],
+) -> list[LoopTime]:
+    """Return the times of all engines, which take turns on each case; without Pinocchio the base is
+    the first engine.
+
+    The least time of the rounds counts, so that other processes do not affect the ratios.
+    """
+    able = [engine for engine in engines if engine.version() is not None]
+    names = [engine.name for engine in able]
+    if not able:
+        return []
+    base = BASE if BASE in names else names[0]
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
+    for case in cases:
+        progress(f"{case.name}: loops of {len(able)} engines")
+        work = {e.name: _work(case, e, tol) for e in able if e.unsupported(case) is None}
+        if base not in work:
+            continue
+        us = {
+            name: 1e6 * each.least / len(case.sweep.values)
+            for name, each in take_turns(work, rounds).items()
+        }
+        for name, each in us.items():
+            found[name].append((each, each / us[base]))
+    return [_summary(engine, base, found) for engine in able if found[engine.name]]
+
+
+def _summary(
+    engine: Engine, base: str, found: Mapping[str, Sequence[tuple[float, float]]]
+) -> LoopTime:
+    us, ratios = np.array(found[engine.name]).T
+    return LoopTime(
+        engine=engine.name,
+        loop=engine.loop,
+        base=base,
+        cases=len(us),
+        us_per_sample=float(np.median(us)),
+        ratio=float(np.median(ratios)),
+        lower=float(ratios.min()),
+        upper=float(ratios.max()),
+    )

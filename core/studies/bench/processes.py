@@ -1,5 +1,5 @@
-"""Cost of the first use, and memory: each measurement is a new process, and the kinds of processes
-take turns.
+"""Cost of the first use, stage by stage, and memory: each measurement is a new process, and the
+kinds of processes take turns.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
@@ -19,8 +20,49 @@ import msgspec
 
 from ...case.case import Case
 from ...harness.engine import Engine, may_run_here
-from .cold_start import FIRST, STAGES
+from ...harness.native_engine import NativeEngine
+from .native_breakdown import level
 from .rounds import Spread, spread
+
+STAGES = (
+    "import numpy",
+    "import kincheck",
+    "build",
+    "first solve",
+    "second solve",
+    "ten more",
+    "solve anew",
+)
+FIRST = STAGES[1:4]
+"""The stages after the import of numpy, up to the first solution."""
+
+
+def first_use(clock: Sequence[float]) -> None:
+    """Build and solve the pickled case from standard input; print the seconds of all stages as a
+    line of JSON.
+
+    The last stage solves the same case again, as repeated calls of `solve` do.
+
+    Args:
+        clock: times of the start of the process, the import of numpy and the import of the solver.
+    """
+    case, tol = pickle.load(sys.stdin.buffer)
+    begin = perf_counter()
+    whole = level()
+    model = whole.build(case)
+    now = [begin, perf_counter()]
+    for solves in (1, 1, 10):  # during ten more solves, programs are compiled
+        for _ in range(solves):
+            whole.solve(model, case, tol)
+        now.append(perf_counter())
+    anew, recent = 0.0, NativeEngine(every_body=True)
+    for _ in range(2):  # so far nothing of this case is cached
+        begin = perf_counter()
+        recent.solve(recent.build(case), case, tol)
+        anew = perf_counter() - begin
+    stages = [*(b - a for each in (clock, now) for a, b in pairwise(each)), anew]
+    print(json.dumps(dict(zip(STAGES, stages, strict=True))))
+
 
 # Fewer rounds than for solves: a process takes a second.
 MOST_ROUNDS = 5
@@ -43,8 +85,8 @@ import numpy
 clock.append(perf_counter())
 from kincheck.core import solve
 clock.append(perf_counter())
-from kincheck.core.studies.bench import cold_start
-cold_start.first_use(clock){_TELL}"""
+from kincheck.core.studies.bench.processes import first_use
+first_use(clock){_TELL}"""
 # as the console script, but in one process, so that its memory is the total
 _RUN = f"""
 import sys

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from time import process_time
 from typing import Any
 
@@ -18,6 +19,7 @@ import msgspec
 import numpy as np
 
 from ...case.case import Case, Output, Series, Sweep, Truth
+from ...errors import SolveError
 from ...harness.engine import Engine
 from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
@@ -26,17 +28,18 @@ from ...joints import Revolute, Spherical, Universal
 from ...kinematics import Method, NativeSolver
 from ...mechanism.mechanism import Body, Mechanism, Point
 from ...mechanism.motions import JointAngle
+from ...trajectory import Trajectory
 from .precision import Contestant, contestants
-from .ring import pivot, ring
+from .ring import LEAN, pivot, ring
 from .rounds import Spread, take_turns, warmed
 
 LOOPS = (1, 2, 4, 8, 16)
 CRANKS = (4, 8, 16, 24, 48, 100)
 MANY = (16, 100, 1000, 5000)
 """Chain lengths for an engine that solves loop by loop."""
-# Angle of the cranks at design [rad]; a quarter turn from upright the links are in line and the
+# Turn of the cranks to both sides [rad]; a quarter turn from upright the links are in line and the
 # motion branches.
-LEAN, TURN = 0.3, 0.8
+TURN = 0.8
 SAMPLES = 64
 # Largest time for all samples of one size [s]; a slower engine is not tried with the next size,
 # which would fill the rounds.
@@ -194,6 +197,66 @@ def _solved(
                 if seconds > LONGEST
                 else ""
             )
+
+
+class Scaling(msgspec.Struct, frozen=True, kw_only=True):
+    """A mechanism of one size, solved by one method: position, velocity and acceleration of one
+    point far from the driver.
+
+    Attributes:
+        size: number of loops of the chain, or of cranks of the ring.
+        residual: largest constraint residual [m].
+        error: position error of the point [m].
+    """
+
+    mechanism: str
+    size: int
+    bodies: int
+    unknowns: int
+    path: str
+    us_per_value: Spread
+    residual: float
+    error: float
+
+
+def measure_scalings(sizes: Sequence[int], tol: float, rounds: int) -> list[Scaling]:
+    """Solve large chains and rings as one sparse system, in turns.
+
+    Raises:
+        SolveError: not all samples of a sweep were reached.
+    """
+    cases = {("chain", n): chain(n) for n in sizes} | {("ring", n): circle(n) for n in sizes}
+    solver = NativeSolver(method=Method.SPARSE)
+    work = {
+        key: partial(solver.prepare(case.mechanism, case.sweep.path, case.outputs[0].points), tol)
+        for key, case in cases.items()
+    }
+    seconds = take_turns(work, rounds)
+    return [_scaling(key, case, work[key](), seconds[key]) for key, case in cases.items()]
+
+
+def _scaling(key: tuple[str, int], case: Case, found: Trajectory, seconds: Spread) -> Scaling:
+    name, size = key
+    if not found.solved.all():
+        raise SolveError(f"bench: {name} of {size}: {found.message}")
+    x, y = (case.reference[output.name].position for output in case.outputs)
+    off = found.points[case.outputs[0].points[0]].position - np.stack([x, y, 0.0 * x], axis=1)
+    return Scaling(
+        mechanism=name,
+        size=size,
+        bodies=len(case.mechanism.bodies),
+        unknowns=found.details["unknowns"],
+        path="sparse",
+        us_per_value=seconds.times(1e6 / SAMPLES),
+        residual=found.residual,
+        error=float(np.abs(off).max()),
+    )
+
+
+def exponent(small: Scaling, large: Scaling) -> float:
+    """Return the exponent of the size in the growth of the cost between two rows."""
+    ratio = large.us_per_value.median / small.us_per_value.median
+    return math.log(ratio) / math.log(large.unknowns / small.unknowns)
 
 
 def growth(sizes: Sequence[Size]) -> tuple[int, int, float] | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ...report.markdown import escaped, row
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
-from .results import Cell, Finding, Stress
+from .results import Cell, Finding, Stress, largest
 from .verdicts import ELSEWHERE, SILENT, Verdict
 
 NAME = "stress"
@@ -62,42 +62,33 @@ def report(found: Stress) -> Report:
 
 def headline(cells: Sequence[Cell]) -> str:
     """Return a phrase with the numbers of silently wrong, examined and unexamined samples."""
-    count = {verdict: sum(cell.samples.get(verdict, 0) for cell in cells) for verdict in Verdict}
-    apart = [
-        f"{count[verdict]} {SHORT[verdict]}"
-        for verdict in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
-        if count[verdict]
-    ]
-    wrong, examined = sum(count[each] for each in SILENT), sum(map(_examined, cells))
+    wrong, examined = _count(cells, *SILENT), _examined(cells)
     sentence = (
         f"{wrong or 'None'} of {examined} samples silently wrong"
         if examined
         else "No sample was examined"
     )
-    return ", ".join([sentence, *apart])
+    apart = (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
+    counts = [f"{count} {SHORT[each]}" for each in apart if (count := _count(cells, each))]
+    return ", ".join([sentence, *counts])
 
 
-def _examined(cell: Cell) -> int:
+def _examined(cells: Sequence[Cell]) -> int:
     """Return the number of samples whose answer has a verdict."""
-    return (
-        sum(cell.samples.values())
-        - cell.samples.get(Verdict.UNJUDGED, 0)
-        - cell.samples.get(Verdict.UNSUPPORTED, 0)
-    )
+    unexamined = _count(cells, Verdict.UNJUDGED, Verdict.UNSUPPORTED)
+    return sum(sum(cell.samples.values()) for cell in cells) - unexamined
 
 
 def idle(found: Stress) -> list[str]:
     """Return a line with the reason for each engine without an examined sample."""
     lines: list[str] = []
-    for engine in dict.fromkeys(map(_engine, found.cells)):
-        cells = [cell for cell in found.cells if _engine(cell) == engine]
-        if cells[0].version is not None and any(map(_examined, cells)):
+    for engine, cells in _by_engine(found.cells).items():
+        if cells[0].version is None:
+            why = "it is not installed"
+        elif not _examined(cells):
+            why = "choose other families or another engine"
+        else:
             continue
-        why = (
-            "it is not installed"
-            if cells[0].version is None
-            else "choose other families or another engine"
-        )
         lines.append(f"{engine}: {headline(cells)[0].lower()}{headline(cells)[1:]}: {why}")
     return lines
 
@@ -108,74 +99,45 @@ def _shares(found: Stress) -> Section:
         for verdict in SHORT
         if verdict not in OF_FORCES or any(cell.samples.get(verdict, 0) for cell in found.cells)
     ]
-    rows = [
-        [
-            cell.family,
-            _engine(cell),
-            str(cell.specimens),
-            *_counts(cell, shown),
-            *map(_ratio, cell.worst),
-        ]
-        for cell in found.cells
-    ]
-    for engine in dict.fromkeys(map(_engine, found.cells)):
-        cells = [cell for cell in found.cells if _engine(cell) == engine]
-        whole = Cell(
-            family="all",
-            engine=cells[0].engine,
-            mode=cells[0].mode,
-            version=cells[0].version,
-            settings=cells[0].settings,
-            specimens=sum(cell.specimens for cell in cells),
-            samples={name: sum(cell.samples[name] for cell in cells) for name in cells[0].samples},
-            elsewhere=sum(cell.elsewhere for cell in cells),
-            worst=[
-                max((x for c in cells if (x := c.worst[k]) is not None), default=None)
-                for k in range(len(ERRORS))
-            ],
-            bad=sum(cell.bad for cell in cells),
-            seconds=sum(cell.seconds for cell in cells),
-        )
-        rows.append(
-            ["all", engine, str(whole.specimens), *_counts(whole, shown), *map(_ratio, whole.worst)]
-        )
-    settings = {_engine(cell): cell for cell in found.cells}
-    told = [
-        f"{name} {cell.version}: "
-        + "; ".join(f"{key}: {value}" for key, value in cell.settings.items())
-        for name, cell in settings.items()
+    rows = [_row(cell.family, [cell], shown) for cell in found.cells]
+    engines = _by_engine(found.cells)
+    rows += [_row("all", cells, shown) for cells in engines.values()]
+    wrong = [f"{name} {_count(cells, *SILENT)}" for name, cells in engines.items()]
+    settings = [
+        f"{name} {cells[-1].version}: "
+        + "; ".join(f"{key}: {value}" for key, value in cells[-1].settings.items())
+        for name, cells in engines.items()
     ]
     columns = ["family", "engine", "specimens", *(SHORT[each] for each in shown), *ERRORS]
-    return Section("Samples by outcome", [_verdict(found)], [*NOTES, *told], columns, 2, rows)
+    verdict = f"Silently wrong: {', '.join(wrong)}."
+    return Section("Samples by outcome", [verdict], [*NOTES, *settings], columns, 2, rows)
 
 
-def _verdict(found: Stress) -> str:
-    wrong = {_engine(cell): 0 for cell in found.cells}
-    for cell in found.cells:
-        wrong[_engine(cell)] += sum(cell.samples.get(each, 0) for each in SILENT)
-    return (
-        "Silently wrong: " + ", ".join(f"{engine} {count}" for engine, count in wrong.items()) + "."
-    )
-
-
-def _counts(cell: Cell, shown: Sequence[Verdict]) -> list[str]:
+def _row(family: str, cells: Sequence[Cell], shown: Sequence[Verdict]) -> list[str]:
     """Return the number of samples by verdict, with the share of the supported samples."""
-    supported = sum(cell.samples.values()) - cell.samples.get(Verdict.UNSUPPORTED, 0)
-    texts: list[str] = []
+    supported = sum(sum(cell.samples.values()) for cell in cells)
+    supported -= _count(cells, Verdict.UNSUPPORTED)
+    elsewhere = sum(cell.elsewhere for cell in cells)
+    texts = [family, _engine(cells[0]), str(sum(cell.specimens for cell in cells))]
     for verdict in shown:
-        count = cell.samples.get(verdict, 0)
-        share = (
-            f" ({100 * count / supported:.3g} %)"
-            if supported and count and verdict is not Verdict.UNSUPPORTED
-            else ""
-        )
-        elsewhere = (
-            f", {cell.elsewhere} in another assembly"
-            if verdict is Verdict.SILENTLY_WRONG and cell.elsewhere
-            else ""
-        )
-        texts.append(f"{count}{share}{elsewhere}")
-    return texts
+        text = str(count := _count(cells, verdict))
+        if supported and count and verdict is not Verdict.UNSUPPORTED:
+            text += f" ({100 * count / supported:.3g} %)"
+        if verdict is Verdict.SILENTLY_WRONG and elsewhere:
+            text += f", {elsewhere} in another assembly"
+        texts.append(text)
+    return [*texts, *map(_ratio, largest(cell.worst for cell in cells))]
+
+
+def _by_engine(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+    found: dict[str, list[Cell]] = {}
+    for cell in cells:
+        found.setdefault(_engine(cell), []).append(cell)
+    return found
+
+
+def _count(cells: Sequence[Cell], *verdicts: Verdict) -> int:
+    return sum(cell.samples.get(verdict, 0) for cell in cells for verdict in verdicts)
 
 
 def _families(found: Stress) -> Section:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 import msgspec
@@ -59,6 +60,12 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
     worst: list[float | None]
     bad: int
     seconds: float
+
+
+def largest(errors: Iterable[Sequence[float | None]]) -> list[float | None]:
+    """Return the largest error of each quantity; None if nothing was compared."""
+    columns = zip([None] * 4, *errors, strict=True)
+    return [max((x for x in each if x is not None), default=None) for each in columns]
 
 
 class Proofs(msgspec.Struct, frozen=True, kw_only=True):

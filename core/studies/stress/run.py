@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -12,18 +13,17 @@ import numpy as np
 from ...case.case import Case
 from ...errors import KincheckError, SolveError
 from ...harness.engine import Engine
-from ...harness.execution import Failure, Pair
+from ...harness.execution import Answer, Failure, Pair
 from ...harness.provenance import plain
-from ...harness.record import Outcome
 from ...kinematics import UnprovedError
 from ...version import VERSION
 from ..truth.motion import Reach, Truth
 from ..truth.proofs import distance_from_proof
 from ..truth.rows import require_extended
 from .families import Family, Specimen
-from .results import Acceptance, Cell, Finding, Proofs, Stress
+from .results import Acceptance, Cell, Finding, Proofs, Stress, largest
 from .solving import solve_all, suited
-from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
+from .verdicts import BAD, Judgement, Verdict, judged, refused_description
 
 # Fewest specimens of a small share, and fewest samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
@@ -44,24 +44,19 @@ class Example:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
-    """A specimen with its case, or the reason for its refusal, and its reference."""
+class Draw:
+    """A specimen with its number in the family and its reference."""
 
     number: int
     samples: int
     specimen: Specimen
-    case: Case | None
-    refusal: KincheckError | None
     truth: Truth | None
 
-
-@dataclass(eq=False)
-class _Results:
-    cells: list[Cell] = field(default_factory=list[Cell])
-    proofs: list[Proofs] = field(default_factory=list[Proofs])
-    examples: list[Example] = field(default_factory=list[Example])
-    acceptances: list[Acceptance] = field(default_factory=list[Acceptance])
-    unfinished: dict[str, str] = field(default_factory=dict[str, str])
+    @property
+    def case(self) -> Case | None:
+        """The case; None if its description is refused."""
+        found = self.specimen.case
+        return found if isinstance(found, Case) else None
 
 
 def stress(
@@ -80,77 +75,52 @@ def stress(
     task and the finished part. A KincheckError is raised if this machine has no extended precision.
     """
     require_extended()
-    found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
+    run, unfinished = _Run(seed), dict[str, str]()
+    share, parts = max(1, samples // len(families)), 1 + len(engines)
     for number, family in enumerate(families):
+        name, done = family.name, number / len(families)
         try:
-            _family(
-                family,
-                engines,
-                found,
-                seconds,
-                samples=max(1, samples // len(families)),
-                seed=seed,
-                prove=prove,
-                progress=lambda what, done, before=number: progress(
-                    what, (before + done) / len(families)
-                ),
-            )
+            progress(f"{name}: making {share} samples", done)
+            with run.timed("truth"):
+                draws = specimens(family, seed, share)
+            if prove:
+                with run.timed("proofs"):
+                    run.prove(name, draws)
+            count = f"{sum(draw.samples for draw in draws)} samples of {len(draws)} specimens"
+            for k, engine in enumerate(engines, 1):
+                progress(f"{name}: {count} by {engine.name}", done + k / parts / len(families))
+                with run.timed("engines"):
+                    run.solve(name, engine, draws)
         except KincheckError as error:  # the other families keep their results
-            found.unfinished[family.name] = str(error)
-            progress(f"{family.name}: not finished: {error}", (number + 1) / len(families))
+            unfinished[name] = str(error)
+            progress(f"{name}: not finished: {error}", (number + 1) / len(families))
     results = Stress(
         kincheck=VERSION,
         command=command,
         seed=seed,
         samples=samples,
         abouts={family.name: family.about for family in families},
-        cells=found.cells,
-        findings=[example.finding for example in found.examples],
-        proofs=found.proofs,
-        acceptances=found.acceptances,
-        seconds=seconds,
-        unfinished=found.unfinished,
+        cells=run.cells,
+        findings=[example.finding for example in run.examples],
+        proofs=run.proofs,
+        acceptances=run.acceptances,
+        seconds=run.seconds,
+        unfinished=unfinished,
     )
-    return results, found.examples
+    return results, run.examples
 
 
-def _family(
-    family: Family,
-    engines: Sequence[Engine],
-    found: _Results,
-    seconds: dict[str, float],
-    *,
-    samples: int,
-    seed: int,
-    prove: bool,
-    progress: Callable[[str, float], object],
-) -> None:
-    begun, parts = perf_counter(), 1 + len(engines)
-    progress(f"{family.name}: making {samples} samples", 0.0)
-    made = specimens(family, seed, samples)
-    seconds["truth"] += (now := perf_counter()) - begun
-    if prove:
-        found.proofs += _proofs(family.name, made, seed)
-    seconds["proofs"] += (then := perf_counter()) - now
-    count = f"{sum(each.samples for each in made)} samples of {len(made)} specimens"
-    for number, engine in enumerate(engines, 1):
-        progress(f"{family.name}: {count} by {engine.name}", number / parts)
-        _solve(family, engine, made, found)
-    seconds["engines"] += perf_counter() - then
-
-
-def specimens(family: Family, seed: int, share: int) -> list[Made]:
+def specimens(family: Family, seed: int, share: int) -> list[Draw]:
     """Return specimens with a share of samples in total."""
     most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
-    found: list[Made] = []
-    while (done := sum(one.samples for one in found)) < share:
-        found.append(
-            specimen(family, seed, len(found), min(most, max(FEWEST_SAMPLES, share - done)))
-        )
+    found: list[Draw] = []
+    while (done := sum(draw.samples for draw in found)) < share:
+        rest = min(most, max(FEWEST_SAMPLES, share - done))
+        found.append(specimen(family, seed, len(found), rest))
     return found
 
 
-def specimen(family: Family, seed: int, number: int, most: int) -> Made:
+def specimen(family: Family, seed: int, number: int, most: int) -> Draw:
     """Return specimen `number` of a family; its mechanism is independent of the rest of the run."""
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
     # a coarse sweep is harder to solve, a fine sweep has more samples to judge
@@ -158,143 +128,133 @@ def specimen(family: Family, seed: int, number: int, most: int) -> Made:
     wanted = int(COARSEST * (family.samples / COARSEST) ** fineness) if family.several else most
     samples = min(wanted, most)
     one = family.specimen(rng, samples)
-    try:
-        case = one.describe()
-    except KincheckError as error:
-        return Made(number, samples, one, None, error, None)
-    return Made(number, samples, one, case, None, one.truth(case) if one.truth else None)
+    truth = one.truth(one.case) if one.truth and isinstance(one.case, Case) else None
+    return Draw(number, samples, one, truth)
 
 
-def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results) -> None:
-    """Solve all specimens of a family with an engine."""
-    begun = perf_counter()
-    there = [(one, one.case) for one in made if one.case is not None]
-    answers = solve_all(
-        [Pair(case, suited(engine, case, one.number), one.specimen.tol) for one, case in there]
+@dataclass(eq=False)
+class _Run:
+    seed: int
+    cells: list[Cell] = field(default_factory=list[Cell])
+    proofs: list[Proofs] = field(default_factory=list[Proofs])
+    examples: list[Example] = field(default_factory=list[Example])
+    acceptances: list[Acceptance] = field(default_factory=list[Acceptance])
+    seconds: dict[str, float] = field(
+        default_factory=lambda: {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
     )
-    results = {
-        one.number: (case, answer) for (one, case), answer in zip(there, answers, strict=True)
-    }
-    judgements: list[tuple[Made, Judgement]] = []
-    for one in made:
-        if one.refusal is not None:
-            judgements.append((one, described_wrong(one.specimen, one.samples, one.refusal)))
-            continue
-        case, answer = results[one.number]
-        judgement = judged(one.specimen, case, one.truth, answer)
-        judgements.append((one, judgement))
-        missing = isinstance(answer, Failure) and answer.outcome in (
-            Outcome.UNSUPPORTED,
-            Outcome.UNAVAILABLE,
-        )
-        if (
-            one.specimen.reported
-            and one.truth is not None
-            and one.truth.violated is not None
-            and not missing
-        ):
-            accepted = not isinstance(answer, Failure) and answer.solved == one.samples
-            tilt = dict(one.specimen.facts).get("tilt", 0.0)
-            unavoidable = float(one.truth.violated.max())
-            found.acceptances.append(
-                Acceptance(
-                    engine=engine.name,
-                    tilt=tilt,
-                    accepted=accepted,
-                    told=judgement.told,
-                    unavoidable=unavoidable,
-                )
+
+    @contextmanager
+    def timed(self, part: str) -> Generator[None]:
+        begun = perf_counter()
+        yield
+        self.seconds[part] += perf_counter() - begun
+
+    def solve(self, family: str, engine: Engine, draws: Sequence[Draw]) -> None:
+        """Solve and judge all specimens of a family with an engine."""
+        begun = perf_counter()
+        cases = [(draw, draw.case) for draw in draws if draw.case is not None]
+        answers = iter(
+            solve_all(
+                [Pair(case, suited(engine, case, d.number), d.specimen.tol) for d, case in cases]
             )
-    found.cells.append(_cell(family, engine, judgements, perf_counter() - begun))
-    for verdict in BAD:
-        bad = [
-            (one, each) for one, each in judgements if each.counts[verdict] and one.case is not None
-        ]
-        if bad:
-            one, judgement = min(bad, key=lambda pair: _size(pair[0]))
-            found.examples.append(_example(family, engine, one, judgement, verdict))
+        )
+        judgements: list[tuple[Draw, Judgement]] = []
+        for draw in draws:
+            if draw.case is None:
+                judgements.append((draw, refused_description(draw.specimen, draw.samples)))
+                continue
+            answer = next(answers)
+            judgement = judged(draw.specimen, draw.case, draw.truth, answer)
+            judgements.append((draw, judgement))
+            if not judgement.counts[Verdict.UNSUPPORTED]:
+                self._accept(engine, draw, answer, judgement)
+        self.cells.append(_cell(family, engine, judgements, perf_counter() - begun))
+        for verdict in BAD:
+            bad = [pair for pair in judgements if pair[1].counts[verdict] and pair[0].case]
+            if bad:
+                self._example(family, engine, verdict, *min(bad, key=lambda pair: _size(pair[0])))
+
+    def _accept(
+        self, engine: Engine, draw: Draw, answer: Answer | Failure, judgement: Judgement
+    ) -> None:
+        """Record whether an engine accepts contradictory geometry."""
+        tilt, truth = draw.specimen.tilt, draw.truth
+        if tilt is None or truth is None or truth.violated is None:
+            return
+        self.acceptances.append(
+            Acceptance(
+                engine=engine.name,
+                tilt=tilt,
+                accepted=not isinstance(answer, Failure) and answer.solved == draw.samples,
+                told=judgement.told,
+                unavoidable=float(truth.violated.max()),
+            )
+        )
+
+    def _example(
+        self, family: str, engine: Engine, verdict: Verdict, draw: Draw, judgement: Judgement
+    ) -> None:
+        case, sample = draw.case, judgement.first(verdict)
+        if case is None or sample is None:
+            raise ValueError("an example needs a case and a bad sample")
+        finding = Finding(
+            family=family,
+            engine=engine.name,
+            mode=engine.mode,
+            verdict=verdict,
+            specimen=draw.specimen.name,
+            number=draw.number,
+            sample=sample,
+            value=float(case.sweep.values[sample]),
+            message=judgement.message,
+            tol=draw.specimen.tol,
+            worst=list(judgement.worst),
+        )
+        solver = suited(engine, case, draw.number)
+        self.examples.append(Example(solver, draw.specimen, case, verdict, finding))
+
+    def prove(self, family: str, draws: Sequence[Draw]) -> None:
+        """Prove a random sample of every other small mechanism with a followed reference."""
+        rng, proved, worst = np.random.default_rng([self.seed, 1]), 0, 0.0
+        reasons: list[str] = []
+        for draw in draws[::2]:
+            truth = draw.truth
+            if truth is None or not truth.parts:
+                continue
+            reached = np.flatnonzero(truth.reach == Reach.REACHED)
+            if not len(reached) or len(truth.system.mechanism.moving) > LARGEST_PROVED:
+                continue
+            try:
+                worst = max(worst, distance_from_proof(truth, int(rng.choice(reached))))
+                proved += 1
+            except (UnprovedError, SolveError) as error:  # SolveError: near a singular design
+                reasons.append(f"{draw.specimen.name}: {error}")
+        if tried := proved + len(reasons):
+            self.proofs.append(
+                Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)
+            )
 
 
-def _size(one: Made) -> tuple[int, int]:
-    return (len(one.case.mechanism.bodies), len(one.case.mechanism.joints)) if one.case else (0, 0)
+def _size(draw: Draw) -> tuple[int, int]:
+    mechanism = draw.case.mechanism if draw.case else None
+    return (len(mechanism.bodies), len(mechanism.joints)) if mechanism else (0, 0)
 
 
 def _cell(
-    family: Family, engine: Engine, judgements: Sequence[tuple[Made, Judgement]], seconds: float
+    family: str, engine: Engine, judgements: Sequence[tuple[Draw, Judgement]], seconds: float
 ) -> Cell:
-    worst: list[float | None] = [None] * 4
-    for _, each in judgements:
-        if not each.counts[Verdict.SILENTLY_WRONG]:
-            worst = [
-                max((x for x in pair if x is not None), default=None)
-                for pair in zip(worst, each.worst, strict=True)
-            ]
+    counts = [each.counts for _, each in judgements]
+    true = [each.worst for _, each in judgements if not each.counts[Verdict.SILENTLY_WRONG]]
     return Cell(
-        family=family.name,
+        family=family,
         engine=engine.name,
         mode=engine.mode,
         version=engine.version(),
         settings=plain(engine.settings),
         specimens=len(judgements),
-        samples={
-            str(verdict): sum(each.counts[verdict] for _, each in judgements) for verdict in Verdict
-        },
+        samples={str(verdict): sum(each[verdict] for each in counts) for verdict in Verdict},
         elsewhere=sum(each.elsewhere for _, each in judgements),
-        worst=worst,
-        bad=sum(any(each.counts[verdict] for verdict in BAD) for _, each in judgements),
+        worst=largest(true),
+        bad=sum(any(each[verdict] for verdict in BAD) for each in counts),
         seconds=seconds,
-    )
-
-
-def _example(
-    family: Family, engine: Engine, one: Made, judgement: Judgement, verdict: Verdict
-) -> Example:
-    case, sample = one.case, judgement.first(verdict)
-    if case is None or sample is None:
-        raise ValueError("an example needs a case and a bad sample")
-    finding = Finding(
-        family=family.name,
-        engine=engine.name,
-        mode=engine.mode,
-        verdict=verdict,
-        specimen=one.specimen.name,
-        number=one.number,
-        sample=sample,
-        value=float(case.sweep.values[sample]),
-        message=judgement.message,
-        tol=one.specimen.tol,
-        worst=list(judgement.worst),
-    )
-    return Example(suited(engine, case, one.number), one.specimen, case, verdict, finding)
-
-
-def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
-    """Prove a random sample of every other small mechanism with a followed reference."""
-    rng, tried, proved, worst = np.random.default_rng([seed, 1]), 0, 0, 0.0
-    reasons: list[str] = []
-    for one in made[::2]:
-        truth = one.truth
-        if (
-            truth is None
-            or not truth.parts
-            or one.case is None
-            or len(one.case.mechanism.moving) > LARGEST_PROVED
-        ):
-            continue
-        reached = np.flatnonzero(truth.reach == Reach.REACHED)
-        if not len(reached):
-            continue
-        tried += 1
-        try:
-            worst = max(worst, distance_from_proof(truth, int(rng.choice(reached))))
-            proved += 1
-        except (
-            UnprovedError,
-            SolveError,
-        ) as error:  # also raised too near to a singular design
-            reasons.append(f"{one.specimen.name}: {error}")
-    return (
-        [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)]
-        if tried
-        else []
     )

@@ -80,11 +80,13 @@ class Judgement:
         return int(found[0]) if len(found) else None
 
 
-def described_wrong(specimen: Specimen, samples: int, error: KincheckError) -> Judgement:
+def refused_description(specimen: Specimen, samples: int) -> Judgement:
     """Return the judgement of a specimen with a refused description, which is the same for every
     engine.
     """
-    right = specimen.truth is None and error.kind in specimen.reasons
+    error = specimen.case
+    kind = error.kind if isinstance(error, KincheckError) else None
+    right = specimen.truth is None and kind in specimen.reasons
     verdict = Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY
     return _all(samples, verdict, str(error))
 
@@ -123,11 +125,8 @@ def judged(
                 continue
             compared[k] = True
             # a missing value of a solved sample is infinitely wrong
-            off = (
-                np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)[known]
-                .max(axis=1)
-                .astype(np.float64)
-            )
+            errors_of_axes = np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)
+            off = errors_of_axes[known].max(axis=1).astype(np.float64)
             bound = np.maximum(truth.bounds[name][k, known], np.finfo(np.float64).tiny)
             ratios[k, known] = np.maximum(ratios[k, known], off / bound)
             if k == 0:
@@ -136,7 +135,7 @@ def judged(
     forces = _judged_forces(case, truth, result, known & ~wrong, ratios[3])
     compared[3] = bool(np.isfinite(ratios[3]).any() and (ratios[3] > 0.0).any())
     told = max(result.residual, float(result.details.get("redundant_residual") or 0.0))
-    if specimen.reported and truth.violated is not None:
+    if specimen.tilt is not None and truth.violated is not None:
         wrong |= known & (truth.violated > SPREAD * told)
     verdicts[solved] = Verdict.UNJUDGED
     verdicts[known] = np.where(wrong, Verdict.SILENTLY_WRONG, Verdict.RIGHT)[known]

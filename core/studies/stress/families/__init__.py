@@ -1,13 +1,14 @@
-"""Families of difficult situations. The study loads every module in this folder, so a new class in
-a new file is a new family.
-"""
+"""Families of difficult situations."""
 
-import importlib
-import pkgutil
-
+from . import arms, degenerate, forces, loops, planar, spatial
 from .base import Family, Specimen
 
-for _module in pkgutil.iter_modules(__path__):
-    importlib.import_module(f".{_module.name}", __name__)
+__all__ = ["FAMILIES", "Family", "Specimen"]
 
-__all__ = ["Family", "Specimen"]
+_FAMILIES = (
+    arms.arms, planar.corners, degenerate.degenerate, loops.loops, loops.folds, forces.forces,
+    spatial.hardpoints, planar.units, planar.offset, planar.ratios, planar.drift, planar.rates,
+    planar.tolerances, planar.reach, planar.redundant, spatial.singular, loops.starts, planar.twins,
+)  # fmt: skip
+FAMILIES = {family.name: family for family in _FAMILIES}
+"""All families by name."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,35 +12,26 @@ from ....joints import AxialJoint, Cylindrical, Fixed, Joint, Revolute, Screw, T
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import Driver, JointAngle, JointDisplacement, Motion, Ramp, Sine
 from ...truth.motion import Motion as Closed
-from ...truth.motion import closed
 from ...truth.rows import PI, Poses, Real, extended, unit
-from .base import Family, Rng, Specimen, as_case, bodies, direction
+from .base import Rng, Specimen, bodies, direction, family, swept
 
 KINDS: Sequence[type[Joint]] = (Revolute, Revolute, Translational, Cylindrical, Screw, Fixed)
 LARGEST = 30
 
 
-class Arms(Family):
-    """Trees of bodies whose drivers all move at once, each with another motion."""
-
-    name = "arms"
-    about = (
-        f"trees of 3 to {LARGEST} bodies on hinges, slides, cylinders and screws, every freedom"
-        " driven; forward kinematics"
-    )
-    samples = 41
-
-    def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a random tree or chain with joints 0.1 to 0.3 m apart."""
-        count = bodies(rng, LARGEST)
-        mechanism, motions = random_arm(rng, count)
-        swept = mechanism.drivers[0].name
-        return Specimen(
-            f"arm of {count} bodies and {len(mechanism.drivers)} drivers",
-            partial(as_case, mechanism, swept, np.linspace(-2.0, 2.0, samples), motions=motions),
-            partial(closed, motion=forward(mechanism)),
-            facts=(("bodies", count),),
-        )
+@family(
+    f"trees of 3 to {LARGEST} bodies on hinges, slides, cylinders and screws, every freedom driven;"
+    " forward kinematics",
+    samples=41,
+)
+def arms(rng: Rng, samples: int) -> Specimen:
+    """Return a random tree or chain with joints 0.1 to 0.3 m apart, whose drivers all move at once,
+    each with another motion.
+    """
+    count = bodies(rng, LARGEST)
+    mechanism, motions = random_arm(rng, count)
+    name = f"arm of {count} bodies and {len(mechanism.drivers)} drivers"
+    return swept(name, mechanism, forward(mechanism), -2.0, 2.0, samples, motions=motions)
 
 
 def random_arm(

@@ -1,24 +1,25 @@
-"""Base of the families: a family makes random specimens, each with a case, its truth and its
-correct refusals.
+"""Descriptions of the families: a family makes random specimens, each with a case, its truth and
+its correct refusals.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial
 
 import numpy as np
 
 from ....case.case import Case, Sweep, Truth
 from ....case.io.outputs import with_all_coordinates
+from ....errors import KincheckError
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ....mechanism.motions import Motion
 from ....trajectory import Array
+from ...truth.motion import Motion as ClosedForm
 from ...truth.motion import Truth as Known
-from ...truth.motion import followed
+from ...truth.motion import closed, followed
 
 TOL = 1e-12
 """Largest accepted residual, as in `kincheck run`."""
@@ -52,50 +53,48 @@ class Specimen:
     """One mechanism and its sweep.
 
     Attributes:
-        describe: makes the case. It may raise KincheckError, which is then the outcome for every
+        case: the case, or the refusal of its description, which is then the outcome for every
             engine.
         truth: computes the reference of the case; None if every answer is wrong.
         reasons: further correct kinds of refusal, besides singular poses and the end of the motion.
         excused: whether a refusal for these reasons is correct although solutions exist.
-        reported: whether an answer must report the contradiction of the geometry
-            (`Known.violated`).
-        facts: properties of the specimen, by name.
+        tilt: contradiction of the geometry [rad], which an answer must report (`Known.violated`);
+            None if there is none.
     """
 
     name: str
-    describe: Callable[[], Case]
+    case: Case | KincheckError
     truth: Callable[[Case], Known] | None = followed
     tol: float = TOL
     reasons: frozenset[FailureKind] = frozenset()
     excused: bool = False
-    reported: bool = False
-    facts: tuple[tuple[str, float], ...] = ()
+    tilt: float | None = None
 
 
-class Family(ABC):
-    """Base of the families. Declaring one with a name registers it.
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A family of specimens.
 
     Attributes:
         about: sentence on the situation and its sizes.
+        specimen: makes a random specimen with a number of samples.
         samples: largest number of samples of a specimen, which limits the fineness of the sweep;
             coarse sweeps are as frequent as fine ones.
         several: whether several specimens share the samples; else one specimen has them all.
     """
 
-    name: ClassVar[str]
-    about: ClassVar[str]
-    samples: ClassVar[int] = 201
-    several: ClassVar[bool] = True
-    registry: ClassVar[dict[str, Family]] = {}
+    name: str
+    about: str
+    specimen: Callable[[Rng, int], Specimen]
+    samples: int = 201
+    several: bool = True
 
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        if "name" in cls.__dict__:
-            Family.registry[cls.name] = cls()
 
-    @abstractmethod
-    def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a random specimen with a number of samples."""
+def family(
+    about: str, *, samples: int = 201, several: bool = True
+) -> Callable[[Callable[[Rng, int], Specimen]], Family]:
+    """Make the family of the decorated function, which makes a specimen and gives the name."""
+    return lambda make: Family(make.__name__, about, make, samples, several)
 
 
 def as_case(
@@ -114,6 +113,30 @@ def as_case(
     )
 
 
+def swept(
+    name: str,
+    mechanism: Mechanism,
+    motion: ClosedForm | None,
+    first: float,
+    last: float,
+    samples: int,
+    *,
+    nearest: list[float] | None = None,
+    rate: float = 1.0,
+    motions: dict[str, Motion] | None = None,
+) -> Specimen:
+    """Return the specimen of a sweep of the first driver.
+
+    Args:
+        motion: closed form of the motion; if None, the reference is followed from the design.
+        nearest: swept values at poses nearest to singular; see `closed`.
+    """
+    values = np.linspace(first, last, samples)
+    case = as_case(mechanism, mechanism.drivers[0].name, values, rate=rate, motions=motions)
+    truth = partial(closed, motion=motion, nearest=nearest or ()) if motion else followed
+    return Specimen(name, case, truth)
+
+
 def direction(rng: Rng) -> Array:
     """Return a random unit vector."""
     found = rng.normal(size=3)
@@ -123,6 +146,11 @@ def direction(rng: Rng) -> Array:
 def power(rng: Rng, low: float, high: float) -> float:
     """Return a number between 10^low and 10^high, uniform in its logarithm."""
     return float(10.0 ** rng.uniform(low, high))
+
+
+def sign(rng: Rng) -> float:
+    """Return -1 or 1."""
+    return float(rng.choice([-1.0, 1.0]))
 
 
 def bodies(rng: Rng, most: int) -> int:

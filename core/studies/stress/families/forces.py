@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from ....algebra import triple
-from ....case.case import Case, Quantity
+from ....case.case import Quantity
 from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ....case.quantity import with_markers
 from ....joints import Cylindrical, Joint, RackPinion, Revolute, Screw, Translational
@@ -25,10 +24,9 @@ from ....mechanism.loads import (
 from ....mechanism.mechanism import GROUND, Mechanism
 from ....mechanism.motions import JointAngle, JointDisplacement, Motion, Sine
 from .arms import random_arm
-from .base import Family, Rng, Specimen, as_case, bodies, direction, power
-from .dimensions import crank_rocker
+from .base import Rng, Specimen, as_case, bodies, direction, family, power
+from .linkages import any_plane, crank_rocker, four_bar
 from .loops import random_mechanism
-from .planar import any_plane, four_bar
 
 LARGEST = 8
 # Minimum length of springs [m]: a small error changes the direction of a shorter spring much.
@@ -42,64 +40,41 @@ OF_ARMS = (Revolute, Translational, Translational, Cylindrical, Screw)
 TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
 
 
-class Forces(Family):
-    """Forces of joints, drivers and elements."""
-
-    name = "forces"
-    about = (
-        f"loops of 3 to {LARGEST} bodies, arms driven at every slide and hinge, and planar"
-        " four-bars with random masses, gravity, springs, dampers and constant loads; some hinges"
-        " twice, which leaves forces undetermined"
-    )
-    samples = 11
-
-    def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a loaded mechanism: a four-bar with four hinges, an arm, or a loop, which has one
-        hinge twice in every second specimen.
-        """
-        draw, motions = rng.random(), dict[str, Motion]()
-        along: Sequence[np.ndarray] = ()
-        if draw < 1.0 / 3.0:
-            plane = any_plane(rng)
-            mechanism, reach, what = four_bar(plane, *crank_rocker(rng)), 1.0, "four_bar"
-            along = (plane.e1, plane.e2, np.array(plane.normal))
-        elif draw < 2.0 / 3.0:
-            arm, motions = random_arm(rng, int(rng.integers(2, LARGEST)), OF_ARMS)
-            # a joint may have the body that it carries first
-            joints = [joint.reversed() if rng.random() < 0.5 else joint for joint in arm.joints]
-            mechanism, reach = replace(arm, joints=joints), 1.0
-            what = f"arm of {len(joints)} bodies"
-        else:
-            mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
-            reach *= NEAR
-            what, along = f"loop of {len(mechanism.bodies)} bodies", (direction(rng),)
-            if rng.random() < 0.5 and (doubled := _doubled(rng, mechanism)) is not None:
-                mechanism, what = doubled, f"{what}, a hinge twice"
-        mechanism = _loaded(rng, mechanism)
-        motions = motions or {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
-        values = np.linspace(-reach, reach, samples)
-        rate = power(rng, -1.0, 1.0)
-        outputs = _outputs(rng, mechanism, along)
-        return Specimen(
-            what,
-            partial(_case, mechanism, values, rate, motions, outputs),
-            facts=(("bodies", len(mechanism.bodies)),),
-        )
-
-
-def _case(
-    mechanism: Mechanism,
-    values: np.ndarray,
-    rate: float,
-    motions: dict[str, Motion],
-    outputs: Sequence[Quantity],
-) -> Case:
+@family(
+    f"loops of 3 to {LARGEST} bodies, arms driven at every slide and hinge, and planar four-bars"
+    " with random masses, gravity, springs, dampers and constant loads; some hinges twice, which"
+    " leaves forces undetermined",
+    samples=11,
+)
+def forces(rng: Rng, samples: int) -> Specimen:
+    """Return a loaded mechanism: a four-bar with four hinges, an arm, or a loop, which has one
+    hinge twice in every second specimen.
+    """
+    draw, motions = rng.random(), dict[str, Motion]()
+    along: Sequence[np.ndarray] = ()
+    if draw < 1.0 / 3.0:
+        plane = any_plane(rng)
+        mechanism, reach, name = four_bar(plane, *crank_rocker(rng))[0], 1.0, "four_bar"
+        along = (plane.e1, plane.e2, np.array(plane.normal))
+    elif draw < 2.0 / 3.0:
+        arm, motions = random_arm(rng, int(rng.integers(2, LARGEST)), OF_ARMS)
+        # a joint may have the body that it carries first
+        joints = [joint.reversed() if rng.random() < 0.5 else joint for joint in arm.joints]
+        mechanism, reach = replace(arm, joints=joints), 1.0
+        name = f"arm of {len(joints)} bodies"
+    else:
+        mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
+        reach *= NEAR
+        name, along = f"loop of {len(mechanism.bodies)} bodies", (direction(rng),)
+        if rng.random() < 0.5 and (doubled := _doubled(rng, mechanism)) is not None:
+            mechanism, name = doubled, f"{name}, a hinge twice"
+    mechanism = _loaded(rng, mechanism)
+    motions = motions or {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
+    rate, outputs = power(rng, -1.0, 1.0), _outputs(rng, mechanism, along)
+    values = np.linspace(-reach, reach, samples)
     case = as_case(mechanism, mechanism.drivers[0].name, values, rate=rate, motions=motions)
-    return replace(
-        case,
-        mechanism=with_markers(mechanism, outputs),
-        outputs=(*case.outputs, *outputs),
-    )
+    watched = with_markers(mechanism, outputs)
+    return Specimen(name, replace(case, mechanism=watched, outputs=(*case.outputs, *outputs)))
 
 
 def _doubled(rng: Rng, mechanism: Mechanism) -> Mechanism | None:

@@ -1,5 +1,5 @@
-"""Random closed loops of every joint type. They close by construction: both bodies of a joint are
-at the design position.
+"""Random closed loops of every joint type, and the families that drive them. They close by
+construction: both bodies of a joint are at the design position.
 
 Random joints close a random tree of bodies until as many freedoms remain as there are drivers. A
 joint is accepted only if all its rows are independent of the earlier rows, by a basis of the
@@ -10,16 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, fields, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ....algebra import triple
+from ....case.case import TIME
 from ....errors import MechanismError
-from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion
+from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion, Revolute, Translational
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import (
+    Absolute,
     Driver,
     JointAngle,
     JointDisplacement,
@@ -28,8 +29,10 @@ from ....mechanism.motions import (
     Sine,
 )
 from ....trajectory import Array
+from ...truth.fold import first_fold
 from ...truth.rows import Poses, Rows
-from .base import Family, Rng, Specimen, as_case, bodies, direction
+from .base import Rng, Specimen, as_case, bodies, direction, family, power, sign, swept
+from .linkages import any_plane, flat_plane, polar
 
 LARGEST = 30
 # Joint types for the tree, and for the loop closures. Types with five freedoms carry no body.
@@ -42,27 +45,153 @@ CLOSERS = (*CARRIERS, "distance", "distance", "in_plane", "parallel_axes", "perp
 SOUND = 0.02
 
 
-class Loops(Family):
-    """Mechanisms of any topology."""
+@family(
+    f"random closed loops of 3 to {LARGEST} bodies, all joint types, gears and racks, 1 or 2"
+    " drivers",
+    samples=81,
+)
+def loops(rng: Rng, samples: int) -> Specimen:
+    """Return a loop, driven far enough for a dead centre in every second specimen."""
+    mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
+    motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
+    name = f"loop of {len(mechanism.bodies)} bodies"
+    return swept(name, mechanism, None, -reach, reach, samples, motions=motions)
 
-    name = "loops"
-    about = (
-        f"random closed loops of 3 to {LARGEST} bodies, all joint types, gears and racks, 1 or 2"
-        " drivers"
+
+MOST_FOLDED, DRIVERS = 4, 3
+# The search for a fold ends after this multiple of the reach. Over one reach, the rates at design
+# would turn or shift something by 0.3 to 1 [rad or m].
+FARTHER = 5.0
+# Distance from a sample to the fold ahead of it, and from this sample to the next, as fractions of
+# the distance from the design to the fold [powers of ten].
+BEFORE, STEP = (-4.0, -0.3), (-1.0, 0.7)
+
+
+@family(
+    f"random closed mechanisms of 1 to {MOST_FOLDED} bodies, all joint types, gears and racks, 1 to"
+    f" {DRIVERS} drivers that move at once, in 2 to 4 samples: most have one sample 1e-4 to 0.5 of"
+    " the way before a fold, and the next one far beyond it",
+    samples=2,
+)
+def folds(rng: Rng, samples: int) -> Specimen:
+    """Return a sweep past the first fold, if there is one; the other drivers swing. The motion
+    turns back between two samples, where another assembly may continue.
+    """
+    mechanism, reach = random_mechanism(rng, lambda: int(rng.integers(1, MOST_FOLDED + 1)), DRIVERS)
+    driver, stop = mechanism.drivers[0].name, FARTHER * reach
+    motions: dict[str, Motion] = {}
+    for other in mechanism.drivers[1:]:
+        amplitude, turns = float(rng.uniform(-1.0, 1.0)), float(rng.uniform(0.05, 0.3))
+        motions[other.name] = Sine(amplitude * reach, turns / reach)
+    fold = first_fold(as_case(mechanism, driver, np.array([stop]), motions=motions), stop)
+    last = stop if fold is None else fold * (1.0 - power(rng, *BEFORE))
+    step = (last if fold is None else fold) * power(rng, *STEP)
+    name = f"mechanism of {len(mechanism.bodies)} bodies, {len(mechanism.drivers)} drivers"
+    first = last - (samples - 2) * step
+    return swept(name, mechanism, None, first, last + step, samples, motions=motions)
+
+
+MOST_STARTED = 5
+# Excursion of the drivers in a second, as a fraction of the reach: few motions meet a fold.
+EXCURSION = 0.3
+# Below this slope of the sine at the design [-], the excursion grows with the square of time.
+TURNING = 0.1
+DIGITS = ("exact", "rounded", "typed")
+"""Precision of the design value: to the last bit, up to rounding, or with six digits."""
+
+
+@family(
+    "two-link arms whose tip goes round the base, with a rack that counts the turns, and random"
+    f" closed mechanisms of 1 to {MOST_STARTED} bodies; 1 to {DRIVERS} absolute drivers on sines"
+    " that pass the design values at time zero: exactly, up to rounding, or as typed with six"
+    " digits; times around zero, after it or before it",
+    samples=41,
+)
+def starts(rng: Rng, samples: int) -> Specimen:
+    """Return an arm or a closed mechanism, swept over time by absolute drivers. The last bits of
+    numbers must not decide the result.
+    """
+    digits = str(rng.choice(DIGITS))
+    mechanism, motions = (_arm if rng.random() < 0.5 else _closed)(rng, digits)
+    first, last = ((-1.0, 1.0), (0.2, 1.0), (-1.0, -0.2))[int(rng.integers(3))]
+    name = f"{digits} start, {mechanism.name}, {len(mechanism.drivers)} drivers"
+    times = np.linspace(first, last, samples)
+    return Specimen(name, as_case(mechanism, TIME, times, motions=motions))
+
+
+def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
+    """Return a random closed mechanism; its drivers swing by a part of its reach."""
+    found, reach = random_mechanism(rng, lambda: int(rng.integers(1, MOST_STARTED + 1)), DRIVERS)
+    mechanism = replace(found, drivers=[replace(each, relative=False) for each in found.drivers])
+    return mechanism, {
+        driver.name: _sine(rng, mechanism.design_value(driver.name), EXCURSION * reach, digits)
+        for driver in mechanism.drivers
+    }
+
+
+def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
+    """Return two links and their motion; the tip circles the base once a second.
+
+    A straight path of the drivers from the design to a later sample passes near the base, and may
+    end in the other assembly, in another turn, or at no pose.
+    """
+    origin, exact = np.zeros(3), digits == "exact"
+    plane = flat_plane(rng, origin) if exact else any_plane(rng, origin)
+    first, second = rng.uniform(0.3, 1.0, 2)
+    least, most = abs(first - second), first + second
+    radius = float(least + rng.uniform(0.2, 0.8) * (most - least))
+    angle = 0.0 if exact else float(rng.uniform(-np.pi, np.pi))
+    bend = np.arccos((first**2 + radius**2 - second**2) / (2.0 * first * radius))
+    elbow = angle + bend * sign(rng)
+    at = plane.point(polar(first, elbow))
+    tip = plane.point(polar(radius, angle))
+    side = triple(plane.normal)
+    mechanism = Mechanism(
+        "two-link arm",
+        [Body("upper"), Body("lower"), Body("rack")],
+        [
+            Revolute("base", GROUND, "upper", point=plane.point(0j), axis=side),
+            Revolute("elbow", "upper", "lower", point=at, axis=side),
+            Translational("guide", GROUND, "rack", point=side, axis=plane.along(1.0 + 0j)),
+        ],
+        [Point("tip", "lower", tip), Point("on_rack", "rack", side)],
+        [
+            PointCoordinate("x", "tip", plane.along(1.0 + 0j), relative=False),
+            PointCoordinate("y", "tip", plane.along(1j), relative=False),
+        ],
+        [RackPinion("turns", ("base", "guide"), 0.1)],
     )
-    samples = 81
+    phases = {"x": angle + np.pi / 2.0, "y": angle}
+    return mechanism, {
+        name: _motion(mechanism.design_value(name), radius, 1.0, phase, digits)
+        for name, phase in phases.items()
+    }
 
-    def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a loop, driven far enough for a dead centre in every second specimen."""
-        mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
-        count = len(mechanism.bodies)
-        motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
-        values = np.linspace(-reach, reach, samples)
-        return Specimen(
-            f"loop of {count} bodies",
-            partial(as_case, mechanism, mechanism.drivers[0].name, values, motions=motions),
-            facts=(("bodies", count),),
-        )
+
+def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
+    """Return a sine with the design value at time zero.
+
+    It moves by about the excursion in the first second.
+    """
+    if not design:
+        turns = 0 if digits == "exact" else int(rng.integers(-2, 3))
+        phase, amplitude = np.pi * turns, excursion
+    elif digits == "exact":  # the sine of this phase is exactly one
+        phase, amplitude = np.pi / 2.0, design
+    else:
+        phase = float(rng.uniform(0.2, np.pi - 0.2)) * sign(rng)
+        amplitude = design / np.sin(phase)
+    slope, part = abs(float(np.cos(phase))), excursion / abs(amplitude)
+    turn = part / slope if slope > TURNING else np.sqrt(2.0 * part)
+    frequency = min(float(turn), 1.0) * float(rng.uniform(0.3, 1.0)) / (2.0 * np.pi)
+    return _motion(design, float(amplitude), frequency, phase, digits)
+
+
+def _motion(design: float, amplitude: float, frequency: float, phase: float, digits: str) -> Motion:
+    """Return a sine of absolute values, as a case file reads it."""
+    numbers = amplitude, frequency, phase
+    sine = Sine(*(float(f"{x:.6g}") for x in numbers) if digits == "typed" else numbers)
+    return Absolute(sine, design) if design else sine
 
 
 def random_mechanism(rng: Rng, count: Callable[[], int], most: int = 2) -> tuple[Mechanism, float]:
@@ -72,12 +201,12 @@ def random_mechanism(rng: Rng, count: Callable[[], int], most: int = 2) -> tuple
         count: returns a number of bodies.
         most: largest number of drivers.
     """
-    while (found := Builder(rng, count(), most).built()) is None:
+    while (found := _Builder(rng, count(), most).built()) is None:
         pass
     return found
 
 
-class Builder:
+class _Builder:
     """Builder of one random mechanism.
 
     Args:
@@ -97,19 +226,12 @@ class Builder:
         """Return the mechanism and the reach of its drivers; None if it cannot be closed."""
         for body in self.bodies:
             parent = str(self.rng.choice(list(self.places)))
-            self.places[body.name] = self.places[parent] + self.rng.uniform(0.3, 0.6) * direction(
-                self.rng
-            )
-        for body in self.bodies:
-            near = [name for name in self.places if name != body.name]
-            nearest = sorted(
-                near,
-                key=lambda name: float(np.linalg.norm(self.places[name] - self.places[body.name])),
-            )
-            before = [
-                name for name in nearest if name == GROUND or int(name[1:]) < int(body.name[1:])
-            ]
-            while not self._join(str(self.rng.choice(CARRIERS)), before[0], body.name):
+            away = self.rng.uniform(0.3, 0.6) * direction(self.rng)
+            self.places[body.name] = self.places[parent] + away
+        for k, body in enumerate(self.bodies):
+            place, before = self.places[body.name], [*self.places][: k + 1]
+            nearest = min(before, key=lambda name: np.linalg.norm(self.places[name] - place))
+            while not self._join(str(self.rng.choice(CARRIERS)), nearest, body.name):
                 pass
         drivers, tries = int(self.rng.integers(1, self.most + 1)), 0
         while self.freedoms > drivers:
@@ -135,11 +257,7 @@ class Builder:
         """Return the mechanism of these joints, always with the same points, so that the unknowns
         stay the same.
         """
-        points = [
-            Point(f"p_{name}", name, triple(self.places[name]))
-            for name in self.places
-            if name != GROUND
-        ]
+        points = [Point(f"p_{b.name}", b.name, triple(self.places[b.name])) for b in self.bodies]
         return Mechanism("loop", self.bodies, joints, points, drivers, couplers)
 
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
@@ -187,13 +305,9 @@ class Builder:
         required = [
             f for f in fields(cls) if f.default is MISSING and f.name not in ("name", "i", "j")
         ]
+        given = {f.name: values[f.metadata["kind"]] for f in required}
         try:
-            return cls(
-                f"{kind}_{len(self.joints) + 1}",
-                one,
-                other,
-                **{f.name: values[f.metadata["kind"]] for f in required},
-            )
+            return cls(f"{kind}_{len(self.joints) + 1}", one, other, **given)
         except MechanismError:
             return None
 
@@ -214,13 +328,11 @@ class Builder:
         if pair[0] == pair[1]:
             return False
         name, size = f"coupler_{len(self.couplers) + 1}", float(self.rng.uniform(0.3, 1.5))
-        coupler = (
-            Gear(name, pair, size) if seconds is turning else RackPinion(name, pair, 0.2 * size)
-        )
+        gears = seconds is turning
+        coupler = Gear(name, pair, size) if gears else RackPinion(name, pair, 0.2 * size)
         joined = [joint for joint in self.joints if joint.name in pair]
         rows = sum(joint.rows for joint in joined)
-        whole = self._rows(self._mechanism(joined, couplers=[coupler]))
-        if not self._take(whole[rows:], leave):
+        if not self._take(self._rows(self._mechanism(joined, couplers=[coupler]), rows), leave):
             return False
         self.couplers.append(coupler)
         return True
@@ -231,29 +343,22 @@ class Builder:
 
         The rates at design turn or shift something by 0.3 to 1 over the reach [rad or m].
         """
-        drivers: list[Driver] = []
-        for joint in self.joints:
-            if isinstance(joint, AxialJoint):
-                of = {"rotation": JointAngle, "translation": JointDisplacement}
-                drivers += [
-                    of[f](f"{joint.name}_{f}", joint.name) for f in joint.freedoms if f in of
-                ]
+        of = {"rotation": JointAngle, "translation": JointDisplacement}
+        axial = [joint for joint in self.joints if isinstance(joint, AxialJoint)]
+        drivers: list[Driver] = [
+            of[f](f"{joint.name}_{f}", joint.name)
+            for joint in axial
+            for f in joint.freedoms
+            if f in of
+        ]
         drivers += [
             PointCoordinate(f"shift_{b.name}", f"p_{b.name}", triple(direction(self.rng)))
             for b in self.bodies[:3]
         ]
-        needed = [
-            joint
-            for joint in self.joints
-            if any(getattr(d, "joint", "") == joint.name for d in drivers)
-        ]
-        rows = (
-            self._rows(self._mechanism(needed, drivers), sum(joint.rows for joint in needed))
-            @ self.motions
-        )
-        order = self.rng.permutation(len(drivers))
+        carried = sum(joint.rows for joint in axial)
+        rows = self._rows(self._mechanism(axial, drivers), carried) @ self.motions
         taken: list[int] = []
-        for k in order:
+        for k in self.rng.permutation(len(drivers)):
             trial = [*taken, int(k)]
             if len(taken) < count and np.linalg.svd(rows[trial], compute_uv=False)[-1] > SOUND:
                 taken = trial

@@ -1,282 +1,345 @@
-"""Planar linkages with closed forms, for the families of sizes, offsets, rates and reaches."""
+"""Families of planar linkages with closed forms: sizes, places, rates, tolerances, reach, change
+points, two loops on one crank, and contradictory hinges.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from ....algebra import triple
-from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
-from ....mechanism.mechanism import Body, Mechanism, Point
-from ....mechanism.motions import JointAngle, JointDisplacement
-from ....trajectory import Array
-from ...truth.motion import Motion
-from ...truth.rows import Real, extended, unit
-from .base import Rng, direction
+from ....case.case import Case
+from ....failures import FailureKind
+from ....mechanism.mechanism import Mechanism
+from ...truth.motion import Motion, Truth, chunks, closed, closed_poses
+from ...truth.path import System
+from ...truth.rows import extended
+from .base import TOL, Rng, Specimen, direction, family, power, sign, swept
+from .linkages import (
+    JOINTS_OF_A_LOOP,
+    Plane,
+    any_plane,
+    area,
+    beside,
+    crank_rocker,
+    flat_plane,
+    flats,
+    four_bar,
+    meet,
+    nearly_kite,
+    nearly_parallel,
+    plan,
+    polar,
+    rockers,
+    slider_crank,
+    turning_crank,
+)
 
-Plan = tuple[float, float]
-"""A point in the plane."""
+NEARLY_A_TURN = 0.97 * np.pi
 
 
-@dataclass(frozen=True, eq=False)
-class Plane:
-    """The plane of a linkage: its origin and axes, global [m]."""
+def linkage(
+    rng: Rng,
+    plane: Plane,
+    samples: int,
+    *,
+    scale: float = 1.0,
+    grid: float = 0.0,
+    rate: float = 1.0,
+) -> Specimen:
+    """Return a four-bar or a slider-crank, whose crank makes one full turn."""
+    way = str(rng.choice(JOINTS_OF_A_LOOP))
+    if rng.random() < 0.5:
+        found = four_bar(plane, *crank_rocker(rng, scale, grid), way)
+    else:
+        b, c = (scale * each for each in turning_crank(rng, grid))
+        found = slider_crank(plane, b, c, way, "turn")
+    return swept(f"{found[0].name} with {way}", *found, -np.pi, np.pi, samples, rate=rate)
 
-    origin: Array
-    e1: Array
-    e2: Array
 
-    def point(self, at: Plan) -> tuple[float, float, float]:
-        """Return the global position of a point of the plane, rounded once."""
-        return triple(
-            np.asarray(
-                extended(self.origin) + self.lift(extended(at)[:, None])[:, 0], dtype=np.float64
-            )
+@family("four-bars and slider-cranks of 1e-6 to 1e3 m in any orientation, one turn")
+def units(rng: Rng, samples: int) -> Specimen:
+    """Return a linkage of random size, at a similar distance from the origin."""
+    scale, plane = power(rng, -6.0, 3.0), any_plane(rng)
+    return linkage(rng, replace(plane, origin=scale * plane.origin), samples, scale=scale)
+
+
+@family(
+    "four-bars and slider-cranks of 1 m, up to 1e7 m from the origin, coordinates on a grid that"
+    " avoids rounding"
+)
+def offset(rng: Rng, samples: int) -> Specimen:
+    """Return a linkage in a plane along the global axes.
+
+    A double holds both the 24 bits of the offset and the 20 bits of the grid.
+    """
+    grid = 2.0**-20
+    origin = np.round(rng.uniform(-1.0, 1.0, 3) * power(rng, 0.0, 7.0) / grid) * grid
+    return linkage(rng, flat_plane(rng, origin), samples, grid=grid)
+
+
+@family("cranks, and cranks with rockers, of 1e-6 to 1 of the other links' lengths, one turn")
+def ratios(rng: Rng, samples: int) -> Specimen:
+    """Return a slider-crank with a short crank, or a four-bar with two opposite short bars or one
+    short crank.
+    """
+    plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
+    ratio = power(rng, -6.0, 0.0)
+    short, kind = polar(0.3 * ratio, rng.uniform(0.3, 2.8)), int(rng.integers(3))
+    if kind == 0:
+        found = slider_crank(plane, short, complex(rng.uniform(1.0, 1.3)), way, "turn")
+    else:
+        # the rocker is 1.3 / 0.3 times the crank and perpendicular to the ground, or about as long
+        # as the other links
+        c = (
+            complex(1.0, 1.3 * ratio)
+            if kind == 1
+            else complex(rng.uniform(0.4, 0.6), rng.uniform(0.6, 0.8))
         )
-
-    def lift(self, shift: Real) -> Real:
-        """Return global displacements from displacements in the plane, shape (3, n)."""
-        e1, e2 = map(extended, (self.e1, self.e2))
-        return e1[:, None] * shift[0] + e2[:, None] * shift[1]
-
-    @property
-    def normal(self) -> tuple[float, float, float]:
-        """Return the normal of the plane, global; turns are right-handed about it."""
-        return triple(np.cross(self.e1, self.e2))
-
-    def along(self, at: Plan) -> tuple[float, float, float]:
-        """Return the global direction of a direction in the plane."""
-        return triple(at[0] * self.e1 + at[1] * self.e2)
-
-    def turned(self, angle: Real) -> Real:
-        """Return the quaternion of a rotation in the plane, shape (4, n)."""
-        h = unit(extended(np.cross(extended(self.e1), extended(self.e2))))
-        return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
+        found = four_bar(plane, short, 1.0 + 0j, c, way)
+    name = f"{found[0].name} with {way}, ratio {ratio:.3g}"
+    return swept(name, *found, -np.pi, np.pi, samples)
 
 
-def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
-    """Return a plane of any direction through a point; by default the point is near the origin."""
-    e3, e1 = direction(rng), direction(rng)
-    e1 = np.cross(e3, e1)
-    e1 = e1 / np.linalg.norm(e1)
-    at = rng.uniform(-1.0, 1.0, 3) if origin is None else origin
-    return Plane(at, e1, np.cross(e3, e1))
+# Largest number of turns between samples. The solver divides a step into at most 2,000 parts, and a
+# turn needs some twelve.
+TURNS, MOST_BETWEEN = 1000, 100
 
 
-def flat_plane(rng: Rng, origin: Array) -> Plane:
-    """Return a plane along two of the global axes: global coordinates are sums of two numbers,
-    which are exact for suitable numbers.
-    """
-    first = int(rng.integers(3))
-    e1, e2 = np.eye(3)[first], np.eye(3)[(first + 1) % 3]
-    return Plane(origin, e1, e2)
+@family(
+    "crank-rockers over 1,000 turns in one sweep of all the samples, up to 1e6",
+    samples=1_000_000,
+    several=False,
+)
+def drift(rng: Rng, samples: int) -> Specimen:
+    """Return a crank-rocker over many turns; its closed form ignores earlier turns."""
+    plane, points, way = any_plane(rng), crank_rocker(rng), str(rng.choice(JOINTS_OF_A_LOOP))
+    turns = min(TURNS, MOST_BETWEEN * (samples - 1))
+    name, last = f"four_bar with {way}, {turns} turns", 2.0 * np.pi * turns
+    return swept(name, *four_bar(plane, *points, way), 0.0, last, samples)
 
 
-def spin(angle: Real, at: Plan | Real) -> Real:
-    """Return a point of the plane after a rotation about the origin, shape (2, n)."""
-    x, y = (extended(each) for each in at)
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * x - s * y, s * x + c * y])
+@family("four-bars and slider-cranks driven at 1e-9 to 1e9 rad/s either way")
+def rates(rng: Rng, samples: int) -> Specimen:
+    """Return a linkage at a random rate; accelerations grow with the square of the rate."""
+    rate = power(rng, -9.0, 9.0) * sign(rng)
+    found = linkage(rng, any_plane(rng), samples, rate=rate)
+    return replace(found, name=f"{found.name} at {rate:.3g} rad/s")
 
 
-def heading(a: Real) -> Real:
-    """Return the angle of vectors of shape (2, n)."""
-    return np.arctan2(a[1], a[0])
-
-
-def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
-    """Return the intersection of circles with squared radii p and q about two points, on one side
-    of the line through them; NaN if there is none.
-    """
-    d = second - first
-    e = (d * d).sum(axis=0)
-    along = (p - q + e) / (2.0 * e)
-    with np.errstate(invalid="ignore"):
-        across = side * np.sqrt(p / e - along * along)
-    return first + along * d + across * np.stack([-d[1], d[0]])
-
-
-JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
-"""Ways to connect the coupler of a loop to its neighbours, with or without redundant rows."""
-
-
-def coupled(
-    way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan], label: str = ""
-) -> tuple[list[Body], list[Joint]]:
-    """Return bodies and joints of the coupler between two bodies at their points, or of a rod that
-    replaces it.
-    """
-    first, second, coupler = names
-    start, end = map(plane.point, at)
-    n = plane.normal
-    along = plane.along((at[1][0] - at[0][0], at[1][1] - at[0][1]))
-    across = triple(np.cross(n, along))
-    if way == "rod":
-        return [], [Distance(f"{label}rod", first, second, (start, end))]
-    pin_1, pin_2 = f"{label}pin_1", f"{label}pin_2"
-    joints: Mapping[str, Sequence[Joint]] = {
-        "revolutes": (
-            Revolute(pin_1, first, coupler, start, n),
-            Revolute(pin_2, coupler, second, end, n),
-        ),
-        "balls": (
-            Universal(pin_1, first, coupler, start, (n, across)),
-            Spherical(pin_2, coupler, second, end),
-        ),
-        "universals": (
-            Universal(pin_1, first, coupler, start, (across, n)),
-            Universal(pin_2, coupler, second, end, (n, along)),
-        ),
-        "cylinders": (
-            Cylindrical(pin_1, first, coupler, start, n),
-            Spherical(pin_2, coupler, second, end),
-        ),
+# Correct refusals of a tolerance below round-off, which name the residual.
+BELOW_ROUNDING = frozenset(
+    {
+        FailureKind.BELOW_ROUNDING,
+        FailureKind.NOT_CONVERGED,
+        FailureKind.NOT_SETTLED,
+        FailureKind.NO_POSE,
     }
-    return [Body(coupler)], list(joints[way])
+)
 
 
-def four_bar(
-    plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", turn: str = "turn"
-) -> Mechanism:
-    """Return a four-bar: a driven crank from the plane's origin to B, a coupler from B to C, a
-    rocker from C to D.
+@family("four-bars and slider-cranks with requested residuals of 1e-15 to 1e-300")
+def tolerances(rng: Rng, samples: int) -> Specimen:
+    """Return a linkage with a tiny tolerance.
+
+    Correct outcomes are the best possible solution, or a refusal with the reached residual.
     """
-    bodies, joints = coupled(way, plane, ("crank", "rocker", "coupler"), (b, c))
-    return Mechanism(
-        "four_bar",
-        [Body("crank"), Body("rocker"), *bodies],
-        [
-            Revolute("pivot", "ground", "crank", plane.point((0.0, 0.0)), plane.normal),
-            Revolute("rest", "ground", "rocker", plane.point(d), plane.normal),
-        ]
-        + joints,
-        [Point("B", "crank", plane.point(b)), Point("C", "rocker", plane.point(c))],
-        [JointAngle(turn, "pivot")],
+    tol = power(rng, -300.0, -15.0) if rng.random() < 0.2 else power(rng, -20.0, -15.0)
+    found = linkage(rng, any_plane(rng), samples)
+    name = f"{found.name} to {tol:.3g}"
+    return replace(found, name=name, tol=tol, reasons=BELOW_ROUNDING, excused=True)
+
+
+@family(
+    "sliders driven past the stretched rod, rockers past their dead centres, struts and tie rods"
+    " within 1e-6 of them at design",
+    samples=81,
+)
+def reach(rng: Rng, samples: int) -> Specimen:
+    """Return a driven slider, or a four-bar whose driven bar cannot turn fully. No engine may have
+    values at a pose without an assembly.
+    """
+    plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
+    if rng.random() < 0.5:
+        crank, rod = float(rng.uniform(0.2, 0.6)), float(rng.uniform(0.7, 1.3))
+        # the angle at the crank pin: stretched out at 0, folded at pi
+        bend = power(rng, -6.0, 0.0) if rng.random() < 0.5 else float(rng.uniform(0.3, 2.8))
+        c = float(np.sqrt(crank**2 + rod**2 + 2.0 * crank * rod * np.cos(bend)))
+        b = polar(crank, np.arctan2(rod * np.sin(bend), crank + rod * np.cos(bend)))
+        found = slider_crank(plane, b, complex(c), way, "slide")
+        first, last = -1.2 * (c - abs(rod - crank)), 1.2 * (crank + rod - c) + 0.1 * crank
+        return swept(f"slider_crank with {way}, bend {bend:.3g}", *found, first, last, samples)
+    name, last = f"four_bar with {way}, driven past its dead centres", 0.99 * np.pi
+    return swept(name, *four_bar(plane, *rockers(rng), way), -last, last, samples)
+
+
+# Near change points
+
+
+def parallelogram(rng: Rng, samples: int) -> Specimen:
+    """Return a parallelogram; it folds flat twice a turn.
+
+    Correct answers for an exact parallelogram are its own motion or a refusal, never the motion
+    that crosses there. With an error of one sign it becomes the antiparallel linkage, within the
+    root of the error. With an error of the other sign it cannot pass.
+    """
+    return _near_change_points(rng, samples, "parallelogram", nearly_parallel)
+
+
+def kite(rng: Rng, samples: int) -> Specimen:
+    """Return a kite, whose crank is nearly as long as the ground and passes the rocker's pivot."""
+    return _near_change_points(rng, samples, "kite", nearly_kite)
+
+
+Dimensions = Callable[[Rng], tuple[complex, complex, complex, float]]
+
+
+def _near_change_points(rng: Rng, samples: int, kind: str, dimensions: Dimensions) -> Specimen:
+    plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
+    b, d, c, off = dimensions(rng)
+    found = four_bar(plane, b, d, c, way, parallel=kind == "parallelogram" and off == 0.0)
+    name, last = f"{kind} with {way}, off by {off:.2g}", NEARLY_A_TURN
+    return swept(name, *found, -last, last, samples, nearest=flats(b, d))
+
+
+PAIRS: Mapping[str, Dimensions] = {
+    "parallelograms": nearly_parallel,
+    "kites": nearly_kite,
+    "rockers": lambda rng: (*rockers(rng), 1.0),  # far from any singular shape
+}
+
+
+@family(
+    "two equal loops on one crank, with equal or different joints, so that the sign of the whole"
+    " determinant shows no singular pose: parallelograms (exact, and off by 1e-12 to 1e-2), kites,"
+    " and four-bars driven past their dead centres",
+    samples=61,
+)
+def twins(rng: Rng, samples: int) -> Specimen:
+    """Return two equal loops on one crank with the same singular poses: the determinant of all rows
+    changes its sign twice there, so that it shows nothing.
+    """
+    plane, (first, second) = any_plane(rng), rng.choice(JOINTS_OF_A_LOOP, 2).tolist()
+    kind = [*PAIRS][int(rng.integers(len(PAIRS)))]
+    b, d, c, off = PAIRS[kind](rng)
+    parallel = kind == "parallelograms" and off == 0.0
+    found = four_bar(plane, b, d, c, first, parallel=parallel)
+    found = beside(found, plane, b, d, c, second, "twin ", parallel=parallel)
+    name, last = f"{kind} with {first} and {second}, off by {off:.2g}", NEARLY_A_TURN
+    return swept(name, *found, -last, last, samples, nearest=flats(b, d))
+
+
+# Smallest relative area of a design: the coordinates of a nearly folded shape have too few digits.
+FOLDED = 0.05
+# Lengths of crank, ground, coupler and rocker, from three sizes and an error.
+SHAPES: Mapping[str, Callable[[float, float, float, float], tuple[float, float, float, float]]] = {
+    "kite": lambda a, g, x, off: (g + off, g, x, x),
+    "kite on its side": lambda a, g, x, off: (a, g, a + off, g),
+    "parallelogram": lambda a, g, x, off: (a, g, g + off, a),
+    "stretched four-bar": lambda a, g, x, off: (a, g, x, a + g - x + off),
+    "folded four-bar": lambda a, g, x, off: (a, g, x, x + abs(g - a) + off),
+}
+
+
+@family(
+    "four-bars of any sizes, off by 1e-7 to 0.1 from kites, parallelograms and others that can lie"
+    " flat, from anywhere in coarse steps: rods on hinges (three redundant rows), on two"
+    " universals (one), and on what leaves none; half of them with a regular loop of 1e-3 to 0.3 of"
+    " their size on the same crank",
+    samples=31,
+)
+def corners(rng: Rng, samples: int) -> Specimen:
+    """Return a random four-bar, half of them beside a regular loop. Redundant rows or a second loop
+    must not hide the sharp corners of its motion, or a narrowly missed passage, anywhere along a
+    step.
+    """
+    plane, way = any_plane(rng), str(rng.choice(["universals", "revolutes", *JOINTS_OF_A_LOOP]))
+    off = power(rng, -7.0, -1.0) * sign(rng)
+    kind = [*SHAPES][int(rng.integers(len(SHAPES)))]
+    b, d, c = _loop(rng, kind, off)
+    last = float(rng.uniform(2.0, 6.2) * sign(rng))
+    found = four_bar(plane, b, d, c, way)
+    name = f"{kind} with {way}, off by {off:.2g}"
+    # the small loop's singular values are always small, and hide the singular values of the large
+    # loop
+    if rng.random() < 0.5:
+        ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
+        found = beside(found, plane, *crank_rocker(rng, ratio), hung, "small ")
+        name = f"{name}, beside a loop of {ratio:.2g} with {hung}"
+    return swept(name, *found, 0.0, last, samples, nearest=flats(b, d))
+
+
+def _loop(rng: Rng, kind: str, off: float) -> tuple[complex, complex, complex]:
+    """Return B, D and C of a four-bar of this kind, at any unfolded pose."""
+    while True:
+        a, g, x = (float(size) for size in rng.uniform(0.3, 1.5, 3))
+        crank, ground, coupler, rocker = SHAPES[kind](a, g, x, off)
+        b, side = polar(crank, rng.uniform(-np.pi, np.pi)), sign(rng)
+        d, squares = complex(ground), extended([coupler, rocker]) ** 2
+        c = complex(meet(plan(b), squares[0], plan(d), squares[1], side))
+        # twice the area; NaN if the circles do not meet
+        if min(coupler, rocker) > 0.1 and abs(area(c - b, d - b)) > FOLDED * abs(d - b):
+            return b, d, c
+
+
+# Contradictory hinges
+
+# Directions have a precision of 1e-16; a smaller tilt than this is rounding, not a contradiction.
+ROUNDED = 1e-14
+CONTRADICTIONS = frozenset(
+    {
+        FailureKind.CONTRADICTORY,
+        FailureKind.DEAD_CENTRE,
+        FailureKind.FREE,
+        FailureKind.NO_POSE,
+        FailureKind.OVERDRIVEN,
+    }
+)
+"""Correct refusals of a loop whose hinges are not parallel."""
+
+
+@family("four-bars of four hinges, one of them off by 1e-12 to 1e-3 rad, or exact")
+def redundant(rng: Rng, samples: int) -> Specimen:
+    """Return a four-bar with one tilted hinge.
+
+    Correct outcomes are the best possible solution with its residual, or a refusal with the
+    contradiction.
+    """
+    tilt = 0.0 if rng.random() < 0.15 else power(rng, -12.0, -3.0)
+    sound, motion = four_bar(any_plane(rng), *crank_rocker(rng))
+    joint: Any = sound.joint("pin_2")
+    bent = replace(joint, axis=triple(np.array(joint.axis) + tilt * direction(rng)))
+    tilted = replace(sound, joints=[bent if each is joint else each for each in sound.joints])
+    found = swept(f"four_bar, one hinge off by {tilt:.2g} rad", tilted, None, -2.0, 2.0, samples)
+    return replace(
+        found,
+        truth=partial(_tilted, sound=sound, motion=motion, tilt=tilt),
+        reasons=CONTRADICTIONS,
+        excused=tilt > ROUNDED,
+        tilt=tilt,
     )
 
 
-def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
-    """Return the closed form of a four-bar in the assembly of the design, between the crank's
-    turning points; a parallelogram passes them.
+def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
+    """Return the truth of the untilted mechanism, with bounds that allow for another choice of
+    rows. Rows with an error of the tilt move the pose by K times the tilt. The inverse of another
+    choice of rows is at most K times larger.
     """
-    B, C, D = (extended(each)[:, None] for each in (b, c, d))
-    p, q = ((C - B) ** 2).sum(axis=0), ((C - D) ** 2).sum(axis=0)
-    side = float(np.sign((D - B)[0, 0] * (C - B)[1, 0] - (D - B)[1, 0] * (C - B)[0, 0]))
-    first, last = (-np.inf, np.inf) if parallel else turning_range(B, D, p, q)
-    pivot, pin, rest = (extended(plane.point(each)) for each in ((0.0, 0.0), b, d))
-
-    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
-        turn = np.where((first < drives[0]) & (drives[0] < last), drives[0], np.nan)
-        now_b = spin(turn, b)
-        now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
-        still = np.zeros((3, len(turn)), dtype=np.longdouble)
-        return {
-            "crank": (plane.turned(turn), pivot, still),
-            "rocker": (plane.turned(heading(now_c - D) - heading(C - D)), rest, still),
-            "coupler": (
-                plane.turned(heading(now_c - now_b) - heading(C - B)),
-                pin,
-                plane.lift(now_b - B),
-            ),
-        }
-
-    return motion
-
-
-def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
-    """Return the range of rotation of a crank at b, from there, in both directions.
-
-    The coupler and the rocker have squared lengths p and q; the rocker's pivot is at d. The law of
-    cosines gives the cosines of the crank's angle from the ground with coupler and rocker folded or
-    stretched out. A cosine between -1 and 1 is a turning point; other cosines are no limit.
-    """
-    r2, g2 = (b * b).sum(axis=0)[0], (d * d).sum(axis=0)[0]
-    folded, stretched = ((np.sqrt(p[0]) + sign * np.sqrt(q[0])) ** 2 for sign in (-1.0, 1.0))
-    nearest, farthest = ((r2 + g2 - e) / (2.0 * np.sqrt(r2 * g2)) for e in (folded, stretched))
-    at = heading(b)[0] - heading(d)[0]
-    at = np.arctan2(np.sin(at), np.cos(at))
-    low, high = (float(np.arccos(x)) if -1.0 < x < 1.0 else None for x in (nearest, farthest))
-    # all angles of turning points, in the full turn and one full turn to either side
-    stops = [
-        k * 2.0 * np.pi + sign * stop
-        for stop in (low, high)
-        if stop is not None
-        for sign in (-1.0, 1.0)
-        for k in (-1, 0, 1)
-    ]
-    ahead, behind = (
-        [stop - at for stop in stops if stop > at],
-        [stop - at for stop in stops if stop < at],
-    )
-    return float(max(behind, default=-np.inf)), float(min(ahead, default=np.inf))
-
-
-def flats(b: Plan, d: Plan) -> list[float]:
-    """Return the rotations of a crank at b, up to two turns, that bring it into the line of the
-    ground: it points to the pivot at d, or away from it.
-    """
-    at = float(heading(extended(b)) - heading(extended(d)))
-    return [k * math.pi - at for k in range(-4, 5)]
-
-
-def slider_crank(
-    plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)
-) -> Mechanism:
-    """Return a slider-crank: a crank from the plane's origin to B, a coupler from B to C on a
-    slider along the guide; "turn" or "slide" is driven.
-    """
-    bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), (b, c))
-    driver = JointAngle("turn", "pivot") if drive == "turn" else JointDisplacement("slide", "guide")
-    return Mechanism(
-        "slider_crank",
-        [Body("crank"), Body("slider", plane.point(c)), *bodies],
-        [
-            Revolute("pivot", "ground", "crank", plane.point((0.0, 0.0)), plane.normal),
-            Translational("guide", "ground", "slider", plane.point(c), plane.along(guide)),
-            *joints,
-        ],
-        [Point("B", "crank", plane.point(b)), Point("C", "slider", plane.point(c))],
-        [driver],
-    )
-
-
-def slider_crank_motion(
-    plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan = (1.0, 0.0)
-) -> Motion:
-    """Return the closed form of a slider-crank with a guide vector of length one: a quadratic
-    equation gives the slider, or two circles give the crank.
-    """
-    B, C, g = (extended(each)[:, None] for each in (b, c, guide))
-    r2, l2 = (B * B).sum(axis=0), ((C - B) ** 2).sum(axis=0)
-    side = float(np.sign(C[0, 0] * B[1, 0] - C[1, 0] * B[0, 0]))
-    ahead = float(np.sign(((C - B) * g).sum()))
-    pivot, pin, slider = (extended(plane.point(each)) for each in ((0.0, 0.0), b, c))
-
-    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
-        value = drives[0]
-        if drive == "turn":
-            now_b = spin(value, b)
-            back = ((C - now_b) * g).sum(axis=0)  # |C + s g - B|^2 = l^2
-            with np.errstate(invalid="ignore"):
-                s = -back + ahead * np.sqrt(back * back - ((C - now_b) ** 2).sum(axis=0) + l2)
-            turn, now_c = value, C + s * g
-        else:
-            # beyond the pivot the linkage can be assembled, but no motion leads there
-            value = np.where(((C + value * g) * g).sum(axis=0) * (C * g).sum() > 0.0, value, np.nan)
-            now_c = C + value * g
-            now_b = meet(0.0 * now_c, r2 + 0.0 * value, now_c, l2 + 0.0 * value, side)
-            turn = heading(now_b) - heading(B)
-        return {
-            "crank": (plane.turned(turn), pivot, np.zeros((3, len(turn)), dtype=np.longdouble)),
-            "slider": (plane.turned(0.0 * turn), slider, plane.lift(now_c - C)),
-            "coupler": (
-                plane.turned(heading(now_c - now_b) - heading(C - B)),
-                pin,
-                plane.lift(now_b - B),
-            ),
-        }
-
-    return motion
+    found, system = closed(replace(case, mechanism=sound), motion), System(case)
+    rows, times = system.rows, system.path.times
+    violated = np.zeros(len(times))
+    for samples in chunks(np.arange(len(times))):
+        drives = system.sampled(samples)
+        poses = closed_poses(found.system.rows, motion, drives[0])
+        at = system.solved(poses, drives, times[samples], rows.angles(poses))
+        violated[samples] = np.abs(rows.residual(at.poses, drives[0], at.angles)).max(axis=0)
+    slack = found.condition * (1.0 + found.condition) * tilt * rows.unit
+    for bound in found.bounds.values():
+        bound[0] += slack
+        if tilt > ROUNDED:  # rates depend on inexact poses and contradictory rows
+            bound[1:] = np.inf
+    return replace(found, violated=np.where(violated > TOL, violated * rows.unit, 0.0))

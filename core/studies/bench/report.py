@@ -11,12 +11,13 @@ from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
 from ...unit_text import with_unit
 from ..paper.formulation import report as formulation_report
-from . import cost_report as cost
 from . import native_breakdown
-from .cost_report import TIMED, cells
-from .diagrams import entries_of, precision_diagram
+from .diagrams import batch_diagram, entries_of, precision_diagram, size_diagram, stage_diagram
 from .engines import NAME, Bench
 from .precision import REQUIRED, Entry, Needed
+from .processes import STAGES
+from .rounds import Spread
+from .size import exponent, growth
 
 LOOPS_RUN = {
     "python": "in Python, around calls into the simulator",
@@ -52,15 +53,14 @@ def report(found: Bench) -> Report:
     for case in dict.fromkeys(entry.case for entry in found.levels):
         sections.append(_levels(found, case))
     sections += [_rates(found)] if found.rates else []
-    sections += [cost.loops(found)] if found.loops else []
-    sections += [cost.batches(found)] if found.batches else []
-    sections += [cost.studies(found)] if found.studies else []
+    sections += [_loops(found)] if found.loops else []
+    sections += [_batches(found)] if found.batches else []
+    sections += [_studies(found)] if found.studies else []
     sections += [
-        cost.sizes(found, family)
-        for family in dict.fromkeys(each.mechanism for each in found.sizes)
+        _sizes(found, family) for family in dict.fromkeys(each.mechanism for each in found.sizes)
     ]
-    sections += [cost.scalings(found)] if found.scalings else []
-    sections += [cost.processes(found)] if found.processes else []
+    sections += [_scalings(found)] if found.scalings else []
+    sections += [_processes(found)] if found.processes else []
     sections += formulation_report(found.formulation).sections if found.formulation else []
     return Report(NAME, "Run time against error, measured", facts, sections)
 
@@ -74,7 +74,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
             str(entry.outcome),
             *(number(getattr(entry.errors, name)) for name in QUANTITIES),
             number(entry.iterations),
-            *cells(entry.us_per_sample),
+            *_cells(entry.us_per_sample),
         )
         for entry in entries
     ]
@@ -214,7 +214,7 @@ def _levels(found: Bench, case: str) -> Section:
         part = None if us is None or whole is None else us.median / whole
         errors = (number(getattr(entry.errors, name)) for name in QUANTITIES)
         rows.append(
-            (entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part))
+            (entry.setting, entry.loop, str(entry.outcome), *errors, *_cells(us), number(part))
         )
     headings = (
         "requested",
@@ -275,3 +275,251 @@ def _rates(found: Bench) -> Section:
         2,
         rows,
     )
+
+
+TIMED = (
+    "Median and quartiles over the rounds, in µs per sample: warm, contestants in turns in one"
+    " process. Errors are the largest over samples and outputs. An outcome is by the tolerances of"
+    " the case, which a coarse effort is expected to miss."
+)
+
+
+def _cells(us: Spread | None) -> tuple[str, str]:
+    """Return median and quartiles as text."""
+    return (
+        ("–", "–")
+        if us is None
+        else (number(us.median), f"{number(us.lower)} … {number(us.upper)}")
+    )
+
+
+def _loops(found: Bench) -> Section:
+    rows = [
+        (
+            each.engine,
+            each.loop,
+            str(each.cases),
+            number(each.us_per_sample),
+            number(each.ratio),
+            f"{number(each.lower)} … {number(each.upper)}",
+        )
+        for each in found.loops
+    ]
+    base = found.loops[0].base
+    notes = (
+        (
+            "Projection at full effort, warm, engines taking turns on each case. µs a sample:"
+            f" median over the cases. The ratio is to {base} on the same case: median and extremes"
+            " over the cases."
+        ),
+    )
+    headings = ("engine", "loop", "cases", "µs", f"times\n{base}", "from … to")
+    return Section("Whole loops by engine", [], notes, headings, 2, rows)
+
+
+def _batches(found: Bench) -> Section:
+    rows = [
+        (
+            str(each.variants),
+            *_cells(each.us_per_sample),
+            number(each.gflops),
+            "–" if each.of_peak is None else f"{100 * each.of_peak:.1f} %",
+            f"{100 * each.solved:.4g} %",
+            str(each.retried),
+            number(each.error),
+        )
+        for each in found.batches
+    ]
+    notes = (
+        (
+            "All hardpoints vary by a thousandth of the mechanism's size; one core; time by sample"
+            " and variant. Error: position of the first variant, which is the case itself. Retried:"
+            " variants solved again alone."
+        ),
+    )
+    headings = (
+        "variants",
+        "µs",
+        "quartiles",
+        "Gflop/s",
+        "of peak",
+        "solved",
+        "retried",
+        "error [m]",
+    )
+    return Section(
+        f"{found.batches[0].case}: cost against batch size",
+        [],
+        notes,
+        headings,
+        1,
+        rows,
+        [batch_diagram(found)],
+    )
+
+
+def _studies(found: Bench) -> Section:
+    rows = [
+        (
+            str(each.jobs),
+            *_cells(each.us_per_sample),
+            *_cells(each.times),
+            "–" if each.peak_times is None else number(each.peak_times.median),
+            str(each.unsolved),
+        )
+        for each in found.studies
+    ]
+    first = found.studies[0]
+    notes = (
+        (
+            f"{first.variants} variants drawn, solved and reduced as kincheck sweep does it, every"
+            " hardpoint by a thousandth of the mechanism's size; µs of the whole machine by sample"
+            " and variant. Times as fast: as on one thread, by round; the kernel that measures a"
+            " core's peak tells what the machine gives at that time."
+        ),
+    )
+    headings = (
+        "threads",
+        "µs",
+        "quartiles",
+        "times as\nfast",
+        "quartiles",
+        "of the\npeak kernel",
+        "unsolved",
+    )
+    return Section(f"{first.case}: a tolerance study by threads", [], notes, headings, 1, rows)
+
+
+def _sizes(found: Bench, family: str) -> Section:
+    sizes = [each for each in found.sizes if each.mechanism == family]
+    many = family.rpartition(" ")[2]
+    rows = [
+        (
+            e.engine,
+            e.loop,
+            str(e.loops),
+            str(e.bodies),
+            str(e.outcome or "–"),
+            number(e.error),
+            number(e.residual),
+            *_cells(e.us_per_sample),
+        )
+        for e in sizes
+    ]
+    sentences: list[str] = []
+    for engine in dict.fromkeys(each.engine for each in sizes):
+        mine = [each for each in sizes if each.engine == engine]
+        if (grown := growth(mine)) is not None:
+            n, m, power = grown
+            sentences.append(
+                f"{engine}: from {n} to {m} {many} the cost grows as their number to the power of"
+                f" {power:.2f}."
+            )
+        sentences += [
+            f"{engine}, {each.loops} {many}: {each.message}"
+            for each in mine
+            if each.us_per_sample is None
+        ]
+    headings = (
+        "engine",
+        "loop",
+        many,
+        "bodies",
+        "outcome",
+        "error [m]",
+        "residual",
+        "µs",
+        "quartiles",
+    )
+    return Section(
+        f"Cost against size: {family}",
+        sentences,
+        (TIMED,),
+        headings,
+        2,
+        rows,
+        [size_diagram(family, sizes)],
+    )
+
+
+def _scalings(found: Bench) -> Section:
+    rows = [
+        (
+            e.mechanism,
+            str(e.size),
+            str(e.bodies),
+            str(e.unknowns),
+            e.path,
+            number(e.error),
+            number(e.residual),
+            *_cells(e.us_per_value),
+        )
+        for e in found.scalings
+    ]
+    sentences: list[str] = []
+    for mechanism in dict.fromkeys(each.mechanism for each in found.scalings):
+        small, *_, large = (each for each in found.scalings if each.mechanism == mechanism)
+        power = exponent(small, large)
+        sentences.append(
+            f"{mechanism}: from {small.size} to {large.size} the cost grows as the unknowns to the"
+            f" power of {power:.2f}."
+        )
+    notes = (
+        (
+            "Median and quartiles, µs of a driver value: position, velocity and acceleration of one"
+            " point far from the driver."
+        ),
+    )
+    headings = (
+        "mechanism",
+        "size",
+        "bodies",
+        "unknowns",
+        "path",
+        "error [m]",
+        "residual",
+        "µs",
+        "quartiles",
+    )
+    return Section(
+        "Cost against size: large mechanisms as one sparse system",
+        sentences,
+        notes,
+        headings,
+        1,
+        rows,
+    )
+
+
+def _processes(found: Bench) -> Section:
+    rows = [
+        (
+            each.what,
+            *_cells(each.seconds),
+            *(number(each.stages[name].median if each.stages else None) for name in STAGES),
+            number(each.beyond_numpy),
+            str(each.status),
+            number(each.peak_mb),
+        )
+        for each in found.processes
+    ]
+    notes = (
+        (
+            "Seconds of fresh processes, files warm; stages are medians, beyond numpy: those after"
+            " it, to the first solution. In the course of ten more solves programs are compiled"
+            " that are not in the cache; until then they are interpreted. Memory: the most a"
+            " process held; runs are of the first case, and in one process with their engine"
+            " (--jobs 0)."
+        ),
+    )
+    headings = (
+        "process",
+        "s",
+        "quartiles",
+        *(name.replace(" ", "\n") for name in STAGES),
+        "beyond\nnumpy",
+        "status",
+        "memory\n[MB]",
+    )
+    diagrams = [stage_diagram(found)] if any(each.stages for each in found.processes) else []
+    return Section("First use, whole processes and memory", [], notes, headings, 1, rows, diagrams)
