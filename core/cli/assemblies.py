@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
+from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, unknown
+from ..options import (
+    ONE_CASE,
+    argument,
+    destination,
+    group,
+    joint_types,
+    json_file,
+    measured,
+    option,
+    options,
+    whole,
+)
 from . import import_options
 from .export import formats, keep_texts
-from .option_types import add_json, measured, whole
+from .parser import Command
 from .registry import Registry, Status, given
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..studies.assemblies import Survey
 
 # Two assemblies meet where the smallest singular value is below this; regular linkages stay above
@@ -20,96 +33,67 @@ if TYPE_CHECKING:
 MEETING = 1e-6
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    listing: argparse.ArgumentParser
-    listing = commands.add_parser(
-        "assemblies",
-        help="list assemblies of a mechanism, found from random starts",
-        description=_assemblies.__doc__,
-    )
-    listing.set_defaults(do=_assemblies)
-    listing.add_argument(
-        "case",
-        metavar="CASE",
-        help="name of a built-in case, or path to a case file or to another tool's file",
-    )
-    listing.add_argument(
-        "--at",
-        type=measured,
-        metavar="VALUE",
-        help=(
-            "value of the swept driver, such as 30mm or -20deg, in SI without a unit; default: the"
-            " design position"
-        ),
-    )
-    listing.add_argument(
-        "--samples",
-        type=whole(1),
-        default=200,
-        metavar="N",
-        help="number of random starts; default %(default)s",
-    )
-    listing.add_argument(
-        "--seed",
-        type=whole(0),
-        default=0,
-        metavar="N",
-        help="seed of the random starts; default %(default)s",
-    )
-    add_json(listing, "the assemblies with all poses")
-    listing.add_argument(
-        "--export",
-        metavar="FORMAT",
-        help=f"write the mechanism, started in one of them: {formats()}",
-    )
-    listing.add_argument(
-        "--number",
-        type=whole(1),
-        metavar="K",
-        help="number of the assembly to export; default 1, the first of the list",
-    )
-    listing.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="stem of the exported files; default: CASE.K in this folder",
-    )
-    import_options.add_options(listing)
-
-
-def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class ListAssemblies(Command):
     """List the assemblies found from random starts at a driver value, the intended assembly first.
 
     Exit status: 0 assemblies are found, 1 none is found, 2 the tool could not do its work.
     """
-    from ..case.io.atomic_files import require_writable
-    from ..report.terminal import with_json
-    from ..studies.assemblies import survey, written
 
-    if options.export is None and (found := given(options, ("number", "out"))):
-        raise KincheckError(
-            f"{found}: found without --export, which it belongs to; add"
-            " --export FORMAT, or leave out"
-        )
-    require_writable([("--json", options.json), ("--out", options.out)])
-    if options.export is not None and options.export not in registry.writers:
-        raise KincheckError(unknown("format", options.export, registry.writers))
-    case = registry.find_case(options.case, import_options.supplied(options))
-    import_options.tell_left_out([case])
-    found = survey(
-        case,
-        import_options.driver_value(options.at, case),
-        samples=options.samples,
-        seed=options.seed,
+    about: ClassVar[str] = "list assemblies of a mechanism, found from random starts"
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    at: str | None = option(
+        "value of the swept driver, such as 30mm or -20deg, in SI without a unit; default: the"
+        " design position",
+        measured,
+        "VALUE",
+        default=None,
     )
-    with with_json(found.report(), options.json):
-        _print(found, options.json)
-        if options.export is not None:
-            number: int = options.number or 1
-            texts = written(found, registry.writer(options.export), number)
-            keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
-    return Status.WITHIN if found.assemblies.found else Status.DEVIATES
+    samples: int = option(
+        "number of random starts; default %(default)s", whole(1), "N", default=200
+    )
+    seed: int = option("seed of the random starts; default %(default)s", whole(0), "N", default=0)
+    json: str | None = json_file("the assemblies with all poses")
+    export: str | None = destination(
+        f"write the mechanism, started in one of them: {formats()}", metavar="FORMAT"
+    )
+    number: int | None = destination(
+        "number of the assembly to export; default 1, the first of the list", whole(1), "K"
+    )
+    out: Path | None = destination(
+        "stem of the exported files; default: CASE.K in this folder", Path
+    )
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import require_writable
+        from ..report.terminal import with_json
+        from ..studies.assemblies import survey, written
+
+        if self.export is None and (found := given(self, ("number", "out"))):
+            raise KincheckError(
+                f"{found}: found without --export, which it belongs to; add"
+                " --export FORMAT, or leave out"
+            )
+        require_writable([("--json", self.json), ("--out", self.out)])
+        if self.export is not None and self.export not in registry.writers:
+            raise KincheckError(unknown("format", self.export, registry.writers))
+        case = registry.case_of(self)
+        found = survey(
+            case,
+            import_options.driver_value(self.at, case),
+            samples=self.samples,
+            seed=self.seed,
+        )
+        with with_json(found.report(), self.json):
+            _print(found, self.json)
+            if self.export is not None:
+                number: int = self.number or 1
+                texts = written(found, registry.writer(self.export), number)
+                keep_texts(texts, f"{case.name}.{number}", self.out, self.json)
+        return Status.WITHIN if found.assemblies.found else Status.DEVIATES
 
 
 def _print(found: Survey, json: str | None) -> None:

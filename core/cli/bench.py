@@ -2,157 +2,90 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import KincheckError
 from ..extras import how_to_install
+from ..options import (
+    argument,
+    destination,
+    joint_types,
+    json_file,
+    option,
+    options,
+    verbosity,
+    whole,
+    with_values,
+)
 from ..report.progress import complain
-from .option_types import add_json, whole
-from .registry import Registry, Status, add_joint_types
+from .parser import Command
+from .registry import Registry, Status
 from .run_options import TOL
-from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..studies.bench.engines import Bench
 
 SEED = 943745
 STRUT = "mcpherson_strut"
-CASES = (STRUT, "stewart_platform")
+BOTH = (STRUT, "stewart_platform")
 """Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
 six coupled loops.
 """
+PARTS = ("work", "loop", "batch", "study", "size", "processes")
 # Rounds that settle a median to a tenth of the distance between the quartiles.
 ROUNDS = 20
 
 _MAIN = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    bench: argparse.ArgumentParser
-    bench = commands.add_parser(
-        "bench",
-        help="measure the engines, the formulation and its programs",
-        description=_all.__doc__,
-    )
-    bench.set_defaults(do=_all)
-    bench.add_argument(
-        "--out", type=Path, metavar="DIR", help="write bench.json and bench.html there"
-    )
-    add_json(bench)
-    add_verbosity(bench, quiet="print no progress")
-    benchmarks = bench.add_subparsers(title="benchmarks", metavar="BENCHMARK")
-    engines = benchmarks.add_parser(
-        "engines",
-        help="run time against error, batch and mechanism size, first use, memory",
-        description=_engines.__doc__,
-    )
-    engines.set_defaults(do=_engines)
-    engines.add_argument(
-        "--cases",
-        nargs="+",
-        default=[STRUT],
-        metavar="CASE",
-        help=f"built-in names, patterns, or case files; all: every built-in case; default: {STRUT}",
-    )
-    add_joint_types(engines)
-    engines.add_argument(
-        "--engine",
-        nargs="+",
-        default=[],
-        metavar="NAME",
-        help="default: all engines, in both modes",
-    )
-    engines.add_argument(
-        "--rounds",
-        type=whole(1),
-        default=ROUNDS,
-        metavar="N",
-        help="rounds of all contestants in turn; default %(default)s",
-    )
-    engines.add_argument(
-        "--parts",
-        nargs="+",
-        choices=("work", "loop", "batch", "study", "size", "processes"),
-        default=["work", "loop", "batch", "study", "size", "processes"],
-        help=(
-            "work against precision; whole loops as multiples of Pinocchio's; cost against batch"
-            " size, of a study by threads, and against mechanism size; first use and memory;"
-            " default: all"
-        ),
-    )
-    formulation = benchmarks.add_parser(
-        "formulation",
-        help="operation counts and round-off of the paper's rows",
-        description=_formulation.__doc__,
-    )
-    formulation.set_defaults(do=_formulation)
-    formulation.add_argument(
-        "--seed",
-        type=whole(0),
-        default=SEED,
-        metavar="N",
-        help="seed of the random states; default %(default)s",
-    )
-    statics = benchmarks.add_parser(
-        "compliance",
-        help="equilibria and compliance matrices of a suspension, many samples together",
-        description=_compliance.__doc__,
-    )
-    statics.set_defaults(do=_compliance)
-    statics.add_argument("case", metavar="CASE", help="case file of kincheck kc")
-    statics.add_argument(
-        "--rounds", type=whole(1), default=ROUNDS, metavar="N", help="rounds; default %(default)s"
-    )
-    statics.add_argument(
-        "--json",
-        metavar="FILE",
-        help="write the results as JSON; - for standard output",
-        default=argparse.SUPPRESS,
-    )
-    for each, names in ((engines, "bench"), (formulation, "bench_formulation")):
-        # No defaults: they would overwrite the options before the benchmark's name.
-        given: dict[str, Any] = {"default": argparse.SUPPRESS}
-        each.add_argument(
-            "--out",
-            type=Path,
-            metavar="DIR",
-            help=f"write {names}.json and {names}.html there",
-            **given,
-        )
-        each.add_argument(
-            "--json",
-            metavar="FILE",
-            help="write the results as JSON; - for standard output",
-            **given,
-        )
-    engines.add_argument(
-        "-q", "--quiet", action="store_true", default=argparse.SUPPRESS, help="print no progress"
-    )
-
-
-def _all(options: argparse.Namespace, registry: Registry) -> int:
-    """Measure the engines on a few cases, and the formulation. This takes some minutes."""
-    options.cases, options.engine, options.rounds, options.parts = CASES, [], ROUNDS, None
-    return _measured(options, registry, formulation=True)
-
-
-def _engines(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class BenchEngines(Command):
     """Measure run time against error for every engine and mode, at several efforts. The contestants
     take turns in one process.
     """
-    return _measured(options, registry, formulation=False)
+
+    about: ClassVar[str] = "run time against error, batch and mechanism size, first use, memory"
+    cases: tuple[str, ...] = option(
+        f"built-in names, patterns, or case files; all: every built-in case; default: {STRUT}",
+        metavar="CASE",
+        several="once",
+        default=(STRUT,),
+    )
+    joint_type: tuple[str, ...] = joint_types()
+    engine: tuple[str, ...] = option(
+        "default: all engines, in both modes",
+        metavar="NAME",
+        several="once",
+        default=(),
+    )
+    rounds: int = option(
+        "rounds of all contestants in turn; default %(default)s", whole(1), "N", default=ROUNDS
+    )
+    parts: tuple[str, ...] = option(
+        "work against precision; whole loops as multiples of Pinocchio's; cost against batch"
+        " size, of a study by threads, and against mechanism size; first use and memory;"
+        " default: all",
+        choices=PARTS,
+        several="once",
+        default=PARTS,
+    )
+    out: Path | None = destination("write bench.json and bench.html there", Path, "DIR")
+    json: str | None = json_file()
+    quiet: bool = verbosity("print no progress")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        return _measured(self, registry, formulation=False)
 
 
-def _measured(options: argparse.Namespace, registry: Registry, *, formulation: bool) -> int:
+def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -> int:
     from ..extras import THREADS
     from ..harness.record import Outcome
     from ..report.meter import Meter
@@ -191,7 +124,7 @@ def _measured(options: argparse.Namespace, registry: Registry, *, formulation: b
             engines,
             tol=TOL,
             rounds=options.rounds,
-            parts=options.parts or bench_engines.PARTS,
+            parts=options.parts,
             command=options.command,
             progress=meter,
         )
@@ -225,34 +158,79 @@ def _with_one_thread(command: str, variables: Sequence[str]) -> int:
     ).returncode
 
 
-def _destinations(options: argparse.Namespace, name: str) -> list[str]:
+def _destinations(options: BenchEngines | BenchFormulation, name: str) -> list[str]:
     from .destinations import Destinations
 
     return Destinations.of(options).problems([f"{name}.{kind}" for kind in ("json", "html")])
 
 
-def _formulation(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class BenchFormulation(Command):
     """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole
     sweep. This needs mpmath.
     """
-    from ..report import sections as bench
-    from ..studies.paper import formulation as bench_formulation
 
-    if problems := _destinations(options, bench_formulation.NAME):
-        raise KincheckError("\n".join(problems))
-    found = bench_formulation.measure(registry.case(STRUT), options.seed, bench_formulation.STATES)
-    bench.deliver(bench_formulation.report(found), found, out=options.out, json=options.json)
-    return Status.WITHIN
+    about: ClassVar[str] = "operation counts and round-off of the paper's rows"
+    seed: int = option(
+        "seed of the random states; default %(default)s", whole(0), "N", default=SEED
+    )
+    out: Path | None = destination(
+        "write bench_formulation.json and bench_formulation.html there", Path, "DIR"
+    )
+    json: str | None = json_file()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..report import sections as bench
+        from ..studies.paper import formulation as bench_formulation
+
+        if problems := _destinations(self, bench_formulation.NAME):
+            raise KincheckError("\n".join(problems))
+        found = bench_formulation.measure(registry.case(STRUT), self.seed, bench_formulation.STATES)
+        bench.deliver(bench_formulation.report(found), found, out=self.out, json=self.json)
+        return Status.WITHIN
 
 
-def _compliance(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class BenchCompliance(Command):
     """Measure the time of an equilibrium of a suspension, and of its compliance matrix, in a study
     of many samples: travel and lateral force on a grid.
     """
-    from ..report.terminal import with_json
-    from ..studies.bench.compliance import lines, measure
 
-    found = measure(registry.find_case(options.case, driven=False), options.rounds)
-    with with_json(found, options.json):
-        print(*lines(found), sep="\n", file=sys.stderr if options.json == "-" else sys.stdout)
-    return Status.WITHIN
+    about: ClassVar[str] = (
+        "equilibria and compliance matrices of a suspension, many samples together"
+    )
+    case: str = argument("case file of kincheck kc", "CASE")
+    rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
+    json: str | None = json_file()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..report.terminal import with_json
+        from ..studies.bench.compliance import lines, measure
+
+        found = measure(registry.find_case(self.case, driven=False), self.rounds)
+        with with_json(found, self.json):
+            print(*lines(found), sep="\n", file=sys.stderr if self.json == "-" else sys.stdout)
+        return Status.WITHIN
+
+
+@options
+class BenchAll(Command):
+    """Measure the engines on a few cases, and the formulation. This takes some minutes."""
+
+    about: ClassVar[str] = "measure the engines, the formulation and its programs"
+    below: ClassVar[Mapping[str, type[Command]]] = {
+        "engines": BenchEngines,
+        "formulation": BenchFormulation,
+        "compliance": BenchCompliance,
+    }
+    out: Path | None = destination("write bench.json and bench.html there", Path, "DIR")
+    json: str | None = json_file()
+    quiet: bool = verbosity("print no progress")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        given = {name: getattr(self, name) for name in ("out", "json", "quiet", "command")}
+        every = with_values(BenchEngines(), cases=BOTH, **given)
+        return _measured(every, registry, formulation=True)

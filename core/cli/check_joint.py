@@ -2,51 +2,44 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
-from typing import Any
+from typing import ClassVar
 
-from .option_types import whole
+from ..options import (
+    argument,
+    option,
+    options,
+    verbosity,
+    whole,
+)
+from .parser import Command
 from .registry import Registry, Status
-from .verbosity import add_verbosity
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    checking: argparse.ArgumentParser
-    checking = commands.add_parser(
-        "check-joint",
-        help="check your own joint type, or a built-in one",
-        description=_check_joint.__doc__,
-    )
-    checking.set_defaults(do=_check_joint)
-    checking.add_argument(
-        "joint",
-        metavar="JOINT",
-        help="a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
-        " built-in type, such as revolute",
-    )
-    checking.add_argument(
-        "--seed",
-        type=whole(0),
-        default=0,
-        metavar="N",
-        help="seed of the random poses; default %(default)s",
-    )
-    add_verbosity(checking, quiet="print only the failed checks and the count")
-
-
-def _check_joint(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class CheckJoint(Command):
     """Check a joint type: its equations against their derivatives, its branches, and a closed loop
     in every engine.
     """
-    from ..studies.checks.check_joint import check_joint
-    from .joint_loading import named_joint
 
-    report = check_joint(
-        named_joint(options.joint),
-        seed=options.seed,
-        engines=[*map(registry.engine, registry.engines)],
+    about: ClassVar[str] = "check your own joint type, or a built-in one"
+    joint: str = argument(
+        "a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
+        " built-in type, such as revolute",
+        "JOINT",
     )
-    report.print(sys.stdout, quiet=options.quiet)
-    return Status.WITHIN if report.passed else Status.DEVIATES
+    seed: int = option("seed of the random poses; default %(default)s", whole(0), "N", default=0)
+    quiet: bool = verbosity("print only the failed checks and the count")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..studies.checks.check_joint import check_joint
+        from .joint_loading import named_joint
+
+        report = check_joint(
+            named_joint(self.joint),
+            seed=self.seed,
+            engines=[*map(registry.engine, registry.engines)],
+        )
+        report.print(sys.stdout, quiet=self.quiet)
+        return Status.WITHIN if report.passed else Status.DEVIATES

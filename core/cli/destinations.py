@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -51,7 +50,7 @@ class Destinations:
     long: bool = False
 
     @classmethod
-    def of(cls, options: argparse.Namespace) -> Destinations:
+    def of(cls, options: object) -> Destinations:
         """Return the destinations named by a command's options."""
         names = [each.name for each in fields(cls)]
         return cls(**{name: value for name, value in vars(options).items() if name in names})

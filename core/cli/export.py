@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, ClassVar
 
 from ..case.io.escape import file_name
+from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, unknown
+from ..options import (
+    ONE_CASE,
+    argument,
+    destination,
+    group,
+    joint_types,
+    measured,
+    option,
+    options,
+)
 from . import import_options
-from .option_types import measured
+from .parser import Command
 from .registry import Registry, Status
+
+if TYPE_CHECKING:
+    from ..case.case import Case
 
 FORMATS = {
     "mjcf": "MuJoCo",
@@ -30,54 +43,41 @@ def formats() -> str:
     return f"{', '.join(first)} or {last}"
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    export: argparse.ArgumentParser
-    export = commands.add_parser(
-        "export", help="write a mechanism for a simulator", description=_export.__doc__
-    )
-    export.set_defaults(do=_export)
-    export.add_argument(
-        "case",
-        metavar="CASE",
-        help="name of a built-in case, or path to a case file or to another tool's file",
-    )
-    export.add_argument("--to", required=True, metavar="FORMAT", help=formats())
-    export.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="stem of the written files; default: the case's name, in this folder",
-    )
-    export.add_argument(
-        "--at",
-        type=measured,
-        metavar="VALUE",
-        help=(
-            "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
-            " default: the design position"
-        ),
-    )
-    import_options.add_options(export)
-
-
-def _export(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Export(Command):
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
     A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
-    from ..case.io.model_writer import written
 
-    if options.to not in registry.writers:
-        raise KincheckError(unknown("format", options.to, registry.writers))
-    case = registry.find_case(options.case, import_options.supplied(options), driven=False)
-    import_options.tell_left_out([case])
-    keep_texts(
-        written(case, registry.writer(options.to), import_options.driver_value(options.at, case)),
-        case.name,
-        options.out,
+    about: ClassVar[str] = "write a mechanism for a simulator"
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    to: str = destination(formats(), metavar="FORMAT", required=True)
+    out: Path | None = destination(
+        "stem of the written files; default: the case's name, in this folder", Path
     )
-    return Status.WITHIN
+    at: str | None = option(
+        "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
+        " default: the design position",
+        measured,
+        "VALUE",
+    )
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.model_writer import written
+
+        if self.to not in registry.writers:
+            raise KincheckError(unknown("format", self.to, registry.writers))
+        case = registry.case_of(self, driven=False)
+        keep_texts(
+            written(case, registry.writer(self.to), import_options.driver_value(self.at, case)),
+            case.name,
+            self.out,
+        )
+        return Status.WITHIN
 
 
 def keep_texts(

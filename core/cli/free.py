@@ -2,90 +2,106 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, ClassVar
 
+from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
-from . import import_options
-from .option_types import add_json, positive, whole
+from ..options import (
+    ONE_CASE,
+    argument,
+    destination,
+    group,
+    joint_types,
+    json_file,
+    option,
+    options,
+    positive,
+    whole,
+)
+from .parser import Command
 from .registry import Registry, Status
 
-
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    freeing: argparse.ArgumentParser
-    freeing = commands.add_parser(
-        "free",
-        help="move a case without drivers, by its masses and loads, to round-off",
-        description=_free.__doc__,
-    )
-    freeing.set_defaults(do=_free)
-    freeing.add_argument(
-        "case",
-        metavar="CASE",
-        help="name of a built-in case, or path to a case file or to another tool's file",
-    )
-    freeing.add_argument(
-        "--duration", type=positive, metavar="T", help="of the motion [s]; default: of [free]"
-    )
-    freeing.add_argument(
-        "--samples",
-        type=whole(2),
-        metavar="N",
-        help="number of samples, both ends included; default: of [free]",
-    )
-    freeing.add_argument(
-        "--csv",
-        type=Path,
-        metavar="FILE",
-        help="write time and outputs as columns, SI units",
-    )
-    add_json(freeing, "outputs and errors")
-    import_options.add_options(freeing)
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..studies.free import FreeResult
 
 
-def _free(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class MoveFreely(Command):
     """Integrate the motion of a case without its drivers: its masses, loads and the rates of
     [free] alone move it from the design position.
 
     The error is the change when all steps are halved. Exit status: 0 the whole motion is
     integrated; 1 it ends before, at a change point; 2 the tool could not do its work.
     """
-    from ..case.case import Free
-    from ..case.io.atomic_files import require_writable, write
-    from ..report.progress import complain
-    from ..report.terminal import with_json
-    from ..studies.free import free_of
 
-    case = registry.find_case(options.case, import_options.supplied(options), driven=False)
-    import_options.tell_left_out([case])
-    given = case.free
-    duration = options.duration or (given and given.duration)
-    samples = options.samples or (given and given.samples)
-    if not duration or not samples:
-        raise KincheckError(
-            f"{options.case}: says no duration and samples of its free motion; add [free] with"
-            " duration and samples, or give --duration and --samples"
-        )
-    case = replace(case, free=Free(duration, samples, given.rates if given else {}))
-    require_writable([("--csv", options.csv), ("--json", options.json)])
-    found = free_of(case)
-    if options.csv:
-        write("--csv", options.csv, found.write_csv)
-    complain([*found.notes, *filter(None, [found.message])])
-    with with_json(found.facts, options.json):
-        print(
-            f"{case.name}: {len(found.times)} samples to {found.times[-1]:.9g} s,"
-            f" {found.freedoms} degrees of freedom, {found.redundant} redundant rows,"
-            f" {found.method}",
-            f"  change when all steps are halved: {found.error:.1e} m,"
-            f" {found.turning_error:.1e} rad",
-            f"  change of energy less work: {found.energy_error:.1e} J; largest gap:"
-            f" {found.gap:.1e} of the mechanism's size",
-            sep="\n",
-            file=sys.stderr if options.json == "-" else sys.stdout,
-        )
-    return Status.DEVIATES if found.message else Status.WITHIN
+    about: ClassVar[str] = "move a case without drivers, by its masses and loads, to round-off"
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    duration: float | None = option(
+        "of the motion [s]; default: of [free]", positive, "T", default=None
+    )
+    samples: int | None = option(
+        "number of samples, both ends included; default: of [free]",
+        whole(2),
+        "N",
+        default=None,
+    )
+    rates: Mapping[str, float] | None = field(default=None)
+    csv: Path | None = destination("write time and outputs as columns, SI units", Path)
+    json: str | None = json_file("outputs and errors")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
+
+    def answer(self, registry: Registry) -> FreeResult:
+        """Integrate the motion of a case without its drivers.
+
+        Args `rates`: at the start, by driver or joint [m/s or rad/s]; default: those of [free].
+
+        Raises:
+            KincheckError: duration or samples are missing, or the mechanism has no free motion.
+        """
+        from ..case.case import Free
+        from ..studies.free import free_of
+
+        case = registry.case_of(self, driven=False)
+        given = case.free
+        duration = self.duration or (given and given.duration)
+        samples = self.samples or (given and given.samples)
+        if not duration or not samples:
+            raise KincheckError(
+                f"{case.name if self.case is case else self.case}: says no duration and samples of"
+                " its free motion; add [free] with duration and samples, or give --duration and"
+                " --samples"
+            )
+        rates: Mapping[str, float] = given.rates if given else {}
+        rates = rates if self.rates is None else self.rates
+        return free_of(replace(case, free=Free(duration, samples, rates)))
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import require_writable, write
+        from ..report.progress import complain
+        from ..report.terminal import with_json
+
+        require_writable([("--csv", self.csv), ("--json", self.json)])
+        found = self.answer(registry)
+        if self.csv:
+            write("--csv", self.csv, found.write_csv)
+        complain([*found.notes, *filter(None, [found.message])])
+        with with_json(found.facts, self.json):
+            print(
+                f"{found.case}: {len(found.times)} samples to {found.times[-1]:.9g} s,"
+                f" {found.freedoms} degrees of freedom, {found.redundant} redundant rows,"
+                f" {found.method}",
+                f"  change when all steps are halved: {found.error:.1e} m,"
+                f" {found.turning_error:.1e} rad",
+                f"  change of energy less work: {found.energy_error:.1e} J; largest gap:"
+                f" {found.gap:.1e} of the mechanism's size",
+                sep="\n",
+                file=sys.stderr if self.json == "-" else sys.stdout,
+            )
+        return Status.DEVIATES if found.message else Status.WITHIN

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import argparse
-import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..errors import KincheckError, unknown
+from ..options import (
+    destination,
+    option,
+    options,
+    whole,
+)
 from ..report.progress import complain
-from .option_types import add_several, whole
+from .parser import Command
 from .registry import Registry, Status
 from .run_options import HISTORY
 
@@ -20,104 +24,71 @@ if TYPE_CHECKING:
     from ..history.store import RunRow, Store
 
 LAST = 20  # runs shown by default
+WRITTEN = f"written by kincheck run --history; default: the environment variable {HISTORY}"
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    history: argparse.ArgumentParser
-    history = commands.add_parser(
-        "history",
-        help="list the stored runs, their trends and their steps",
-        description=_history.__doc__,
-    )
-    history.set_defaults(do=_history)
-    add_history(history, "history file")
-    add_several(history, "--case", "trends of these cases only")
-    add_several(history, "--engine", "trends of these engines only")
-    history.add_argument(
-        "--last",
-        type=whole(0),
-        default=LAST,
-        metavar="N",
-        help="number of latest runs; default %(default)s; 0: all",
-    )
-    history.add_argument(
-        "--remove",
-        type=whole(1),
-        nargs="+",
-        default=[],
-        metavar="RUN",
-        help="remove these runs, for example damaged ones",
-    )
-    history.add_argument(
-        "--plot",
-        type=Path,
-        metavar="FILE.html",
-        help="draw errors and times over the runs as an HTML page",
-    )
-    history.add_argument(
-        "--export",
-        type=Path,
-        metavar="FILE",
-        help="write all runs as a table: FILE.parquet or FILE.csv",
-    )
-
-
-def add_history(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option for the history file."""
-    parser.add_argument(
-        "--history",
-        type=Path,
-        metavar="FILE",
-        default=os.environ.get(HISTORY) or None,
-        help=(
-            f"{what}, written by kincheck run --history; default: the environment variable"
-            f" {HISTORY}"
-        ),
-    )
-
-
-def _history(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class ListRuns(Command):
     """List the runs, the latest first; for a case or an engine, list its errors and times over the
     runs, and their steps.
     """
-    from ..case.io.atomic_files import require_writable
-    from ..history.queries import read
-    from ..history.store import Store
 
-    if options.history is None:
-        raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
-    require_writable([("--plot", options.plot), ("--export", options.export)], options.history)
-    with Store(Path(options.history), writable=bool(options.remove)) as store:
-        for run in options.remove:
-            store.remove(run)
-            print(f"run {run} is removed")
-        chosen: dict[str, Any] = {"cases": options.case, "engines": options.engine}
-        _check_names(store, **chosen)
-        history = read(store, last=options.last or None, **chosen)
-        if options.case or options.engine:
-            _print_trends(history)
-        else:
-            _print_runs(store, store.runs()[: options.last or None])
-        if options.plot is not None:
-            from ..report.history_plot import write_plot
+    about: ClassVar[str] = "list the stored runs, their trends and their steps"
+    history: Path | None = destination(f"history file, {WRITTEN}", Path, environment=HISTORY)
+    case: tuple[str, ...] = option("trends of these cases only", metavar="NAME", several="together")
+    engine: tuple[str, ...] = option(
+        "trends of these engines only", metavar="NAME", several="together"
+    )
+    last: int = option(
+        "number of latest runs; default %(default)s; 0: all", whole(0), "N", default=LAST
+    )
+    remove: tuple[int, ...] = option(
+        "remove these runs, for example damaged ones", whole(1), "RUN", several="once"
+    )
+    plot: Path | None = destination(
+        "draw errors and times over the runs as an HTML page", Path, "FILE.html"
+    )
+    export: Path | None = destination("write all runs as a table: FILE.parquet or FILE.csv", Path)
 
-            write_plot(
-                history,
-                options.plot,
-                title=f"{Path(options.history).name}: errors and times over the runs",
-            )
-            print(
-                f"{options.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
-                " runs"
-            )
-        if options.export is not None:
-            from ..history.export import export
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import require_writable
+        from ..history.queries import read
+        from ..history.store import Store
 
-            count = export(store, options.export, **chosen)
-            print(f"{options.export}: {count} rows")
-        complain(store.damage)
-        return Status.FAILED if store.damage else Status.WITHIN
+        if self.history is None:
+            raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
+        require_writable([("--plot", self.plot), ("--export", self.export)], self.history)
+        with Store(Path(self.history), writable=bool(self.remove)) as store:
+            for run in self.remove:
+                store.remove(run)
+                print(f"run {run} is removed")
+            chosen: dict[str, Any] = {"cases": self.case, "engines": self.engine}
+            _check_names(store, **chosen)
+            history = read(store, last=self.last or None, **chosen)
+            if self.case or self.engine:
+                _print_trends(history)
+            else:
+                _print_runs(store, store.runs()[: self.last or None])
+            if self.plot is not None:
+                from ..report.history_plot import write_plot
+
+                write_plot(
+                    history,
+                    self.plot,
+                    title=f"{Path(self.history).name}: errors and times over the runs",
+                )
+                print(
+                    f"{self.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
+                    " runs"
+                )
+            if self.export is not None:
+                from ..history.export import export
+
+                count = export(store, self.export, **chosen)
+                print(f"{self.export}: {count} rows")
+            complain(store.damage)
+            return Status.FAILED if store.damage else Status.WITHIN
 
 
 def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:

@@ -4,7 +4,6 @@ end. No result is lost if the history fails.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -12,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import MOST_NAMED, shortened
-from .import_options import supplied
-from .run_options import curve_options
+from ..options import several
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -22,20 +20,20 @@ if TYPE_CHECKING:
     from .destinations import Trends
 
 
-def selection(options: argparse.Namespace) -> dict[str, Any]:
+def selection(options: Any) -> dict[str, Any]:
     """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
     options of solution and judgement.
     """
     run = ("joints", "joint_type", "mode", "reference", "require", "static", "reactions")
     run += ("recorded", "engine_command", "fmu", "analysis")
-    parts = {
+    parts: dict[str, dict[str, Any]] = {
         "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
-        "files": vars(supplied(options)),
-        "curve": vars(curve_options(options)),
+        "files": vars(options.supplied) | {"recorded": bool(options.recorded)},
+        "curve": vars(options.curve),
     }
     return {
-        "cases": sorted({*_words(options.case)}),
-        "engines": sorted({*_words(options.engine)}),
+        "cases": sorted({*_words(several(options.cases))}),
+        "engines": sorted({*_words(several(options.engines))}),
         "options": {
             part: {name: _words(x) for name, x in each.items() if x} for part, each in parts.items()
         },
@@ -52,7 +50,7 @@ def _words(given: Any) -> Any:
 
 
 def keeping(
-    options: argparse.Namespace,
+    options: Any,
     cases: Sequence[Case],
     engines: Sequence[Engine],
     unread: Sequence[str],

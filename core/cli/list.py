@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..extras import how_to_install, installed_version, is_extra
-from .registry import Registry, Status, add_joint_types
-from .verbosity import add_verbosity
+from ..options import (
+    joint_types,
+    options,
+    switch,
+    verbosity,
+)
+from .parser import Command
+from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,71 +30,54 @@ BROKEN = 96
 CUT = {"no_wrap": True, "overflow": "ellipsis", "crop": True}
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    listing: argparse.ArgumentParser = commands.add_parser(
-        "list", help="list cases and engines", description=_list.__doc__
-    )
-    listing.set_defaults(do=_list)
-    listing.add_argument(
-        "--schema",
-        action="store_true",
-        help="list the keys of a case file, and of a file of variations",
-    )
-    listing.add_argument(
-        "--joints",
-        action="store_true",
-        help="list the types a case file can name: joints, drivers, motions",
-    )
-    listing.add_argument(
-        "--outputs",
-        action="store_true",
-        help="list the types of outputs a case file can name, with their signs",
-    )
-    add_verbosity(
-        listing,
-        quiet="print only the names: cases, then engines",
-        verbose="print sources in full on narrow terminals, too",
-    )
-    add_joint_types(listing)
-
-
-def _list(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class List(Command):
     """List the built-in cases with the kind and source of their references, and the engines with
     the installed versions (kincheck doctor also imports them); or list the keys and types of files.
     """
-    from ..report.terminal import page
 
-    console = page(None)
-    # a line for each case: cut at the edge of a terminal, whole in a pipe
-    how: Any = {"soft_wrap": True} if options.verbose or not console.is_terminal else CUT
-    print_line = partial(console.print, **how)
-    if options.schema or options.joints or options.outputs:
-        _print_references(options, console)
+    about: ClassVar[str] = "list cases and engines"
+    schema: bool = switch("list the keys of a case file, and of a file of variations")
+    joints: bool = switch("list the types a case file can name: joints, drivers, motions")
+    outputs: bool = switch("list the types of outputs a case file can name, with their signs")
+    quiet: bool = verbosity("print only the names: cases, then engines")
+    verbose: bool = verbosity("print sources in full on narrow terminals, too", "-v")
+    joint_type: tuple[str, ...] = joint_types()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..report.terminal import page
+
+        console = page(None)
+        # a line for each case: cut at the edge of a terminal, whole in a pipe
+        how: Any = {"soft_wrap": True} if self.verbose or not console.is_terminal else CUT
+        print_line = partial(console.print, **how)
+        if self.schema or self.joints or self.outputs:
+            _print_references(self, console)
+            return Status.WITHIN
+        cases = registry.cases()
+        if self.quiet:
+            print(*cases, *dict.fromkeys((*registry.engines, *registry.simulations)), sep="\n")
+            return Status.WITHIN
+        print_line("cases:")
+        for name in cases:
+            kind, source = registry.summary(name)
+            print_line(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
+        print_line("engines:")
+        engines: list[Engine] = [
+            *map(registry.engine, registry.engines),
+            *(registry.engine(name, "simulate") for name in registry.simulations),
+        ]
+        width = max(len(engine.name) for engine in engines)
+        for engine in engines:
+            version = _version(engine)
+            state = (
+                f"not installed: {how_to_install(engine.name)}"
+                if version is None
+                else f"{version}  {engine.mode}, loop: {engine.loop}"
+            )
+            console.print(f"  {engine.name:{width}}  {state}", soft_wrap=True)
         return Status.WITHIN
-    cases = registry.cases()
-    if options.quiet:
-        print(*cases, *dict.fromkeys((*registry.engines, *registry.simulations)), sep="\n")
-        return Status.WITHIN
-    print_line("cases:")
-    for name in cases:
-        kind, source = registry.summary(name)
-        print_line(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
-    print_line("engines:")
-    engines: list[Engine] = [
-        *map(registry.engine, registry.engines),
-        *(registry.engine(name, "simulate") for name in registry.simulations),
-    ]
-    width = max(len(engine.name) for engine in engines)
-    for engine in engines:
-        version = _version(engine)
-        state = (
-            f"not installed: {how_to_install(engine.name)}"
-            if version is None
-            else f"{version}  {engine.mode}, loop: {engine.loop}"
-        )
-        console.print(f"  {engine.name:{width}}  {state}", soft_wrap=True)
-    return Status.WITHIN
 
 
 def _version(engine: Engine) -> str | None:
@@ -99,7 +87,7 @@ def _version(engine: Engine) -> str | None:
     return installed_version(engine.name) if is_extra(engine.name) else versions([engine])[0]
 
 
-def _print_references(options: argparse.Namespace, console: Console) -> None:
+def _print_references(options: List, console: Console) -> None:
     """Print keys and types, with whole lines for a pipe and broken lines for a terminal."""
     from ..case.io import catalogue
     from ..report.terminal import LOG_WIDTH, indented, unheaded

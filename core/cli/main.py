@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 from ..errors import KincheckError
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..version import VERSION
-from . import COMMANDS, command_name
-from .parser import Parser
+from . import COMMANDS
+from .parser import Parser, add_command
 
 if TYPE_CHECKING:
     from .registry import Registry
@@ -159,7 +159,12 @@ def parser(argv: Sequence[str]) -> Parser:
     )
     found.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = found.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    named = [name for name in COMMANDS if argv and argv[0] == command_name(name)]
+    named = [name for name in COMMANDS if argv and argv[0] == name]
     for name in named or COMMANDS:
-        importlib.import_module(f".{name}", __package__).add(commands)
+        module, _, cls = COMMANDS[name].partition(":")
+        command = getattr(importlib.import_module(f".{module}", __package__), cls or "add")
+        if cls:
+            add_command(commands, name, command)
+        else:
+            command(commands)
     return found

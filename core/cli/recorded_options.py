@@ -2,62 +2,67 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import KincheckError
+from ..options import option, options
+from .parser import Command
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.io.reference_curve import CurveOptions
     from ..harness.engine import Engine
 
 
-def add_options(run: argparse.ArgumentParser) -> None:
-    """Add the options to the parser of the command."""
-    group = run.add_argument_group(
-        "recordings",
-        "Results of other programs, beside the engines. --map and --accuracy say more.",
+RECORDINGS = "recordings"
+
+
+@options
+class WithRecordings(Command):
+    """A command that judges results of other programs."""
+
+    HEADINGS: ClassVar[Mapping[str, str]] = {
+        RECORDINGS: "Results of other programs, beside the engines. --map and --accuracy say more."
+    }
+    recorded: Sequence[Path] = option(
+        "results of the case as an engine with the file's name: a table, results of Adams"
+        " (.res) or OpenSim (.mot, .sto), a MAT-file (.mat)",
+        Path,
+        "FILE",
+        several="repeated",
+        heading=RECORDINGS,
+        default=(),
     )
-    group.add_argument(
-        "--recorded",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help=(
-            "results of the case as an engine with the file's name: a table, results of Adams"
-            " (.res) or OpenSim (.mot, .sto), a MAT-file (.mat)"
-        ),
-    )
-    group.add_argument(
-        "--engine-command",
-        action="append",
-        default=[],
+    engine_command: Sequence[str] = option(
+        'a program as an engine: "prog {case} {samples} {out}" reads the case (TOML) and its'
+        " samples (CSV), and writes outputs or poses (CSV)",
         metavar="COMMAND",
-        help=(
-            'a program as an engine: "prog {case} {samples} {out}" reads the case (TOML) and its'
-            " samples (CSV), and writes outputs or poses (CSV)"
-        ),
+        several="repeated",
+        heading=RECORDINGS,
+        default=(),
     )
-    group.add_argument(
-        "--fmu",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help=(
-            "a functional mock-up unit (FMI 2 or 3) as an engine; --map VARIABLE=NAME says which"
-            " variables are drivers and outputs of the case"
-        ),
+    fmu: Sequence[Path] = option(
+        "a functional mock-up unit (FMI 2 or 3) as an engine; --map VARIABLE=NAME says which"
+        " variables are drivers and outputs of the case",
+        Path,
+        "FILE",
+        several="repeated",
+        heading=RECORDINGS,
+        default=(),
     )
-    group.add_argument(
-        "--analysis", metavar="NAME", help="one of several analyses of results of Adams"
+    analysis: str | None = option(
+        "one of several analyses of results of Adams",
+        metavar="NAME",
+        heading=RECORDINGS,
+        default=None,
     )
 
 
-def foreign_engines(options: argparse.Namespace, cases: Sequence[Case]) -> list[Engine]:
+def foreign_engines(
+    options: WithRecordings, cases: Sequence[Case], columns: Sequence[str]
+) -> list[Engine]:
     """Return the programs of --engine-command and the FMUs of --fmu as engines.
 
     Raises:
@@ -72,16 +77,26 @@ def foreign_engines(options: argparse.Namespace, cases: Sequence[Case]) -> list[
         raise KincheckError(
             f"{options.fmu[0]}: found {len(cases)} cases, expected the one of the FMU"
         )
-    if options.fmu and options.jobs == 0:
-        raise KincheckError("--fmu runs foreign machine code in workers alone; leave out --jobs 0")
     return [
         *(ProgramEngine(command) for command in options.engine_command),
-        *(read_fmu(file, cases[0], options.map) for file in options.fmu),
+        *(read_fmu(file, cases[0], columns) for file in options.fmu),
     ]
 
 
-def recorded_engines(options: argparse.Namespace, case: Case) -> tuple[Case, list[Engine]]:
+def recorded_engines(
+    files: Sequence[Path],
+    case: Case,
+    curve: CurveOptions,
+    *,
+    analysis: str | None = None,
+    sheet: str | None = None,
+) -> tuple[Case, list[Engine]]:
     """Return the case at the samples of its recordings, and the recordings as engines.
+
+    Args:
+        curve: meaning and accuracy of the columns.
+        analysis: one of several in results of Adams.
+        sheet: of a workbook.
 
     Raises:
         KincheckError: a recording cannot be read, or two have different samples.
@@ -97,24 +112,23 @@ def recorded_engines(options: argparse.Namespace, case: Case) -> tuple[Case, lis
 
     engines: list[Engine] = []
     found: Case | None = None
-    for file in options.recorded:
+    for file in files:
         meanings: list[Meaning] = []
 
         def choose(
             heads: Sequence[Head], file: Path = file, meanings: list[Meaning] = meanings
         ) -> list[int]:
-            meanings.append(Reader(file, case, heads).read(options.map))
+            meanings.append(Reader(file, case, heads).read(curve.columns))
             return sorted({use.column for use in meanings[-1].uses})
 
-        sheet = options.sheet
-        recording = read_recording(file, choose, analysis=options.analysis, sheet=sheet)
+        recording = read_recording(file, choose, analysis=analysis, sheet=sheet)
         samples = samples_of(case, recording, meanings[-1])
-        accuracy = read_accuracy(file, case, options.accuracy)
+        accuracy = read_accuracy(file, case, curve.accuracy)
         resampled = at_samples(case, samples)
         values = resampled.case.sweep.values
         if found is not None and not np.array_equal(values, found.sweep.values):
             raise KincheckError(
-                f"{file}: found other samples than those of {options.recorded[0]}, expected the"
+                f"{file}: found other samples than those of {files[0]}, expected the"
                 " same for recordings beside each other; run them one by one"
             )
         found = found or resampled.case

@@ -4,17 +4,26 @@ of the native engine.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 from ..case.io.escape import file_name, visible
 from ..errors import KincheckError
-from .option_types import whole
-from .registry import Registry, Status, add_joint_types
+from ..options import (
+    CASES,
+    argument,
+    destination,
+    joint_types,
+    option,
+    options,
+    switch,
+    verbosity,
+    whole,
+)
+from .parser import Command
+from .registry import Registry, Status
 from .run_options import TOL
-from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..case.io.reference_file import Reference
@@ -27,96 +36,73 @@ FEWEST, DIGITS, MOST = 17, 30, 1000
 NAMED = 5
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    proving: argparse.ArgumentParser
-    proving = commands.add_parser(
-        "reference",
-        help="prove the samples of cases to any number of digits",
-        description=_prove.__doc__,
-    )
-    proving.set_defaults(do=_prove)
-    proving.add_argument(
-        "case",
-        nargs="*",
-        metavar="CASE",
-        help=(
-            "built-in names, patterns such as 'mcpherson*', or case files; default: all built-in"
-            " cases"
-        ),
-    )
-    add_joint_types(proving)
-    proving.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="write CASE.reference.json there, for run --reference or a case file",
-    )
-    proving.add_argument(
-        "--digits",
-        type=whole(FEWEST, MOST),
-        default=DIGITS,
-        metavar="N",
-        help="accuracy of the outputs, 10^-N; default %(default)s",
-    )
-    proving.add_argument(
-        "--decimal",
-        action="store_true",
-        help=(
-            "take the numbers of a case as their printed decimals, instead of as the doubles that"
-            " engines get"
-        ),
-    )
-    add_verbosity(
-        proving,
-        quiet="print one line for each case",
-        verbose="print every unproved sample",
-    )
-
-
-def _prove(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class ProveReferences(Command):
     """Prove that exactly one solution exists near each sample of the native engine, and enclose its
     outputs.
 
     Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not
     do its work.
     """
-    from ..case.io.atomic_files import unwritable, written
-    from ..harness.record import to_json
-    from ..report.terminal import indented, page
-    from ..studies.verified_reference import prove_case
 
-    unread: dict[str, str] = {}
-    cases = registry.find_cases(options.case or [*registry.cases()], unread)
-    problems = [*unread.values()]
-    if options.out is not None:
-        try:
-            options.out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            problems.append(
-                f"--out {options.out}: cannot be made a folder ({error.strerror}); give another one"
+    about: ClassVar[str] = "prove the samples of cases to any number of digits"
+    case: tuple[str, ...] = argument(CASES, "CASE", "*")
+    joint_type: tuple[str, ...] = joint_types()
+    out: Path | None = destination(
+        "write CASE.reference.json there, for run --reference or a case file", Path, "DIR"
+    )
+    digits: int = option(
+        "accuracy of the outputs, 10^-N; default %(default)s",
+        whole(FEWEST, MOST),
+        "N",
+        default=DIGITS,
+    )
+    decimal: bool = switch(
+        "take the numbers of a case as their printed decimals, instead of as the doubles that"
+        " engines get"
+    )
+    quiet: bool = verbosity("print one line for each case")
+    verbose: bool = verbosity("print every unproved sample", "-v")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import unwritable, written
+        from ..harness.record import to_json
+        from ..report.terminal import indented, page
+        from ..studies.verified_reference import prove_case
+
+        unread: dict[str, str] = {}
+        cases = registry.find_cases(self.case or [*registry.cases()], unread)
+        problems = [*unread.values()]
+        if self.out is not None:
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                problems.append(
+                    f"--out {self.out}: cannot be made a folder ({error.strerror}); give"
+                    " another one"
+                )
+        names = [f"{file_name(case.name)}.reference.json" for case in cases]
+        if self.out is not None:
+            problems += unwritable(
+                (case.name, self.out / name) for case, name in zip(cases, names, strict=True)
             )
-    names = [f"{file_name(case.name)}.reference.json" for case in cases]
-    if options.out is not None:
-        problems += unwritable(
-            (case.name, options.out / name) for case, name in zip(cases, names, strict=True)
-        )
-    if problems:
-        raise KincheckError("\n".join(problems))
-    complete = True
-    for case, name in zip(cases, names, strict=True):
-        numbers = "decimal" if options.decimal else "double"
-        found, errors = prove_case(case, digits=options.digits, numbers=numbers, tol=TOL)
-        complete &= found.proved == len(found.samples)
-        lines = _lines(found, len(found.samples) if options.verbose else NAMED)
-        print(*(lines[:1] if options.quiet else lines), sep="\n", flush=True)
-        if errors and not options.quiet:
-            page(None).print(indented(_table(errors)))
-        if options.out is not None:
-            problems += written(options.out / name, to_json(found))
-    if problems:
-        raise KincheckError("\n".join(problems))
-    return Status.WITHIN if complete else Status.DEVIATES
+        if problems:
+            raise KincheckError("\n".join(problems))
+        complete = True
+        for case, name in zip(cases, names, strict=True):
+            numbers = "decimal" if self.decimal else "double"
+            found, errors = prove_case(case, digits=self.digits, numbers=numbers, tol=TOL)
+            complete &= found.proved == len(found.samples)
+            lines = _lines(found, len(found.samples) if self.verbose else NAMED)
+            print(*(lines[:1] if self.quiet else lines), sep="\n", flush=True)
+            if errors and not self.quiet:
+                page(None).print(indented(_table(errors)))
+            if self.out is not None:
+                problems += written(self.out / name, to_json(found))
+        if problems:
+            raise KincheckError("\n".join(problems))
+        return Status.WITHIN if complete else Status.DEVIATES
 
 
 def _lines(found: Reference, named: int) -> list[str]:

@@ -12,9 +12,10 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.io.reader_options import NOTHING, Supplied
+from ..case.io.reader_options import LEFT_OUT, NOTHING, Supplied
 from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
-from .engine_loading import WHERE, load_engine
+from ..report.progress import complain
+from .engine_loading import WHERE, load_engine, made
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -68,8 +69,17 @@ class Registry:
     steppers: Sequence[str] = ()
     stepper_files: Callable[..., Mapping[str, str]] | None = None
 
-    def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
-        """Return the case of a name or in a file.
+    def case_of(self, options: Any, *, driven: bool = True) -> Case:
+        """Return the case that options name, and print what is left out of another tool's file."""
+        case = self.find_case(options.case, options.supplied, driven=driven)
+        if options.command:
+            tell_left_out([case])
+        return case
+
+    def find_case(
+        self, name: str | Path | Case, supplied: Supplied = NOTHING, *, driven: bool = True
+    ) -> Case:
+        """Return the case of a name or in a file, and a case itself.
 
         Args:
             supplied: facts missing in a file of another tool.
@@ -82,6 +92,9 @@ class Registry:
         from ..case.models.files import DATASETS, SUFFIXES, load
         from ..kinematics import require_driven
 
+        if not isinstance(name, str | Path):
+            return name
+        name = str(name)
         matching, known = self.matching(name), self.cases()
         if len(matching) > 1:
             raise KincheckError(
@@ -169,9 +182,9 @@ class Registry:
         return list(cases.values())
 
     def find_engines(
-        self, names: Sequence[str], problems: list[str], mode: str | None = None
+        self, names: Sequence[str | Engine | None], problems: list[str], mode: str | None = None
     ) -> list[Engine]:
-        """Return the engines, each once, of names and MODULE:CLASS.
+        """Return the engines, each once, of names and MODULE:CLASS, and engines themselves.
 
         Args:
             problems: receives the messages of unknown names and missing modes.
@@ -179,6 +192,9 @@ class Registry:
         """
         engines: list[Engine] = []
         for name in dict.fromkeys(names):
+            if not isinstance(name, str):
+                engines.append(made(repr(name), name))
+                continue
             if WHERE.fullmatch(name):
                 self._add(engines, name, problems, mode)
                 continue
@@ -235,6 +251,11 @@ class Registry:
             return Unloadable(name, f"{type(error).__name__}: {error}", mode)
 
 
+def tell_left_out(cases: Iterable[Case]) -> None:
+    """Print on standard error the parts of other tools' files that were left out."""
+    complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)
+
+
 def add_joint_types(command: argparse.ArgumentParser) -> None:
     """Add the option for joint types to a command for case files; `main` loads the classes."""
     command.add_argument(
@@ -249,7 +270,7 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
     )
 
 
-def given(options: argparse.Namespace, names: Iterable[str]) -> str:
+def given(options: object, names: Iterable[str]) -> str:
     """Return the names of the given options, for a message.
 
     Options with the default None, False or [] count.
@@ -257,6 +278,6 @@ def given(options: argparse.Namespace, names: Iterable[str]) -> str:
     found = (
         name
         for name in names
-        if getattr(options, name) not in ([], None) and getattr(options, name) is not False
+        if getattr(options, name) not in ([], (), None) and getattr(options, name) is not False
     )
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)

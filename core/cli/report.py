@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import KincheckError
+from ..options import (
+    argument,
+    destination,
+    json_file,
+    option,
+    options,
+    switch,
+    verbosity,
+)
 from ..report.progress import complain
-from .history import add_history
-from .option_types import add_json
+from .history import HISTORY, WRITTEN
+from .parser import Command
 from .registry import Registry, Status
-from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..history.findings import Regressions
@@ -24,100 +31,84 @@ if TYPE_CHECKING:
 OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    report: argparse.ArgumentParser = commands.add_parser(
-        "report", help="report the changes since another run", description=_report.__doc__
-    )
-    report.set_defaults(do=_report)
-    report.add_argument(
-        "run",
-        nargs="?",
-        metavar="RUN",
-        help=(
-            "number of a run in the history, or a results.json; default: the latest run, or an"
-            " earlier one of another selection that failed and was not green since"
-        ),
-    )
-    report.add_argument(
-        "--against",
-        default="last-green",
-        metavar="RUN",
-        help=(
-            "run to compare with: a number or file, last-green (an earlier run without faults and"
-            " with the most of the run's comparisons, the latest of several) or BRANCH-baseline"
-            " (likewise, on that branch without uncommitted changes); default %(default)s"
-        ),
-    )
-    report.add_argument(
-        "--missing-is-failure",
-        action="store_true",
-        help=(
-            "exit with status 1 also if a case or an engine is missing that is in the run compared"
-            " with, or in the last run of the same selection; for nightly runs"
-        ),
-    )
-    add_history(report, "history of the runs, their steps and their spread")
-    report.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(OUT)} there")
-    add_json(report, "the changes")
-    report.add_argument(
-        "--junit",
-        type=Path,
-        metavar="FILE",
-        help="write the run as JUnit XML, with a failure for every regression",
-    )
-    report.add_argument(
-        "--markdown",
-        type=Path,
-        metavar="FILE",
-        help="write the summary as Markdown, for a pull request or an e-mail",
-    )
-    add_verbosity(report, quiet="print only the headline")
-
-
-def _report(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class ReportChanges(Command):
     """Report the changes since another run: new failures, fixes, lost results, lower accuracy,
     longer times, changed versions, the first run of each change, and tolerances to tighten.
 
     Exit status: 0 no regression, 1 a regression, 2 the tool could not do its work.
     """
-    from ..history.comparison import regressions
-    from ..history.run_selection import find, find_against
-    from ..history.store import Store
-    from ..report.regression_summary import to_markdown
-    from ..report.regression_text import print_regressions
-    from .destinations import Destinations
 
-    if problems := Destinations.of(options).problems(OUT, options.history):
-        raise KincheckError("\n".join(problems))
-    with ExitStack() as open_files:
-        store = (
-            open_files.enter_context(Store(Path(options.history), writable=False))
-            if options.history
-            else None
-        )
-        subject = find(options.run, store)
-        against, reason = find_against(options.against, subject, store)
-        found = regressions(
-            subject, against, reason, store, missing_is_failure=options.missing_is_failure
-        )
-        file = sys.stderr if options.json == "-" else sys.stdout
-        if file.isatty() and not options.quiet:
-            print_regressions(found, file)
-        else:
-            text = to_markdown(found)
-            headline = text.partition("\n")[0].removeprefix("## ") + "\n"
-            print(headline if options.quiet else text, end="", file=file)
-        _write(options, subject, found, store, problems)
-        problems += store.damage if store is not None else []
-    complain(problems)
-    if problems:
-        return Status.FAILED
-    return Status.DEVIATES if found.regressed else Status.WITHIN
+    about: ClassVar[str] = "report the changes since another run"
+    subject: str | None = argument(
+        "number of a run in the history, or a results.json; default: the latest run, or an"
+        " earlier one of another selection that failed and was not green since",
+        "RUN",
+        "?",
+    )
+    against: str = option(
+        "run to compare with: a number or file, last-green (an earlier run without faults and"
+        " with the most of the run's comparisons, the latest of several) or BRANCH-baseline"
+        " (likewise, on that branch without uncommitted changes); default %(default)s",
+        metavar="RUN",
+        default="last-green",
+    )
+    missing_is_failure: bool = switch(
+        "exit with status 1 also if a case or an engine is missing that is in the run compared"
+        " with, or in the last run of the same selection; for nightly runs"
+    )
+    history: Path | None = destination(
+        f"history of the runs, their steps and their spread, {WRITTEN}", Path, environment=HISTORY
+    )
+    out: Path | None = destination(f"write {', '.join(OUT)} there", Path, "DIR")
+    json: str | None = json_file("the changes")
+    junit: Path | None = destination(
+        "write the run as JUnit XML, with a failure for every regression", Path
+    )
+    markdown: Path | None = destination(
+        "write the summary as Markdown, for a pull request or an e-mail", Path
+    )
+    quiet: bool = verbosity("print only the headline")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..history.comparison import regressions
+        from ..history.run_selection import find, find_against
+        from ..history.store import Store
+        from ..report.regression_summary import to_markdown
+        from ..report.regression_text import print_regressions
+        from .destinations import Destinations
+
+        if problems := Destinations.of(self).problems(OUT, self.history):
+            raise KincheckError("\n".join(problems))
+        with ExitStack() as open_files:
+            store = (
+                open_files.enter_context(Store(Path(self.history), writable=False))
+                if self.history
+                else None
+            )
+            subject = find(self.subject, store)
+            against, reason = find_against(self.against, subject, store)
+            found = regressions(
+                subject, against, reason, store, missing_is_failure=self.missing_is_failure
+            )
+            file = sys.stderr if self.json == "-" else sys.stdout
+            if file.isatty() and not self.quiet:
+                print_regressions(found, file)
+            else:
+                text = to_markdown(found)
+                headline = text.partition("\n")[0].removeprefix("## ") + "\n"
+                print(headline if self.quiet else text, end="", file=file)
+            _write(self, subject, found, store, problems)
+            problems += store.damage if store is not None else []
+        complain(problems)
+        if problems:
+            return Status.FAILED
+        return Status.DEVIATES if found.regressed else Status.WITHIN
 
 
 def _write(
-    options: argparse.Namespace,
+    options: ReportChanges,
     subject: Subject,
     found: Regressions,
     store: Store | None,

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..errors import KincheckError
 from ..extras import THREADS
-from .option_types import add_json
+from ..options import (
+    argument,
+    json_file,
+    option,
+    options,
+)
+from .parser import Command
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
@@ -29,49 +34,8 @@ NO_CONVERTERS = {
 """Simulators that save no model, and what they do."""
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    same: argparse.ArgumentParser
-    same = commands.add_parser(
-        "same",
-        help="compare files: the same mechanism, what is lost, or how it differs",
-        description=_same.__doc__,
-    )
-    same.set_defaults(do=_same)
-    same.add_argument(
-        "files",
-        nargs="+",
-        metavar="FILE",
-        help="models and case files of any formats, or names of built-in cases; the first is"
-        " compared with each of the others",
-    )
-    same.add_argument(
-        "--match",
-        action="append",
-        default=[],
-        metavar="LINK=LINK",
-        help="a link of the first file and its partner in the others, if names and places do not"
-        " tell",
-    )
-    same.add_argument(
-        "--converted-by",
-        action="append",
-        default=[],
-        choices=(*CONVERTERS, *NO_CONVERTERS),
-        help="compare with what a simulator makes of the first file: it loads and saves the file;"
-        " drake and pinocchio save no model, and say so",
-    )
-    same.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="elements to leave out of all models, by tag, name or TAG/NAME; a note says so",
-    )
-    add_json(same, "the verdict")
-
-
-def _same(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Same(Command):
     """Compare mechanisms: the motion of each file must satisfy the joints and loops of the other,
     with as many freedoms. Limits, motors, masses and gravity are no motion: what is lost or changed
     of them is listed.
@@ -79,40 +43,71 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 the same motion, whether something is lost or not, 1 it differs, 2 not judged or
     not read.
     """
-    for name in THREADS:  # many small matrices: threads would wait for each other
-        os.environ.setdefault(name, "1")
-    from ..case.io.atomic_files import require_writable
-    from ..case.models.files import require_used
-    from ..report.terminal import page, with_json
-    from ..studies.same import compare
 
-    require_writable([("--json", options.json)])
-    for name in options.converted_by:
-        if name in NO_CONVERTERS:
+    about: ClassVar[str] = "compare files: the same mechanism, what is lost, or how it differs"
+    files: tuple[str, ...] = argument(
+        "models and case files of any formats, or names of built-in cases; the first is"
+        " compared with each of the others",
+        "FILE",
+        "+",
+    )
+    match: tuple[str, ...] = option(
+        "a link of the first file and its partner in the others, if names and places do not tell",
+        metavar="LINK=LINK",
+        several="repeated",
+        default=(),
+    )
+    converted_by: tuple[str, ...] = option(
+        "compare with what a simulator makes of the first file: it loads and saves the file;"
+        " drake and pinocchio save no model, and say so",
+        choices=(*CONVERTERS, *NO_CONVERTERS),
+        several="repeated",
+        default=(),
+    )
+    without: tuple[str, ...] = option(
+        "elements to leave out of all models, by tag, name or TAG/NAME; a note says so",
+        metavar="NAME",
+        several="repeated",
+        default=(),
+    )
+    json: str | None = json_file("the verdict")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        for name in THREADS:  # many small matrices: threads would wait for each other
+            os.environ.setdefault(name, "1")
+        from ..case.io.atomic_files import require_writable
+        from ..case.models.files import require_used
+        from ..report.terminal import page, with_json
+        from ..studies.same import compare
+
+        require_writable([("--json", self.json)])
+        for name in self.converted_by:
+            if name in NO_CONVERTERS:
+                raise KincheckError(
+                    f"--converted-by {name}: {NO_CONVERTERS[name]}, so there is no file to compare;"
+                    f" run the model in it: kincheck run FILE --engine native {name}"
+                )
+        given = dict(map(_pair, self.match))
+        names: Sequence[str] = self.files
+        if len(names) + len(self.converted_by) < 2:
             raise KincheckError(
-                f"--converted-by {name}: {NO_CONVERTERS[name]}, so there is no file to compare; run"
-                f" the model in it: kincheck run FILE --engine native {name}"
+                f"same: found one file, expected two or more, or --converted-by"
+                f" {', '.join(CONVERTERS)}; add one"
             )
-    given = dict(map(_pair, options.match))
-    names: Sequence[str] = options.files
-    if len(names) + len(options.converted_by) < 2:
-        raise KincheckError(
-            f"same: found one file, expected two or more, or --converted-by"
-            f" {', '.join(CONVERTERS)}; add one"
-        )
-    first, *others = (_read(name, registry, options.without) for name in names)
-    used = {name for each in (first, *others) for name in each.without}
-    require_used(Path(names[0]), options.without, used)
-    others += [_converted(name, Path(names[0]), registry) for name in options.converted_by]
-    found = [compare(first, other, given) for other in others]
-    with with_json(_report(found), options.json):
-        console = page(options.json)
-        for each in found:
-            several = f"{' and '.join(each.files)}: " if len(found) > 1 else ""
-            console.print(f"{several}{each.text}", soft_wrap=True)
-            for note in each.notes:
-                console.print(f"  {note}", soft_wrap=True)
-    return max(STATUS[each.verdict] for each in found)
+        first, *others = (_read(name, registry, self.without) for name in names)
+        used = {name for each in (first, *others) for name in each.without}
+        require_used(Path(names[0]), self.without, used)
+        others += [_converted(name, Path(names[0]), registry) for name in self.converted_by]
+        found = [compare(first, other, given) for other in others]
+        with with_json(_report(found), self.json):
+            console = page(self.json)
+            for each in found:
+                several = f"{' and '.join(each.files)}: " if len(found) > 1 else ""
+                console.print(f"{several}{each.text}", soft_wrap=True)
+                for note in each.notes:
+                    console.print(f"  {note}", soft_wrap=True)
+        return max(STATUS[each.verdict] for each in found)
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
 
 from ..case.io.atomic_files import to_standard_output
-from .registry import Registry, Status, add_joint_types
+from ..options import (
+    argument,
+    joint_types,
+    options,
+)
+from .parser import Command
+from .registry import Registry, Status
 
 
 def _case() -> dict[str, Any]:
@@ -58,25 +63,22 @@ SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
 }
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    schema: argparse.ArgumentParser = commands.add_parser(
-        "schema", help="print the JSON Schema of a file", description=_schema.__doc__
-    )
-    schema.set_defaults(do=_schema)
-    schema.add_argument(
-        "name",
-        choices=[*SCHEMAS],
-        metavar="NAME",
-        help=f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
-    )
-    add_joint_types(schema)
-
-
-def _schema(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class PrintSchema(Command):
     """Print the JSON Schema of a file, for editors and validators, made from the types of its
     reader and writer.
     """
-    found = msgspec.json.encode(SCHEMAS[options.name]())
-    to_standard_output(msgspec.json.format(found, indent=2) + b"\n")
-    return Status.WITHIN
+
+    about: ClassVar[str] = "print the JSON Schema of a file"
+    name: str = argument(
+        f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
+        "NAME",
+        choices=[*SCHEMAS],
+    )
+    joint_type: tuple[str, ...] = joint_types()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        found = msgspec.json.encode(SCHEMAS[self.name]())
+        to_standard_output(msgspec.json.format(found, indent=2) + b"\n")
+        return Status.WITHIN

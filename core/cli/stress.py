@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import argparse
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import KincheckError, unknown
-from .option_types import add_json, add_several, positive, whole
+from ..options import (
+    destination,
+    json_file,
+    option,
+    options,
+    positive,
+    switch,
+    verbosity,
+    whole,
+)
+from .parser import Command
 from .registry import Registry, Status, given
-from .run_options import MODES, TOL
-from .verbosity import add_verbosity
+from .run_options import MODE, MODES, TOL
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -24,116 +32,111 @@ OF_FAMILIES = ("family", "samples", "seed", "no_proofs")
 """Options of random mechanisms."""
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    stress: argparse.ArgumentParser
-    stress = commands.add_parser(
-        "stress",
-        help="stress-test engines with random degenerate mechanisms",
-        description=_stress.__doc__,
-    )
-    stress.set_defaults(do=_stress)
-    add_several(stress, "--family", "default: all families")
-    stress.add_argument("--list", action="store_true", help="list the families")
-    stress.add_argument(
-        "--samples",
-        type=whole(1),
-        metavar="N",
-        help=f"number of samples over all families; default {SAMPLES}",
-    )
-    stress.add_argument(
-        "--seed", type=whole(0), metavar="S", help="seed of the random mechanisms; default 0"
-    )
-    add_several(stress, "--engine", "default: native")
-    stress.add_argument(
-        "--mode",
-        choices=MODES,
-        help="mode of the engines; default: projection, or simulate if an engine has only this",
-    )
-    stress.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="write the tables there, and the smallest bad cases as reduced case files",
-    )
-    add_json(stress)
-    stress.add_argument(
-        "--no-proofs",
-        action="store_true",
-        help="skip the proof of a share of the reference motions, which needs python-flint",
-    )
-    add_several(stress, "--replay", "judge case files instead", metavar="FILE", type=Path)
-    stress.add_argument(
-        "--tol",
-        type=positive,
-        metavar="X",
-        help=f"largest accepted constraint residual of replayed files; default {TOL:g}",
-    )
-    add_verbosity(stress, quiet="print no progress")
-
-
-def _stress(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class StressEngines(Command):
     """Run engines on random mechanisms that are difficult for solvers, and judge every sample.
 
     Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool
     could not do its work, or an engine supports none of the samples.
     """
-    from ..harness.standard import STANDARD
-    from ..report.sections import deliver
-    from ..report.terminal import page, unheaded
-    from ..studies.stress.families import Family
-    from ..studies.stress.report import idle, markdown, report
-    from ..studies.stress.verdicts import BAD
-    from . import destinations as delivery
 
-    if options.list:
-        if found := given(
-            options, [name for name in vars(options) if name not in ("list", "command", "do")]
-        ):
-            raise KincheckError(f"--list runs nothing; leave out {found}")
-        rows = [(name, family.about) for name, family in Family.registry.items()]
-        page(None).print(unheaded(rows))
-        return Status.WITHIN
-    problems: list[str] = []
-    engines = registry.find_engines(options.engine or [STANDARD], problems, options.mode)
-    if options.replay:
-        if options.out or options.json:
-            problems.append("--replay only prints its findings; leave out --out and --json")
-        if found := given(options, OF_FAMILIES):
-            problems.append(f"--replay judges files, which belong to no family; leave out {found}")
+    about: ClassVar[str] = "stress-test engines with random degenerate mechanisms"
+    family: tuple[str, ...] = option(
+        "default: all families", metavar="NAME", several="together", default=()
+    )
+    list: bool = switch("list the families", default=False)
+    samples: int | None = option(
+        f"number of samples over all families; default {SAMPLES}",
+        whole(1),
+        "N",
+        default=None,
+    )
+    seed: int | None = option(
+        "seed of the random mechanisms; default 0", whole(0), "S", default=None
+    )
+    engine: tuple[str, ...] = option(
+        "default: native", metavar="NAME", several="together", default=()
+    )
+    mode: str | None = option(MODE, choices=MODES, default=None)
+    out: Path | None = destination(
+        "write the tables there, and the smallest bad cases as reduced case files", Path, "DIR"
+    )
+    json: str | None = json_file()
+    no_proofs: bool = switch(
+        "skip the proof of a share of the reference motions, which needs python-flint",
+        default=False,
+    )
+    replay: tuple[Path, ...] = option(
+        "judge case files instead", Path, "FILE", several="together", default=()
+    )
+    tol: float | None = option(
+        f"largest accepted constraint residual of replayed files; default {TOL:g}",
+        positive,
+        "X",
+        default=None,
+    )
+    quiet: bool = verbosity("print no progress")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..harness.standard import STANDARD
+        from ..report.sections import deliver
+        from ..report.terminal import page, unheaded
+        from ..studies.stress.families import Family
+        from ..studies.stress.report import idle, markdown, report
+        from ..studies.stress.verdicts import BAD
+        from . import destinations as delivery
+
+        if self.list:
+            if found := given(
+                self, [name for name in vars(self) if name not in ("list", "command")]
+            ):
+                raise KincheckError(f"--list runs nothing; leave out {found}")
+            rows = [(name, family.about) for name, family in Family.registry.items()]
+            page(None).print(unheaded(rows))
+            return Status.WITHIN
+        problems: list[str] = []
+        engines = registry.find_engines(self.engine or [STANDARD], problems, self.mode)
+        if self.replay:
+            if self.out or self.json:
+                problems.append("--replay only prints its findings; leave out --out and --json")
+            if found := given(self, OF_FAMILIES):
+                problems.append(
+                    f"--replay judges files, which belong to no family; leave out {found}"
+                )
+            if problems:
+                raise KincheckError("\n".join(problems))
+            return _replay(self, registry, engines)
+        if self.tol is not None:
+            problems.append(
+                "--tol is for replayed files, and families have their own tolerances; leave it out,"
+                " or give --replay"
+            )
+        known = Family.registry
+        problems += [unknown("family", name, [*known]) for name in self.family if name not in known]
+        problems += delivery.Destinations.of(self).problems(FILES)
         if problems:
             raise KincheckError("\n".join(problems))
-        return _replay(options, registry, engines)
-    if options.tol is not None:
-        problems.append(
-            "--tol is for replayed files, and families have their own tolerances; leave it out,"
-            " or give --replay"
-        )
-    known = Family.registry
-    problems += [unknown("family", name, [*known]) for name in options.family if name not in known]
-    problems += delivery.Destinations.of(options).problems(FILES)
-    if problems:
-        raise KincheckError("\n".join(problems))
-    with delivery.json_only() if options.json == "-" else nullcontext():
-        found = _run(
-            options,
-            [known[name] for name in dict.fromkeys(options.family or known)],
-            engines,
-            problems,
-        )
-    made = report(found)
-    problems += [
-        *(f"family {name} was not finished: {why}" for name, why in found.unfinished.items()),
-        *idle(found),
-    ]
-    beside = {FILES[2]: markdown(made)}
-    deliver(made, found, out=options.out, json=options.json, beside=beside, problems=problems)
-    bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
-    return Status.DEVIATES if bad else Status.WITHIN
+        with delivery.json_only() if self.json == "-" else nullcontext():
+            found = _run(
+                self,
+                [known[name] for name in dict.fromkeys(self.family or known)],
+                engines,
+                problems,
+            )
+        made = report(found)
+        problems += [
+            *(f"family {name} was not finished: {why}" for name, why in found.unfinished.items()),
+            *idle(found),
+        ]
+        beside = {FILES[2]: markdown(made)}
+        deliver(made, found, out=self.out, json=self.json, beside=beside, problems=problems)
+        bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
+        return Status.DEVIATES if bad else Status.WITHIN
 
 
 def _run(
-    options: argparse.Namespace,
+    options: StressEngines,
     families: list[Family],
     engines: list[Engine],
     problems: list[str],
@@ -165,7 +168,7 @@ def _run(
     return found
 
 
-def _replay(options: argparse.Namespace, registry: Registry, engines: list[Engine]) -> int:
+def _replay(options: StressEngines, registry: Registry, engines: list[Engine]) -> int:
     """Judge case files by following their motion from the design."""
     from ..studies.stress.reproducers import judge
     from ..studies.stress.verdicts import BAD, Verdict

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, unknown
-from . import import_options
-from .option_types import add_json, positive
+from ..options import (
+    ONE_CASE,
+    argument,
+    group,
+    joint_types,
+    json_file,
+    option,
+    options,
+    positive,
+)
+from .parser import Command
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..kinematics import Curve, Event
 
 LENGTH = 5.0
@@ -19,37 +30,8 @@ LENGTH = 5.0
 WAYS = {1: "growing", -1: "falling"}
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    tracing: argparse.ArgumentParser
-    tracing = commands.add_parser(
-        "trace",
-        help="follow a motion past lock-ups; find limit and branch points",
-        description=_trace.__doc__,
-    )
-    tracing.set_defaults(do=_trace)
-    tracing.add_argument(
-        "case",
-        metavar="CASE",
-        help="name of a built-in case, or path to a case file or to another tool's file",
-    )
-    tracing.add_argument(
-        "--driver",
-        metavar="NAME",
-        help="driver whose value follows from the motion; default: the swept driver",
-    )
-    tracing.add_argument(
-        "--length",
-        type=positive,
-        default=LENGTH,
-        metavar="L",
-        help="length in each direction [mechanism sizes and radians]; default %(default)s",
-    )
-    add_json(tracing, "the curve")
-    import_options.add_options(tracing)
-
-
-def _trace(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Trace(Command):
     """Follow a case's motion from its design position in both directions by arc length, and report
     its singular poses.
 
@@ -58,27 +40,46 @@ def _trace(options: argparse.Namespace, registry: Registry) -> int:
     straight on. Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends
     before; 2 the tool could not do its work.
     """
-    from ..case.io.atomic_files import require_writable
-    from ..kinematics import trace
-    from ..report.terminal import with_json
 
-    case = registry.find_case(options.case, import_options.supplied(options))
-    import_options.tell_left_out([case])
-    drivers = [driver.name for driver in case.mechanism.drivers]
-    driver = options.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
-    if driver not in drivers:
-        raise KincheckError(unknown("driver", driver, drivers))
-    require_writable([("--json", options.json)])
-    curves = [trace(case.mechanism, driver, length=options.length)]
-    if not curves[0].closed:
-        curves.append(trace(case.mechanism, driver, length=options.length, direction=-1))
-    design = case.mechanism.design_value(driver)
-    unit = "rad" if case.mechanism.driver(driver).turns else "m"
-    out = sys.stderr if options.json == "-" else sys.stdout
-    with with_json(_facts(case.name, curves, design, unit), options.json):
-        for direction, curve in zip((1, -1), curves, strict=False):
-            print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
-    return Status.DEVIATES if any(curve.message for curve in curves) else Status.WITHIN
+    about: ClassVar[str] = "follow a motion past lock-ups; find limit and branch points"
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    driver: str | None = option(
+        "driver whose value follows from the motion; default: the swept driver",
+        metavar="NAME",
+        default=None,
+    )
+    length: float = option(
+        "length in each direction [mechanism sizes and radians]; default %(default)s",
+        positive,
+        "L",
+        default=LENGTH,
+    )
+    json: str | None = json_file("the curve")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import require_writable
+        from ..kinematics import trace
+        from ..report.terminal import with_json
+
+        case = registry.case_of(self)
+        drivers = [driver.name for driver in case.mechanism.drivers]
+        driver = self.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
+        if driver not in drivers:
+            raise KincheckError(unknown("driver", driver, drivers))
+        require_writable([("--json", self.json)])
+        curves = [trace(case.mechanism, driver, length=self.length)]
+        if not curves[0].closed:
+            curves.append(trace(case.mechanism, driver, length=self.length, direction=-1))
+        design = case.mechanism.design_value(driver)
+        unit = "rad" if case.mechanism.driver(driver).turns else "m"
+        out = sys.stderr if self.json == "-" else sys.stdout
+        with with_json(_facts(case.name, curves, design, unit), self.json):
+            for direction, curve in zip((1, -1), curves, strict=False):
+                print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
+        return Status.DEVIATES if any(curve.message for curve in curves) else Status.WITHIN
 
 
 def _lines(case: str, curve: Curve, direction: int, design: float, unit: str) -> list[str]:

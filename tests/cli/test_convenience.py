@@ -11,8 +11,8 @@ from kincheck import cases
 from kincheck.core import Revolute
 from kincheck.core.cli import main
 from kincheck.core.cli.joint_loading import named_joint
-from kincheck.core.cli.option_types import whole
 from kincheck.core.harness.provenance import truth_of
+from kincheck.core.options import whole
 from kincheck.core.report.meter import Meter
 from kincheck.core.report.terminal import columns, console
 
