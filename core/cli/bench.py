@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 SEED = 943745
 STRUT = "mcpherson_strut"
-BOTH = (STRUT, "stewart_platform")
+CASES = (STRUT, "stewart_platform")
 """Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
 six coupled loops.
 """
@@ -232,5 +232,5 @@ class BenchAll(Command):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         given = {name: getattr(self, name) for name in ("out", "json", "quiet", "command")}
-        every = with_values(BenchEngines(), cases=BOTH, **given)
+        every = with_values(BenchEngines(), cases=CASES, **given)
         return _measured(every, registry, formulation=True)

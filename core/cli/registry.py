@@ -191,9 +191,11 @@ class Registry:
             mode: the mode; None for the first mode of each engine.
         """
         engines: list[Engine] = []
-        for name in dict.fromkeys(names):
+        for k, name in enumerate(names):
             if not isinstance(name, str):
                 engines.append(made(repr(name), name))
+                continue
+            if name in names[:k]:
                 continue
             if WHERE.fullmatch(name):
                 self._add(engines, name, problems, mode)
