@@ -88,8 +88,8 @@ class BenchEngines(Command):
 def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -> int:
     from ..extras import THREADS
     from ..harness.record import Outcome
-    from ..report.meter import Meter
     from ..report.sections import deliver
+    from ..report.terminal import Meter
     from ..studies.bench import engines as bench_engines
     from ..studies.bench.engines_report import report
     from ..studies.paper import formulation as bench_formulation

@@ -16,7 +16,7 @@ from ..case.io.table_file import WRITERS, lack
 from ..harness.record import Results, to_json
 
 if TYPE_CHECKING:  # drawing code is imported only for a report
-    from ..report.figure_data import Effort, Past
+    from ..report.figures import Effort, Past
 
     Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
     """Earlier results of each case up to this run; None if unknown."""
@@ -132,8 +132,7 @@ def deliver(
         precision: error against time at several efforts, by case, for the report.
         history: reads the trends for the report, after all other files; None without a history.
     """
-    from ..report.matrix import to_markdown
-    from ..report.table import print_table
+    from ..report.table import print_table, to_markdown
 
     encoded = to_json(results) if to.out is not None or to.json is not None else b""
     contents = list[tuple[Path, Content]]()  # several destinations may be one pipe

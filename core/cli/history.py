@@ -71,7 +71,7 @@ class ListRuns(Command):
             else:
                 _print_runs(store, store.runs()[: self.last or None])
             if self.plot is not None:
-                from ..report.history_plot import write_plot
+                from ..report.trends import write_plot
 
                 write_plot(
                     history,
@@ -83,7 +83,7 @@ class ListRuns(Command):
                     " runs"
                 )
             if self.export is not None:
-                from ..history.export import export
+                from ..history.queries import export
 
                 count = export(store, self.export, **chosen)
                 print(f"{self.export}: {count} rows")
@@ -114,7 +114,7 @@ def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
 
 def _cells(store: Store, row: RunRow) -> list[str]:
     from ..harness.record import Outcome
-    from ..history.schema import OUTCOME
+    from ..history.database import OUTCOME
 
     found = store.connection.execute(
         f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
@@ -139,7 +139,7 @@ def _cells(store: Store, row: RunRow) -> list[str]:
 def _print_trends(history: History) -> None:
     from ..harness.labels import number, product
     from ..history.steps import steps
-    from ..report.regression_labels import step_says
+    from ..report.regressions import step_says
     from ..report.terminal import columns, page
     from ..report.trends import largest_errors, run_name
 

@@ -16,7 +16,7 @@ from ..options import several
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
-    from ..history.run_recorder import Keeping
+    from ..history.runs import Keeping
     from .destinations import Trends
 
 
@@ -65,7 +65,7 @@ def keeping(
     """
     if options.history is None:
         return None, []
-    from ..history.run_recorder import keep
+    from ..history.runs import keep
     from ..history.store import HistoryError
     from .joint_loading import sources
 

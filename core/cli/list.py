@@ -82,7 +82,7 @@ class List(Command):
 
 def _version(engine: Engine) -> str | None:
     """Return the installed version of an engine; a simulator with an extra is not imported."""
-    from ..harness.engine_versions import versions
+    from ..harness.engine import versions
 
     return installed_version(engine.name) if is_extra(engine.name) else versions([engine])[0]
 

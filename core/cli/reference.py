@@ -27,7 +27,7 @@ from .run_options import TOL
 
 if TYPE_CHECKING:
     from ..case.io.reference_file import Reference
-    from ..report.fitting_table import FittingTable
+    from ..report.terminal import FittingTable
     from ..studies.native_error import NativeError
 
 # A double has 17 digits; beyond 1000 digits only the time grows.

@@ -245,7 +245,7 @@ class Registry:
         """Return the engine, or a substitute if it cannot be loaded: a broken adapter must not end
         a run of all engines.
         """
-        from ..harness.unloadable import Unloadable
+        from ..harness.engine import Unloadable
 
         try:
             return self.engine(name) if mode == "projection" else self.engine(name, mode)

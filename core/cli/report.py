@@ -25,7 +25,7 @@ from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..history.findings import Regressions
-    from ..history.run_selection import Subject
+    from ..history.runs import Subject
     from ..history.store import Store
 
 OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
@@ -73,10 +73,9 @@ class ReportChanges(Command):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ..history.comparison import regressions
-        from ..history.run_selection import find, find_against
+        from ..history.runs import find, find_against
         from ..history.store import Store
-        from ..report.regression_summary import to_markdown
-        from ..report.regression_text import print_regressions
+        from ..report.regressions import print_regressions, to_markdown
         from .destinations import Destinations
 
         if problems := Destinations.of(self).problems(OUT, self.history):
@@ -118,8 +117,8 @@ def _write(
     from ..case.io.atomic_files import to_standard_output, written
     from ..harness.record import to_json
     from ..history.queries import NIGHTS, read
-    from ..report.regression_junit import to_regression_junit
-    from ..report.regression_summary import to_markdown, to_markup
+    from ..report.junit import to_regression_junit
+    from ..report.regressions import to_markdown, to_markup
     from ..report.report import write_report
     from ..report.trends import trends
 

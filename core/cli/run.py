@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
-    from ..history.run_recorder import Keeping
+    from ..history.runs import Keeping
     from .destinations import Destinations
 
 
@@ -227,8 +227,7 @@ class Run(Isolated, WithRecordings):
 
 def _shown(options: Run) -> Callable[[Results, TextIO], None]:
     """Return a function to print the results."""
-    from ..report.matrix import print_matrix
-    from ..report.table import print_outputs, print_summary, print_table
+    from ..report.table import print_matrix, print_outputs, print_summary, print_table
 
     if options.quiet:
         return print_summary
@@ -384,7 +383,7 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
     none, and notes on its geometry.
     """
     from ..case.notes import notes
-    from ..harness.program_account import explain
+    from ..harness.native_engine import explain
 
     for case in cases:
         try:

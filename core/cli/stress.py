@@ -148,7 +148,7 @@ def _run(
     """
     from msgspec.structs import replace
 
-    from ..report.meter import Meter
+    from ..report.terminal import Meter
     from ..studies.stress.reproducers import save
     from ..studies.stress.run import stress
 

@@ -296,7 +296,7 @@ def _solve(
     stops: list[KeyboardInterrupt | KincheckError],
     problems: list[str],
 ) -> SweepResults:
-    from ..report.meter import Meter
+    from ..report.terminal import Meter
     from ..studies.tolerance.chunk_files import ParquetStore
     from ..studies.tolerance.sweep import Check, on_cluster
 

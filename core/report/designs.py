@@ -20,12 +20,11 @@ from ..joints import Kind
 from ..kinematics import kinds, places
 from ..trajectory import Array
 from ..unit_text import with_unit
-from .axis import driver_axis, in_table_units
+from .axis import ZERO, driver_axis, events, in_table_units, number
 from .curves import columns_of
 from .figures import Style, output_figure
 from .page_model import Plot
 from .sections import Diagram, Report, Section
-from .travel_table import ZERO, events, number
 
 SAME = 1e-9
 """Distance below which points are the same [m]: a table has no such digit, and conversions of units

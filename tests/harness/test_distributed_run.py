@@ -17,7 +17,7 @@ from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError, on_cluster
-from kincheck.core.harness.workers.messages import pack
+from kincheck.core.harness.workers.serve import pack
 
 from ..support.bad_engine import Bad
 from ..support.drill import Slow

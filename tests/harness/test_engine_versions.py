@@ -9,8 +9,7 @@ from pathlib import Path
 
 from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
-from kincheck.core.harness.engine_versions import versions
-from kincheck.core.harness.unloadable import Unloadable
+from kincheck.core.harness.engine import Unloadable, versions
 
 from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 

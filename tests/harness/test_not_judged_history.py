@@ -13,8 +13,8 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
-from kincheck.core.report.regression_junit import to_regression_junit
-from kincheck.core.report.regression_summary import to_markdown
+from kincheck.core.report.junit import to_regression_junit
+from kincheck.core.report.regressions import to_markdown
 
 from ..support.nights import changed, keep, records, reported
 from .test_not_judged import WHY, unjudged

@@ -11,12 +11,11 @@ from kincheck.core.case.case import Series
 from kincheck.core.case.suspension import camber_of_front_view
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.harness.slips import FACTORS, Held, slips
+from kincheck.core.harness.suspects import FACTORS, Held, slips
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
-from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
-from kincheck.core.report.table import messages
+from kincheck.core.report.table import messages, to_markdown
 
 from ..support.fakes import Fake, crank, off
 

@@ -10,9 +10,8 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.report.junit import to_junit
-from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
-from kincheck.core.report.table import messages
+from kincheck.core.report.table import messages, to_markdown
 from kincheck.core.trajectory import Trajectory
 
 from ..support.engine_faults import changed

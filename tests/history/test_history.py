@@ -14,7 +14,7 @@ from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
-from kincheck.core.report.figure_data import Past, trend_figures
+from kincheck.core.report.figures import Past, trend_figures
 from kincheck.core.report.trends import trends
 
 from ..support.nights import changed, keep, nights, records, times

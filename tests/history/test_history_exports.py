@@ -6,7 +6,7 @@ import sys
 import pytest
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.record import Outcome
-from kincheck.core.history.export import NUMBERS, export
+from kincheck.core.history.queries import NUMBERS, export
 from kincheck.core.history.store import HistoryError, Store
 
 from ..support.nights import changed, keep, nights, records

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 from kincheck.core.harness.provenance import calibration, git_state
-from kincheck.core.history.run_recorder import digest
+from kincheck.core.history.runs import digest
 from kincheck.core.history.store import Store
 
 from ..harness.test_workers import timeless

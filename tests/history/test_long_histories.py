@@ -11,8 +11,8 @@ from kincheck.core.case.io.atomic_files import written
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.history.findings import Kind
-from kincheck.core.history.run_recorder import keep as begin
-from kincheck.core.history.run_selection import find, find_against
+from kincheck.core.history.runs import find, find_against
+from kincheck.core.history.runs import keep as begin
 from kincheck.core.history.store import Store
 
 from ..harness.test_unfinished import killed

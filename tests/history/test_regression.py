@@ -7,7 +7,7 @@ import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, Seconds, to_json
 from kincheck.core.history.findings import Kind
-from kincheck.core.report.regression_summary import to_markdown
+from kincheck.core.report.regressions import to_markdown
 
 from ..support.nights import FACTS, RESULTS, changed, keep, nights, records, reported, times, worse
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import msgspec
 import pytest
 from kincheck.core.harness.run import run
-from kincheck.core.history import schema
-from kincheck.core.history.run_recorder import keep
+from kincheck.core.history import database
+from kincheck.core.history.runs import keep
 from kincheck.core.history.store import Store, alive, owner
 
 from ..harness.test_workers import timeless
@@ -248,7 +248,7 @@ def test_schema_check_is_one_statement(path):
     statements = []
     connection = sqlite3.connect(path)
     connection.set_trace_callback(statements.append)
-    assert schema.check(connection) == 0
+    assert database.check(connection) == 0
     connection.close()
     # those of the functions inside a statement are comments
     assert len([each for each in statements if not each.startswith("--")]) == 1

@@ -5,8 +5,8 @@ import sqlite3
 import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.harness.run import run
-from kincheck.core.history import schema
-from kincheck.core.history.run_recorder import keep
+from kincheck.core.history import database
+from kincheck.core.history.runs import keep
 from kincheck.core.history.store import HistoryError, Store
 
 from ..support.fakes import crank
@@ -17,9 +17,9 @@ def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
     keeping, results = kept(path, [crank()], ENGINES)
     with monkeypatch.context() as patch:
         patch.setattr(
-            schema,
+            database,
             "MIGRATIONS",
-            (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
+            (*database.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
         )
         with pytest.raises(HistoryError, match="table runs already exists"):
             Store(path)

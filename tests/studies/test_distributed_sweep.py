@@ -11,7 +11,7 @@ import msgspec
 import pytest
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError
-from kincheck.core.harness.workers.messages import pack
+from kincheck.core.harness.workers.serve import pack
 from kincheck.core.studies.tolerance import sweep as chunk_execution
 from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import on_cluster, solve_there, sweep_designs

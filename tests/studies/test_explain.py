@@ -9,7 +9,7 @@ from kincheck.core import Distance, Point, Revolute
 from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
-from kincheck.core.harness.program_account import explain
+from kincheck.core.harness.native_engine import explain
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.results_file import read_results
 

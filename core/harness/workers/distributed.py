@@ -26,8 +26,8 @@ from ...version import VERSION
 from ..execution import Attempt, Attempts, Failure, Pair, Solver, error_text
 from ..record import Outcome
 from ..resource_limits import Limits
-from .messages import pack
-from .worker import WorkerSlot
+from .pool import WorkerSlot
+from .serve import pack
 
 # Longest time for a port to answer [s], and then for its scheduler. Each takes milliseconds unless
 # packets are lost, which are sent again after 1 s and after 3 s.

@@ -10,7 +10,7 @@ import numpy as np
 from ...case.case import ORDERS, Case
 from ...case.notes import notes
 from ...errors import SolveError, number_of, shortened
-from ...harness.program_account import explain
+from ...harness.native_engine import explain
 from ...kinematics import (
     Blocked,
     ComponentCount,

@@ -20,7 +20,7 @@ import numpy as np
 from ...case.io.atomic_files import whole
 from ...errors import KincheckError
 from ...extras import library
-from ...history.run_recorder import digest
+from ...history.runs import digest
 from ..variation.variation import Coordinate
 from .study import Chunk, Study
 

@@ -27,7 +27,7 @@ from ...harness.execution import error_text
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
-from ...harness.workers.messages import pack
+from ...harness.workers.serve import pack
 from ...version import VERSION
 from ..variation.study_choices import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
