@@ -123,15 +123,15 @@ def _print_no_more() -> None:
 def registry() -> Registry:
     """Return the registry of engines, cases and writers."""
     from ... import adapters, cases
-    from . import engine_loading
+    from . import class_loading
     from .registry import Registry
 
-    others = engine_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
+    others = class_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
     writers = adapters.WRITERS, adapters.writer
 
     def engine(name: str, mode: str = "projection") -> Any:
         if name in others:
-            return engine_loading.made(name, engine_loading.entry_points()[name].load())
+            return class_loading.made(name, class_loading.entry_points()[name].load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 
     return Registry(

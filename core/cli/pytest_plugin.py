@@ -96,7 +96,7 @@ class CaseFile(pytest.File):
         """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..case.io.reader_options import CurveOptions
         from ..errors import KincheckError
-        from .recorded_options import recorded_engines
+        from .run_options import recorded_engines
 
         registry = _registry()
         try:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.io.reader_options import LEFT_OUT, NOTHING, Supplied
 from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
 from ..report.progress import complain
-from .engine_loading import WHERE, load_engine, made
+from .class_loading import WHERE, load_engine, made
 
 if TYPE_CHECKING:
     from ..case.case import Case

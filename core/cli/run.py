@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import KincheckError, SolveError
+from ..errors import MOST_NAMED, KincheckError, SolveError, shortened
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -32,19 +33,18 @@ from ..options import (
     with_values,
 )
 from ..report.progress import complain, lacking, progress, uncompared
-from . import execution_options, history_options, import_options, recorded_options
-from .engine_loading import WHERE
+from . import execution_options, import_options, run_options
+from .class_loading import WHERE
 from .execution_options import Isolated
-from .recorded_options import WithRecordings
 from .registry import Registry, Status, tell_left_out
-from .run_options import HISTORY, MODE, MODES, TOL, judged
+from .run_options import HISTORY, MODE, MODES, TOL, WithRecordings, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
     from ..history.runs import Keeping
-    from .destinations import Destinations
+    from .destinations import Destinations, Trends
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class Run(Isolated, WithRecordings):
             problems += keeping.problems + keeping.store.damage
         # read last, and only for the page: damage costs no result
         if self.history is not None:
-            history = partial(history_options.past, keeping, problems) if keeping else lambda: None
+            history = partial(past, keeping, problems) if keeping else lambda: None
         delivery.deliver(
             results, problems, to, show=_shown(self), precision=precision, history=history
         )
@@ -262,7 +262,7 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
         )
     elif options.recorded:
         try:
-            cases[0], recorded = recorded_options.recorded_engines(
+            cases[0], recorded = run_options.recorded_engines(
                 options.recorded,
                 cases[0],
                 options.curve,
@@ -287,12 +287,12 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
             problems += str(error).splitlines()
     engines = _engines(options, registry, problems)
     baseline = registry.baseline(engines)
-    if recorded and recorded_options.undriven(cases[0]):
+    if recorded and run_options.undriven(cases[0]):
         engines, baseline = [], None
     if options.fmu and options.jobs == 0:
         problems.append("--fmu runs foreign machine code in workers alone; leave out --jobs 0")
     try:
-        foreign = recorded_options.foreign_engines(options, cases, options.curve.columns)
+        foreign = run_options.foreign_engines(options, cases, options.curve.columns)
         engines += [*foreign, *recorded]
     except KincheckError as error:
         problems += str(error).splitlines()
@@ -334,8 +334,8 @@ def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | No
     solver, settings = execution_options.solver(options, plan.engines)
     if plan.unread:
         settings["unread"] = plan.unread
-    settings["selection"] = history_options.selection(options)
-    keeping, problems = history_options.keeping(
+    settings["selection"] = selection(options)
+    keeping, problems = _keeping(
         options, plan.cases, plan.engines, [*plan.unread], settings, plan.mistyped
     )
     made = [*keeping.made] if keeping else []
@@ -449,3 +449,102 @@ def _engines(options: Run, registry: Registry, problems: list[str]) -> list[Engi
     if not engines and not problems:
         problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
     return engines
+
+
+def selection(options: Any) -> dict[str, Any]:
+    """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
+    options of solution and judgement.
+    """
+    run = ("joints", "joint_type", "mode", "reference", "require", "static", "reactions")
+    run += ("recorded", "engine_command", "fmu", "analysis")
+    parts: dict[str, dict[str, Any]] = {
+        "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
+        "files": vars(options.supplied) | {"recorded": bool(options.recorded)},
+        "curve": vars(options.curve),
+    }
+    return {
+        "cases": sorted({*_words(several(options.cases))}),
+        "engines": sorted({*_words(several(options.engines))}),
+        "options": {
+            part: {name: _words(x) for name, x in each.items() if x} for part, each in parts.items()
+        },
+    }
+
+
+def _words(given: Any) -> Any:
+    """Return an option's value as plain data; file names may contain undecodable bytes."""
+    from ..harness.provenance import readable
+
+    if isinstance(given, list | tuple):
+        return [_words(each) for each in given]  # pyright: ignore
+    return given if isinstance(given, bool | float) else readable(str(given))
+
+
+def _keeping(
+    options: Any,
+    cases: Sequence[Case],
+    engines: Sequence[Engine],
+    unread: Sequence[str],
+    settings: dict[str, Any],
+    mistyped: Sequence[str],
+) -> tuple[Keeping | None, list[str]]:
+    """Return the run in its history, or None, and the reasons if the history does not store it.
+
+    Args:
+        mistyped: names of cases that do not exist: with one, or if no case can be read at all,
+            the run is only stored if an earlier one was asked for the same, which then lacks them.
+    """
+    if options.history is None:
+        return None, []
+    from ..history.runs import keep
+    from ..history.store import HistoryError
+    from .joint_loading import sources
+
+    about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
+    code = [*options.joint_type, *(type(each).__module__ for each in engines)]
+    about |= {"unread": unread, "resume": options.resume, "sources": sources(code)}
+    try:
+        if (mistyped or not cases) and not _known(Path(options.history), settings):
+            names = shortened(mistyped or unread, MOST_NAMED)
+            why = "no such case" if mistyped else "no case could be read"
+            return None, [f"{names}: {why}; the run is not in the history"]
+        found = keep(Path(options.history), cases, engines, **about)
+    except HistoryError as error:
+        return None, [f"{error}; the run is not in the history"]
+    if options.resume:
+        print(
+            f"kincheck: run {found.run} is resumed after {len(found.made)} records"
+            if found.resumed
+            else f"kincheck: no unfinished run to resume: run {found.run} is new",
+            file=sys.stderr,
+        )
+    return found, []
+
+
+def _known(path: Path, facts: Mapping[str, Any]) -> bool:
+    """Return whether a history has a run that was asked for the same."""
+    from ..history.queries import same
+    from ..history.store import Store
+
+    if not os.path.exists(path):
+        return False
+    with Store(path, writable=False) as store:
+        return any(same(row.key, facts) for row in store.runs())
+
+
+def past(keeping: Keeping, problems: list[str]) -> Trends:
+    """Return the runs up to this one by case, for the report, and report unreadable parts."""
+    from ..history.queries import NIGHTS, read
+    from ..history.store import HistoryError, Store
+    from ..report.trends import trends
+
+    if keeping.problems:
+        return None
+    try:
+        with Store(keeping.store.path, writable=False) as store:
+            found = trends(read(store, before=keeping.run + 1, last=NIGHTS, like=keeping.facts))
+            problems += [each for each in store.damage if each not in problems]
+    except HistoryError as error:
+        problems.append(str(error))
+        return None
+    return found

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ..case.io.reader_options import CurveOptions
 from ..errors import KincheckError
-from .parser import add_options, values_of
+from ..options import option, options
+from .parser import Command, add_options, values_of
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.io.reference_curve import CurveOptions
+    from ..harness.engine import Engine
+
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of coordinates of
 # one metre, and a thousandth of the outputs' 1e-9 m. A mechanism may amplify it a hundredfold
@@ -59,3 +63,130 @@ def judged(
         return judged_by(cases, proved, unused), []
     case, notes = with_curve(cases[0], curves[0], curve)
     return [case], notes
+
+
+RECORDINGS = "recordings"
+
+
+@options
+class WithRecordings(Command):
+    """A command that judges results of other programs."""
+
+    HEADINGS: ClassVar[Mapping[str, str]] = {
+        RECORDINGS: "Results of other programs, beside the engines. --map and --accuracy say more."
+    }
+    recorded: Sequence[Path] = option(
+        "results of the case as an engine with the file's name: a table, results of Adams"
+        " (.res) or OpenSim (.mot, .sto), a MAT-file (.mat)",
+        Path,
+        "FILE",
+        several="repeated",
+        heading=RECORDINGS,
+        default=(),
+    )
+    engine_command: Sequence[str] = option(
+        'a program as an engine: "prog {case} {samples} {out}" reads the case (TOML) and its'
+        " samples (CSV), and writes outputs or poses (CSV)",
+        metavar="COMMAND",
+        several="repeated",
+        heading=RECORDINGS,
+        default=(),
+    )
+    fmu: Sequence[Path] = option(
+        "a functional mock-up unit (FMI 2 or 3) as an engine; --map VARIABLE=NAME says which"
+        " variables are drivers and outputs of the case",
+        Path,
+        "FILE",
+        several="repeated",
+        heading=RECORDINGS,
+        default=(),
+    )
+    analysis: str | None = option(
+        "one of several analyses of results of Adams",
+        metavar="NAME",
+        heading=RECORDINGS,
+        default=None,
+    )
+
+
+def foreign_engines(
+    options: WithRecordings, cases: Sequence[Case], columns: Sequence[str]
+) -> list[Engine]:
+    """Return the programs of --engine-command and the FMUs of --fmu as engines.
+
+    Raises:
+        KincheckError: a command has another form, or an FMU cannot run.
+    """
+    if not (options.engine_command or options.fmu):
+        return []
+    from ..recorded.fmu import read_fmu
+    from ..recorded.program import ProgramEngine
+
+    if options.fmu and len(cases) != 1:
+        raise KincheckError(
+            f"{options.fmu[0]}: found {len(cases)} cases, expected the one of the FMU"
+        )
+    return [
+        *(ProgramEngine(command) for command in options.engine_command),
+        *(read_fmu(file, cases[0], columns) for file in options.fmu),
+    ]
+
+
+def recorded_engines(
+    files: Sequence[Path],
+    case: Case,
+    curve: CurveOptions,
+    *,
+    analysis: str | None = None,
+    sheet: str | None = None,
+) -> tuple[Case, list[Engine]]:
+    """Return the case at the samples of its recordings, and the recordings as engines.
+
+    Args:
+        curve: meaning and accuracy of the columns.
+        analysis: one of several in results of Adams.
+        sheet: of a workbook.
+
+    Raises:
+        KincheckError: a recording cannot be read, or two have different samples.
+    """
+    import numpy as np
+
+    from ..recorded.engine import RecordedEngine
+    from ..recorded.meaning import Meaning, Reader, read_accuracy
+    from ..recorded.readers import read_recording
+    from ..recorded.recording import Head
+    from ..recorded.samples import samples_of
+    from ..recorded.sweep import at_samples
+
+    engines: list[Engine] = []
+    found: Case | None = None
+    for file in files:
+        meanings: list[Meaning] = []
+
+        def choose(
+            heads: Sequence[Head], file: Path = file, meanings: list[Meaning] = meanings
+        ) -> list[int]:
+            meanings.append(Reader(file, case, heads).read(curve.columns))
+            return sorted({use.column for use in meanings[-1].uses})
+
+        recording = read_recording(file, choose, analysis=analysis, sheet=sheet)
+        samples = samples_of(case, recording, meanings[-1])
+        accuracy = read_accuracy(file, case, curve.accuracy)
+        resampled = at_samples(case, samples)
+        values = resampled.case.sweep.values
+        if found is not None and not np.array_equal(values, found.sweep.values):
+            raise KincheckError(
+                f"{file}: found other samples than those of {files[0]}, expected the"
+                " same for recordings beside each other; run them one by one"
+            )
+        found = found or resampled.case
+        engines.append(RecordedEngine(file.stem, samples, resampled, accuracy))
+    return found or case, engines
+
+
+def undriven(case: Case) -> bool:
+    """Return whether a case has freedoms without a driver, so that no engine can solve it."""
+    from ..kinematics import degrees_of_freedom
+
+    return degrees_of_freedom(case.mechanism) > len(case.mechanism.drivers)

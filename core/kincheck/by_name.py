@@ -7,10 +7,9 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
-from kincheck.core.cli.check_engine import CheckEngine
+from kincheck.core.cli.checks import CheckEngine
 from kincheck.core.cli.compare import Compare
-from kincheck.core.cli.explain import Explain
-from kincheck.core.cli.free import MoveFreely
+from kincheck.core.cli.examine import Explain, MoveFreely
 from kincheck.core.cli.main import registry
 from kincheck.core.cli.registry import Registry
 from kincheck.core.cli.run import Run

@@ -13,7 +13,7 @@ from kincheck.core import (
 )
 from kincheck.core.case.io.model_writer import way_to
 from kincheck.core.cli import main
-from kincheck.core.cli.export import FORMATS
+from kincheck.core.cli.files import FORMATS
 
 from ..support.exported import read
 from ..support.mechanisms import mcpherson, slider_crank

@@ -233,7 +233,7 @@ def test_how_to_install_comes_from_the_metadata():
 
 
 def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys, monkeypatch):
-    monkeypatch.setattr("kincheck.core.cli.list.installed_version", lambda name: None)
+    monkeypatch.setattr("kincheck.core.cli.lists.installed_version", lambda name: None)
     pinocchio = Fake("pinocchio", installed=None)
     cases = {"crank": crank(), "free": crank("free", reference=False)}
     assert kincheck_main("list", engines=[RIGHT, pinocchio], cases=cases) == 0

@@ -35,7 +35,7 @@ def test_a_command_loads_no_other():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == (
-        "check_joint class_loading engine_loading main parser registry"
+        "checks class_loading main parser registry run_options"
     )
 
 

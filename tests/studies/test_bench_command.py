@@ -8,7 +8,7 @@ import subprocess
 
 import msgspec
 import pytest
-from kincheck.core.cli import bench as command
+from kincheck.core.cli import laboratory as command
 from kincheck.core.cli import main
 from kincheck.core.extras import THREADS
 from kincheck.core.studies.bench import engines

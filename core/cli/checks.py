@@ -1,9 +1,8 @@
-"""kincheck reference: prove the samples of cases, write them as references, and measure the errors
-of the native engine.
-"""
+"""Commands that check: kincheck check-joint, check-engine and reference."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -27,8 +26,102 @@ from .run_options import TOL
 
 if TYPE_CHECKING:
     from ..case.io.reference_file import Reference
+    from ..harness.engine import Engine
     from ..report.terminal import FittingTable
+    from ..studies.checks.findings import Report
     from ..studies.native_error import NativeError
+
+
+@options
+class CheckJoint(Command):
+    """Check a joint type: its equations against their derivatives, its branches, and a closed loop
+    in every engine.
+    """
+
+    about: ClassVar[str] = "check your own joint type, or a built-in one"
+    joint: str = argument(
+        "a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
+        " built-in type, such as revolute",
+        "JOINT",
+    )
+    seed: int = option("seed of the random poses; default %(default)s", whole(0), "N", default=0)
+    quiet: bool = verbosity("print only the failed checks and the count")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..studies.checks.check_joint import check_joint
+        from .joint_loading import named_joint
+
+        report = check_joint(
+            named_joint(self.joint),
+            seed=self.seed,
+            engines=[*map(registry.engine, registry.engines)],
+        )
+        report.print(sys.stdout, quiet=self.quiet)
+        return Status.WITHIN if report.passed else Status.DEVIATES
+
+
+TOPOLOGIES = {
+    "one loop": "rssr",
+    "open and closed": "spatial_slider_crank",
+    "several loops": "andrews_squeezer",
+    "parallel robot": "stewart_platform",
+    "redundant rows": "bennett",
+    "two drivers": "mcpherson_steered",
+    "outputs of orientation": "mcpherson_suspension",
+}
+"""Built-in cases by a word on their structure."""
+
+
+@options
+class CheckEngine(Command):
+    """Check an engine: every joint type, several topologies, its rates against differences, its
+    refusals, and repeated answers. Each pair is solved in a worker process.
+    """
+
+    about: ClassVar[str] = "check your own engine"
+    engine: str | Engine | None = argument(
+        "the class, in a module of this folder or an installed one; or an engine's name",
+        "MODULE:CLASS",
+        "?",
+        default=None,
+    )
+    engine_command: str | None = option(
+        'a program as an engine, "prog {case} {samples} {out}"; see run',
+        metavar="COMMAND",
+        default=None,
+    )
+    quiet: bool = verbosity("print only the failed checks and the count")
+
+    def answer(self, registry: Registry) -> Report:
+        """Check an engine, given by itself, by name, or as MODULE:CLASS.
+
+        Raises:
+            KincheckError: there is no such engine, or a member of the engine protocol is missing.
+        """
+        from ..harness.standard import STANDARD
+        from ..recorded.program import ProgramEngine
+        from ..report.progress import progress
+        from ..studies.checks.check_engine import check_engine
+
+        program = self.engine_command
+        engine = ProgramEngine(program) if program is not None else self.engine
+        problems = list[str]()
+        found = registry.find_engines([engine], problems)
+        if problems:
+            raise KincheckError("\n".join(problems))
+        cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}
+        native = registry.engine(STANDARD)
+        return check_engine(found[0], native, cases, tol=TOL, progress=progress([]))
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        if (self.engine is None) == (self.engine_command is None):
+            raise KincheckError("Name one engine to check: MODULE:CLASS or --engine-command.")
+        report = self.answer(registry)
+        report.print(sys.stdout, quiet=self.quiet)
+        return Status.WITHIN if report.passed else Status.DEVIATES
+
 
 # A double has 17 digits; beyond 1000 digits only the time grows.
 FEWEST, DIGITS, MOST = 17, 30, 1000

@@ -1,20 +1,18 @@
-"""kincheck list: list cases and engines, or the types known to case files."""
+"""Commands that print what kincheck knows: kincheck list, schema and completion."""
 
 from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import msgspec
+
+from ..case.io.atomic_files import to_standard_output
 from ..extras import how_to_install, installed_version, is_extra
-from ..options import (
-    joint_types,
-    options,
-    switch,
-    verbosity,
-)
+from ..options import argument, joint_types, options, switch, verbosity
 from .parser import Command
 from .registry import Registry, Status
 
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..harness.engine import Engine
+
 
 SOURCE_WIDTH = 100
 """Longest line of the docstrings that `--schema` prints [characters]."""
@@ -162,3 +161,144 @@ def _hung(line: str, width: int) -> list[str]:
         break_on_hyphens=False,
     )
     return parts or [""]
+
+
+def _case() -> dict[str, Any]:
+    from ..case.io.catalogue import case_schema
+
+    return case_schema()
+
+
+def _variation() -> dict[str, Any]:
+    from ..studies.variation.variation_schema import variation_schema
+
+    return variation_schema()
+
+
+def _results() -> dict[str, Any]:
+    from ..harness.record import Results
+
+    return msgspec.json.schema(Results)
+
+
+def _regression() -> dict[str, Any]:
+    from ..history.findings import Regressions
+
+    return msgspec.json.schema(Regressions)
+
+
+def _live() -> dict[str, Any]:
+    from ..live.protocol import live_schema
+
+    return live_schema()
+
+
+def _board() -> dict[str, Any]:
+    from ..studies.board.results import Board
+
+    return msgspec.json.schema(Board)
+
+
+SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "case": _case,
+    "variation": _variation,
+    "results": _results,
+    "regression": _regression,
+    "live": _live,
+    "board": _board,
+}
+
+
+@options
+class PrintSchema(Command):
+    """Print the JSON Schema of a file, for editors and validators, made from the types of its
+    reader and writer.
+    """
+
+    about: ClassVar[str] = "print the JSON Schema of a file"
+    name: str = argument(
+        f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
+        "NAME",
+        choices=[*SCHEMAS],
+    )
+    joint_type: tuple[str, ...] = joint_types()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        found = msgspec.json.encode(SCHEMAS[self.name]())
+        to_standard_output(msgspec.json.format(found, indent=2) + b"\n")
+        return Status.WITHIN
+
+
+SHELLS = ("bash", "zsh", "tcsh")
+FILES = ("FILE", "FILE.html", "RUN")
+# Functions of the shells: engine options complete to engine names, cases to built-in names and
+# files.
+ENGINES = ("engine", "require")
+PREAMBLE = {
+    "bash": 'kincheck_cases() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}',
+    "zsh": "kincheck_cases() {{ compadd {names}; _files; }}",
+    "tcsh": "",
+}
+
+
+@options
+class Completion(Command):
+    """Print a shell script for the completion of commands, options, built-in cases, engines and
+    files. Repeat this after an update.
+    """
+
+    about: ClassVar[str] = "print the completion script of a shell"
+    epilog: ClassVar[str | None] = (
+        "bash: echo 'eval \"$(kincheck completion bash)\"' >> ~/.bashrc. zsh: kincheck"
+        " completion zsh > a folder of $fpath, as _kincheck. tcsh: kincheck completion tcsh >"
+        " ~/.kincheck.tcsh, and source that in ~/.tcshrc. Then open a new shell."
+    )
+    shell: str = argument(", ".join(SHELLS), "SHELL", choices=SHELLS)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        import shtab
+
+        from ..case.models.hardpoints.templates import TEMPLATES
+        from ..joints import Joint
+        from ..studies.stress.families import Family
+        from .main import parser
+
+        names = {
+            **{
+                each: [*dict.fromkeys((*registry.engines, *registry.simulations))]
+                for each in ENGINES
+            },
+            "family": [*Family.registry],
+            "template": [*TEMPLATES],
+            "to": [*registry.writers],
+            "joint": sorted(Joint.registry),
+            "export": [*registry.writers],
+        }
+        found = parser([])
+        for each in (found, *_below(found)):
+            for action in each.arguments():
+                if action.metavar == "CASE":
+                    action.complete = {  # pyright: ignore[reportAttributeAccessIssue]
+                        "bash": "kincheck_cases",
+                        "zsh": "kincheck_cases",
+                        "tcsh": "f",
+                    }
+                elif action.metavar in FILES:
+                    action.complete = shtab.FILE  # pyright: ignore[reportAttributeAccessIssue]
+                elif action.metavar == "DIR":
+                    action.complete = shtab.DIRECTORY  # pyright: ignore[reportAttributeAccessIssue]
+                elif action.choices is None:
+                    action.choices = names.get(action.dest)
+        # a dictionary by shell, which the library's types omit
+        preamble: Any = {self.shell: PREAMBLE[self.shell].format(names=" ".join(registry.cases()))}
+        print(shtab.complete(found, self.shell, preamble=preamble))
+        return Status.WITHIN
+
+
+def _below(parser: Any) -> Iterable[Any]:
+    """Yield the parsers of all commands below a parser."""
+    for each in parser.commands().values():
+        yield each
+        yield from _below(each)
