@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..report.terminal import FittingTable
     from ..studies.checks.findings import Report
-    from ..studies.native_error import NativeError
+    from ..studies.verified_reference import NativeError
 
 
 @options

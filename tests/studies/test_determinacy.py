@@ -9,7 +9,7 @@ from kincheck.core.case.case import without_forces
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import Body
 from kincheck.core.report.terminal import console
-from kincheck.core.studies.diagnosis.determinacy import determinacy
+from kincheck.core.studies.diagnosis.diagnose import determinacy
 from kincheck.core.studies.diagnosis.text import _directions, _forces
 
 

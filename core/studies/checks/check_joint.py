@@ -35,7 +35,6 @@ from ...harness.engine import Engine
 from ...joints import Joint, Kind
 from ...trajectory import Array
 from .findings import Finding, Report, Verdict, skipped, stated
-from .joint_drivers import driver
 from .joint_equations import (
     axis_lengths,
     composition,
@@ -51,7 +50,7 @@ from .joint_equations import (
     round_off,
     size_and_place,
 )
-from .joint_loops import loops
+from .joint_loops import driver, loops
 from .manifold import Specimen, branches, moved_specimen
 from .traced_joint import BODIES, Place
 
