@@ -11,16 +11,18 @@ import numpy as np
 
 from ..case.case import HELD_BUT, TIME, Case, Free, Sweep
 from ..case.io.table_file import Kind, write_csv
+from ..dataset import Dataset, Variable
 from ..errors import KincheckError
 from ..harness.compare import output_series
 from ..kinematics import free_motion
+from ..tabular import Tabular
 from ..trajectory import Array
 
 SCHEMA = "kincheck-free/1"
 
 
 @dataclass(frozen=True, eq=False)
-class FreeResult:
+class FreeResult(Tabular):
     """The free motion of a case, n samples, SI units.
 
     Attributes:
@@ -53,6 +55,23 @@ class FreeResult:
     method: str
     message: str
     notes: tuple[str, ...]
+
+    def summary(self) -> str:
+        """Return case, duration and error in one line."""
+        ended = f"; {self.message}" if self.message else ""
+        return (
+            f"{self.case}: {len(self.times)} samples to {self.times[-1]:.9g} s, change when all"
+            f" steps are halved {self.error:.1e} m{ended}"
+        )
+
+    def dataset(self) -> Dataset:
+        """Return the outputs over time."""
+        variables = {
+            name: Variable("sample", values, self.units[name])
+            for name, values in self.outputs.items()
+        }
+        coords = {TIME: Variable("sample", self.times, "s")}
+        return Dataset(("sample",), coords, variables, TIME)
 
     def write_csv(self, path: Path) -> int:
         """Write time and outputs as columns of a CSV file; return the number of rows."""
