@@ -283,7 +283,7 @@ def whole(least: int, most: int | None = None) -> Callable[[str], int]:
     def read(text: str) -> int:
         found = _whole(text)
         if found is None or found < least or (most is not None and found > most):
-            raise KincheckError(f"{text!r} is not a whole number {expected}; give one")
+            raise KincheckError(f"{text!r} is not a whole number {expected}. Give one.")
         return found
 
     return read
@@ -309,12 +309,12 @@ def positive(text: str) -> float:
     except ValueError:
         found = math.nan
     if not 0.0 < found < math.inf:
-        raise KincheckError(f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12")
+        raise KincheckError(f"{text!r} is not a positive number. Give one such as 1, 0.5 or 1e-12.")
     return found
 
 
 def measured(text: str) -> str:
     """Return the text of an option that is a number, with or without a unit."""
     if not re.fullmatch(r"\s*[-+]?[\d.]*\d\.?(?:[eE][-+]?\d+)?\s*[A-Za-z]*\s*", text):
-        raise KincheckError(f"{text!r} is not a number; give one such as 0.02, 20mm or -3deg")
+        raise KincheckError(f"{text!r} is not a number. Give one such as 0.02, 20mm or -3deg.")
     return text

@@ -78,8 +78,8 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
     module_name, _, name = where.partition(":")
     if not (module_name and name):
         raise KincheckError(
-            f"{where!r} names no class; write MODULE:CLASS, such as my_{kind}:My{kind.capitalize()}"
-            f" for a class in my_{kind}.py"
+            f"{where!r} names no class. Write MODULE:CLASS, such as my_{kind}:My{kind.capitalize()}"
+            f" for a class in my_{kind}.py."
         )
     if "" not in sys.path:
         sys.path.insert(0, "")
@@ -89,25 +89,25 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
         members = [] if found is not None else _members(module, offered)
     except SystemExit as end:  # a script; its exit would skip the check and set the exit status
         raise KincheckError(
-            f"module {module_name!r} ends the process when it is imported (status {end.code});"
-            ' guard what it does there by if __name__ == "__main__":'
+            f"module {module_name!r} ends the process when it is imported (status {end.code})."
+            ' Guard what it does there by if __name__ == "__main__":'
         ) from end
     except Exception as error:  # any error of the module's own code
         if isinstance(error, ModuleNotFoundError) and f"{module_name}.".startswith(
             f"{error.name}."
         ):
             raise KincheckError(
-                f"there is no module {module_name!r}; start in its folder, or install it, and leave"
-                " out the ending .py"
+                f"there is no module {module_name!r}. Start in its folder, or install it, and leave"
+                " out the ending .py."
             ) from error
         raise KincheckError(
-            f"module {module_name!r} cannot be imported: {_raised(error)}; correct it"
+            f"module {module_name!r} cannot be imported: {_raised(error)}. Correct it."
         ) from error
     if found is None:
         close = similar(name, members)
         known = ", ".join(members) or "none"
-        remedy = f"did you mean {close!r}?" if close else f"its {kind}s: {known}"
-        raise KincheckError(f"module {module_name!r} has no class {name!r}; {remedy}")
+        remedy = f"Did you mean {close!r}?" if close else f"Its {kind}s: {known}."
+        raise KincheckError(f"module {module_name!r} has no class {name!r}. {remedy}")
     return found
 
 
@@ -141,14 +141,14 @@ def made(where: str, found: Any) -> Engine:
         engine: Any = found() if callable(found) else found
     except Exception as error:  # any error of the engine's own code
         raise KincheckError(
-            f"{where} cannot be created: {type(error).__name__}: {error}; it is called without"
-            " arguments"
+            f"{where} cannot be created: {type(error).__name__}: {error}. It must be"
+            " possible to call it without arguments."
         ) from error
     missing = [name for name in MEMBERS if not hasattr(engine, name)]
     if missing:
         raise KincheckError(
-            f"{where} is no engine: {', '.join(missing)} missing; see"
-            " kincheck.core.harness.engine.Engine"
+            f"{where} is no engine: {', '.join(missing)} missing. See"
+            " kincheck.core.harness.engine.Engine."
         )
     return engine
 
@@ -178,6 +178,6 @@ def offered(known: Sequence[str]) -> tuple[str, ...]:
         if name in known:
             raise KincheckError(
                 f"package {each.dist.name if each.dist else each.value!r} offers an engine named"
-                f" {name!r}, which is kincheck's own; rename its entry point"
+                f" {name!r}, which is kincheck's own. Rename its entry point."
             )
     return tuple(entry_points())

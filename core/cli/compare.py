@@ -133,9 +133,9 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
         given += registry.matching(str(each)) if isinstance(each, str | Path) else [each]
     names = [*map(_name_of, given)]
     if twice := next((name for name in names if names.count(name) > 1), None):
-        raise KincheckError(f"{twice}: found twice, expected once; leave one out")
+        raise KincheckError(f"{twice}: found twice. Leave one out.")
     if len(names) < 2:
-        raise KincheckError(f"{names[0]}: found one design, expected two or more; name another")
+        raise KincheckError(f"{names[0]}: found one design, expected two or more. Name another.")
     cases: list[Case] = []
     problems: list[str] = []
     for each in given:
@@ -151,8 +151,8 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
         own = case.sweep
         if own.driver != first.driver:
             raise KincheckError(
-                f"{name}: found the driver {own.driver}, expected {first.driver} as in {names[0]};"
-                " compare designs that move in the same way"
+                f"{name}: found the driver {own.driver}, expected {first.driver} as in {names[0]}."
+                " Compare designs that move in the same way."
             )
         cases[k] = replace(
             case,

@@ -243,8 +243,7 @@ class ListAssemblies(Command):
 
         if self.export is None and (found := given(self, ("number", "out"))):
             raise KincheckError(
-                f"{found}: found without --export, which it belongs to; add"
-                " --export FORMAT, or leave out"
+                f"{found}: only an export uses it. Add --export FORMAT, or leave it out."
             )
         require_writable([("--json", self.json), ("--out", self.out)])
         if self.export is not None and self.export not in registry.writers:
@@ -362,8 +361,8 @@ class MoveFreely(Command):
         if not duration or not samples:
             raise KincheckError(
                 f"{case.name if self.case is case else self.case}: says no duration and samples of"
-                " its free motion; add [free] with duration and samples, or give --duration and"
-                " --samples"
+                " its free motion. Add [free] with duration and samples, or give --duration and"
+                " --samples."
             )
         rates: Mapping[str, float] = given.rates if given else {}
         rates = rates if self.rates is None else self.rates

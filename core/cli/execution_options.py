@@ -29,7 +29,7 @@ def limit(text: str) -> float:
     """Return the number in the text of a limit."""
     number = positive(text)
     if number > MOST:
-        raise KincheckError(f"{text!r} is too large, expected {MOST:g} at most; give less")
+        raise KincheckError(f"{text!r} is too large. Give {MOST:g} at most.")
     return number
 
 
@@ -77,12 +77,12 @@ def contradictions(options: Isolated | argparse.Namespace) -> list[str]:
     problems: list[str] = []
     if options.scheduler is not None and options.jobs is not None:
         problems.append(
-            "--scheduler: the cluster decides how many pairs run at a time; leave out --jobs"
+            "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs."
         )
     if options.jobs == 0 and (options.timeout or options.memory):
         problems.append(
-            "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and"
-            " --memory, or --jobs"
+            "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
+            " --memory, or --jobs."
         )
     return problems
 

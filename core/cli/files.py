@@ -111,7 +111,7 @@ def keep_texts(
     }
     for file in files:
         if out is None and file.exists():
-            raise KincheckError(f"{file} exists already; give --out to overwrite a file")
+            raise KincheckError(f"{file} exists already. Give --out to overwrite a file.")
     require_writable([("--json", json), *(("--out", file) for file in files)])
     problems: list[str] = []
     for file, text in files.items():
@@ -149,7 +149,7 @@ class Import(Command):
         files, supplied = import_options.return_cases(self.case, self.supplied)
         if len(files) != 1:
             raise KincheckError(
-                f"import: found {len(files)} files, expected one; name it before --hold"
+                f"import: found {len(files)} files, expected one. Name it before --hold."
             )
         (file,) = files
         case = registry.find_case(file, supplied)
@@ -225,15 +225,15 @@ class Same(Command):
         for name in self.converted_by:
             if name in NO_CONVERTERS:
                 raise KincheckError(
-                    f"--converted-by {name}: {NO_CONVERTERS[name]}, so there is no file to compare;"
-                    f" run the model in it: kincheck run FILE --engine native {name}"
+                    f"--converted-by {name}: {NO_CONVERTERS[name]}, so there is no file to compare."
+                    f" Run the model in it: kincheck run FILE --engine native {name}"
                 )
         given = dict(map(_pair, self.match))
         names: Sequence[str] = self.files
         if len(names) + len(self.converted_by) < 2:
             raise KincheckError(
                 f"same: found one file, expected two or more, or --converted-by"
-                f" {', '.join(CONVERTERS)}; add one"
+                f" {', '.join(CONVERTERS)}. Add one."
             )
         first, *others = (_read(name, registry, self.without) for name in names)
         used = {name for each in (first, *others) for name in each.without}
@@ -253,7 +253,7 @@ class Same(Command):
 def _pair(text: str) -> tuple[str, str]:
     first, sign, second = text.partition("=")
     if not (first and sign and second):
-        raise KincheckError(f"--match: found {text!r}, expected LINK=LINK; correct it")
+        raise KincheckError(f"--match: found {text!r}, expected LINK=LINK.")
     return first, second
 
 
@@ -314,8 +314,8 @@ class PrintTemplates(Command):
                 if not text:
                     raise KincheckError(
                         f"template {name}: its links are rods without joints, so no role takes a"
-                        " bushing; kincheck import TABLE writes a case file, and [forces.NAME] type"
-                        ' = "bushing" is a bushing there'
+                        " bushing. Write a case file by kincheck import TABLE, and add"
+                        ' [forces.NAME] type = "bushing" there.'
                     )
             print(*filter(None, texts), sep="\n\n")
         else:

@@ -57,7 +57,9 @@ class ListRuns(Command):
         from ..history.store import Store
 
         if self.history is None:
-            raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
+            raise KincheckError(
+                f"history: no file is given. Give --history FILE, or set {HISTORY}."
+            )
         require_writable([("--plot", self.plot), ("--export", self.export)], self.history)
         with Store(Path(self.history), writable=bool(self.remove)) as store:
             for run in self.remove:

@@ -66,5 +66,5 @@ def driver_value(text: str | None, case: Case) -> float | None:
     except ValueError:
         raise KincheckError(
             f"--at: {text!r} is not a number with one of the units {', '.join(units)}, or in"
-            f" {bare}; give a value of the driver {driver}"
+            f" {bare}. Give a value of the driver {driver}."
         ) from None

@@ -307,7 +307,7 @@ class StressEngines(Command):
             if found := given(
                 self, [name for name in vars(self) if name not in ("list", "command")]
             ):
-                raise KincheckError(f"--list runs nothing; leave out {found}")
+                raise KincheckError(f"--list runs nothing. Leave out {found}.")
             rows = [(name, family.about) for name, family in Family.registry.items()]
             page(None).print(unheaded(rows))
             return Status.WITHIN
@@ -315,18 +315,18 @@ class StressEngines(Command):
         engines = registry.find_engines(self.engine or [STANDARD], problems, self.mode)
         if self.replay:
             if self.out or self.json:
-                problems.append("--replay only prints its findings; leave out --out and --json")
+                problems.append("--replay only prints its findings. Leave out --out and --json.")
             if found := given(self, OF_FAMILIES):
                 problems.append(
-                    f"--replay judges files, which belong to no family; leave out {found}"
+                    f"--replay judges files, which belong to no family. Leave out {found}."
                 )
             if problems:
                 raise KincheckError("\n".join(problems))
             return _replay(self, registry, engines)
         if self.tol is not None:
             problems.append(
-                "--tol is for replayed files, and families have their own tolerances; leave it out,"
-                " or give --replay"
+                "--tol is for replayed files, and families have their own tolerances. Leave it out,"
+                " or give --replay."
             )
         known = Family.registry
         problems += [unknown("family", name, [*known]) for name in self.family if name not in known]
@@ -422,6 +422,6 @@ def _replay(options: StressEngines, registry: Registry, engines: list[Engine]) -
                 print(f"  {found.message}")
     if idle := [engine.name for engine in engines if engine.name not in examined]:
         raise KincheckError(
-            f"no sample of {', '.join(idle)} was examined: give another engine or other files"
+            f"no sample of {', '.join(idle)} was examined. Give another engine or other files."
         )
     return Status.DEVIATES if bad else Status.WITHIN

@@ -72,7 +72,7 @@ def _done(argv: list[str]) -> int:
         complain(
             [
                 f"{where.filename}, line {where.lineno}, ended the program with status"
-                f" {end.code!r}; correct it, or leave it out"
+                f" {end.code!r}. Correct it, or leave it out."
             ]
         )
     except BrokenPipeError:  # the reader has closed our output
@@ -81,8 +81,8 @@ def _done(argv: list[str]) -> int:
         if error.errno in FULL and error.filename is None:
             complain(
                 [
-                    f"standard output cannot be written ({error.strerror}); requested files are"
-                    " written"
+                    f"standard output cannot be written ({error.strerror}). Requested files are"
+                    " written."
                 ]
             )
             _print_no_more()

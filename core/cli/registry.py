@@ -98,15 +98,15 @@ class Registry:
         matching, known = self.matching(name), self.cases()
         if len(matching) > 1:
             raise KincheckError(
-                f"{name!r} matches {len(matching)} cases: {shortened(matching, MOST_NAMED)}; name"
-                " one of them"
+                f"{name!r} matches {len(matching)} cases: {shortened(matching, MOST_NAMED)}. Name"
+                " one of them."
             )
         (name,) = matching
         if name in known:
             if supplied.given:
                 raise KincheckError(
-                    f"{name}: --{supplied.given[0]} is for files, and this is a built-in case:"
-                    " leave it out"
+                    f"{name}: --{supplied.given[0]} is for files, and this is a built-in case."
+                    " Leave it out."
                 )
             case = self.case(name)
         elif Path(name).suffix in SUFFIXES or os.sep in name or os.path.exists(name):
@@ -114,8 +114,8 @@ class Registry:
         else:
             raise KincheckError(
                 unknown("case", name, known)
-                + "; case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
-                " .urdf, .sdf or .adm"
+                + ". Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
+                " .urdf, .sdf or .adm."
             )
         # a dataset says itself which freedoms are left to a recording
         if not driven or (supplied.recorded and Path(name).suffix.lower() in DATASETS):
@@ -140,7 +140,7 @@ class Registry:
         found = [each for each in self.cases() if fnmatchcase(each, name)] + sorted(glob(name))
         if not found:
             raise KincheckError(
-                f"no built-in case and no file matches {name!r}; kincheck list shows the cases"
+                f"no built-in case and no file matches {name!r}. kincheck list shows the cases."
             )
         return found
 
@@ -211,8 +211,8 @@ class Registry:
                 )
             elif mode not in (None, *modes):
                 problems.append(
-                    f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}: leave out --mode or"
-                    " the engine"
+                    f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}. Leave out --mode or"
+                    " the engine."
                 )
             else:
                 engines.append(self._loaded(name, mode or modes[0]))
@@ -229,8 +229,8 @@ class Registry:
             return
         if mode not in (None, found.mode):
             problems.append(
-                f"engine {where} has the mode {found.mode!r}, not {mode!r}: leave out --mode or the"
-                " engine"
+                f"engine {where} has the mode {found.mode!r}, not {mode!r}. Leave out --mode or the"
+                " engine."
             )
         else:
             engines.append(found)

@@ -246,9 +246,9 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
     """
     problems: list[str] = execution_options.contradictions(options)
     if options.resume and options.history is None:
-        problems.append(f"--resume needs a history: give --history FILE, or set {HISTORY}")
+        problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
     if options.bench is not None and options.out is None:
-        problems.append("--bench adds to the report: give --out DIR")
+        problems.append("--bench adds to the report. Give --out DIR.")
     tell = complain if options.command else _nothing
     unread: dict[str, str] = {}
     cases = _cases(options, registry, unread)
@@ -274,7 +274,7 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
     if not (options.reference or options.recorded or options.fmu) and (
         options.curve != CurveOptions()
     ):
-        problems.append("options for measured curves need a curve: give --reference FILE")
+        problems.append("options for measured curves need a curve. Give --reference FILE.")
     if options.reference and not problems:
         try:
             # a reference may name an unreadable case, which does not stop the others
@@ -290,7 +290,7 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
     if recorded and run_options.undriven(cases[0]):
         engines, baseline = [], None
     if options.fmu and options.jobs == 0:
-        problems.append("--fmu runs foreign machine code in workers alone; leave out --jobs 0")
+        problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
     try:
         foreign = run_options.foreign_engines(options, cases, options.curve.columns)
         engines += [*foreign, *recorded]
@@ -447,7 +447,7 @@ def _engines(options: Run, registry: Registry, problems: list[str]) -> list[Engi
         [*(several(options.engines) or every), *options.require], problems, options.mode
     )
     if not engines and not problems:
-        problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
+        problems.append(f"no engine has the mode {options.mode!r}. Leave out --mode.")
     return engines
 
 

@@ -124,7 +124,7 @@ def foreign_engines(
 
     if options.fmu and len(cases) != 1:
         raise KincheckError(
-            f"{options.fmu[0]}: found {len(cases)} cases, expected the one of the FMU"
+            f"{options.fmu[0]}: found {len(cases)} cases, expected the one of the FMU. Name one."
         )
     return [
         *(ProgramEngine(command) for command in options.engine_command),
@@ -177,8 +177,8 @@ def recorded_engines(
         values = resampled.case.sweep.values
         if found is not None and not np.array_equal(values, found.sweep.values):
             raise KincheckError(
-                f"{file}: found other samples than those of {files[0]}, expected the"
-                " same for recordings beside each other; run them one by one"
+                f"{file}: found other samples than those of {files[0]}. Run recordings"
+                " with different samples one by one."
             )
         found = found or resampled.case
         engines.append(RecordedEngine(file.stem, samples, resampled, accuracy))

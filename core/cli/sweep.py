@@ -205,18 +205,18 @@ class Sweep(Command):
         problems += Destinations.of(self).problems(names)
         if self.scheduler is not None and self.jobs is not None:
             problems.append(
-                "--scheduler: the cluster decides the number of threads; leave out --jobs"
+                "--scheduler: the cluster decides the number of threads. Leave out --jobs."
             )
         problems += replay_problems(self)
         if self.replay and (self.store or self.scheduler):
             problems.append(
-                "--replay solves in this process and stores nothing; leave out --store and"
-                " --scheduler"
+                "--replay solves in this process and stores nothing. Leave out --store and"
+                " --scheduler."
             )
         if self.resume and (self.out is None or self.replay):
             problems.append(
-                "--resume continues from a folder of results: give --out DIR, and leave out"
-                " --replay"
+                "--resume continues from a folder of results. Give --out DIR, and leave out"
+                " --replay."
             )
         engine, share = _check(self, registry, problems)
         study = self._study(registry, problems)
@@ -259,8 +259,7 @@ def _check(options: Sweep, registry: Registry, problems: list[str]) -> tuple[Eng
         share = math.nan
     if not 0.0 < share <= 1.0:
         problems.append(
-            f"--check {options.check}: found the share {text!r}, expected a fraction such as"
-            " 0.01; correct it"
+            f"--check {options.check}: found the share {text!r}, expected a fraction such as 0.01."
         )
     engines = registry.find_engines([name], problems)
     return (engines[0] if engines else None), share
@@ -395,9 +394,11 @@ def replay_problems(options: Sweep) -> list[str]:
         return []
     if options.sampling is Sampling.LATIN:
         if options.samples is None:
-            return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
+            return [
+                "--replay: a Latin hypercube depends on the number of variants. Give --samples."
+            ]
     elif options.samples is not None:
-        return ["--replay: seed and index identify a variant; leave out --samples"]
+        return ["--replay: seed and index identify a variant. Leave out --samples."]
     return []
 
 
@@ -410,8 +411,8 @@ def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | No
     for index in options.replay:
         if study.samples and index >= study.samples:
             raise KincheckError(
-                f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
-                " give one of them"
+                f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1}."
+                " Give one of them."
             )
     native = registry.engine(STANDARD)
     engines = [native] if engine is None or engine.name == STANDARD else [native, engine]

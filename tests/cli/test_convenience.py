@@ -41,7 +41,7 @@ def test_a_pattern_names_all_cases_that_match(kincheck_main, capsys):
 def test_a_command_for_one_case_refuses_a_pattern_of_several(kincheck_main, capsys):
     assert kincheck_main("explain", "cran*", engines=[RIGHT]) == 2
     said = capsys.readouterr().err
-    assert "'cran*' matches 2 cases: crank, crank_two; name one of them" in said
+    assert "'cran*' matches 2 cases: crank, crank_two. Name one of them" in said
 
 
 def test_a_pattern_names_files_too(kincheck_main, tmp_path, capsys):

@@ -117,7 +117,7 @@ def test_trends_of_a_pair_and_its_steps(path, capsys):
 def test_history_refuses_unknown_names_and_files(path, capsys, monkeypatch):
     monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
     assert main.main(["history"]) == 2
-    assert "no file is given; give --history FILE, or set KINCHECK_HIST" in capsys.readouterr().err
+    assert "no file is given. Give --history FILE, or set KINCHECK_HIST" in capsys.readouterr().err
     assert history(path) == 2
     assert "there is no such file" in capsys.readouterr().err
     nights(path, 1)

@@ -68,7 +68,7 @@ def test_disk_error_during_run_keeps_results(path):
 def test_resume_takes_history_from_environment(path):
     process = kincheck("run", "--resume")
     assert (
-        "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"
+        "--resume needs a history. Give --history FILE, or set KINCHECK_HISTORY."
         in process.communicate()[1]
     )
     assert process.returncode == 2

@@ -17,6 +17,7 @@ from kincheck.core.harness.execution import here
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw
 from kincheck.core.studies.checks import check_engine as checking
+from kincheck.core.studies.checks import engine_cases as force_cases
 from kincheck.core.studies.checks.check_engine import rates
 from kincheck.core.studies.checks.findings import Verdict
 
@@ -32,7 +33,7 @@ def few(monkeypatch):
     """Three joint types and one topology; modules of the tests are found by workers."""
     monkeypatch.syspath_prepend(str(ROOT))
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Planar, Gear)])
-    monkeypatch.setattr(checking, "probes", lambda: [probe(Screw)])
+    monkeypatch.setattr(force_cases, "probes", lambda: [probe(Screw)])
     monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})
 
 
@@ -97,7 +98,7 @@ def test_check_engine_stops_on_protocol_error(few):
 @pytest.mark.parametrize(
     ("where", "message"),
     [
-        (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
+        (f"{HERE}:Fauly", "has no class 'Fauly'. Did you mean 'Faulty'?"),
         (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
         (
             f"{HERE}:np",

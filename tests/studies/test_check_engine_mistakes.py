@@ -6,6 +6,7 @@ from kincheck.core.case.joint_probe import probe
 from kincheck.core.harness.execution import here
 from kincheck.core.joints import Screw, Universal
 from kincheck.core.studies.checks import check_engine as checking
+from kincheck.core.studies.checks import engine_cases as force_cases
 from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
@@ -16,13 +17,13 @@ def here_alone(monkeypatch):
     """Solved in this process, by two joint types at most."""
     monkeypatch.setattr(checking, "in_workers", lambda *_: here)
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Universal)])
-    monkeypatch.setattr(checking, "probes", lambda: [probe(Universal)])
+    monkeypatch.setattr(force_cases, "probes", lambda: [probe(Universal)])
     monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})
 
 
 @pytest.fixture
 def without_loads(monkeypatch):
-    monkeypatch.setattr(checking, "checking", list)
+    monkeypatch.setattr(checking, "force_cases", list)
 
 
 @pytest.fixture
