@@ -71,9 +71,9 @@ class Designs(Tabular):
         coords = {"design": Variable("design", [*self.curves])}
         for head, values in self.drivers.items():
             name, _, unit = head.partition(" [")
-            numbers = np.array(values, dtype=np.float64)
+            numbers = np.array([np.nan if x is None else x for x in values], dtype=np.float64)
             coords[name] = Variable("sample", numbers, unit.removesuffix("]"))
-        missing = np.full(self.results.records[0].samples, np.nan)
+        missing = np.full(len(next(iter(self.drivers.values()))), np.nan)
         variables = {
             name: Variable(dims, [each.get(name, missing) for each in self.curves.values()], unit)
             for name, unit in self.units.items()
@@ -99,7 +99,7 @@ class Designs(Tabular):
 
 def designs_of(results: Results, cases: Sequence[Case]) -> Designs:
     """Return the designs of a run that have any value."""
-    units = {"length": cases[0].length_unit, "angle": "deg"}
+    units = {"length": cases[0].length_unit, "angle": cases[0].angle_unit}
     every = {name: each | {"units": units} for name, each in results.run["cases"].items()}
     results = msgspec.structs.replace(results, run=results.run | {"cases": every})
     facts, other = every[cases[0].name], _defined_otherwise(every)
