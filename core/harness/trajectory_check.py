@@ -127,8 +127,8 @@ def _check_bodies(case: Case, bodies: Mapping[str, BodyMotion], solved: Mask) ->
     if bodies and (apart := sorted(moving ^ {*bodies})):
         raise BadTrajectoryError(
             f"motions of bodies {', '.join(bodies)}, but {apart[0]!r} is"
-            f" {'missing' if apart[0] in moving else 'no moving body'}; give those of all moving"
-            " bodies, or none"
+            f" {'missing' if apart[0] in moving else 'no moving body'}. Give those of all moving"
+            " bodies, or none."
         )
     for name, motion in bodies.items():
         for key, columns in (("r", 3), ("p", 4), ("v", 6), ("a", 6)):
@@ -160,7 +160,7 @@ def _check_forces(forces: Forces, n: int) -> None:
     given |= {f"force of element {name!r}": (x, (n,)) for name, x in forces.elements.items()}
     for what, (values, shape) in given.items():
         if np.isinf(_numbers(what, values, shape)).any():
-            raise BadTrajectoryError(f"{what} is infinite; give finite numbers, or NaN for none")
+            raise BadTrajectoryError(f"{what} is infinite. Give finite numbers, or NaN for none.")
 
 
 def _numbers(what: str, values: Any, shape: tuple[int | None, ...], kinds: str = "f") -> Any:

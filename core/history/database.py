@@ -144,11 +144,11 @@ def check(connection: sqlite3.Connection) -> int:
         " pragma_user_version, pragma_application_id"
     ).fetchone()
     if application != APPLICATION and (tables or version or application):
-        raise ValueError("a database of another program; give another file")
+        raise ValueError("a database of another program. Give another file.")
     if version > len(MIGRATIONS):
         raise ValueError(
-            f"its schema is version {version}, this kincheck knows {len(MIGRATIONS)}; update"
-            " kincheck"
+            f"its schema is version {version}, this kincheck knows {len(MIGRATIONS)}. Update"
+            " kincheck."
         )
     return version
 
@@ -342,6 +342,6 @@ def _require_whole(path: Path) -> None:
     if beside.is_file() and beside.stat().st_size:
         raise HistoryError(
             f"history {path}: its latest records are still in {beside.name}, and the folder is"
-            " read-only, so they cannot be merged; copy both files to a"
-            " writable folder"
+            " read-only, so they cannot be merged. Copy both files to a"
+            " writable folder."
         )

@@ -320,8 +320,8 @@ def export(
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise KincheckError(
-            f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in"
-            f" {' or '.join(SUFFIXES)}"
+            f"--export {path}: ends in {path.suffix or 'nothing'!r}. Give a file that ends in"
+            f" {' or '.join(SUFFIXES)}."
         )
     kind = suffix.removeprefix(".")
     if missing := lack(kind, f"--export {path}", "or give a .csv"):

@@ -75,14 +75,14 @@ def find(name: str | None, store: Store | None) -> Subject:
         return _in_file(Path(name), store)
     if store is None:
         raise KincheckError(
-            f"report: {'no run' if name is None else f'run {name}'} without a history; give"
-            " --history FILE, or a results.json"
+            f"report: {'no run' if name is None else f'run {name}'} without a history. Give"
+            " --history FILE, or a results.json."
         )
     if name is not None:
         row = store.run(int(name))
         if row.status == "running":
             raise KincheckError(
-                f"report: run {row.id} is still running; report it when it has ended"
+                f"report: run {row.id} is still running. Report it when it has ended."
             )
         return _stored(store, row)
     rows = [row for row in store.runs() if row.status != "running"]
@@ -122,7 +122,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
     against = find(name, store)
     if against.number is not None and against.number == subject.number:
         raise KincheckError(
-            f"report: {subject.name} cannot be compared with itself; give another --against"
+            f"report: {subject.name} cannot be compared with itself. Give another --against."
         )
     return against, ""
 
@@ -130,7 +130,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
 def _in_file(file: Path, store: Store | None) -> Subject:
     if not exists(file):
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
-        raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
+        raise KincheckError(f"report: there is no run {str(file)!r}. Give {known}.")
     results = read_results(file)
     rows, facts = store.runs() if store else [], results.run
     known = tuple(facts.get(key) for key in ("started", "host", "command"))

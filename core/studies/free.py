@@ -104,11 +104,11 @@ def free_of(case: Case) -> FreeResult:
     """
     if case.free is None:
         raise KincheckError(
-            f"case {case.name!r} says no duration of its free motion; add [free] with duration and"
-            " samples, or give --duration and --samples"
+            f"case {case.name!r} says no duration of its free motion. Add [free] with duration and"
+            " samples, or give --duration and --samples."
         )
     if TIME in (output.name for output in case.outputs):
-        raise KincheckError(f"case {case.name!r}: an output is named {TIME!r}; rename it")
+        raise KincheckError(f"case {case.name!r}: an output is named {TIME!r}. Rename it.")
     free: Free = case.free
     times = np.linspace(0.0, free.duration, free.samples)
     found = free_motion(case.mechanism, times, free.rates)

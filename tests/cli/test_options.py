@@ -44,7 +44,7 @@ REFUSED = [
     ("stress --tol -1", "is not a positive number"),
     *((f"sweep mcpherson_strut --vary vary.toml {options}", said) for options, said in (
         ("--samples 0", "'0' is not a whole number of 1 or more"),
-        ("", "monte_carlo draws as many variants as it is told; give --samples"),
+        ("", "monte_carlo draws as many variants as it is told. Give --samples"),
         ("--samples 5 --check mujocco", "there is no engine 'mujocco'; did you mean 'mujoco'?"),
         ("--samples 5 --check native:2",
          "--check native:2: found the share '2', expected a fraction"),

@@ -32,7 +32,7 @@ def test_rules_find_the_run_to_compare_with(path):
     with pytest.raises(
         KincheckError,
         match=(
-            r"there is no run 'green'; give a number of the history, a results.json, last-green or"
+            r"there is no run 'green'. Give a number of the history, a results.json, last-green or"
         ),
     ):
         reported(path, against="green")
@@ -65,6 +65,6 @@ def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
     )
     assert main.main(["report"]) == 2
     assert (
-        "no run without a history; give --history FILE, or a results.json"
+        "no run without a history. Give --history FILE, or a results.json"
         in capsys.readouterr().err
     )

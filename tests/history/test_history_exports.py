@@ -73,7 +73,7 @@ def test_impossible_exports_are_refused(path, tmp_path, monkeypatch):
     nights(path, 1)
     with Store(path) as store:
         with pytest.raises(
-            KincheckError, match=r"ends in '.xlsx'; give a file that ends in .parquet or .csv"
+            KincheckError, match=r"ends in '.xlsx'. Give a file that ends in .parquet or .csv"
         ):
             export(store, tmp_path / "all.xlsx")
         with pytest.raises(KincheckError, match="cannot be written"):

@@ -32,7 +32,7 @@ def test_a_file_of_another_program_is_left_alone(path):
     other.execute("CREATE TABLE bookmarks (url TEXT)")
     other.close()
     before = path.read_bytes()
-    with pytest.raises(HistoryError, match="a database of another program; give another file"):
+    with pytest.raises(HistoryError, match=r"a database of another program. Give another file"):
         Store(path)
     assert path.read_bytes() == before
     path.write_bytes(b"not a database at all" * 100)

@@ -89,14 +89,14 @@ def connected(distributed: Any, address: str) -> Generator[Any]:
             client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
         except OSError as error:
             raise ClusterError(
-                f"scheduler {address}: does not answer ({error_text(error)}); start one with"
+                f"scheduler {address}: does not answer ({error_text(error)}). Start one with"
                 " `dask scheduler` and workers with `dask worker ADDRESS`, where kincheck and the"
-                " engines are installed"
+                " engines are installed."
             ) from error
         except (ValueError, TypeError) as error:
             raise ClusterError(
                 f"scheduler {address}: found no address ({error_text(error)}), expected HOST:PORT"
-                " or tcp://HOST:PORT; write it as `dask scheduler` prints it"
+                " or tcp://HOST:PORT. Write it as `dask scheduler` prints it."
             ) from error
         with client:
             yield client

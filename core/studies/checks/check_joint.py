@@ -112,7 +112,7 @@ def check_joint(
         list(specimens) if specimens is not None else specimens_of(joint_class, rng, SPECIMENS)
     )
     if not offered:
-        raise SpecimenError(f"{joint_class.__name__}: no specimens were offered; give one or more")
+        raise SpecimenError(f"{joint_class.__name__}: no specimens were offered. Give one or more.")
     found = [
         finding
         for k, joint in enumerate(offered)
@@ -213,8 +213,8 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
     ]
     if unknown:
         raise SpecimenError(
-            f"{joint_class.__name__}: field {unknown[0]!r} has no kind; declare it by position(),"
-            f" direction(), positions(), directions() or length(), or {remedy}"
+            f"{joint_class.__name__}: field {unknown[0]!r} has no kind. Declare it by position(),"
+            f" direction(), positions(), directions() or length(), or {remedy}."
         )
     makers = (partial(_value, rng=rng, angle=math.radians(angle)) for angle in ANGLES)
     try:

@@ -294,7 +294,7 @@ def _equivalent(case: Case) -> Case | None:
     if taken := sorted(names & {part.name for parts in another for part in parts}):
         raise MechanismError(
             f"{tested}: equivalent() names a part {taken[0]!r}, whatever the joint's name is, so"
-            " two such joints collide in a mechanism; build the names of its parts from self.name"
+            " two such joints collide in a mechanism. Build the names of its parts from self.name."
         )
     known = {*Joint.registry.values()} - {type(tested)}
     mechanism = with_equivalents(case.mechanism, known)

@@ -223,7 +223,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     mechanism = case.mechanism
     if not mechanism.moving:
         raise SolveError(
-            f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed"
+            f"mechanism {mechanism.name!r}: no body can move. Declare a body that is not fixed."
         )
     ranks = Ranks(mechanism)
     account = ranks.account

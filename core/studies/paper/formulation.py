@@ -104,8 +104,8 @@ def _swept(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
     found = solve(mechanism, sweep.driver, values, rate=sweep.rate, points=case.points, style=style)
     if not found.solved.all():
         raise SolveError(
-            f"bench formulation: case {case.name!r}, style {style!r}: {found.message}; choose a"
-            " sweep it can finish"
+            f"bench formulation: case {case.name!r}, style {style!r}: {found.message}. Choose a"
+            " sweep it can finish."
         )
     return found
 
