@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeAlias
 
-from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
+from ..case.io.atomic_files import Content, Named, unwritable
 from ..case.io.table_file import WRITERS, lack
 from ..harness.record import Results, to_json
 
@@ -132,6 +132,7 @@ def deliver(
         precision: error against time at several efforts, by case, for the report.
         history: reads the trends for the report, after all other files; None without a history.
     """
+    from ..report import terminal
     from ..report.table import print_table, to_markdown
 
     encoded = to_json(results) if to.out is not None or to.json is not None else b""
@@ -142,8 +143,6 @@ def deliver(
         contents.append((to.junit, lambda path: path.write_bytes(to_junit(results))))
     if to.markdown is not None:
         contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
-    if to.json not in (None, "-"):
-        contents.append((Path(to.json), encoded))
     if to.curves:
         from ..report.curves import write_curves
 
@@ -156,11 +155,7 @@ def deliver(
         contents.append(
             (to.out / "report.html", lambda path: _write_page(results, path, precision, history))
         )
-    problems += write_all(contents)
-    # last: the reader of standard output may have closed it
-    (show or print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
-    if to.json == "-":
-        to_standard_output(encoded)
+    problems += terminal.deliver(contents, encoded, to.json, partial(show or print_table, results))
 
 
 def _write_page(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
 from ..errors import KincheckError, unknown
 from ..options import argument, destination, json_file, option, options, switch, verbosity, whole
@@ -17,6 +16,7 @@ from .registry import Registry, Status
 from .run_options import HISTORY
 
 if TYPE_CHECKING:
+    from ..case.io.atomic_files import Content
     from ..history.findings import Regressions
     from ..history.queries import History
     from ..history.runs import Subject
@@ -223,10 +223,12 @@ class ReportChanges(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ..harness.record import to_json
         from ..history.comparison import regressions
         from ..history.runs import find, find_against
         from ..history.store import Store
         from ..report.regressions import print_regressions, to_markdown
+        from ..report.terminal import deliver
         from .destinations import Destinations
 
         if problems := Destinations.of(self).problems(OUT, self.history):
@@ -242,14 +244,17 @@ class ReportChanges(Command):
             found = regressions(
                 subject, against, reason, store, missing_is_failure=self.missing_is_failure
             )
-            file = sys.stderr if self.json == "-" else sys.stdout
-            if file.isatty() and not self.quiet:
-                print_regressions(found, file)
-            else:
+
+            def show(file: TextIO) -> None:
+                if file.isatty() and not self.quiet:
+                    print_regressions(found, file)
+                    return
                 text = to_markdown(found)
                 headline = text.partition("\n")[0].removeprefix("## ") + "\n"
                 print(headline if self.quiet else text, end="", file=file)
-            _write(self, subject, found, store, problems)
+
+            contents = _contents(self, subject, found, store)
+            problems += deliver(contents, to_json(found), self.json, show)
             problems += store.damage if store is not None else []
         complain(problems)
         if problems:
@@ -257,15 +262,10 @@ class ReportChanges(Command):
         return Status.DEVIATES if found.regressed else Status.WITHIN
 
 
-def _write(
-    options: ReportChanges,
-    subject: Subject,
-    found: Regressions,
-    store: Store | None,
-    problems: list[str],
-) -> None:
-    """Write as many of the requested files as possible."""
-    from ..case.io.atomic_files import to_standard_output, written
+def _contents(
+    options: ReportChanges, subject: Subject, found: Regressions, store: Store | None
+) -> list[tuple[Path, Content]]:
+    """Return the requested files."""
     from ..harness.record import to_json
     from ..history.queries import NIGHTS, read
     from ..report.junit import to_regression_junit
@@ -277,24 +277,13 @@ def _write(
         past = trends(read(store, last=NIGHTS, like=subject.facts)) if store is not None else None
         write_report(subject.results, path, history=past, changes=to_markup(found))
 
-    contents: dict[str, Callable[[Path], object]] = {
-        "regressions.json": lambda path: path.write_bytes(to_json(found)),
-        "regressions.md": lambda path: path.write_text(to_markdown(found), "utf-8"),
-        "junit.xml": lambda path: path.write_bytes(to_regression_junit(subject.results, found)),
-        "report.html": page,
-    }
-    wanted = (
-        [(options.out / name, write) for name, write in contents.items()]
-        if options.out is not None
-        else []
-    )
-    named = (
-        ("regressions.json", options.json),
-        ("regressions.md", options.markdown),
-        ("junit.xml", options.junit),
-    )
-    wanted += [(Path(path), contents[name]) for name, path in named if path not in (None, "-")]
-    for path, write in wanted:
-        problems += written(path, write)
-    if options.json == "-":
-        to_standard_output(to_json(found))
+    def markdown(path: Path) -> None:
+        path.write_text(to_markdown(found), "utf-8")
+
+    def junit(path: Path) -> None:
+        path.write_bytes(to_regression_junit(subject.results, found))
+
+    folder = zip(OUT, (to_json(found), markdown, junit, page), strict=True)
+    wanted = [] if options.out is None else [(options.out / name, each) for name, each in folder]
+    named = ((options.markdown, markdown), (options.junit, junit))
+    return [*wanted, *((path, each) for path, each in named if path is not None)]

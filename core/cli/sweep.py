@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -335,13 +335,13 @@ def _solve(
 
 def _deliver(options: Sweep, results: SweepResults) -> list[str]:
     """Print the table and write the requested files; return the problems in writing."""
-    from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
+    from ..report.terminal import deliver
     from ..studies.tolerance.page import page
     from ..studies.tolerance.tables import envelope_csv, gradient_csv, limits_csv, print_sweep
 
     encoded = to_json(results)
-    contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
+    contents: list[tuple[Path, bytes]] = []
     if options.out is not None:
         texts = (
             encoded,
@@ -352,11 +352,7 @@ def _deliver(options: Sweep, results: SweepResults) -> list[str]:
         contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
     if options.out is not None and results.limits:
         contents.append((options.out / LIMITS, limits_csv(results).encode()))
-    problems = write_all(contents)  # first: the reader of standard output may have closed it
-    print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
-    if options.json == "-":
-        to_standard_output(encoded)
-    return problems
+    return deliver(contents, encoded, options.json, partial(print_sweep, results))
 
 
 def only(case: Case, names: Sequence[str], problems: list[str]) -> Case:

@@ -7,11 +7,10 @@ from __future__ import annotations
 import base64
 import json
 import re
-import sys
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TextIO, cast
 
@@ -19,7 +18,7 @@ import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.text import Text
 
-from ..case.io.atomic_files import Content, to_standard_output, write_all
+from ..case.io.atomic_files import Content
 from ..case.io.escape import file_name
 from ..errors import KincheckError
 from ..harness.labels import against, engine_name, known, named, number, output_label
@@ -195,22 +194,15 @@ def deliver(
         KincheckError: a file cannot be written, or there are earlier problems.
     """
     contents: list[tuple[Path, Content]] = [*files]
-    if json not in (None, "-"):
-        contents.append((Path(json), to_json(results)))
+    encoded = to_json(results)
     if out is not None:
         contents += [
-            (out / f"{report.name}.json", to_json(results)),
+            (out / f"{report.name}.json", encoded),
             (out / f"{report.name}.html", page(report).encode()),
             *((out / name, text.encode()) for name, text in beside.items()),
         ]
-    problems = [
-        *problems,
-        *write_all(contents),
-    ]  # before printing, since the reader of the tables may end early
-    print_report(report, sys.stderr if json == "-" else sys.stdout)
-    if json == "-":
-        to_standard_output(to_json(results))
-    if problems:
+    written = terminal.deliver(contents, encoded, json, partial(print_report, report))
+    if problems := [*problems, *written]:
         raise KincheckError("\n".join(problems))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -18,7 +18,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from ..case.io.atomic_files import to_standard_output, write
+from ..case.io.atomic_files import Content, to_standard_output, write, write_all
 from ..case.io.escape import visible
 from ..errors import KincheckError
 from ..harness.record import to_json
@@ -186,6 +186,30 @@ def with_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> Ge
     yield
     if problem:
         raise problem
+
+
+def deliver(
+    contents: Sequence[tuple[Path, Content]],
+    encoded: bytes,
+    json: str | None,
+    show: Callable[[TextIO], None],
+) -> list[str]:
+    """Write files, print, and return the problems in writing.
+
+    The reader of what is printed may end early, so the files come first, and a document on
+    standard output last.
+
+    Args:
+        encoded: document of the option --json.
+        json: its file, or "-" for standard output, which then holds nothing else.
+        show: prints.
+    """
+    named = [(Path(json), encoded)] if json not in (None, "-") else []
+    problems = write_all([*contents, *named])
+    show(sys.stderr if json == "-" else sys.stdout)
+    if json == "-":
+        to_standard_output(encoded)
+    return problems
 
 
 def listed(names: Sequence[str]) -> str:
