@@ -34,7 +34,7 @@ round far below."""
 WITHOUT_LENGTH = (Kind.DIRECTION, Kind.DIRECTIONS, Kind.NUMBER)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Designs(Tabular):
     """The solved designs.
 

@@ -21,7 +21,7 @@ from ..trajectory import Array
 SCHEMA = "kincheck-free/1"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FreeResult(Tabular):
     """The free motion of a case, n samples, SI units.
 
