@@ -98,7 +98,7 @@ class Dataset:
         """
         if not self.x:
             raise KincheckError(
-                f"there is nothing to draw over {' and '.join(self.rows)}; take to_dataframe"
+                f"there is nothing to draw over {' and '.join(self.rows)}. Take to_dataframe."
             )
         (along,) = self.coords[self.x].dims
         found = dict[str, dict[str, NDArray[Any]]]()

@@ -104,6 +104,7 @@ def test_mechanisms_are_seen_in_three_dimensions(results):
     moving = results["Results"]._repr_html_()
     assert "<animate" in moving
     assert "<script" not in html + moving
+    assert "<svg" in kincheck.load("rssr")._repr_html_()
     assert kincheck.Mechanism("a<b", [kincheck.Body("x")], [])._repr_html_().count("a&lt;b") == 1
 
 

@@ -285,6 +285,10 @@ class Case:
             f" {', '.join(output.name for output in self.outputs) or 'none'}>"
         )
 
+    def _repr_html_(self) -> str:
+        """Return the case and its design position for a notebook."""
+        return self.mechanism.to_html(repr(self))
+
     def geometry(self, offsets: Mapping[str, ArrayLike]) -> dict[str, Array]:
         """Return the places of the geometry in designs with moved hardpoints, for `solve_designs`.
 

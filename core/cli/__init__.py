@@ -1,39 +1,34 @@
-"""The command line: one module per command, with `add` (its options) and a function from the
-options to an exit status.
+"""The command line. A command is a data class whose fields are its options, with `answer`, which is
+the function in Python, and `run`, which prints, writes and returns the exit status.
 
-A new command is a module and its name in `COMMANDS`. Slow imports wait until the command runs.
+A new command is such a class and its name in `COMMANDS`. Slow imports wait until it runs.
 """
 
-COMMANDS = (
-    "run",
-    "sweep",
-    "list",
-    "templates",
-    "schema",
-    "bench",
-    "check_joint",
-    "check_engine",
-    "import_",
-    "export",
-    "reference",
-    "explain",
-    "assemblies",
-    "same",
-    "compare",
-    "trace",
-    "kc",
-    "serve",
-    "free",
-    "board",
-    "doctor",
-    "history",
-    "report",
-    "stress",
-    "completion",
-)
-"""Modules of the commands, in the order of the help; see `command_name`."""
-
-
-def command_name(module: str) -> str:
-    """Return the name of a command on the command line: check-joint, import."""
-    return module.rstrip("_").replace("_", "-")
+COMMANDS = {
+    "run": "run:Run",
+    "sweep": "sweep:Sweep",
+    "list": "lists:List",
+    "templates": "files:PrintTemplates",
+    "schema": "lists:PrintSchema",
+    "bench": "laboratory:BenchAll",
+    "check-joint": "checks:CheckJoint",
+    "check-engine": "checks:CheckEngine",
+    "import": "files:Import",
+    "export": "files:Export",
+    "reference": "checks:ProveReferences",
+    "explain": "examine:Explain",
+    "assemblies": "examine:ListAssemblies",
+    "same": "files:Same",
+    "compare": "compare:Compare",
+    "trace": "examine:Trace",
+    "kc": "kc",
+    "serve": "serve",
+    "free": "examine:MoveFreely",
+    "board": "board",
+    "doctor": "doctor:Doctor",
+    "history": "history:ListRuns",
+    "report": "history:ReportChanges",
+    "stress": "laboratory:StressEngines",
+    "completion": "lists:Completion",
+}
+"""Module and class of each command, in the order of the help."""

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
+from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
-from . import import_options
-from .option_types import add_json
-from .registry import Registry, Status
-from .run_options import TOL, add_curve_files
+from ..options import (
+    argument,
+    destination,
+    group,
+    joint_types,
+    json_file,
+    option,
+    options,
+)
+from ..report.progress import complain
+from .parser import Command
+from .registry import Registry, Status, tell_left_out
+from .run_options import TOL
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -20,40 +29,11 @@ if TYPE_CHECKING:
 
 PAGE = ("compare.json", "compare.html")
 """File names in the folder of --out."""
+WIDE = "write a column for each output, design and difference"
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    command: argparse.ArgumentParser
-    command = commands.add_parser(
-        "compare",
-        help="two hardpoint tables or more: differing points, and curves over curves",
-        description=_compare.__doc__,
-    )
-    command.set_defaults(do=_compare)
-    command.add_argument(
-        "case",
-        nargs="+",
-        metavar="CASE",
-        help="hardpoint tables or suspension cases; the others are compared with the first",
-    )
-    command.add_argument(
-        "--tolerance",
-        action="append",
-        default=[],
-        metavar="OUTPUT=NUMBER UNIT",
-        help=(
-            'accepted difference of an output: "toe=0.1 deg", without a unit in that of the table;'
-            " a larger one is status 1; may be repeated"
-        ),
-    )
-    command.add_argument("--out", type=Path, metavar="DIR", help="write the page DIR/compare.html")
-    add_json(command)
-    add_curve_files(command, "a column for each output, design and difference")
-    import_options.add_options(command)
-
-
-def _compare(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Compare(Command):
     """Compare designs of a suspension: which hardpoints differ, and by how much toe, camber, roll
     centre and the other outputs do, at rebound, design, jounce and where they differ most.
 
@@ -61,62 +41,106 @@ def _compare(options: argparse.Namespace, registry: Registry) -> int:
     all. Exit status: 0 all is solved; 1 a difference exceeds its --tolerance; 2 a design does not
     reach all samples (what it reaches is compared), or the tool could not do its work.
     """
-    from ..case.io.table_file import WRITERS, Kind
-    from ..harness import run as running
-    from ..report import designs as views
-    from ..report.progress import complain
-    from ..report.sections import deliver
-    from .destinations import Destinations
 
-    to = Destinations.of(options)
-    if problems := to.problems(PAGE):
-        raise KincheckError("\n".join(problems))
-    cases = _cases(options, registry)
-    import_options.tell_left_out(cases)
-    found = running.run(cases, [registry.engine("native")], tol=TOL, command=options.command)
-    designs = views.designs_of(found, cases)
-    unsolved = [
-        f"{each.case}: {each.message}"
-        for each in found.records
-        if not each.driver or each.solved != each.samples
-    ]
-    if len(designs.curves) < len(cases):
-        raise KincheckError("\n".join(unsolved))
-    complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
-    beyond = views.exceeded(designs, _accepted(options.tolerance, Path(options.case[0]), designs))
-    columns = views.side_by_side(designs)
-    rows = [*zip(*columns.values(), strict=True)]
-    kinds = dict.fromkeys(columns, Kind.NUMBER)
-    deliver(
-        views.comparison(designs, beyond),
-        designs.results,
-        out=to.out,
-        json=to.json,
-        files=[
-            (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
-            for kind, file in to.curves.items()
-        ],
-        problems=unsolved,
+    about: ClassVar[str] = "two hardpoint tables or more: differing points, and curves over curves"
+    cases: Sequence[str | Path | Case] = argument(
+        "hardpoint tables or suspension cases; the others are compared with the first", "CASE", "+"
     )
-    return Status.DEVIATES if beyond else Status.WITHIN
+    tolerance: tuple[str, ...] = option(
+        'accepted difference of an output: "toe=0.1 deg", without a unit in that of the table;'
+        " a larger one is status 1; may be repeated",
+        metavar="OUTPUT=NUMBER UNIT",
+        several="repeated",
+        default=(),
+    )
+    out: Path | None = destination("write the page DIR/compare.html", Path, "DIR")
+    json: str | None = json_file()
+    csv: Path | None = destination(f"{WIDE} as CSV", Path)
+    parquet: Path | None = destination(f"{WIDE} as Parquet", Path)
+    xlsx: Path | None = destination(f"{WIDE} as a workbook", Path)
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied)
+
+    def answer(self, registry: Registry) -> Designs:
+        """Compare two designs of a suspension or more with the first: hardpoints and outputs.
+
+        Raises:
+            KincheckError: there are not two, one cannot be read, moves by another driver, or does
+                not reach all samples.
+        """
+        designs, beyond, unsolved = self._compared(registry)
+        if unsolved:
+            raise KincheckError("\n".join(unsolved))
+        return replace(designs, exceeded=tuple(beyond))
+
+    def _compared(self, registry: Registry) -> tuple[Designs, list[str], list[str]]:
+        """Return the designs, differences beyond their tolerances, and designs unsolved in part."""
+        from ..harness import run as running
+        from ..report import designs as views
+
+        cases = _cases(self, registry)
+        found = running.run(cases, [registry.engine("native")], tol=TOL, command=self.command)
+        designs = views.designs_of(found, cases)
+        unsolved = [
+            f"{each.case}: {each.message}"
+            for each in found.records
+            if not each.driver or each.solved != each.samples
+        ]
+        if len(designs.curves) < len(cases):
+            raise KincheckError("\n".join(unsolved))
+        if self.command:
+            tell_left_out(cases)
+            complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
+        accepted = _accepted(self.tolerance, Path(_name_of(self.cases[0])), designs)
+        return designs, views.exceeded(designs, accepted), unsolved
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.table_file import WRITERS, Kind
+        from ..report import designs as views
+        from ..report.sections import deliver
+        from .destinations import Destinations
+
+        to = Destinations.of(self)
+        if problems := to.problems(PAGE):
+            raise KincheckError("\n".join(problems))
+        designs, beyond, unsolved = self._compared(registry)
+        columns = views.side_by_side(designs)
+        rows = [*zip(*columns.values(), strict=True)]
+        kinds = dict.fromkeys(columns, Kind.NUMBER)
+        deliver(
+            views.comparison(designs, beyond),
+            designs.results,
+            out=to.out,
+            json=to.json,
+            files=[
+                (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
+                for kind, file in to.curves.items()
+            ],
+            problems=unsolved,
+        )
+        return Status.DEVIATES if beyond else Status.WITHIN
 
 
-def _cases(options: argparse.Namespace, registry: Registry) -> list[Case]:
+def _cases(options: Compare, registry: Registry) -> list[Case]:
     """Return the cases with different names, the first one's samples, and its driver.
 
     Raises:
         KincheckError: there are not two, one cannot be read, or they move by other drivers.
     """
-    names = [each for name in options.case for each in registry.matching(name)]
+    given: list[str | Case] = []
+    for each in options.cases:
+        given += registry.matching(str(each)) if isinstance(each, str | Path) else [each]
+    names = [*map(_name_of, given)]
     if twice := next((name for name in names if names.count(name) > 1), None):
-        raise KincheckError(f"{twice}: found twice, expected once; leave one out")
+        raise KincheckError(f"{twice}: found twice. Leave one out.")
     if len(names) < 2:
-        raise KincheckError(f"{names[0]}: found one design, expected two or more; name another")
+        raise KincheckError(f"{names[0]}: found one design, expected two or more. Name another.")
     cases: list[Case] = []
     problems: list[str] = []
-    for name in names:
+    for each in given:
         try:
-            cases.append(registry.find_case(name, import_options.supplied(options)))
+            cases.append(registry.find_case(each, options.supplied))
         except KincheckError as error:
             problems.append(str(error))
     if problems:
@@ -127,8 +151,8 @@ def _cases(options: argparse.Namespace, registry: Registry) -> list[Case]:
         own = case.sweep
         if own.driver != first.driver:
             raise KincheckError(
-                f"{name}: found the driver {own.driver}, expected {first.driver} as in {names[0]};"
-                " compare designs that move in the same way"
+                f"{name}: found the driver {own.driver}, expected {first.driver} as in {names[0]}."
+                " Compare designs that move in the same way."
             )
         cases[k] = replace(
             case,
@@ -137,6 +161,10 @@ def _cases(options: argparse.Namespace, registry: Registry) -> list[Case]:
             sweep=replace(own, values=first.change + own.design),
         )
     return cases
+
+
+def _name_of(case: str | Path | Case) -> str:
+    return str(case) if isinstance(case, str | Path) else case.name
 
 
 def _accepted(texts: Sequence[str], file: Path, designs: Designs) -> dict[str, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -12,12 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeAlias
 
-from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
+from ..case.io.atomic_files import Content, Named, unwritable
 from ..case.io.table_file import WRITERS, lack
 from ..harness.record import Results, to_json
 
 if TYPE_CHECKING:  # drawing code is imported only for a report
-    from ..report.figure_data import Effort, Past
+    from ..report.figures import Effort, Past
 
     Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
     """Earlier results of each case up to this run; None if unknown."""
@@ -51,7 +50,7 @@ class Destinations:
     long: bool = False
 
     @classmethod
-    def of(cls, options: argparse.Namespace) -> Destinations:
+    def of(cls, options: object) -> Destinations:
         """Return the destinations named by a command's options."""
         names = [each.name for each in fields(cls)]
         return cls(**{name: value for name, value in vars(options).items() if name in names})
@@ -133,8 +132,8 @@ def deliver(
         precision: error against time at several efforts, by case, for the report.
         history: reads the trends for the report, after all other files; None without a history.
     """
-    from ..report.matrix import to_markdown
-    from ..report.table import print_table
+    from ..report import terminal
+    from ..report.table import print_table, to_markdown
 
     encoded = to_json(results) if to.out is not None or to.json is not None else b""
     contents = list[tuple[Path, Content]]()  # several destinations may be one pipe
@@ -144,8 +143,6 @@ def deliver(
         contents.append((to.junit, lambda path: path.write_bytes(to_junit(results))))
     if to.markdown is not None:
         contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
-    if to.json not in (None, "-"):
-        contents.append((Path(to.json), encoded))
     if to.curves:
         from ..report.curves import write_curves
 
@@ -158,11 +155,7 @@ def deliver(
         contents.append(
             (to.out / "report.html", lambda path: _write_page(results, path, precision, history))
         )
-    problems += write_all(contents)
-    # last: the reader of standard output may have closed it
-    (show or print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
-    if to.json == "-":
-        to_standard_output(encoded)
+    problems += terminal.deliver(contents, encoded, to.json, partial(show or print_table, results))
 
 
 def _write_page(

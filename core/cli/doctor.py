@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
-from .option_types import add_json
+from ..options import (
+    json_file,
+    options,
+    verbosity,
+)
+from .parser import Command
 from .registry import Registry, Status
 from .run_options import TOL
-from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,34 +22,29 @@ SAMPLE = "mcpherson_strut"
 """Case of the self-check: the paper's strut, whose reference has 17 digits."""
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    doctor: argparse.ArgumentParser
-    doctor = commands.add_parser(
-        "doctor",
-        help="list installed and missing parts, and test the installation",
-        description=_doctor.__doc__,
-    )
-    doctor.set_defaults(do=_doctor)
-    add_json(doctor, "the findings")
-    add_verbosity(doctor, quiet="print only the verdict and the essential missing parts")
-
-
-def _doctor(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Doctor(Command):
     """List installed and missing parts with remedies, and solve a case with the native engine.
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """
-    from ..case.io.atomic_files import require_writable
-    from ..harness.standard import STANDARD
-    from ..report.terminal import page, with_json
-    from .installation import examine
 
-    require_writable([("--json", options.json)])
-    found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
-    with with_json(found, options.json):
-        (_print_verdict if options.quiet else _print)(found, page(options.json))
-    return Status.WITHIN if found.able else Status.FAILED
+    about: ClassVar[str] = "list installed and missing parts, and test the installation"
+    json: str | None = json_file("the findings")
+    quiet: bool = verbosity("print only the verdict and the essential missing parts")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import require_writable
+        from ..harness.standard import STANDARD
+        from ..report.terminal import page, with_json
+        from .installation import examine
+
+        require_writable([("--json", self.json)])
+        found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
+        with with_json(found, self.json):
+            (_print_verdict if self.quiet else _print)(found, page(self.json))
+        return Status.WITHIN if found.able else Status.FAILED
 
 
 def _print(found: Examination, console: Console) -> None:

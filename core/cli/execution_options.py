@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..errors import KincheckError
 from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
-from .option_types import whole
+from ..options import option, options, positive, whole
+from .parser import Command
+from .parser import add_options as add_to_parser
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -19,70 +22,72 @@ SCHEDULER = (
 )
 
 
-def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float]) -> None:
+ISOLATION = "isolation"
+
+
+def limit(text: str) -> float:
+    """Return the number in the text of a limit."""
+    number = positive(text)
+    if number > MOST:
+        raise KincheckError(f"{text!r} is too large. Give {MOST:g} at most.")
+    return number
+
+
+@options
+class Isolated(Command):
+    """A command for pairs of case and engine, each solved in a worker process."""
+
+    HEADINGS: ClassVar[Mapping[str, str]] = {
+        ISOLATION: "Each case is solved with each engine in a worker process."
+    }
+    jobs: int | None = option(
+        "worker processes at a time; default: half the processors; 0 solves in this process,"
+        " without limits: the default if only the native engine runs and no limit is given",
+        whole(0),
+        "N",
+        heading=ISOLATION,
+        default=None,
+    )
+    timeout: float | None = option(
+        f"limit for one case with one engine; default {TIMEOUT:g}, a hundred times as long"
+        " as the built-in cases take",
+        limit,
+        "SECONDS",
+        heading=ISOLATION,
+        default=None,
+    )
+    memory: float | None = option(
+        f"limit for a worker process, on Linux; default {MEMORY:g}, sixteen times as much as"
+        " the built-in cases take",
+        limit,
+        "GB",
+        heading=ISOLATION,
+        default=None,
+    )
+    scheduler: str | None = option(SCHEDULER, metavar="ADDRESS", heading=ISOLATION, default=None)
+
+
+def add_options(parser: argparse.ArgumentParser, *_: object) -> None:
     """Add the options to a command for pairs of case and engine."""
-
-    def limit(text: str) -> float:
-        number = positive(text)
-        if number > MOST:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} is too large, expected {MOST:g} at most; give less"
-            )
-        return number
-
-    group = parser.add_argument_group(
-        "isolation", "Each case is solved with each engine in a worker process."
-    )
-    group.add_argument(
-        "--jobs",
-        type=whole(0),
-        metavar="N",
-        help=(
-            "worker processes at a time; default: half the processors; 0 solves in this process,"
-            " without limits: the default if only the native engine runs and no limit is given"
-        ),
-    )
-    group.add_argument(
-        "--timeout",
-        type=limit,
-        metavar="SECONDS",
-        help=(
-            f"limit for one case with one engine; default {TIMEOUT:g}, a hundred times as long"
-            " as the built-in cases take"
-        ),
-    )
-    group.add_argument(
-        "--memory",
-        type=limit,
-        metavar="GB",
-        help=(
-            f"limit for a worker process, on Linux; default {MEMORY:g}, sixteen times as much as"
-            " the built-in cases take"
-        ),
-    )
-    group.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help=SCHEDULER,
-    )
+    add_to_parser(parser, Isolated)
 
 
-def contradictions(options: argparse.Namespace) -> list[str]:
+def contradictions(options: Isolated | argparse.Namespace) -> list[str]:
     """Return the contradictions between the options."""
     problems: list[str] = []
     if options.scheduler is not None and options.jobs is not None:
         problems.append(
-            "--scheduler: the cluster decides how many pairs run at a time; leave out --jobs"
+            "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs."
         )
     if options.jobs == 0 and (options.timeout or options.memory):
         problems.append(
-            "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and"
-            " --memory, or --jobs"
+            "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
+            " --memory, or --jobs."
         )
     return problems
 
 
-def unreachable(options: argparse.Namespace) -> list[str]:
+def unreachable(options: Any) -> list[str]:
     """Return why the requested cluster cannot be reached. This takes time, so it is the last check
     before the work.
     """
@@ -97,7 +102,9 @@ def unreachable(options: argparse.Namespace) -> list[str]:
         return [str(error)]
 
 
-def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
+def solver(
+    options: Isolated | argparse.Namespace, engines: Sequence[Engine]
+) -> tuple[Solver, dict[str, Any]]:
     """Return the solver of the pairs, and its settings for the results."""
     from ..harness.workers.distributed import on_cluster
     from ..harness.workers.pool import solver_for

@@ -1,123 +1,96 @@
-"""kincheck history: list the stored runs, and the trends of a case and an engine."""
+"""Commands for stored runs: kincheck history and report."""
 
 from __future__ import annotations
 
-import argparse
-import os
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
 from ..errors import KincheckError, unknown
+from ..options import argument, destination, json_file, option, options, switch, verbosity, whole
 from ..report.progress import complain
-from .option_types import add_several, whole
+from .parser import Command
 from .registry import Registry, Status
 from .run_options import HISTORY
 
 if TYPE_CHECKING:
+    from ..case.io.atomic_files import Content
+    from ..history.findings import Regressions
     from ..history.queries import History
+    from ..history.runs import Subject
     from ..history.store import RunRow, Store
 
+
 LAST = 20  # runs shown by default
+WRITTEN = f"written by kincheck run --history; default: the environment variable {HISTORY}"
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    history: argparse.ArgumentParser
-    history = commands.add_parser(
-        "history",
-        help="list the stored runs, their trends and their steps",
-        description=_history.__doc__,
-    )
-    history.set_defaults(do=_history)
-    add_history(history, "history file")
-    add_several(history, "--case", "trends of these cases only")
-    add_several(history, "--engine", "trends of these engines only")
-    history.add_argument(
-        "--last",
-        type=whole(0),
-        default=LAST,
-        metavar="N",
-        help="number of latest runs; default %(default)s; 0: all",
-    )
-    history.add_argument(
-        "--remove",
-        type=whole(1),
-        nargs="+",
-        default=[],
-        metavar="RUN",
-        help="remove these runs, for example damaged ones",
-    )
-    history.add_argument(
-        "--plot",
-        type=Path,
-        metavar="FILE.html",
-        help="draw errors and times over the runs as an HTML page",
-    )
-    history.add_argument(
-        "--export",
-        type=Path,
-        metavar="FILE",
-        help="write all runs as a table: FILE.parquet or FILE.csv",
-    )
-
-
-def add_history(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option for the history file."""
-    parser.add_argument(
-        "--history",
-        type=Path,
-        metavar="FILE",
-        default=os.environ.get(HISTORY) or None,
-        help=(
-            f"{what}, written by kincheck run --history; default: the environment variable"
-            f" {HISTORY}"
-        ),
-    )
-
-
-def _history(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class ListRuns(Command):
     """List the runs, the latest first; for a case or an engine, list its errors and times over the
     runs, and their steps.
     """
-    from ..case.io.atomic_files import require_writable
-    from ..history.queries import read
-    from ..history.store import Store
 
-    if options.history is None:
-        raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
-    require_writable([("--plot", options.plot), ("--export", options.export)], options.history)
-    with Store(Path(options.history), writable=bool(options.remove)) as store:
-        for run in options.remove:
-            store.remove(run)
-            print(f"run {run} is removed")
-        chosen: dict[str, Any] = {"cases": options.case, "engines": options.engine}
-        _check_names(store, **chosen)
-        history = read(store, last=options.last or None, **chosen)
-        if options.case or options.engine:
-            _print_trends(history)
-        else:
-            _print_runs(store, store.runs()[: options.last or None])
-        if options.plot is not None:
-            from ..report.history_plot import write_plot
+    about: ClassVar[str] = "list the stored runs, their trends and their steps"
+    history: Path | None = destination(f"history file, {WRITTEN}", Path, environment=HISTORY)
+    case: tuple[str, ...] = option("trends of these cases only", metavar="NAME", several="together")
+    engine: tuple[str, ...] = option(
+        "trends of these engines only", metavar="NAME", several="together"
+    )
+    last: int = option(
+        "number of latest runs; default %(default)s; 0: all", whole(0), "N", default=LAST
+    )
+    remove: tuple[int, ...] = option(
+        "remove these runs, for example damaged ones", whole(1), "RUN", several="once"
+    )
+    plot: Path | None = destination(
+        "draw errors and times over the runs as an HTML page", Path, "FILE.html"
+    )
+    export: Path | None = destination("write all runs as a table: FILE.parquet or FILE.csv", Path)
 
-            write_plot(
-                history,
-                options.plot,
-                title=f"{Path(options.history).name}: errors and times over the runs",
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import require_writable
+        from ..history.queries import read
+        from ..history.store import Store
+
+        if self.history is None:
+            raise KincheckError(
+                f"history: no file is given. Give --history FILE, or set {HISTORY}."
             )
-            print(
-                f"{options.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
-                " runs"
-            )
-        if options.export is not None:
-            from ..history.export import export
+        require_writable([("--plot", self.plot), ("--export", self.export)], self.history)
+        with Store(Path(self.history), writable=bool(self.remove)) as store:
+            for run in self.remove:
+                store.remove(run)
+                print(f"run {run} is removed")
+            chosen: dict[str, Any] = {"cases": self.case, "engines": self.engine}
+            _check_names(store, **chosen)
+            history = read(store, last=self.last or None, **chosen)
+            if self.case or self.engine:
+                _print_trends(history)
+            else:
+                _print_runs(store, store.runs()[: self.last or None])
+            if self.plot is not None:
+                from ..report.trends import write_plot
 
-            count = export(store, options.export, **chosen)
-            print(f"{options.export}: {count} rows")
-        complain(store.damage)
-        return Status.FAILED if store.damage else Status.WITHIN
+                write_plot(
+                    history,
+                    self.plot,
+                    title=f"{Path(self.history).name}: errors and times over the runs",
+                )
+                print(
+                    f"{self.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
+                    " runs"
+                )
+            if self.export is not None:
+                from ..history.queries import export
+
+                count = export(store, self.export, **chosen)
+                print(f"{self.export}: {count} rows")
+            complain(store.damage)
+            return Status.FAILED if store.damage else Status.WITHIN
 
 
 def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:
@@ -143,7 +116,7 @@ def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
 
 def _cells(store: Store, row: RunRow) -> list[str]:
     from ..harness.record import Outcome
-    from ..history.schema import OUTCOME
+    from ..history.database import OUTCOME
 
     found = store.connection.execute(
         f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
@@ -168,7 +141,7 @@ def _cells(store: Store, row: RunRow) -> list[str]:
 def _print_trends(history: History) -> None:
     from ..harness.labels import number, product
     from ..history.steps import steps
-    from ..report.regression_labels import step_says
+    from ..report.regressions import step_says
     from ..report.terminal import columns, page
     from ..report.trends import largest_errors, run_name
 
@@ -204,3 +177,113 @@ def _print_trends(history: History) -> None:
         )
     if not history.pairs:
         print("no runs of these cases and engines")
+
+
+OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
+
+
+@options
+class ReportChanges(Command):
+    """Report the changes since another run: new failures, fixes, lost results, lower accuracy,
+    longer times, changed versions, the first run of each change, and tolerances to tighten.
+
+    Exit status: 0 no regression, 1 a regression, 2 the tool could not do its work.
+    """
+
+    about: ClassVar[str] = "report the changes since another run"
+    subject: str | None = argument(
+        "number of a run in the history, or a results.json; default: the latest run, or an"
+        " earlier one of another selection that failed and was not green since",
+        "RUN",
+        "?",
+    )
+    against: str = option(
+        "run to compare with: a number or file, last-green (an earlier run without faults and"
+        " with the most of the run's comparisons, the latest of several) or BRANCH-baseline"
+        " (likewise, on that branch without uncommitted changes); default %(default)s",
+        metavar="RUN",
+        default="last-green",
+    )
+    missing_is_failure: bool = switch(
+        "exit with status 1 also if a case or an engine is missing that is in the run compared"
+        " with, or in the last run of the same selection; for nightly runs"
+    )
+    history: Path | None = destination(
+        f"history of the runs, their steps and their spread, {WRITTEN}", Path, environment=HISTORY
+    )
+    out: Path | None = destination(f"write {', '.join(OUT)} there", Path, "DIR")
+    json: str | None = json_file("the changes")
+    junit: Path | None = destination(
+        "write the run as JUnit XML, with a failure for every regression", Path
+    )
+    markdown: Path | None = destination(
+        "write the summary as Markdown, for a pull request or an e-mail", Path
+    )
+    quiet: bool = verbosity("print only the headline")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..harness.record import to_json
+        from ..history.comparison import regressions
+        from ..history.runs import find, find_against
+        from ..history.store import Store
+        from ..report.regressions import print_regressions, to_markdown
+        from ..report.terminal import deliver
+        from .destinations import Destinations
+
+        if problems := Destinations.of(self).problems(OUT, self.history):
+            raise KincheckError("\n".join(problems))
+        with ExitStack() as open_files:
+            store = (
+                open_files.enter_context(Store(Path(self.history), writable=False))
+                if self.history
+                else None
+            )
+            subject = find(self.subject, store)
+            against, reason = find_against(self.against, subject, store)
+            found = regressions(
+                subject, against, reason, store, missing_is_failure=self.missing_is_failure
+            )
+
+            def show(file: TextIO) -> None:
+                if file.isatty() and not self.quiet:
+                    print_regressions(found, file)
+                    return
+                text = to_markdown(found)
+                headline = text.partition("\n")[0].removeprefix("## ") + "\n"
+                print(headline if self.quiet else text, end="", file=file)
+
+            contents = _contents(self, subject, found, store)
+            problems += deliver(contents, to_json(found), self.json, show)
+            problems += store.damage if store is not None else []
+        complain(problems)
+        if problems:
+            return Status.FAILED
+        return Status.DEVIATES if found.regressed else Status.WITHIN
+
+
+def _contents(
+    options: ReportChanges, subject: Subject, found: Regressions, store: Store | None
+) -> list[tuple[Path, Content]]:
+    """Return the requested files."""
+    from ..harness.record import to_json
+    from ..history.queries import NIGHTS, read
+    from ..report.junit import to_regression_junit
+    from ..report.regressions import to_markdown, to_markup
+    from ..report.report import write_report
+    from ..report.trends import trends
+
+    def page(path: Path) -> None:
+        past = trends(read(store, last=NIGHTS, like=subject.facts)) if store is not None else None
+        write_report(subject.results, path, history=past, changes=to_markup(found))
+
+    def markdown(path: Path) -> None:
+        path.write_text(to_markdown(found), "utf-8")
+
+    def junit(path: Path) -> None:
+        path.write_bytes(to_regression_junit(subject.results, found))
+
+    folder = zip(OUT, (to_json(found), markdown, junit, page), strict=True)
+    wanted = [] if options.out is None else [(options.out / name, each) for name, each in folder]
+    named = ((options.markdown, markdown), (options.junit, junit))
+    return [*wanted, *((path, each) for path, each in named if path is not None)]

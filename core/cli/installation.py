@@ -16,8 +16,7 @@ import msgspec
 
 from ..case.case import Case
 from ..extras import how_to_install
-from ..harness.engine import Engine
-from ..harness.engine_versions import PATIENCE
+from ..harness.engine import PATIENCE, Engine
 from ..harness.provenance import circumstances
 from ..harness.record import Outcome, Record
 from ..harness.run import run

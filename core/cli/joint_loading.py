@@ -33,12 +33,12 @@ def named_joint(where: str) -> type[Joint]:
         return load_joint(where)
     if where in Coupler.registry:
         raise KincheckError(
-            f"{where!r} couples two other joints; check-joint checks those between two bodies:"
-            f" {', '.join(sorted(Joint.registry))}"
+            f"{where!r} couples two other joints. check-joint checks those between two bodies:"
+            f" {', '.join(sorted(Joint.registry))}."
         )
     raise KincheckError(
-        f"{unknown('joint type', where, sorted(Joint.registry))}; write MODULE:CLASS"
-        " for your own class, such as my_joint:MyJoint for a class in my_joint.py"
+        f"{unknown('joint type', where, sorted(Joint.registry))}. Write MODULE:CLASS"
+        " for your own class, such as my_joint:MyJoint for a class in my_joint.py."
     )
 
 
@@ -53,16 +53,17 @@ def load_joint(where: str) -> type[Joint]:
     """
     found = load_named(where, "joint", _is_joint)
     if not (isinstance(found, type) and issubclass(found, Joint)):
-        raise KincheckError(f"{where} is no joint type; derive it from kincheck.core.Joint")
+        raise KincheckError(f"{where} is no joint type. Derive it from kincheck.core.Joint.")
     named = getattr(found, "type", None)
     if not (isinstance(named, str) and named):
         raise KincheckError(
-            f'{where} has no type, the name of such joints in case files; write type = "..." in'
-            " the class"
+            f'{where} has no type, the name of such joints in case files. Write type = "..." in'
+            " the class."
         )
     if named in Coupler.registry:
         raise KincheckError(
-            f"{where}: the type {named!r} belongs to joints that couple two others; give it another"
+            f"{where}: the type {named!r} belongs to joints that couple two others."
+            " Give it another."
         )
     return found
 

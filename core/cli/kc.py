@@ -168,7 +168,7 @@ def _checked(
 ) -> Results:
     """Return the records of the engines, stored in the history if there is one."""
     from ..harness import run as running
-    from ..history.run_recorder import keep
+    from ..history.runs import keep
     from ..history.store import HistoryError
 
     solver, settings = execution_options.solver(options, engines)

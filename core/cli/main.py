@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 from ..errors import KincheckError
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..version import VERSION
-from . import COMMANDS, command_name
-from .parser import Parser
+from . import COMMANDS
+from .parser import Parser, add_command
 
 if TYPE_CHECKING:
     from .registry import Registry
@@ -72,7 +72,7 @@ def _done(argv: list[str]) -> int:
         complain(
             [
                 f"{where.filename}, line {where.lineno}, ended the program with status"
-                f" {end.code!r}; correct it, or leave it out"
+                f" {end.code!r}. Correct it, or leave it out."
             ]
         )
     except BrokenPipeError:  # the reader has closed our output
@@ -81,8 +81,8 @@ def _done(argv: list[str]) -> int:
         if error.errno in FULL and error.filename is None:
             complain(
                 [
-                    f"standard output cannot be written ({error.strerror}); requested files are"
-                    " written"
+                    f"standard output cannot be written ({error.strerror}). Requested files are"
+                    " written."
                 ]
             )
             _print_no_more()
@@ -123,15 +123,15 @@ def _print_no_more() -> None:
 def registry() -> Registry:
     """Return the registry of engines, cases and writers."""
     from ... import adapters, cases
-    from . import engine_loading
+    from . import class_loading
     from .registry import Registry
 
-    others = engine_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
+    others = class_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
     writers = adapters.WRITERS, adapters.writer
 
     def engine(name: str, mode: str = "projection") -> Any:
         if name in others:
-            return engine_loading.made(name, engine_loading.entry_points()[name].load())
+            return class_loading.made(name, class_loading.entry_points()[name].load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 
     return Registry(
@@ -159,7 +159,12 @@ def parser(argv: Sequence[str]) -> Parser:
     )
     found.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = found.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    named = [name for name in COMMANDS if argv and argv[0] == command_name(name)]
+    named = [name for name in COMMANDS if argv and argv[0] == name]
     for name in named or COMMANDS:
-        importlib.import_module(f".{name}", __package__).add(commands)
+        module, _, cls = COMMANDS[name].partition(":")
+        command = getattr(importlib.import_module(f".{module}", __package__), cls or "add")
+        if cls:
+            add_command(commands, name, command)
+        else:
+            command(commands)
     return found

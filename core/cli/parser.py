@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
-from collections.abc import Iterator, Sequence
-from typing import Any, NoReturn, cast
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import MISSING, Field, field
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeVar, cast
 
-from ..errors import brief, similar, unknown
+from ..errors import KincheckError, brief, similar, unknown
+from ..options import Option, declared, flags_of, options, with_values
+
+if TYPE_CHECKING:
+    from .registry import Registry
+
+T = TypeVar("T")
 
 
 class Parser(argparse.ArgumentParser):
@@ -88,3 +97,119 @@ class Parser(argparse.ArgumentParser):
             if option in parser._option_string_actions
         ]
         return f"; it belongs to {', '.join(having)}: give that first" if having else ""
+
+
+@options
+class Command:
+    """A command: what it solves, as the function in Python does, and what it prints and writes.
+
+    Attributes:
+        about: what it does, in the list of commands.
+        epilog: end of the help.
+        below: commands below this one, by name, with the heading of their list.
+        command: the command line.
+    """
+
+    about: ClassVar[str]
+    epilog: ClassVar[str | None] = None
+    below: ClassVar[Mapping[str, type[Command]]] = {}
+    command: str = field(default="", init=False)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line, and return the exit status."""
+        raise NotImplementedError
+
+
+def add_command(commands: Any, name: str, cls: type[Command], given: Collection[str] = ()) -> None:
+    """Add a command to the parser.
+
+    Args:
+        given: options that stand before its name too.
+    """
+    parser: Parser = commands.add_parser(
+        name, help=cls.about, description=cls.__doc__, epilog=cls.epilog
+    )
+    parser.set_defaults(do=partial(_run, cls))
+    known = add_options(parser, cls, given)
+    if cls.below:
+        below = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
+        for each, other in cls.below.items():
+            add_command(below, each, other, known)
+
+
+def add_options(parser: argparse.ArgumentParser, cls: Any, given: Collection[str] = ()) -> set[str]:
+    """Add the options of a class to a parser, and return their names in its namespace."""
+    groups: dict[str, Any] = {"": parser}
+    headings: dict[str, str] = {}
+    for base in cls.__mro__:
+        headings |= cast("Any", vars(base)).get("HEADINGS", {})
+    known = set[str]()
+    # headings of groups stand above those of the class's own options
+    own = sorted(declared(cls), key=lambda found: bool(found[1] and found[1].heading))
+    for each, meaning, below in own:
+        if meaning is None:
+            known |= add_options(parser, below, given)
+            continue
+        where: Any = groups.get(meaning.heading)
+        if where is None:
+            where = parser.add_argument_group(meaning.heading, headings[meaning.heading])
+            groups[meaning.heading] = where
+        if meaning.exclusive:
+            where = groups.get("-q") or parser.add_mutually_exclusive_group()
+            groups["-q"] = where
+        name = _name_of(each, meaning)
+        known.add(name)
+        facts: dict[str, Any] = {"help": meaning.help}
+        if each.default is not MISSING:
+            several = isinstance(each.default, tuple)
+            facts["default"] = [*each.default] if several else each.default
+        if meaning.environment:
+            facts["default"] = os.environ.get(meaning.environment) or None
+        if name in given:  # a default would overwrite what stands there
+            facts["default"] = argparse.SUPPRESS
+        if meaning.action != "store_true":
+            facts |= {"type": _reader(meaning.read), "metavar": meaning.metavar}
+            facts["choices"] = meaning.choices
+        for key in ("nargs", "action", "required"):
+            if value := getattr(meaning, key):
+                facts[key] = value
+        where.add_argument(*(flags_of(each, meaning) or [name]), **facts)
+    return known
+
+
+def _run(cls: type[Command], found: argparse.Namespace, registry: Registry) -> int:
+    return with_values(values_of(cls, found), command=found.command).run(registry)
+
+
+def _name_of(each: Field[Any], meaning: Option) -> str:
+    """Return the name of an option in the namespace."""
+    *_, last = [each.name, *flags_of(each, meaning)]
+    return last.removeprefix("--").replace("-", "_")
+
+
+def _reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return a reader whose messages argparse prints."""
+    if read is str:
+        return str
+
+    def reader(text: str) -> Any:
+        try:
+            return read(text)
+        except KincheckError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    reader.__name__ = read.__name__  # in argparse's own messages
+    return reader
+
+
+def values_of(cls: type[T], found: argparse.Namespace) -> T:
+    """Return the options of a class in the namespace of a parser."""
+    values: dict[str, Any] = {}
+    for each, meaning, below in declared(cls):
+        if meaning is None:
+            values[each.name] = values_of(below, found)
+        else:
+            value = getattr(found, _name_of(each, meaning))
+            many: Any = value
+            values[each.name] = tuple(many) if isinstance(value, list) else value
+    return with_values(object.__new__(cls), **values)

@@ -13,7 +13,6 @@ so slow imports wait for --kincheck.
 from __future__ import annotations
 
 import re
-from argparse import Namespace
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -30,6 +29,11 @@ if TYPE_CHECKING:
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
 """Mark of a TOML or JSON case file of any version: an unknown version causes a message."""
 SUFFIXES = ".toml", ".json"
+RECORDED = {
+    "recorded": ("FILE", "results of another program, as an engine of the case files"),
+    "map": ("TEXT", "the meaning of their columns, as --map of kincheck run"),
+    "accuracy": ("TEXT", "their accuracy, as --accuracy of kincheck run"),
+}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -50,11 +54,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
             " installed engines"
         ),
     )
-    for name, metavar, text in (
-        ("recorded", "FILE", "results of another program, as an engine of the case files"),
-        ("map", "TEXT", "the meaning of their columns, as --map of kincheck run"),
-        ("accuracy", "TEXT", "their accuracy, as --accuracy of kincheck run"),
-    ):
+    for name, (metavar, text) in RECORDED.items():
         group.addoption(
             f"--kincheck-{name}", action="append", default=[], metavar=metavar, help=text
         )
@@ -89,27 +89,23 @@ def _required(config: pytest.Config) -> list[str]:
     return [*names]
 
 
-def _recordings(config: pytest.Config) -> Namespace:
-    """Return the options of recordings, as those of the command line."""
-    given: dict[str, Any] = {
-        name: config.getoption(f"--kincheck-{name}") for name in ("recorded", "map", "accuracy")
-    }
-    given["recorded"] = [Path(file) for file in given["recorded"]]
-    return Namespace(**given, analysis=None, sheet=None)
-
-
 class CaseFile(pytest.File):
     """A case file with a test for each engine."""
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield the engines' tests; an invalid file is a collection error with its message."""
+        from ..case.io.reader_options import CurveOptions
         from ..errors import KincheckError
-        from .recorded_options import recorded_engines
+        from .run_options import recorded_engines
 
         registry = _registry()
         try:
             case = registry.find_case(str(self.path))
-            case, recorded = recorded_engines(_recordings(self.config), case)
+            given: dict[str, Any] = {
+                name: self.config.getoption(f"--kincheck-{name}") for name in RECORDED
+            }
+            curve = CurveOptions(columns=given["map"], accuracy=given["accuracy"])
+            case, recorded = recorded_engines([*map(Path, given["recorded"])], case, curve)
         except KincheckError as error:
             raise self.CollectError(str(error)) from None
         required = _required(self.config)

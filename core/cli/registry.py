@@ -12,9 +12,10 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.io.reader_options import NOTHING, Supplied
+from ..case.io.reader_options import LEFT_OUT, NOTHING, Supplied
 from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
-from .engine_loading import WHERE, load_engine
+from ..report.progress import complain
+from .class_loading import WHERE, load_engine, made
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -68,8 +69,17 @@ class Registry:
     steppers: Sequence[str] = ()
     stepper_files: Callable[..., Mapping[str, str]] | None = None
 
-    def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
-        """Return the case of a name or in a file.
+    def case_of(self, options: Any, *, driven: bool = True) -> Case:
+        """Return the case that options name, and print what is left out of another tool's file."""
+        case = self.find_case(options.case, options.supplied, driven=driven)
+        if options.command:
+            tell_left_out([case])
+        return case
+
+    def find_case(
+        self, name: str | Path | Case, supplied: Supplied = NOTHING, *, driven: bool = True
+    ) -> Case:
+        """Return the case of a name or in a file, and a case itself.
 
         Args:
             supplied: facts missing in a file of another tool.
@@ -82,18 +92,21 @@ class Registry:
         from ..case.models.files import DATASETS, SUFFIXES, load
         from ..kinematics import require_driven
 
+        if not isinstance(name, str | Path):
+            return name
+        name = str(name)
         matching, known = self.matching(name), self.cases()
         if len(matching) > 1:
             raise KincheckError(
-                f"{name!r} matches {len(matching)} cases: {shortened(matching, MOST_NAMED)}; name"
-                " one of them"
+                f"{name!r} matches {len(matching)} cases: {shortened(matching, MOST_NAMED)}. Name"
+                " one of them."
             )
         (name,) = matching
         if name in known:
             if supplied.given:
                 raise KincheckError(
-                    f"{name}: --{supplied.given[0]} is for files, and this is a built-in case:"
-                    " leave it out"
+                    f"{name}: --{supplied.given[0]} is for files, and this is a built-in case."
+                    " Leave it out."
                 )
             case = self.case(name)
         elif Path(name).suffix in SUFFIXES or os.sep in name or os.path.exists(name):
@@ -101,8 +114,8 @@ class Registry:
         else:
             raise KincheckError(
                 unknown("case", name, known)
-                + "; case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
-                " .urdf, .sdf or .adm"
+                + ". Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
+                " .urdf, .sdf or .adm."
             )
         # a dataset says itself which freedoms are left to a recording
         if not driven or (supplied.recorded and Path(name).suffix.lower() in DATASETS):
@@ -127,7 +140,7 @@ class Registry:
         found = [each for each in self.cases() if fnmatchcase(each, name)] + sorted(glob(name))
         if not found:
             raise KincheckError(
-                f"no built-in case and no file matches {name!r}; kincheck list shows the cases"
+                f"no built-in case and no file matches {name!r}. kincheck list shows the cases."
             )
         return found
 
@@ -169,16 +182,21 @@ class Registry:
         return list(cases.values())
 
     def find_engines(
-        self, names: Sequence[str], problems: list[str], mode: str | None = None
+        self, names: Sequence[str | Engine | None], problems: list[str], mode: str | None = None
     ) -> list[Engine]:
-        """Return the engines, each once, of names and MODULE:CLASS.
+        """Return the engines, each once, of names and MODULE:CLASS, and engines themselves.
 
         Args:
             problems: receives the messages of unknown names and missing modes.
             mode: the mode; None for the first mode of each engine.
         """
         engines: list[Engine] = []
-        for name in dict.fromkeys(names):
+        for k, name in enumerate(names):
+            if not isinstance(name, str):
+                engines.append(made(repr(name), name))
+                continue
+            if name in names[:k]:
+                continue
             if WHERE.fullmatch(name):
                 self._add(engines, name, problems, mode)
                 continue
@@ -193,8 +211,8 @@ class Registry:
                 )
             elif mode not in (None, *modes):
                 problems.append(
-                    f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}: leave out --mode or"
-                    " the engine"
+                    f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}. Leave out --mode or"
+                    " the engine."
                 )
             else:
                 engines.append(self._loaded(name, mode or modes[0]))
@@ -211,8 +229,8 @@ class Registry:
             return
         if mode not in (None, found.mode):
             problems.append(
-                f"engine {where} has the mode {found.mode!r}, not {mode!r}: leave out --mode or the"
-                " engine"
+                f"engine {where} has the mode {found.mode!r}, not {mode!r}. Leave out --mode or the"
+                " engine."
             )
         else:
             engines.append(found)
@@ -227,12 +245,17 @@ class Registry:
         """Return the engine, or a substitute if it cannot be loaded: a broken adapter must not end
         a run of all engines.
         """
-        from ..harness.unloadable import Unloadable
+        from ..harness.engine import Unloadable
 
         try:
             return self.engine(name) if mode == "projection" else self.engine(name, mode)
         except Exception as error:
             return Unloadable(name, f"{type(error).__name__}: {error}", mode)
+
+
+def tell_left_out(cases: Iterable[Case]) -> None:
+    """Print on standard error the parts of other tools' files that were left out."""
+    complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)
 
 
 def add_joint_types(command: argparse.ArgumentParser) -> None:
@@ -249,7 +272,7 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
     )
 
 
-def given(options: argparse.Namespace, names: Iterable[str]) -> str:
+def given(options: object, names: Iterable[str]) -> str:
     """Return the names of the given options, for a message.
 
     Options with the default None, False or [] count.
@@ -257,6 +280,6 @@ def given(options: argparse.Namespace, names: Iterable[str]) -> str:
     found = (
         name
         for name in names
-        if getattr(options, name) not in ([], None) and getattr(options, name) is not False
+        if getattr(options, name) not in ([], (), None) and getattr(options, name) is not False
     )
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)

@@ -2,42 +2,49 @@
 
 from __future__ import annotations
 
-import argparse
+import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from os.path import exists
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
 from ..case.io.escape import visible
-from ..errors import KincheckError, SolveError
+from ..case.io.reader_options import CurveOptions, Supplied
+from ..errors import MOST_NAMED, KincheckError, SolveError, shortened
 from ..harness.interrupts import hold, status_of, words_of
+from ..options import (
+    CASES,
+    argument,
+    destination,
+    group,
+    joint_types,
+    json_file,
+    option,
+    options,
+    positive,
+    several,
+    switch,
+    verbosity,
+    with_values,
+)
 from ..report.progress import complain, lacking, progress, uncompared
-from . import execution_options, history_options, import_options, recorded_options
-from .engine_loading import WHERE
-from .registry import Registry, Status
-from .run_options import HISTORY, add_options, curve_options, judged
+from . import execution_options, import_options, run_options
+from .class_loading import WHERE
+from .execution_options import Isolated
+from .registry import Registry, Status, tell_left_out
+from .run_options import HISTORY, MODE, MODES, TOL, WithRecordings, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
-    from ..history.run_recorder import Keeping
-    from .destinations import Destinations
-
-
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    run: argparse.ArgumentParser
-    run = commands.add_parser(
-        "run", help="solve cases with engines and judge the results", description=_run.__doc__
-    )
-    run.set_defaults(do=_run)
-    add_options(run)
+    from ..history.runs import Keeping
+    from .destinations import Destinations, Trends
 
 
 @dataclass(frozen=True)
@@ -60,7 +67,11 @@ class _Plan:
     named: Sequence[str]
 
 
-def _run(options: argparse.Namespace, registry: Registry) -> int:
+CURVES = "write the curves of all engines and references"
+
+
+@options
+class Run(Isolated, WithRecordings):
     """Solve every case with every engine, judge each, print a table and write the requested files.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
@@ -69,48 +80,154 @@ def _run(options: argparse.Namespace, registry: Registry) -> int:
     or compared. Results with nothing to compare are not judged, and do not change the
     status if others are judged.
     """
-    from . import destinations as delivery
 
-    to = delivery.Destinations.of(options)
-    plan = _planned(options, registry, to)
-    precision: Any = None
-    if options.bench is not None:
-        from ..studies.bench.engines import efforts_in
+    about: ClassVar[str] = "solve cases with engines and judge the results"
+    cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
+        CASES, "CASE", "*", default=()
+    )
+    joints: bool = switch(
+        "run a small closed loop around every joint type, and the named cases", default=False
+    )
+    engines: str | Engine | Sequence[str | Engine] | None = option(
+        "only these, by name or MODULE:CLASS; all must be installed (else status 2); default: all"
+        " engines",
+        metavar="NAME",
+        flag="--engine",
+        several="together",
+        kw_only=False,
+        default=(),
+    )
+    mode: str | None = option(MODE, choices=MODES, default=None)
+    tol: float = option(
+        f"largest accepted constraint residual [m or -]; default {TOL:g}",
+        positive,
+        "X",
+        default=TOL,
+    )
+    out: Path | None = destination("write results.json and report.html there", Path, "DIR")
+    bench: Path | None = destination(
+        "show the work-precision data of this bench.json in the report", Path
+    )
+    json: str | None = json_file()
+    csv: Path | None = destination(f"{CURVES} as CSV", Path)
+    parquet: Path | None = destination(f"{CURVES} as Parquet", Path)
+    xlsx: Path | None = destination(f"{CURVES} as a workbook", Path)
+    long: bool = switch(
+        "write curves of hardpoint tables as those of other files, a row per output and sample"
+        " in SI units; default: a row per sample and a column per output in the table's units",
+        init=False,
+    )
+    junit: Path | None = destination("write the results as JUnit XML", Path)
+    markdown: Path | None = destination("write the table of cases and engines as Markdown", Path)
+    reference: str | Path | Sequence[str | Path] | None = option(
+        "judge cases by these files instead of by their own references: proved references of"
+        " kincheck reference (.json), or one measured curve (.csv, .xlsx, ...)",
+        Path,
+        "FILE",
+        several="together",
+        default=(),
+    )
+    explain: bool = switch(
+        "print what the native engine computes for each case, and what it leaves out", init=False
+    )
+    require: tuple[str, ...] = option(
+        "engines that must be installed and support every case (else status 2)",
+        metavar="NAME",
+        several="together",
+        init=False,
+    )
+    quiet: bool = verbosity("print only messages and the counts of outcomes: no progress, no table")
+    verbose: bool = verbosity("print the errors of every output and their tolerances", "-v")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied)
+    curve: CurveOptions = group(default_factory=CurveOptions)
+    static: bool = switch(
+        "efforts and reactions at rest, at every sample; [sweep] rate = 0 of all cases",
+        default=False,
+    )
+    reactions: bool = switch(
+        "every determined reaction of joints, effort of drivers and force of elements as"
+        " outputs, first in table and page; what is not determined is a note",
+        default=False,
+    )
+    history: Path | None = destination(
+        "store the run in this file, each record at once; default: the file named by the"
+        f" environment variable {HISTORY}, if it is set",
+        Path,
+        environment=HISTORY,
+    )
+    resume: bool = switch(
+        "resume the latest unfinished run in the history with identical cases, engines,"
+        " tolerance, limits, versions and commit",
+        init=False,
+    )
 
-        precision = efforts_in(options.bench)
-    with delivery.json_only() if to.json == "-" else nullcontext():
-        results, problems, keeping, stopped = _solved(options, plan)
-    if to.out or to.json or keeping:
+    def answer(self, registry: Registry) -> Results:
+        """Solve cases with engines and judge the results.
+
+        A missing engine is a record with the outcome `unavailable`. How a curve of `reference` was
+        read is among the notes.
+
+        Raises:
+            KincheckError: a case cannot be read, there is no engine of a name, or a member of the
+                engine protocol is missing.
+        """
+        from ..harness import run as running
         from ..harness.scene import with_scenes
+        from .destinations import Destinations
 
-        results = with_scenes(results, plan.cases)
-    history: Any = None
-    if keeping:
-        keeping.end(results, interrupted=stopped is not None)
-        problems += keeping.problems + keeping.store.damage
-    # read last, and only for the page: damage costs no result
-    if options.history is not None:
-        history = partial(history_options.past, keeping, problems) if keeping else lambda: None
-    delivery.deliver(
-        results, problems, to, show=_shown(options), precision=precision, history=history
-    )
-    if options.explain:
-        print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
-    problems += lacking(results, plan.required, plan.named) + uncompared(results)
-    complain(problems)
-    if stopped is not None:
-        return stopped
-    if problems or plan.unread:
-        return Status.FAILED
-    return (
-        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
-    )
+        plan = _planned(self, registry, Destinations())
+        solver, _ = execution_options.solver(self, plan.engines)
+        how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver}
+        return with_scenes(running.run(plan.cases, plan.engines, tol=self.tol, **how), plan.cases)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from . import destinations as delivery
+
+        self, to = _with_cases(self, registry), delivery.Destinations.of(self)
+        plan = _planned(self, registry, to)
+        precision: Any = None
+        if self.bench is not None:
+            from ..studies.bench.engines import efforts_in
+
+            precision = efforts_in(self.bench)
+        with delivery.json_only() if to.json == "-" else nullcontext():
+            results, problems, keeping, stopped = _solved(self, plan)
+        if to.out or to.json or keeping:
+            from ..harness.scene import with_scenes
+
+            results = with_scenes(results, plan.cases)
+        history: Any = None
+        if keeping:
+            keeping.end(results, interrupted=stopped is not None)
+            problems += keeping.problems + keeping.store.damage
+        # read last, and only for the page: damage costs no result
+        if self.history is not None:
+            history = partial(past, keeping, problems) if keeping else lambda: None
+        delivery.deliver(
+            results, problems, to, show=_shown(self), precision=precision, history=history
+        )
+        if self.explain:
+            print(
+                *_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout
+            )
+        problems += lacking(results, plan.required, plan.named) + uncompared(results)
+        complain(problems)
+        if stopped is not None:
+            return stopped
+        if problems or plan.unread:
+            return Status.FAILED
+        return (
+            Status.DEVIATES
+            if any(record.outcome.bad for record in results.records)
+            else Status.WITHIN
+        )
 
 
-def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
+def _shown(options: Run) -> Callable[[Results, TextIO], None]:
     """Return a function to print the results."""
-    from ..report.matrix import print_matrix
-    from ..report.table import print_outputs, print_summary, print_table
+    from ..report.table import print_matrix, print_outputs, print_summary, print_table
 
     if options.quiet:
         return print_summary
@@ -121,35 +238,22 @@ def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
     return print_matrix if options.joints else print_table
 
 
-def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) -> _Plan:
+def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
     """Return the plan of the run. Print messages on unreadable cases before any computation.
 
     Raises:
         KincheckError: all problems, if no case is readable or an option is wrong.
     """
-    from ..case.joint_probe import probes
-
     problems: list[str] = execution_options.contradictions(options)
     if options.resume and options.history is None:
-        problems.append(f"--resume needs a history: give --history FILE, or set {HISTORY}")
+        problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
     if options.bench is not None and options.out is None:
-        problems.append("--bench adds to the report: give --out DIR")
-    _return_cases(options, registry)
-    import_options.return_cases(options)
-    named: list[str] = options.case or ([] if options.joints else [*registry.cases()])
+        problems.append("--bench adds to the report. Give --out DIR.")
+    tell = complain if options.command else _nothing
     unread: dict[str, str] = {}
-    cases = registry.find_cases(
-        named, unread, list(probes()) if options.joints else [], import_options.supplied(options)
-    )
-    import_options.tell_left_out(cases)
-    if options.static:
-        from ..studies.reactions import without_motion
-
-        cases = [without_motion(each) for each in cases]
-    if options.reactions:
-        from ..studies.reactions import with_reactions
-
-        cases = [with_reactions(each, options.tol) for each in cases]
+    cases = _cases(options, registry, unread)
+    if options.command:
+        tell_left_out(cases)
     unused: list[str] = []
     recorded: list[Engine] = []
     if options.recorded and len(cases) != 1:
@@ -158,24 +262,38 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         )
     elif options.recorded:
         try:
-            cases[0], recorded = recorded_options.recorded_engines(options, cases[0])
+            cases[0], recorded = run_options.recorded_engines(
+                options.recorded,
+                cases[0],
+                options.curve,
+                analysis=options.analysis,
+                sheet=options.supplied.sheet,
+            )
         except KincheckError as error:
             problems += str(error).splitlines()
-    curve = curve_options(options)
-    if not (options.reference or options.recorded or options.fmu) and curve != type(curve)():
-        problems.append("options for measured curves need a curve: give --reference FILE")
+    if not (options.reference or options.recorded or options.fmu) and (
+        options.curve != CurveOptions()
+    ):
+        problems.append("options for measured curves need a curve. Give --reference FILE.")
     if options.reference and not problems:
         try:
             # a reference may name an unreadable case, which does not stop the others
-            cases, notes = judged(cases, options.reference, curve, unused if unread else None)
-            complain(notes)
+            files = [*map(Path, several(options.reference))]
+            cases, notes = judged(cases, files, options.curve, unused if unread else None)
+            tell(notes)
+            if notes and not options.command:
+                cases = [replace(cases[0], assembly=(*cases[0].assembly, *notes))]
         except KincheckError as error:
             problems += str(error).splitlines()
-    engines, baseline = _engines(options, registry, problems)
-    if recorded and recorded_options.undriven(cases[0]):
+    engines = _engines(options, registry, problems)
+    baseline = registry.baseline(engines)
+    if recorded and run_options.undriven(cases[0]):
         engines, baseline = [], None
+    if options.fmu and options.jobs == 0:
+        problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
     try:
-        engines += [*recorded_options.foreign_engines(options, cases), *recorded]
+        foreign = run_options.foreign_engines(options, cases, options.curve.columns)
+        engines += [*foreign, *recorded]
     except KincheckError as error:
         problems += str(error).splitlines()
     keys = [(engine.name, engine.mode) for engine in engines]
@@ -190,7 +308,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
     # not look like the previous run.
     if problems or not (cases or to.wanted or options.history is not None):
         raise KincheckError("\n".join([*unread.values(), *problems]))
-    complain(line for message in (*unread.values(), *unused) for line in message.splitlines())
+    tell(line for message in (*unread.values(), *unused) for line in message.splitlines())
     return _Plan(
         cases,
         engines,
@@ -198,13 +316,15 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
         [name for name in unread if name not in registry.cases() and not exists(name)],
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
-        [each.name for each in engines] if options.engine else [],
+        [each.name for each in engines] if options.engines else [],
     )
 
 
-def _solved(
-    options: argparse.Namespace, plan: _Plan
-) -> tuple[Results, list[str], Keeping | None, int | None]:
+def _nothing(lines: object) -> None:
+    pass
+
+
+def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
     """Return the results, the problems, the run in the history, and the status if a signal stopped
     the run early.
     """
@@ -214,8 +334,8 @@ def _solved(
     solver, settings = execution_options.solver(options, plan.engines)
     if plan.unread:
         settings["unread"] = plan.unread
-    settings["selection"] = history_options.selection(options)
-    keeping, problems = history_options.keeping(
+    settings["selection"] = selection(options)
+    keeping, problems = _keeping(
         options, plan.cases, plan.engines, [*plan.unread], settings, plan.mistyped
     )
     made = [*keeping.made] if keeping else []
@@ -263,7 +383,7 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
     none, and notes on its geometry.
     """
     from ..case.notes import notes
-    from ..harness.program_account import explain
+    from ..harness.native_engine import explain
 
     for case in cases:
         try:
@@ -273,29 +393,158 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
         yield from (f"  note: {note}" for note in notes(case))
 
 
-def _return_cases(options: argparse.Namespace, registry: Registry) -> None:
-    """Move cases back from options that take several names: `run --engine native my_case.toml`."""
-    for names in (options.engine, options.require):
-        swallowed = [
-            name
-            for name in names
-            if name not in (*registry.engines, *registry.simulations)
-            and not WHERE.fullmatch(name)
-            and (name in registry.cases() or Path(name).suffix)
-        ]
-        options.case += swallowed
-        names[:] = [name for name in names if name not in swallowed]
+def _with_cases(options: Run, registry: Registry) -> Run:
+    """Return the options with the cases among the values of options that take several names:
+    `run --engine native my_case.toml`.
+    """
+    known = (*registry.engines, *registry.simulations)
+    swallowed = [
+        name
+        for name in (*several(options.engines), *options.require)
+        if isinstance(name, str)
+        and name not in known
+        and not WHERE.fullmatch(name)
+        and (name in registry.cases() or Path(name).suffix)
+    ]
+    cases, supplied = import_options.return_cases(
+        (*several(options.cases), *swallowed), options.supplied
+    )
+    return with_values(
+        options,
+        cases=tuple(cases),
+        engines=tuple(each for each in several(options.engines) if each not in swallowed),
+        require=tuple(each for each in options.require if each not in swallowed),
+        supplied=supplied,
+    )
 
 
-def _engines(
-    options: argparse.Namespace, registry: Registry, problems: list[str]
-) -> tuple[list[Engine], Engine | None]:
-    """Return the requested engines, and native as the standard if it is not among them."""
-    named = [*options.engine, *options.require]
+def _cases(options: Run, registry: Registry, unread: dict[str, str]) -> list[Case]:
+    """Return the cases to solve; unreadable ones go to `unread`, or in Python raise."""
+    from ..case.joint_probe import probes
+
+    named = several(options.cases) or ([] if options.joints else registry.cases())
+    found = [*probes()] if options.joints else []
+    supplied = replace(options.supplied, recorded=bool(options.recorded))
+    if options.command:
+        cases = registry.find_cases([*map(str, named)], unread, found, supplied)
+    else:
+        cases = [*found, *(registry.find_case(each, supplied) for each in named)]
+    if options.static:
+        from ..studies.reactions import without_motion
+
+        cases = [without_motion(each) for each in cases]
+    if options.reactions:
+        from ..studies.reactions import with_reactions
+
+        cases = [with_reactions(each, options.tol) for each in cases]
+    return cases
+
+
+def _engines(options: Run, registry: Registry, problems: list[str]) -> list[Engine]:
+    """Return the requested engines."""
     every = registry.simulations if options.mode == "simulate" else registry.engines
     engines = registry.find_engines(
-        named if options.engine else [*every, *options.require], problems, options.mode
+        [*(several(options.engines) or every), *options.require], problems, options.mode
     )
     if not engines and not problems:
-        problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
-    return engines, registry.baseline(engines)
+        problems.append(f"no engine has the mode {options.mode!r}. Leave out --mode.")
+    return engines
+
+
+def selection(options: Any) -> dict[str, Any]:
+    """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
+    options of solution and judgement.
+    """
+    run = ("joints", "joint_type", "mode", "reference", "require", "static", "reactions")
+    run += ("recorded", "engine_command", "fmu", "analysis")
+    parts: dict[str, dict[str, Any]] = {
+        "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
+        "files": vars(options.supplied) | {"recorded": bool(options.recorded)},
+        "curve": vars(options.curve),
+    }
+    return {
+        "cases": sorted({*_words(several(options.cases))}),
+        "engines": sorted({*_words(several(options.engines))}),
+        "options": {
+            part: {name: _words(x) for name, x in each.items() if x} for part, each in parts.items()
+        },
+    }
+
+
+def _words(given: Any) -> Any:
+    """Return an option's value as plain data; file names may contain undecodable bytes."""
+    from ..harness.provenance import readable
+
+    if isinstance(given, list | tuple):
+        return [_words(each) for each in given]  # pyright: ignore
+    return given if isinstance(given, bool | float) else readable(str(given))
+
+
+def _keeping(
+    options: Any,
+    cases: Sequence[Case],
+    engines: Sequence[Engine],
+    unread: Sequence[str],
+    settings: dict[str, Any],
+    mistyped: Sequence[str],
+) -> tuple[Keeping | None, list[str]]:
+    """Return the run in its history, or None, and the reasons if the history does not store it.
+
+    Args:
+        mistyped: names of cases that do not exist: with one, or if no case can be read at all,
+            the run is only stored if an earlier one was asked for the same, which then lacks them.
+    """
+    if options.history is None:
+        return None, []
+    from ..history.runs import keep
+    from ..history.store import HistoryError
+    from .joint_loading import sources
+
+    about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
+    code = [*options.joint_type, *(type(each).__module__ for each in engines)]
+    about |= {"unread": unread, "resume": options.resume, "sources": sources(code)}
+    try:
+        if (mistyped or not cases) and not _known(Path(options.history), settings):
+            names = shortened(mistyped or unread, MOST_NAMED)
+            why = "no such case" if mistyped else "no case could be read"
+            return None, [f"{names}: {why}; the run is not in the history"]
+        found = keep(Path(options.history), cases, engines, **about)
+    except HistoryError as error:
+        return None, [f"{error}; the run is not in the history"]
+    if options.resume:
+        print(
+            f"kincheck: run {found.run} is resumed after {len(found.made)} records"
+            if found.resumed
+            else f"kincheck: no unfinished run to resume: run {found.run} is new",
+            file=sys.stderr,
+        )
+    return found, []
+
+
+def _known(path: Path, facts: Mapping[str, Any]) -> bool:
+    """Return whether a history has a run that was asked for the same."""
+    from ..history.queries import same
+    from ..history.store import Store
+
+    if not os.path.exists(path):
+        return False
+    with Store(path, writable=False) as store:
+        return any(same(row.key, facts) for row in store.runs())
+
+
+def past(keeping: Keeping, problems: list[str]) -> Trends:
+    """Return the runs up to this one by case, for the report, and report unreadable parts."""
+    from ..history.queries import NIGHTS, read
+    from ..history.store import HistoryError, Store
+    from ..report.trends import trends
+
+    if keeping.problems:
+        return None
+    try:
+        with Store(keeping.store.path, writable=False) as store:
+            found = trends(read(store, before=keeping.run + 1, last=NIGHTS, like=keeping.facts))
+            problems += [each for each in store.damage if each not in problems]
+    except HistoryError as error:
+        problems.append(str(error))
+        return None
+    return found

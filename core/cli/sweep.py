@@ -2,45 +2,64 @@
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..errors import KincheckError
+from ..case.io.reader_options import Supplied
+from ..errors import KincheckError, unknown
 from ..harness.interrupts import hold, status_of, words_of
-from ..report.progress import complain
+from ..options import (
+    ONE_CASE,
+    argument,
+    destination,
+    group,
+    joint_types,
+    json_file,
+    option,
+    options,
+    positive,
+    switch,
+    verbosity,
+    whole,
+)
+from ..report.progress import complain, lacking, uncompared
+from ..studies.variation.study_choices import Incomplete, Sampling
 from ..version import VERSION
-from . import execution_options, import_options
+from . import execution_options
+from .execution_options import SCHEDULER
+from .parser import Command
 from .registry import Registry, Status
-from .sweep_inputs import limited, only
-from .sweep_options import FILES, LIMITS, PART, add_options
-from .sweep_replay import checking_solver, replay, replay_problems
+from .run_options import TOL
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..harness.engine import Engine
+    from ..harness.execution import Solver
     from ..studies.tolerance.chunk_files import Part
     from ..studies.tolerance.results import SweepResults
     from ..studies.tolerance.study import Study
     from ..studies.tolerance.sweep import Progress
+    from ..studies.variation.variation import Variation
+
+PART = "sweep.part"
+"""File of the finished part of a sweep, in its folder of results until the sweep ends."""
+
+LIMITS = "limits.csv"
+"""File of the specification limits, for studies with limits."""
+
+FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 
 # Interval between lines of progress without a terminal [s].
 EVERY = 10.0
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    sweep: argparse.ArgumentParser
-    sweep = commands.add_parser(
-        "sweep", help="solve many variants of a design", description=_sweep.__doc__
-    )
-    sweep.set_defaults(do=_sweep)
-    add_options(sweep)
-
-
-def _sweep(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Sweep(Command):
     """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its
     outputs over them.
 
@@ -48,71 +67,188 @@ def _sweep(options: argparse.Namespace, registry: Registry) -> int:
     tool could not do its work. An interrupted sweep writes its partial results and exits with
     status 130.
     """
-    from ..studies.tolerance.study import Study
-    from ..studies.tolerance.sweep import how_many
-    from ..studies.variation.variation_file import read_variation
-    from .destinations import Destinations
 
-    problems: list[str] = []
-    names = ("results.json", "report.html") if options.replay else FILES
-    problems += Destinations.of(options).problems(names)
-    if options.scheduler is not None and options.jobs is not None:
-        problems.append("--scheduler: the cluster decides the number of threads; leave out --jobs")
-    problems += replay_problems(options)
-    if options.replay and (options.store or options.scheduler):
-        problems.append(
-            "--replay solves in this process and stores nothing; leave out --store and --scheduler"
+    about: ClassVar[str] = "solve many variants of a design"
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    variation: str | Path = option(
+        "file that states what varies, and by how much (kincheck-vary/1)",
+        Path,
+        "FILE",
+        flag="--vary",
+        required=True,
+        kw_only=False,
+    )
+    samples: int | None = option("number of random variants", whole(1), "N", default=None)
+    seed: int = option("seed of the random variants; default %(default)s", whole(0), "S", default=0)
+    sampling: Sampling = option(
+        "sampling of the variants: random, Latin hypercube or Sobol sequence; default %(default)s",
+        Sampling,
+        choices=[*Sampling],
+        default=Sampling.RANDOM,
+    )
+    limit: tuple[str, ...] = option(
+        "specification limits of an output, as toe:-2:2deg, or in the units of the --vary file;"
+        " one may be empty."
+        " The study counts the variants inside, with Cp and Cpk",
+        metavar="OUTPUT:LOW:HIGH",
+        several="repeated",
+        default=(),
+    )
+    incomplete: Incomplete = option(
+        "variants that do not reach all samples: outside of the limits, or left out of the"
+        " yield; default %(default)s",
+        Incomplete,
+        choices=[*Incomplete],
+        default=Incomplete.OUTSIDE,
+    )
+    output: tuple[str, ...] = option(
+        "only these outputs; default: all",
+        metavar="NAME",
+        several="together",
+        default=(),
+    )
+    order: int = option(
+        "also reduce time derivatives up to this order; default %(default)s",
+        int,
+        choices=(0, 1, 2),
+        default=0,
+    )
+    tol: float = option(
+        f"largest accepted constraint residual; default {TOL:g}", positive, "X", default=TOL
+    )
+    jobs: int | None = option(
+        "number of threads; default: half the processors", whole(1), "N", default=None
+    )
+    scheduler: str | None = destination(SCHEDULER, metavar="ADDRESS")
+    check: str | None = destination(
+        "rebuild a share of the variants, at least one, as separate cases, and solve them"
+        " with this engine; default share 0.01",
+        metavar="ENGINE[:SHARE]",
+    )
+    replay: tuple[int, ...] = option(
+        "solve only these variants of the seed, each as a separate case, as kincheck run"
+        " does; also with the engine of --check",
+        whole(0),
+        "INDEX",
+        several="once",
+        init=False,
+    )
+    store: Path | None = destination("write the values of all variants as Parquet", Path)
+    out: Path | None = destination(
+        f"write {', '.join(FILES)} there, and {LIMITS} if there are limits", Path, "DIR"
+    )
+    json: str | None = json_file()
+    resume: bool = switch(
+        f"continue the same sweep from its finished part, {PART} in the folder of --out", init=False
+    )
+    quiet: bool = verbosity("print no progress")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
+
+    def answer(self, registry: Registry) -> SweepResults:
+        """Solve variants of a case whose dimensions vary, and reduce its outputs over them.
+
+        Raises:
+            KincheckError: a file is invalid, or the number of samples is missing or superfluous.
+        """
+        study = self._study(registry, [])
+        return self.solve(study)
+
+    def _study(self, registry: Registry, problems: list[str]) -> Study:
+        """Return the study.
+
+        Raises:
+            KincheckError: these problems, or those of the files.
+        """
+        from ..studies.tolerance.study import Study
+        from ..studies.tolerance.sweep import how_many
+        from ..studies.variation.variation_file import read_variation
+
+        whole = registry.case_of(self)
+        case = only(whole, self.output, problems)
+        problems = problems or execution_options.unreachable(self)
+        if problems:
+            raise KincheckError("\n".join(problems))
+        variation = limited(self, read_variation(Path(self.variation), whole), whole, case)
+        if self.replay and self.samples is None:
+            samples = variation.count or 0
+        else:
+            samples = how_many(variation, self.samples)
+        variation = variation.sampled(self.sampling, samples)
+        return Study(case, variation, samples, self.seed, self.order, self.tol)
+
+    def solve(self, study: Study, **how: Any) -> SweepResults:
+        """Solve a study."""
+        from ..harness.resource_limits import default_jobs
+        from ..studies.tolerance.sweep import sweep_designs
+
+        return sweep_designs(
+            study.case,
+            study.variation,
+            samples=self.samples,
+            seed=self.seed,
+            sampling=self.sampling,
+            order=self.order,
+            incomplete=self.incomplete,
+            tol=self.tol,
+            jobs=self.jobs or default_jobs(),
+            command=self.command,
+            **how,
         )
-    if options.resume and (options.out is None or options.replay):
-        problems.append(
-            "--resume continues from a folder of results: give --out DIR, and leave out --replay"
-        )
-    engine, share = _check(options, registry, problems)
-    whole = registry.find_case(options.case, import_options.supplied(options))
-    case = only(whole, options.output, problems)
-    import_options.tell_left_out([case])
-    problems = problems or execution_options.unreachable(options)
-    if problems:
-        raise KincheckError("\n".join(problems))
-    variation = read_variation(options.vary, whole)
-    variation = limited(options, variation, whole, case)
-    if options.replay and options.samples is None:
-        samples = variation.count or 0
-    else:
-        samples = how_many(variation, options.samples)
-    variation = variation.sampled(options.sampling, samples)
-    study = Study(case, variation, samples, options.seed, options.order, options.tol)
-    if options.replay:
-        return replay(options, registry, study, engine)
-    with ExitStack() as stack:
-        part = None if options.out is None else stack.enter_context(_part(options))
-        stops: list[KeyboardInterrupt | KincheckError] = []
-        results = _solve(options, study, engine, share, part, stops, problems)
-        hold()
-        problems += _deliver(options, results) + (part.problems if part is not None else [])
-    for reason in stops:
-        why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
-        goes_on = (
-            "--resume continues from there"
-            if part is not None
-            else "with --out DIR, --resume can continue it"
-        )
-        problems.append(
-            f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}"
-        )
-    complain(problems)
-    if stops and isinstance(stops[0], KeyboardInterrupt):
-        return status_of(stops[0])
-    if problems:
-        return Status.FAILED
-    if part is not None:
-        part.remove()
-    return Status.DEVIATES if results.unsolved or results.deviating else Status.WITHIN
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from .destinations import Destinations
+
+        problems: list[str] = []
+        names = ("results.json", "report.html") if self.replay else FILES
+        problems += Destinations.of(self).problems(names)
+        if self.scheduler is not None and self.jobs is not None:
+            problems.append(
+                "--scheduler: the cluster decides the number of threads. Leave out --jobs."
+            )
+        problems += replay_problems(self)
+        if self.replay and (self.store or self.scheduler):
+            problems.append(
+                "--replay solves in this process and stores nothing. Leave out --store and"
+                " --scheduler."
+            )
+        if self.resume and (self.out is None or self.replay):
+            problems.append(
+                "--resume continues from a folder of results. Give --out DIR, and leave out"
+                " --replay."
+            )
+        engine, share = _check(self, registry, problems)
+        study = self._study(registry, problems)
+        if self.replay:
+            return replay(self, registry, study, engine)
+        with ExitStack() as stack:
+            part = None if self.out is None else stack.enter_context(_part(self, self.out))
+            stops: list[KeyboardInterrupt | KincheckError] = []
+            results = _solve(self, study, engine, share, part, stops, problems)
+            hold()
+            problems += _deliver(self, results) + (part.problems if part is not None else [])
+        for reason in stops:
+            why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
+            goes_on = (
+                "--resume continues from there"
+                if part is not None
+                else "with --out DIR, --resume can continue it"
+            )
+            problems.append(
+                f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}"
+            )
+        complain(problems)
+        if stops and isinstance(stops[0], KeyboardInterrupt):
+            return status_of(stops[0])
+        if problems:
+            return Status.FAILED
+        if part is not None:
+            part.remove()
+        return Status.DEVIATES if results.unsolved or results.deviating else Status.WITHIN
 
 
-def _check(
-    options: argparse.Namespace, registry: Registry, problems: list[str]
-) -> tuple[Engine | None, float]:
+def _check(options: Sweep, registry: Registry, problems: list[str]) -> tuple[Engine | None, float]:
     """Return the engine of the cross-check, and the share of the variants."""
     if options.check is None:
         return None, 0.0
@@ -123,14 +259,13 @@ def _check(
         share = math.nan
     if not 0.0 < share <= 1.0:
         problems.append(
-            f"--check {options.check}: found the share {text!r}, expected a fraction such as"
-            " 0.01; correct it"
+            f"--check {options.check}: found the share {text!r}, expected a fraction such as 0.01."
         )
     engines = registry.find_engines([name], problems)
     return (engines[0] if engines else None), share
 
 
-def _part(options: argparse.Namespace) -> Part:
+def _part(options: Sweep, folder: Path) -> Part:
     """Return the file of the finished part, with all facts that its numbers depend on besides the
     study.
     """
@@ -141,19 +276,18 @@ def _part(options: argparse.Namespace) -> Part:
     from ..studies.tolerance.chunk_files import Part
     from .joint_loading import sources
 
-    facts = {
+    facts: dict[str, Any] = {
         "kincheck": VERSION,
         "numpy": np.__version__,
         "llvm": available(),
         "processor": processor(),
     }
-    return Part(
-        options.out / PART, facts | {"joints": sources(options.joint_type)}, resume=options.resume
-    )
+    facts |= {"joints": sources(options.joint_type)}
+    return Part(folder / PART, facts, resume=options.resume)
 
 
 def _solve(
-    options: argparse.Namespace,
+    options: Sweep,
     study: Study,
     engine: Engine | None,
     share: float,
@@ -161,10 +295,9 @@ def _solve(
     stops: list[KeyboardInterrupt | KincheckError],
     problems: list[str],
 ) -> SweepResults:
-    from ..harness.resource_limits import default_jobs
-    from ..report.meter import Meter
+    from ..report.terminal import Meter
     from ..studies.tolerance.chunk_files import ParquetStore
-    from ..studies.tolerance.sweep import Check, on_cluster, sweep_designs
+    from ..studies.tolerance.sweep import Check, on_cluster
 
     def solved(progress: Progress) -> None:
         rate = f"{progress.solved / progress.seconds:.3g} variants/s"
@@ -187,21 +320,12 @@ def _solve(
             if options.store is None
             else stack.enter_context(ParquetStore(options.store, study))
         )
-        results = sweep_designs(
-            study.case,
-            study.variation,
-            samples=options.samples,
-            seed=options.seed,
-            sampling=options.sampling,
-            order=options.order,
-            incomplete=options.incomplete,
-            tol=options.tol,
-            jobs=options.jobs or default_jobs(),
+        results = options.solve(
+            study,
             source=None if options.scheduler is None else on_cluster(options.scheduler),
             check=check,
             store=store,
             progress=solved,
-            command=options.command,
             part=part,
             stopped=stops.append,
         )
@@ -209,15 +333,15 @@ def _solve(
     return results
 
 
-def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
+def _deliver(options: Sweep, results: SweepResults) -> list[str]:
     """Print the table and write the requested files; return the problems in writing."""
-    from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
+    from ..report.terminal import deliver
     from ..studies.tolerance.page import page
     from ..studies.tolerance.tables import envelope_csv, gradient_csv, limits_csv, print_sweep
 
     encoded = to_json(results)
-    contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
+    contents: list[tuple[Path, bytes]] = []
     if options.out is not None:
         texts = (
             encoded,
@@ -228,8 +352,98 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
         contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
     if options.out is not None and results.limits:
         contents.append((options.out / LIMITS, limits_csv(results).encode()))
-    problems = write_all(contents)  # first: the reader of standard output may have closed it
-    print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
-    if options.json == "-":
-        to_standard_output(encoded)
-    return problems
+    return deliver(contents, encoded, options.json, partial(print_sweep, results))
+
+
+def only(case: Case, names: Sequence[str], problems: list[str]) -> Case:
+    """Return the case with the named outputs only, or with all if none is named."""
+    there = [output.name for output in case.outputs]
+    problems += [unknown("output", name, there) for name in names if name not in there]
+    wanted = tuple(output for output in case.outputs if output.name in names or not names)
+    return replace(case, outputs=wanted)
+
+
+def limited(options: Sweep, variation: Variation, whole: Case, case: Case) -> Variation:
+    """Return the variation with limits for the outputs of the case; limits of the options replace
+    those of the file.
+    """
+    from ..studies.variation.variation_file import limits_of_texts
+
+    given = limits_of_texts(options.limit, whole, variation.units)
+    limits = {each.output: each for each in (*variation.limits, *given)}
+    there = {output.name for output in case.outputs}
+    kept = {
+        name: each
+        for name, each in limits.items()
+        if name in there or name.rpartition(".")[0] in there
+    }
+    if left_out := [name for name in limits if name not in kept]:
+        complain(
+            [f"limits of {', '.join(left_out)}: left out, as --output leaves out these outputs"]
+        )
+    return replace(variation, limits=tuple(kept.values()))
+
+
+def replay_problems(options: Sweep) -> list[str]:
+    """Return the problems of a replay: a Latin hypercube depends on the number of variants."""
+    if not options.replay:
+        return []
+    if options.sampling is Sampling.LATIN:
+        if options.samples is None:
+            return [
+                "--replay: a Latin hypercube depends on the number of variants. Give --samples."
+            ]
+    elif options.samples is not None:
+        return ["--replay: seed and index identify a variant. Leave out --samples."]
+    return []
+
+
+def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | None) -> int:
+    """Solve single variants as a run does, with its table, report and exit status."""
+    from ..harness import run as running
+    from ..harness.standard import STANDARD
+    from . import destinations as delivery
+
+    for index in options.replay:
+        if study.samples and index >= study.samples:
+            raise KincheckError(
+                f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1}."
+                " Give one of them."
+            )
+    native = registry.engine(STANDARD)
+    engines = [native] if engine is None or engine.name == STANDARD else [native, engine]
+    cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
+    results = running.run(
+        cases,
+        engines,
+        tol=options.tol,
+        command=options.command,
+        solver=checking_solver(options, engines[-1]),
+    )
+    problems: list[str] = []
+    delivery.deliver(results, problems, delivery.Destinations.of(options))
+    if engine is not None:
+        problems += lacking(results, [], [engine.name]) + uncompared(results)
+    complain(problems)
+    if problems:
+        return Status.FAILED
+    return (
+        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
+    )
+
+
+def checking_solver(options: Sweep, engine: Engine) -> Solver:
+    """Return the solver of checked variants: this process for an engine without foreign code,
+    worker processes for others.
+    """
+    from ..harness.engine import may_run_here
+    from ..harness.execution import here
+    from ..harness.resource_limits import Limits, default_jobs
+    from ..harness.workers.distributed import on_cluster
+    from ..harness.workers.pool import in_workers
+
+    if options.scheduler is not None:
+        return on_cluster(options.scheduler, Limits())
+    if may_run_here(engine):
+        return here
+    return in_workers(options.jobs or default_jobs(), Limits())

@@ -19,13 +19,10 @@ from ..forces import Forces
 from ..trajectory import Array, Trajectory
 from .compare import output_series
 from .engine import Balancing, Engine
-from .held_trajectory import held_trajectories
-from .provenance import plain, readable
+from .provenance import plain, readable, waited
 from .record import Outcome, Seconds
-from .reported import Reported
 from .resource_limits import memory_limit
-from .scheduler_delay import waited
-from .trajectory_check import check, faults
+from .trajectory_check import Reported, check, faults, held_trajectories
 
 # Number of solves: one interruption does not move their median. Slow engines stop after the budget
 # [s], unless two solves differ in time by the factor UNLIKE: the slow one included a compilation.

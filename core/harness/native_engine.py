@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,9 +12,9 @@ import numpy as np
 from ..case.case import Balance, Case
 from ..failures import FailureKind
 from ..forces import Forces
-from ..kinematics import LAST_ITERATION, NativeSolver, Solver, Style
+from ..kinematics import LAST_ITERATION, NativeSolver, ProgramSize, Solver, Style
 from ..program.llvm.compiler import available
-from ..trajectory import PointMotion, Trajectory
+from ..trajectory import PointMotion, Trajectory, shown
 from ..version import VERSION
 from .standard import STANDARD
 
@@ -92,7 +92,7 @@ class NativeEngine:
 
     def equilibria(self, case: Case) -> Trajectory:
         """Return the equilibria of a case; see `engine.Balancing`."""
-        from ..kinematics import StaticModel, largest_residual  # few cases need them
+        from ..kinematics import StaticModel, largest_residual
 
         mechanism, balance, path = case.mechanism, case.balance or Balance(), case.sweep.path
         names = [driver.name for driver in mechanism.drivers]
@@ -123,3 +123,60 @@ class NativeEngine:
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """Solve all samples in order; tol is relative to the mechanism's size."""
         return model(tol if self.solver.last_iteration <= LAST_ITERATION else math.inf)
+
+
+ORDERS = ("positions only", "and velocities", "and accelerations")
+
+
+def explain(case: Case) -> list[str]:
+    """Return lines of text on unknowns, rows, drivers and points, used or left out, and on the
+    operations of every program.
+
+    Raises:
+        SolveError: the mechanism cannot be solved as described.
+    """
+    mechanism, moving = case.mechanism, tuple(case.sweep.path.motions)
+    sizes = [
+        NativeSolver(order=order, compiled=False).program_size(
+            mechanism, case.sweep.path, case.points
+        )
+        for order in range(len(ORDERS))
+    ]
+    full = sizes[-1]
+    held = [driver.name for driver in mechanism.drivers if driver.name not in moving]
+    unread = shown(point.name for point in mechanism.points if point.name not in case.points)
+    fixed = [body.name for body in mechanism.bodies if body.fixed]
+    grounded = [joint.name for joint in mechanism.grounded]
+    lines = [
+        (
+            f"{case.name}: {full.unknowns} unknowns for"
+            f" {_names([body.name for body in mechanism.moving])}"
+        ),
+        f"  fixed, in no program: {_names(fixed)}",
+        *(
+            [f"  joints between fixed bodies, satisfied at design, left out: {_names(grounded)}"]
+            if grounded
+            else []
+        ),
+        (f"  rows solved: {full.rows}; redundant rows, only checked: {_names(full.redundant)}"),
+        f"  moving drivers: {_names(moving)}; drivers at rest, constants: {_names(held)}",
+        (
+            f"  points computed: {_names(shown(case.points))}; read by no output, not computed:"
+            f" {_names(unread)}"
+        ),
+    ]
+    lines += [f"  {name:18} {_flops(size)}" for name, size in zip(ORDERS, sizes, strict=True)]
+    return lines
+
+
+def _flops(size: ProgramSize) -> str:
+    """Return the operation counts of a sample: each Newton iteration, and the outputs."""
+    newton, outputs = (size.flops[name] for name in ("newton", "outputs"))
+    return (
+        f"{newton} operations per iteration, {outputs} for the outputs: {newton + outputs} with one"
+        " iteration"
+    )
+
+
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(names) or "none"

@@ -4,19 +4,53 @@ the balance of power, and bodies that keep the constraints.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..case.case import Case, pace, size
+from ..case.case import HELD_BUT, Case, Series, pace, size
+from ..case.closing import held_case
 from ..case.measures import ForceMeasure
 from ..errors import KincheckError
 from ..forces import BALANCED, Forces
 from ..trajectory import QUANTITIES, Array, BodyMotion, Trajectory
 from ..unit_text import value_text
-from .reported import Reported
+
+
+class Reported(Trajectory):
+    """Outputs as an engine reports them: of a recording, of a foreign program.
+
+    Attributes:
+        outputs: by name; NaN at samples without a value. Their uncertainty is that of printed
+            digits, and adds to the tolerance.
+        faults: what the engine finds wrong with them by itself, in sentences.
+        judged: whether it judged them by itself, so that they can pass without a standard.
+    """
+
+    outputs: Mapping[str, Series]
+    faults: Sequence[str]
+    judged: bool
+
+    def __init__(
+        self,
+        count: int,
+        outputs: Mapping[str, Series],
+        residual: float = 0.0,
+        *,
+        faults: Sequence[str] = (),
+        judged: bool = False,
+        details: Mapping[str, Any] | None = None,
+        solved: NDArray[np.bool_] | None = None,
+        message: str = "",
+    ) -> None:
+        known = np.ones(count, dtype=np.bool_) if solved is None else solved
+        none = np.zeros(count, dtype=np.int64)
+        super().__init__({}, known, none, residual, message=message, details=details)
+        self.__dict__.update(outputs=outputs, faults=faults, judged=judged)
+
 
 Mask: TypeAlias = NDArray[np.bool_]
 CONSTRAINED = 1e-9
@@ -93,8 +127,8 @@ def _check_bodies(case: Case, bodies: Mapping[str, BodyMotion], solved: Mask) ->
     if bodies and (apart := sorted(moving ^ {*bodies})):
         raise BadTrajectoryError(
             f"motions of bodies {', '.join(bodies)}, but {apart[0]!r} is"
-            f" {'missing' if apart[0] in moving else 'no moving body'}; give those of all moving"
-            " bodies, or none"
+            f" {'missing' if apart[0] in moving else 'no moving body'}. Give those of all moving"
+            " bodies, or none."
         )
     for name, motion in bodies.items():
         for key, columns in (("r", 3), ("p", 4), ("v", 6), ("a", 6)):
@@ -126,7 +160,7 @@ def _check_forces(forces: Forces, n: int) -> None:
     given |= {f"force of element {name!r}": (x, (n,)) for name, x in forces.elements.items()}
     for what, (values, shape) in given.items():
         if np.isinf(_numbers(what, values, shape)).any():
-            raise BadTrajectoryError(f"{what} is infinite; give finite numbers, or NaN for none")
+            raise BadTrajectoryError(f"{what} is infinite. Give finite numbers, or NaN for none.")
 
 
 def _numbers(what: str, values: Any, shape: tuple[int | None, ...], kinds: str = "f") -> Any:
@@ -176,7 +210,7 @@ def faults(case: Case, trajectory: Trajectory, *, rigid: bool) -> Iterator[str]:
                 " drivers' power must be stored or dissipated, so a force or a rate is wrong"
             )
     if trajectory.bodies and solved.any() and rigid:
-        from ..kinematics import motion_defects  # few engines give motions of bodies
+        from ..kinematics import motion_defects
 
         found = motion_defects(case.mechanism, case.sweep.path, trajectory)
         where, off = max(found.items(), key=lambda each: each[1].max())
@@ -204,3 +238,49 @@ def balance_tolerance(case: Case, forces: Forces, solved: Mask) -> float:
                 left.append(paced * lever * (tolerance + BALANCED * float(np.abs(known).max())))
     largest = np.where(solved, np.nan_to_num(forces.largest_power), 0.0).max(initial=0.0)
     return BALANCED * float(largest) + max(left)
+
+
+# Largest difference of a pose reached on two paths, over the mechanism's size: larger than any
+# tolerance, smaller than the distance of two assemblies.
+SAME_POSE = 1e-6
+
+
+def held_trajectories(
+    case: Case, mode: str, found: Trajectory, solve: Callable[[Case], Trajectory]
+) -> tuple[dict[tuple[str, ...], Trajectory], str]:
+    """Return the poses of a trajectory with velocities caused by some drivers while the others are
+    at rest, by these drivers, and the reasons for missing samples.
+
+    There is none if no output needs it, or if the engine steps through time: its velocities then
+    belong to its own path.
+
+    Args:
+        mode: mode of the engine.
+        solve: solves another case with the engine.
+    """
+    wanted = [tuple(o.facts[HELD_BUT]) for o in case.outputs if HELD_BUT in o.facts]
+    held, reasons = dict[tuple[str, ...], Trajectory](), list[str]()
+    for by in dict.fromkeys(wanted) if mode == "projection" else ():
+        held[by], why = _held(case, by, found, solve)
+        reasons += [why] if why else []
+    return held, "; ".join(reasons)
+
+
+def _held(
+    case: Case, by: tuple[str, ...], found: Trajectory, solve: Callable[[Case], Trajectory]
+) -> tuple[Trajectory, str]:
+    held = solve(held_case(case, by))
+    off = [
+        np.abs(held.points[name].position - found.points[name].position).max(axis=1)
+        for name in case.points
+    ]
+    same = np.nan_to_num(np.max(off, axis=0), nan=np.inf) <= SAME_POSE * size(case)
+    solved = held.solved & same
+    lost = int((np.asarray(found.solved) & ~solved).sum())
+    why = held.message or "another assembly was found there"
+    return (
+        replace(held, solved=solved),
+        f"no derivative by {' and '.join(by)} at {lost} of {len(same)} samples: {why}"
+        if lost
+        else "",
+    )

@@ -19,7 +19,7 @@ from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Finding, Kind, Loose, Regressions, Step, changes, same_machine
 from .queries import IDLE, NIGHTS, NOTHING, Entry, History, calibration, read, same
-from .run_selection import Subject
+from .runs import Subject
 from .steps import (
     ENOUGH,
     HEADROOM,

@@ -29,7 +29,7 @@ from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Change, Finding, Kind, Step, changes
 from .queries import IDLE, Entry, History, calibration, unit_of
-from .run_selection import Subject
+from .runs import Subject
 from .store import Pair
 
 DRIFT = 10.0

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from kincheck import primitives
     from kincheck.by_name import (
         check_engine,
+        compare,
         compliance,
         explain,
         free,
@@ -31,9 +32,13 @@ if TYPE_CHECKING:
     )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-_BY_NAME = ("check_engine", "compliance", "explain", "free", "load", "report", "run", "sweep")
+_BY_NAME = (
+    *("check_engine", "compare", "compliance", "explain", "free"),
+    *("load", "report", "run", "sweep"),
+)
 __all__ = [
     "check_engine",
+    "compare",
     "compliance",
     "explain",
     "free",

@@ -32,8 +32,8 @@ from ..harness.record import Record, Results
 from ..harness.scene import with_scenes
 from ..report.curves import write_curves
 from ..report.page_model import judged, worst
-from ..report.page_parts import SCENE_SCRIPTS, script_of, style_sheet
 from ..report.report import write_report
+from ..report.sections import SCENE_SCRIPTS, script_of, style_sheet
 from .model import LiveModel
 from .protocol import (
     LARGEST_MESSAGE,

@@ -24,9 +24,9 @@ from ..case.models.hardpoints.table import Hardpoint, axes_of, unit_of
 from ..case.quantity import Output, Quantity
 from ..case.turns import counted
 from ..errors import KincheckError, unknown
-from ..harness.held_trajectory import SAME_POSE
 from ..harness.labels import output_label
 from ..harness.scene import scene
+from ..harness.trajectory_check import SAME_POSE
 from ..jet import Jet
 from ..kinematics import NativeSolver, PreparedDesigns, Variants, places, require_driven
 from ..mechanism.motions import Path as Way

@@ -191,6 +191,10 @@ class Mechanism:
 
     def _repr_html_(self) -> str:
         """Return the design position for a notebook."""
+        return self.to_html(repr(self))
+
+    def to_html(self, title: str) -> str:
+        """Return the design position as HTML, below a title."""
         from ..notebook_view import view
 
         placed = [
@@ -207,9 +211,8 @@ class Mechanism:
         spots = [(body, [P]) for body, P in placed]
         pairs = [joint.points_on() for joint in self.joints if len(joint.points_on()) == 2]
         rods = [([a], [b]) for a, b in pairs]
-        return view(
-            repr(self), spots, rods, {each.name for each in self.bodies if each.fixed} | {GROUND}
-        )
+        fixed = {each.name for each in self.bodies if each.fixed} | {GROUND}
+        return view(title, spots, rods, fixed)
 
     def _check_loads(self, bodies: Mapping[str, None]) -> None:
         what = "gravity"

@@ -19,7 +19,7 @@ from ..harness.compare import output_series
 from ..harness.engine import RECORDED
 from ..harness.native_engine import NativeEngine
 from ..harness.record import ROWS
-from ..harness.reported import Reported
+from ..harness.trajectory_check import Reported
 from ..trajectory import QUANTITIES, Array, Trajectory
 from .explain import Stated, explained
 from .forces import judge_forces

@@ -15,7 +15,7 @@ from ..case.case import TIME, Case, Quantity, Series, Sweep
 from ..case.io.reference_samples import DERIVATIVES
 from ..errors import shortened
 from ..harness.compare import deviation
-from ..harness.slips import Held, Uncertain, slips
+from ..harness.suspects import Held, Uncertain, slips
 from ..trajectory import Array
 from ..unit_text import value_text
 from .meaning import MAP

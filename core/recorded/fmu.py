@@ -25,7 +25,7 @@ from ..case.io.document import fault, read_bytes
 from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, KincheckError, brief, shortened
 from ..extras import how_to_install, installed_version
-from ..harness.reported import Reported
+from ..harness.trajectory_check import Reported
 from ..trajectory import Array
 from ..unit_text import value_text
 from .engine import RecordedEngine

@@ -23,7 +23,7 @@ from ..case.case import TIME, Case, Truth
 from ..case.io.case_file import case_text
 from ..case.io.document import fault
 from ..errors import CaseError, KincheckError, SolveError, UnsupportedError, number_of
-from ..harness.reported import Reported
+from ..harness.trajectory_check import Reported
 from ..trajectory import Array
 from .engine import RecordedEngine
 from .meaning import Accuracy, Meaning, Reader, inputs_of

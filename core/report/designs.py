@@ -14,18 +14,19 @@ import numpy as np
 
 from ..case.case import MARKER, PER_TRAVEL, Case
 from ..case.units import LENGTHS
+from ..dataset import Dataset, Variable
 from ..harness.labels import named
 from ..harness.record import Results
 from ..joints import Kind
 from ..kinematics import kinds, places
+from ..tabular import Tabular
 from ..trajectory import Array
 from ..unit_text import with_unit
-from .axis import driver_axis, in_table_units
+from .axis import ZERO, driver_axis, events, in_table_units, number
 from .curves import columns_of
 from .figures import Style, output_figure
 from .page_model import Plot
 from .sections import Diagram, Report, Section
-from .travel_table import ZERO, events, number
 
 SAME = 1e-9
 """Distance below which points are the same [m]: a table has no such digit, and conversions of units
@@ -33,8 +34,8 @@ round far below."""
 WITHOUT_LENGTH = (Kind.DIRECTION, Kind.DIRECTIONS, Kind.NUMBER)
 
 
-@dataclass(frozen=True, eq=False)
-class Designs:
+@dataclass(frozen=True, eq=False, repr=False)
+class Designs(Tabular):
     """The solved designs.
 
     Attributes:
@@ -46,6 +47,7 @@ class Designs:
         units: of the outputs, by name.
         other: outputs that are other quantities in some designs, such as the half track of the
             wheel's centre in a table without a radius: the quantities, by name.
+        exceeded: a sentence on each difference larger than accepted.
     """
 
     results: Results
@@ -55,6 +57,28 @@ class Designs:
     curves: Mapping[str, Mapping[str, Array]]
     units: Mapping[str, str]
     other: Mapping[str, str]
+    exceeded: Sequence[str] = ()
+
+    def summary(self) -> str:
+        """Return the designs and the number of differences beyond what is accepted in one line."""
+        first, *others = self.curves
+        beyond = f"; {len(self.exceeded)} beyond the tolerance" if self.exceeded else ""
+        return f"{', '.join(others)} against {first}, {len(self.units)} outputs{beyond}"
+
+    def dataset(self) -> Dataset:
+        """Return the outputs by design and sample, in the units of the first design's table."""
+        dims = ("design", "sample")
+        coords = {"design": Variable("design", [*self.curves])}
+        for head, values in self.drivers.items():
+            name, _, unit = head.partition(" [")
+            numbers = np.array([np.nan if x is None else x for x in values], dtype=np.float64)
+            coords[name] = Variable("sample", numbers, unit.removesuffix("]"))
+        missing = np.full(len(next(iter(self.drivers.values()))), np.nan)
+        variables = {
+            name: Variable(dims, [each.get(name, missing) for each in self.curves.values()], unit)
+            for name, unit in self.units.items()
+        }
+        return Dataset(dims, coords, variables, [*coords][1])
 
     def at(self, sample: int) -> str:
         """Return the travel at a sample as text."""

@@ -10,6 +10,7 @@ from ..harness.evidence import REFERENCE
 from ..harness.labels import UNMADE, notes, suspects
 from ..harness.record import Deviations, Outcome, Record, Results
 from ..harness.standard import STANDARD
+from ..history.findings import Finding, Kind, Regressions
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -119,3 +120,40 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
     if not deviations.items():
         return "skipped", f"{Outcome.UNJUDGED.shown}: {deviations.reason}"
     return "", ""
+
+
+def to_regression_junit(results: Results, found: Regressions) -> bytes:
+    """Return the XML of `to_junit`, with a failure for every regression of a passed pair.
+
+    A finding on a pair as a whole (a lost phase, a time) is a separate test case, named by its
+    kind.
+    """
+    root = ElementTree.fromstring(to_junit(results))
+    tests = {(test.get("classname"), test.get("name")): test for test in root.iter("testcase")}
+    suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
+    unmade = set(results.missing)
+    for finding in found.regressions:
+        pair = (finding.case, finding.engine, finding.mode)
+        if finding.kind is Kind.FAILURE or pair in unmade:  # the XML has these already
+            continue
+        place = ".".join(pair)
+        name = finding.output or str(finding.kind)
+        if finding.case not in suites:  # a case of the earlier run only
+            suites[finding.case] = ElementTree.SubElement(root, "testsuite", name=finding.case)
+        if (place, name) not in tests:
+            tests[place, name] = ElementTree.SubElement(
+                suites[finding.case], "testcase", classname=place, name=name, time="0.000000"
+            )
+        _fail(tests[place, name], finding)
+    for suite in suites.values():
+        count_tests(suite)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _fail(test: ElementTree.Element, finding: Finding) -> None:
+    message = FORBIDDEN.sub("\ufffd", f"{finding.kind}: {finding.message}")
+    verdict = test.find("failure")
+    if verdict is None:
+        verdict = ElementTree.SubElement(test, "failure")
+    verdict.set("message", "; ".join(filter(None, (verdict.get("message"), message))))

@@ -16,9 +16,20 @@ from ..trajectory import QUANTITIES
 from ..unit_text import FORCES, motion_word, value_text
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
-from .error_figure import error_figure
-from .figure_data import Effort, Mark, Past, marks, precision_figure, trend_figures
-from .figures import Figure, Style, Values, band_is_thin, output_figure
+from .figures import (
+    Effort,
+    Figure,
+    Mark,
+    Past,
+    Style,
+    Values,
+    band_is_thin,
+    error_figure,
+    marks,
+    output_figure,
+    precision_figure,
+    trend_figures,
+)
 
 ROUND_OFF = 1e-12
 """Part of a value by which an output may change that counts as constant without a tolerance."""

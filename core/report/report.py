@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
 from markupsafe import Markup
 
+from ..case.case import Truth
 from ..harness.evidence import REFERENCE
 from ..harness.labels import (
     TRUTHS,
     engine_name,
+    named,
+    notes,
     product,
     suspects,
     unread_count,
@@ -23,12 +26,113 @@ from ..harness.labels import (
 from ..harness.record import Outcome, Record, Results
 from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
-from .caveats import ANSWERED, caveats
+from .axis import SAMPLES
 from .curves import downloads
-from .figure_data import Effort, Past
-from .figures import Figure, Style
+from .figures import Effort, Figure, Past, Style
 from .page_model import CaseView, Judged, Material, case_view, judged, worst
-from .page_parts import environment, figure_parts, packed
+from .sections import environment, figure_parts, packed
+
+ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
+"""Outcomes of pairs with an answer."""
+
+
+def caveats(results: Results) -> list[tuple[str, str]]:
+    """Return each limit of the run as a title and a sentence."""
+    records = results.records
+    limits: list[tuple[str, str]] = []
+
+    def add(title: str, text: str) -> None:
+        limits.append((title, text))
+
+    def cases(holds: Callable[[Record], bool]) -> str:
+        return named([*dict.fromkeys(record.case for record in records if holds(record))])
+
+    add(
+        "One description for all",
+        "All engines solve the same case files. A wrong hardpoint, axis or driver in a file is"
+        " wrong in all engines, and no comparison shows it.",
+    )
+    if names := cases(lambda record: record.truth == Truth.IN_HOUSE_ORACLE):
+        add(
+            f"In-house oracle: {names}",
+            "This project computed the reference. Agreement with our own oracle is not validation.",
+        )
+    if names := cases(lambda record: record.truth == Truth.CONSENSUS_ONLY):
+        add(
+            f"Consensus only: {names}",
+            "There is no reference. Engines that agree with the native one may be wrong together.",
+        )
+    for case, note in notes(results.run):
+        add(f"Note on {case}", f"{note[:1].upper()}{note[1:]}.")
+    for outcome in Outcome:
+        pairs = [_pair(record) for record in records if record.outcome is outcome]
+        if pairs and outcome not in ANSWERED:
+            add(
+                f"{outcome.shown.capitalize()}: {len(pairs)}",
+                f"There are no results for {named(pairs, '; ')}.",
+            )
+    for case, why in results.unread.items():
+        add(f"Not read: {case}", f"{why}. There are no results for it.")
+    if pairs := [
+        f"{product(engine, mode)} on {case}"
+        for case, engine, mode in results.missing
+        if case not in results.unread
+    ]:
+        add(
+            f"Not run: {len(pairs)}",
+            f"The run ended before them. There are no results for {named(pairs, '; ')}.",
+        )
+    for record in records:
+        if (
+            record.solved is not None
+            and record.samples is not None
+            and record.solved < record.samples
+        ):
+            add(
+                _pair(record),
+                f"{record.solved} of {record.samples} samples were solved; the others have no"
+                " results.",
+            )
+    for reason, pairs in _uncompared(results).items():
+        add(f"Not judged: {named(pairs)}", reason)
+    if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
+        add(
+            "Modes",
+            "Projection and simulate are separate products; their times and errors form no"
+            " common ranking.",
+        )
+    if len({record.loop for record in records if record.us_per_step is not None}) > 1:
+        add(
+            "Times",
+            "The loops over the samples run in different places (see loop): each time includes"
+            " engine and loop.",
+        )
+    if names := cases(
+        lambda record: any(len(values) > SAMPLES for values in record.driver.values())
+    ):
+        add(
+            f"Thinned figures: {names}",
+            f"About {SAMPLES} samples of each curve are drawn, including the worst; tables"
+            " and verdicts used all.",
+        )
+    return limits
+
+
+def _pair(record: Record) -> str:
+    return f"{engine_name(record)} on {record.case}"
+
+
+def _uncompared(results: Results) -> dict[str, list[str]]:
+    reasons: dict[str, list[str]] = {}
+    for record in results.records:
+        if record.outcome not in ANSWERED:
+            continue
+        for reason in dict.fromkeys(
+            errors.reason for errors in record.errors.values() if errors.reason
+        ):
+            reasons.setdefault(reason, []).append(_pair(record))
+    return reasons
+
 
 NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)

@@ -4,23 +4,129 @@ itself, and comparisons of designs.
 
 from __future__ import annotations
 
-import sys
+import base64
+import json
+import re
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO, cast
 
 import msgspec
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.text import Text
 
-from ..case.io.atomic_files import Content, to_standard_output, write_all
+from ..case.io.atomic_files import Content
+from ..case.io.escape import file_name
 from ..errors import KincheckError
+from ..harness.labels import against, engine_name, known, named, number, output_label
 from ..harness.record import to_json
+from ..unit_text import value_text, with_unit
 from . import terminal
 from .figures import Figure, Style
-from .fitting_table import FittingTable
 from .page_model import Plot
-from .page_parts import environment, figure_parts, style_sheet
+from .terminal import FittingTable
+
+_HERE = Path(__file__).parent
+SCENE_SCRIPTS = (
+    "elements.js",
+    "axes.js",
+    "frame.js",
+    "traces.js",
+    "readout.js",
+    "plot.js",
+    "vectors.js",
+    "motion.js",
+    "canvas.js",
+    "solids.js",
+    "centres.js",
+    "scene.js",
+    "pictures.js",
+    "mechanism.js",
+)
+"""Scripts of figures and scenes, in loading order: each depends only on earlier ones."""
+
+SCRIPTS = (*SCENE_SCRIPTS, "overview.js", "report.js")
+"""Scripts of a report."""
+
+LONG = 300
+"""Characters of a message that the page shows at once; the rest is folded."""
+
+
+@cache
+def environment(*folders: Path) -> Environment:
+    """Return the templates of these folders and of this one, with the filters of the macros.
+
+    The process keeps them: templates take longer to compile than to render.
+    """
+    made = Environment(
+        loader=FileSystemLoader([*folders, _HERE]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    cast("dict[str, Any]", made.filters).update(
+        number=number,
+        label=output_label,
+        engine=engine_name,
+        against=against,
+        known=known,
+        named=named,
+        file_name=file_name,
+        parted=parted,
+        value_text=value_text,
+        with_unit=with_unit,
+    )
+    return made
+
+
+def style_sheet() -> str:
+    """Return the style sheet of all pages."""
+    return (_HERE / "report.css").read_text("utf-8")
+
+
+def figure_parts(
+    figures: Mapping[str, Figure],
+    *,
+    drivers: Mapping[str, Sequence[float]] | None = None,
+    scenes: Mapping[str, Any] | None = None,
+) -> dict[str, str]:
+    """Return style sheet, script and data of a page with figures, by their names in templates.
+
+    Args:
+        drivers: values that replace "driver" in traces, by section.
+        scenes: drawings of mechanisms, by section.
+    """
+    data = {"drivers": drivers or {}, "figures": figures, "scenes": scenes or {}}
+    return {
+        "css": style_sheet(),
+        "script": "\n".join(script_of(name) for name in SCRIPTS),
+        "data": packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
+    }
+
+
+def script_of(name: str, folder: Path = _HERE) -> str:
+    """Return a script of the pages without indentation and comment lines."""
+    lines = [line.strip() for line in (folder / name).read_text("utf-8").splitlines()]
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
+
+
+def parted(message: str) -> tuple[str, str]:
+    """Return the start of a long message, up to the end of a line or sentence, and the rest."""
+    if len(message) <= LONG:
+        return message, ""
+    ends = [found.end() for found in re.finditer(r"\n+|[.;:] +", message) if found.end() <= LONG]
+    return (message[: ends[-1]], message[ends[-1] :]) if ends else (message, "")
+
+
+def packed(text: str) -> str:
+    """Return text as base64 of its zlib stream, which has a third of the size and cannot end its
+    script element.
+    """
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
 
 
 @dataclass(frozen=True)
@@ -88,22 +194,15 @@ def deliver(
         KincheckError: a file cannot be written, or there are earlier problems.
     """
     contents: list[tuple[Path, Content]] = [*files]
-    if json not in (None, "-"):
-        contents.append((Path(json), to_json(results)))
+    encoded = to_json(results)
     if out is not None:
         contents += [
-            (out / f"{report.name}.json", to_json(results)),
+            (out / f"{report.name}.json", encoded),
             (out / f"{report.name}.html", page(report).encode()),
             *((out / name, text.encode()) for name, text in beside.items()),
         ]
-    problems = [
-        *problems,
-        *write_all(contents),
-    ]  # before printing, since the reader of the tables may end early
-    print_report(report, sys.stderr if json == "-" else sys.stdout)
-    if json == "-":
-        to_standard_output(to_json(results))
-    if problems:
+    written = terminal.deliver(contents, encoded, json, partial(print_report, report))
+    if problems := [*problems, *written]:
         raise KincheckError("\n".join(problems))
 
 

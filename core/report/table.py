@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any, TextIO
 
@@ -15,9 +16,37 @@ from ..case.io.escape import visible
 from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread, unsound
 from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
-from ..unit_text import FORCES, motion_word
+from ..unit_text import FORCES, motion_word, with_unit
 from . import terminal
-from .travel_table import print_travel
+from .axis import print_travel
+from .terminal import FittingTable
+
+
+def escaped(text: str) -> str:
+    """Return text that Markdown shows unchanged on a line or in a cell: without mark-up, links,
+    HTML or notified users.
+    """
+    plain = (
+        visible(" ".join(text.split()))
+        .replace("&", "&amp;")
+        .replace("<", "&lt;")
+        .replace(">", "&gt;")
+    )
+    # an underscore inside a word and brackets without a target are plain text
+    plain = re.sub(r"([\\`*~|]|(?<!\w)_|_(?!\w)|(?<=\])\()", r"\\\1", plain)
+    return re.sub(r"(?<!\w)@(?=\w)", "@\N{WORD JOINER}", plain)
+
+
+def code(name: str) -> str:
+    """Return a name as code, where only a bar can be escaped."""
+    shown = visible(name).replace("`", "'").replace("|", "\\|")
+    return f"`{shown}`"
+
+
+def row(cells: Iterable[str]) -> str:
+    """Return a row of a table."""
+    return f"| {' | '.join(cells)} |"
+
 
 COLOURS = {
     Outcome.PASS: "green",
@@ -280,3 +309,121 @@ def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
         if record.message and not results.explains(record):
             said.setdefault((record.engine, record.outcome, record.message), []).append(record.case)
     return said
+
+
+NOT_ASKED = "–"
+# Characters between two columns of a table without rules.
+GAP = 2
+
+
+def print_matrix(results: Results, file: TextIO) -> None:
+    """Print the sign conventions, a row per case and a column per engine, every message, and a
+    count of outcomes. If the engines do not fit side by side, further tables follow.
+    """
+    console = terminal.console(file)
+    print_signs(results.run, console)
+    engines, rows = _laid_out(results)
+    for n, band in enumerate(_bands(engines, rows, console.width)):
+        if n:
+            console.print()
+        table = FittingTable()
+        table.add_column("case", overflow="fold")
+        for engine in band:
+            table.add_column(Text(visible(engine)), overflow="fold")
+        for case, records in rows.items():
+            cells = (
+                _cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in band
+            )
+            table.add_row(Text(visible(case)), *cells)
+        console.print(table)
+    console.print(Text(visible(_reading(results)), style="italic"))
+    print_messages(results, console)
+
+
+def _bands(
+    engines: Sequence[str], rows: Mapping[str, Mapping[str, Record]], width: int
+) -> list[list[str]]:
+    """Return the engines in groups whose columns fit beside the column of cases, at least one each,
+    because truncated errors are useless.
+    """
+    left = width - max((cell_len(visible(case)) for case in ("case", *rows)), default=0)
+    bands: list[list[str]] = [[]]
+    free = left
+    for engine in engines:
+        cells = (cell(each[engine]) for each in rows.values() if engine in each)
+        needed = GAP + max(cell_len(visible(each)) for each in (engine, NOT_ASKED, *cells))
+        if bands[-1] and needed > free:
+            bands.append([])
+            free = left
+        bands[-1].append(engine)
+        free -= needed
+    return bands
+
+
+def to_markdown(results: Results) -> str:
+    """Return the matrix in Markdown: engines with their versions, and a line for every message
+    except those of passed pairs.
+    """
+    engines, rows = _laid_out(results)
+    versions = {record.engine: record.version for record in results.records if record.version}
+    head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
+    lines = [line for each in signs(results.run) for line in (escaped(f"{each}."), "")]
+    lines += [row(map(escaped, head)), row(["---"] * len(head))] if rows else []
+    for case, records in rows.items():
+        cells = (
+            escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines
+        )
+        lines.append(row([code(case), *cells]))
+    lines += ["", f"{escaped(_reading(results))}."]
+    lines += [escaped(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
+    lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
+    lines += [
+        escaped(f"{outcome.shown.capitalize()}: {named(cases)} in {engine}: {message}.")
+        for (engine, outcome, message), cases in messages(results).items()
+        if outcome is not Outcome.PASS
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def cell(record: Record) -> str:
+    """Return the result of an engine for a case as short text."""
+    errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
+    if errors:
+        verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: "
+        return verdict + " · ".join(
+            f"{error.max_abs:.0e} {unit}".rstrip() for error, unit in errors
+        )
+    if record.outcome is Outcome.UNJUDGED and record.residual_max is not None:
+        return f"{record.outcome.shown}, residual {record.residual_max:.0e}"
+    return record.outcome.shown
+
+
+def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:
+    """Return the engines, and the records by case and engine."""
+    rows: dict[str, dict[str, Record]] = {}
+    for record in results.records:
+        rows.setdefault(record.case, {})[record.engine] = record
+    return list(dict.fromkeys(record.engine for record in results.records)), rows
+
+
+def _reading(results: Results) -> str:
+    """Return a sentence on how to read the cells."""
+    standards = sorted(
+        {
+            each.against
+            for record in results.records
+            for errors in record.errors.values()
+            for _, each in errors.items()
+        }
+    )
+    if not standards:
+        return "No errors: nothing was compared with anything"
+    units = " · ".join(
+        with_unit(quantity, motion_unit(LENGTH, quantity)) for quantity in QUANTITIES
+    )
+    return f"Largest errors against {', '.join(map(against, standards))}: {units}"
+
+
+def _cell(record: Record) -> Text:
+    return Text(visible(cell(record)), COLOURS.get(record.outcome, "bold red"))

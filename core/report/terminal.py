@@ -4,20 +4,96 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, TextIO
+from time import perf_counter
+from types import TracebackType
+from typing import IO, Any, Self, TextIO
 
 import msgspec
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.padding import Padding
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
 from rich.text import Text
 
-from ..case.io.atomic_files import to_standard_output, write
+from ..case.io.atomic_files import Content, to_standard_output, write, write_all
+from ..case.io.escape import visible
 from ..errors import KincheckError
 from ..harness.record import to_json
-from .fitting_table import FittingTable
+
+# Wider than any table [characters].
+UNBOUNDED = 100_000
+# Shortest line that text is wrapped to [characters].
+READABLE = 30
+INDENT, GAP = 2, 2
+
+
+class FittingTable(Table):
+    """A table without rules that breaks no word.
+
+    If the console is too narrow for all columns, each row is a block: its first cell, and below it
+    the others with their heads. A number in the first cell has its head, too.
+    """
+
+    def __init__(self, *, title: str | None = None) -> None:
+        super().__init__(
+            box=None,
+            pad_edge=False,
+            header_style="bold",
+            title=title,
+            title_justify="left",
+            title_style="bold",
+        )
+
+    def natural_width(self, console: Console, options: ConsoleOptions) -> int:
+        """Return the width of the table without wrapped text [characters]."""
+        return self._width(console, options, UNBOUNDED)
+
+    def _width(self, console: Console, options: ConsoleOptions, readable: int) -> int:
+        """Return the width of the table with text wrapped to a number of characters."""
+        width = self._extra_width
+        for column in self.columns:
+            found = self._measure_column(console, options.update_width(UNBOUNDED), column)
+            wrapped = max(found.minimum, readable)
+            width += found.maximum if column.no_wrap else min(found.maximum, wrapped)
+        return width
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        if self._width(console, options, READABLE) <= options.max_width:
+            yield from super().__rich_console__(console, options)
+            return
+        if self.title:
+            yield Text(str(self.title), "bold")
+        yield from self._blocks(options.max_width)
+
+    def _blocks(self, width: int) -> Iterator[Text | Padding]:
+        """Yield the lines of each row."""
+        heads = [_text(column.header).plain.replace("\n", " ") for column in self.columns]
+        for number, cells in enumerate(zip(*(each.cells for each in self.columns), strict=True)):
+            style = self.rows[number].style or ""
+            first, *others = map(_text, cells)
+            if first and self.columns[0].justify == "right":
+                yield Text.assemble((f"{heads[0]} ", "dim"), first, style=style)
+            elif first:
+                yield Text.assemble(first, style=style)
+            line = Text(style=style)
+            for head, cell in zip(heads[1:], others, strict=True):
+                if not cell.plain:
+                    continue
+                item = Text.assemble((f"{head} " if head else "", "dim"), cell)
+                if line and line.cell_len + GAP + item.cell_len > width - INDENT:
+                    yield Padding(line, (0, 0, 0, INDENT), expand=False)
+                    line = Text(style=style)
+                line = Text.assemble(line, " " * GAP if line else "", item, style=style)
+            if line:
+                yield Padding(line, (0, 0, 0, INDENT), expand=False)
+
+
+def _text(cell: object) -> Text:
+    return cell if isinstance(cell, Text) else Text(str(cell))
+
 
 # Width for a log or a pipe, unless the environment variable COLUMNS sets it: they have no width,
 # and must not break the lines of a table.
@@ -112,6 +188,97 @@ def with_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> Ge
         raise problem
 
 
+def deliver(
+    contents: Sequence[tuple[Path, Content]],
+    encoded: bytes,
+    json: str | None,
+    show: Callable[[TextIO], None],
+) -> list[str]:
+    """Write files, print, and return the problems in writing.
+
+    The reader of what is printed may end early, so the files come first, and a document on
+    standard output last.
+
+    Args:
+        encoded: document of the option --json.
+        json: its file, or "-" for standard output, which then holds nothing else.
+        show: prints.
+    """
+    named = [(Path(json), encoded)] if json not in (None, "-") else []
+    problems = write_all([*contents, *named])
+    show(sys.stderr if json == "-" else sys.stdout)
+    if json == "-":
+        to_standard_output(encoded)
+    return problems
+
+
 def listed(names: Sequence[str]) -> str:
     """Return the names as one text."""
     return ", ".join(names) or "none"
+
+
+class Meter:
+    """A bar on a terminal, elsewhere lines at intervals.
+
+    Only calls draw it: a drawing thread would disturb measured times.
+
+    Args:
+        name: name of the command, before each line.
+        quiet: print nothing.
+        every: interval between lines without a terminal [s]; 0 for all lines.
+    """
+
+    def __init__(self, name: str, *, quiet: bool = False, every: float = 0.0) -> None:
+        self.name, self.quiet, self.every = name, quiet, every
+        self.begun, self.shown_at = perf_counter(), -every
+        self.bar = None
+        if sys.stderr.isatty() and not quiet:
+            self.bar = Progress(
+                TextColumn("{task.description}", markup=False),
+                BarColumn(bar_width=20),
+                TaskProgressColumn(),
+                TimeRemainingColumn(compact=True),
+                TextColumn("left"),
+                console=Console(file=sys.stderr),
+                auto_refresh=False,
+                transient=True,
+            )
+            self.task = self.bar.add_task(name, total=1.0)
+
+    def __enter__(self) -> Self:
+        if self.bar is not None:
+            self.bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+    def __call__(self, what: str, done: float) -> None:
+        """Show the current work, and the finished share of all work, from 0 to 1."""
+        if self.bar is not None:
+            self.bar.update(self.task, description=visible(what), completed=done, refresh=True)
+            return
+        now = perf_counter() - self.begun
+        if self.quiet or now - self.shown_at < self.every:
+            return
+        self.shown_at = now
+        left = f", about {_time(now * (1.0 - done) / done)} left" if 0.0 < done < 1.0 else ""
+        print(
+            f"{self.name}: {visible(what)} ({100 * done:.0f} %{left})", file=sys.stderr, flush=True
+        )
+
+
+def _time(seconds: float) -> str:
+    """Return a time as text with at most two units."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -126,8 +126,8 @@ def survey(case: Case, at: float | None = None, *, samples: int, seed: int) -> S
     mechanism, value = case.mechanism, case.sweep.design if at is None else at
     if not math.isfinite(value):
         raise SolveError(
-            f"case {case.name!r}: the value {value} is not finite; give a value of"
-            f" {case.sweep.driver!r}"
+            f"case {case.name!r}: the value {value} is not finite. Give a value of"
+            f" {case.sweep.driver!r}."
         )
     there = replace(case.sweep, values=np.array([value]))
     names = tuple(there.path.motions)

@@ -11,16 +11,18 @@ import numpy as np
 
 from ..case.case import HELD_BUT, TIME, Case, Free, Sweep
 from ..case.io.table_file import Kind, write_csv
+from ..dataset import Dataset, Variable
 from ..errors import KincheckError
 from ..harness.compare import output_series
 from ..kinematics import free_motion
+from ..tabular import Tabular
 from ..trajectory import Array
 
 SCHEMA = "kincheck-free/1"
 
 
-@dataclass(frozen=True, eq=False)
-class FreeResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class FreeResult(Tabular):
     """The free motion of a case, n samples, SI units.
 
     Attributes:
@@ -54,6 +56,23 @@ class FreeResult:
     message: str
     notes: tuple[str, ...]
 
+    def summary(self) -> str:
+        """Return case, duration and error in one line."""
+        ended = f"; {self.message}" if self.message else ""
+        return (
+            f"{self.case}: {len(self.times)} samples to {self.times[-1]:.9g} s, change when all"
+            f" steps are halved {self.error:.1e} m{ended}"
+        )
+
+    def dataset(self) -> Dataset:
+        """Return the outputs over time."""
+        variables = {
+            name: Variable("sample", values, self.units[name])
+            for name, values in self.outputs.items()
+        }
+        coords = {TIME: Variable("sample", self.times, "s")}
+        return Dataset(("sample",), coords, variables, TIME)
+
     def write_csv(self, path: Path) -> int:
         """Write time and outputs as columns of a CSV file; return the number of rows."""
         columns = [self.times, *self.outputs.values()]
@@ -85,11 +104,11 @@ def free_of(case: Case) -> FreeResult:
     """
     if case.free is None:
         raise KincheckError(
-            f"case {case.name!r} says no duration of its free motion; add [free] with duration and"
-            " samples, or give --duration and --samples"
+            f"case {case.name!r} says no duration of its free motion. Add [free] with duration and"
+            " samples, or give --duration and --samples."
         )
     if TIME in (output.name for output in case.outputs):
-        raise KincheckError(f"case {case.name!r}: an output is named {TIME!r}; rename it")
+        raise KincheckError(f"case {case.name!r}: an output is named {TIME!r}. Rename it.")
     free: Free = case.free
     times = np.linspace(0.0, free.duration, free.samples)
     found = free_motion(case.mechanism, times, free.rates)

@@ -32,8 +32,8 @@ def with_reactions(case: Case, tol: float) -> Case:
     mechanism = case.mechanism
     if not mechanism.has_loads:
         raise KincheckError(
-            f"{case.name}: no body has mass and no force element acts, so all reactions are zero;"
-            " give bodies mass, center_of_mass and inertia, or add [forces.NAME]"
+            f"{case.name}: no body has mass and no force element acts, so all reactions are zero."
+            " Give bodies mass, center_of_mass and inertia, or add [forces.NAME]."
         )
     load = largest_load(mechanism, size(case), pace(case))
     scales = {False: default(load, "N"), True: default(load * size(case), "N m")}

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +21,12 @@ from ..case.case import HELD_BUT, Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..case.measures import Orientation
 from ..case.turns import oriented, turns_of
+from ..forces import DETERMINED, Forces, Reaction
+from ..harness.compare import output_series
 from ..jet import Jet
 from ..kinematics import (
     Drives,
+    EnclosedForces,
     Enclosure,
     Exact,
     Proofs,
@@ -35,8 +40,122 @@ from ..kinematics import (
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
 from ..version import VERSION
-from .native_error import Column, NativeError, native_errors, upper
-from .proved_forces import FORCES_NOTE, force_values
+
+Column = Sequence[Ball | None]
+"""A quantity at the samples; None where it is not known."""
+
+
+@dataclass(frozen=True)
+class NativeError:
+    """Largest native errors over the samples, of an output's position, velocity and acceleration.
+
+    Attributes:
+        largest: [SI]; None if there is no such derivative.
+        ulps: in units in the last place of the largest value of any output of the same unit: an
+            output may be zero throughout, by symmetry.
+    """
+
+    output: str
+    unit: str
+    largest: Sequence[float | None]
+    ulps: Sequence[float | None]
+
+
+def native_errors(
+    case: Case, found: Proofs, values: Mapping[str, Sequence[Column]]
+) -> list[NativeError]:
+    """Return the native errors of every proved output."""
+    outputs = [output for output in case.outputs if output.name in values]
+    sizes: dict[tuple[str, int], float] = {}
+    for output in outputs:
+        for order, column in enumerate(values[output.name]):
+            known = [
+                sizes.get((output.unit, order), 0.0),
+                *(upper(ball) for ball in column if ball is not None),
+            ]
+            sizes[output.unit, order] = max(known)
+    errors: list[NativeError] = []
+    for output in outputs:
+        native = output_series(case, output, found.native)
+        largest: list[float | None] = []
+        ulps: list[float | None] = []
+        for order, given in enumerate((native.position, native.velocity, native.acceleration)):
+            numbers: list[float] = [] if given is None else given.tolist()
+            pairs = zip(numbers, values[output.name][order], strict=given is not None)
+            off = [
+                upper(flint().arb(x) - ball)
+                for x, ball in pairs
+                if ball is not None and math.isfinite(x)
+            ]
+            size = sizes[output.unit, order]
+            largest.append(max(off, default=None))
+            ulps.append(max(off) / float(np.spacing(size)) if off and size > 0.0 else None)
+        errors.append(NativeError(output.name, output.unit, largest, ulps))
+    return errors
+
+
+def upper(ball: Ball) -> float:
+    """Return a float not below |ball|."""
+    return float(np.nextafter(float(ball.abs_upper()), np.inf))
+
+
+FORCES_NOTE = (
+    " Forces are those of the solved rows; redundant rows, which are left out, carry nothing. A"
+    " component is printed only if a unit multiplier of a redundant row changes it by at most"
+    f" {DETERMINED:g}, and if the native engine finds it determined, which counts rows left out"
+    " within the digits of the case too. Turns of torsional springs are counted as the native"
+    " engine counts them."
+)
+
+
+def force_values(output: Any, found: Proofs) -> tuple[Sequence[Column], str | None]:
+    """Return a force output's values at the samples, as balls, and the reason if there are none.
+
+    A value is None where there is no proof, and where redundant rows leave it undetermined; there
+    are no rates.
+    """
+    column: list[Any] = [None] * len(found.samples)
+    none = [*column]
+    there = {
+        k: each.forces
+        for k, each in enumerate(found.samples)
+        if isinstance(each, Enclosure) and each.forces is not None
+    }
+    if not there:
+        return [none] * 3, None
+    native = found.native.forces
+    assert native is not None  # forces are proved near the native ones
+    determined = np.isfinite(output.values(native))
+    values: list[Any] = output.values(_forces([*there.values()])).tolist()
+    for k, value in zip(there, values, strict=True):
+        column[k] = None if isinstance(value, float) or not determined[k] else value
+    known = any(value is not None for value in column)
+    return [column, none, none], None if known else output.undetermined(native) or None
+
+
+def _forces(samples: Sequence[EnclosedForces]) -> Forces:
+    """Return the forces over the samples, in arrays of balls."""
+    first, n = samples[0], len(samples)
+
+    def reaction(name: str) -> Reaction:
+        table: Any = np.array([each.joints[name] for each in samples], dtype=object)
+        free: Any = np.zeros((n, 6, len(first.free)), dtype=object)
+        for k, each in enumerate(samples):
+            for column, joints in enumerate(each.free):
+                free[k, :, column] = joints[name]
+        return Reaction(table[:, :3], table[:, 3:], free)
+
+    def lanes(values: Sequence[Any]) -> Any:
+        return np.array(values, dtype=object)
+
+    return Forces(
+        {name: reaction(name) for name in first.joints},
+        {name: lanes([each.drivers[name] for each in samples]) for name in first.drivers},
+        {name: lanes([each.elements[name] for each in samples]) for name in first.elements},
+        lanes([each.power for each in samples]),
+        np.zeros(n),
+    )
+
 
 NUMBERS: Mapping[str, Reading] = {"double": as_double, "decimal": as_decimal}
 """Readings of a case's numbers: as the engines' doubles, or as the decimals of

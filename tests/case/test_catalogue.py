@@ -15,7 +15,7 @@ from kincheck.core.case.io.catalogue import case_schema, catalogue, rows_of
 from kincheck.core.case.io.mechanism_sections import DRIVERS
 from kincheck.core.case.io.schema import keys_of
 from kincheck.core.cli import main
-from kincheck.core.cli.schema import SCHEMAS
+from kincheck.core.cli.lists import SCHEMAS
 from kincheck.core.errors import CaseError, MechanismError
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Coupler, Joint, Spherical

@@ -16,11 +16,10 @@ from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.escape import cell, file_name, visible
 from kincheck.core.harness.record import Outcome, Record, Results, to_json
 from kincheck.core.report.junit import to_junit
-from kincheck.core.report.matrix import print_matrix, to_markdown
 from kincheck.core.report.page_model import Material
 from kincheck.core.report.progress import complain, progress
 from kincheck.core.report.report import render
-from kincheck.core.report.table import print_table
+from kincheck.core.report.table import print_matrix, print_table, to_markdown
 from kincheck.core.studies.tolerance.tables import _csv
 from markdown_it import MarkdownIt
 

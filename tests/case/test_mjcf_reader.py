@@ -9,7 +9,7 @@ import pytest
 from kincheck.core.case.case import Truth
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.cli.export import keep_texts
+from kincheck.core.cli.files import keep_texts
 from kincheck.core.cli.main import main
 
 from ..support.mjcf_models import EXACT, agree, model, mujoco

@@ -27,7 +27,7 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import deviation
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.harness.slips import Held, Uncertain, slips
+from kincheck.core.harness.suspects import Held, Uncertain, slips
 from scipy.interpolate import CubicSpline
 
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write

@@ -19,9 +19,8 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.report.junit import to_junit
-from kincheck.core.report.matrix import print_matrix, to_markdown
 from kincheck.core.report.report import write_report
-from kincheck.core.report.table import print_table
+from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
 from ..studies.test_vary import HEAD
 from ..support.rods_of_templates import solved

@@ -10,8 +10,7 @@ import kincheck.core
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.report.caveats import caveats
-from kincheck.core.report.report import headline
+from kincheck.core.report.report import caveats, headline
 
 from ..support.fakes import Fake, crank
 from .test_cli import RIGHT

@@ -161,19 +161,19 @@ def test_unselected_native_is_the_standard(kincheck_main, capsys):
         ("--engin native --ttol=1", "there is no option '--ttol'; did you mean '--tol'?"),
         ("-x", "there is no option '-x'"),
         ("cran[q]", "no built-in case and no file matches 'cran[q]'"),
-        ("--jobs -1", "'-1' is not a whole number of 0 or more; give one"),
+        ("--jobs -1", "'-1' is not a whole number of 0 or more. Give one"),
         (
             "--timeout 5",
             (
-                "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and"
+                "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
                 " --memory, or --jobs"
             ),
         ),
         (
             "--scheduler tcp://there:8786",
-            "--scheduler: the cluster decides how many pairs run at a time; leave out --jobs",
+            "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs",
         ),
-        ("--resume", "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"),
+        ("--resume", "--resume needs a history. Give --history FILE, or set KINCHECK_HISTORY"),
     ],
 )
 def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, said):
@@ -233,7 +233,7 @@ def test_how_to_install_comes_from_the_metadata():
 
 
 def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys, monkeypatch):
-    monkeypatch.setattr("kincheck.core.cli.list.installed_version", lambda name: None)
+    monkeypatch.setattr("kincheck.core.cli.lists.installed_version", lambda name: None)
     pinocchio = Fake("pinocchio", installed=None)
     cases = {"crank": crank(), "free": crank("free", reference=False)}
     assert kincheck_main("list", engines=[RIGHT, pinocchio], cases=cases) == 0

@@ -12,8 +12,8 @@ from kincheck.core.cli import main
 from kincheck.core.harness.execution import error_text
 from kincheck.core.harness.record import from_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.report.caveats import caveats
 from kincheck.core.report.junit import to_junit
+from kincheck.core.report.report import caveats
 
 from ..support.fakes import Fake, off
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG

@@ -34,9 +34,7 @@ def test_a_command_loads_no_other():
         " name.startswith('kincheck.core.cli.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == (
-        "check_joint class_loading engine_loading main option_types parser registry verbosity"
-    )
+    assert done.stdout.splitlines()[-1] == ("checks class_loading main parser registry run_options")
 
 
 def test_the_start_loads_nothing_that_is_not_needed():

@@ -3,6 +3,7 @@
 import csv
 import json
 
+import kincheck
 import pytest
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
@@ -133,3 +134,32 @@ def test_compare_refuses_with_one_message(old, new, capsys, given, said):
     words = given.replace("OLD", old).replace("NEW", new).split()
     assert main(["compare", *words]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_compare_in_python_is_the_command(tmp_path, old, new):
+    file, travel = tmp_path / "d.csv", kincheck.Supplied(travel="40mm:5")
+    assert main(["compare", old, new, "--travel", "40mm:5", "--csv", str(file)]) == 0
+    rows = [*csv.DictReader(file.read_text().splitlines())]
+    found = kincheck.compare([old, new], supplied=travel, tolerance="toe=0.001 deg")
+    table = found.to_dict()["data_vars"]["camber"]
+    assert table["attrs"] == {"units": "deg"}
+    for label, values in zip(("old", "new"), table["data"], strict=True):
+        assert values == [float(row[f"camber {label} [deg]"]) for row in rows]
+    assert "toe of new differs" in found.exceeded[0]
+    assert "new against old" in repr(found)
+    assert "<polyline" in found.to_html()
+    cases = [kincheck.load(each, travel) for each in (old, new)]
+    toe = found.curves["new"]["toe"]
+    assert kincheck.compare(*cases).curves["new"]["toe"] == pytest.approx(toe)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"tolerance": "tow=1"}, "did you mean 'toe'"),
+        ({"supplied": kincheck.Supplied(travel="300mm:5")}, "not reached|cannot"),
+    ],
+)
+def test_compare_in_python_refuses(old, new, given, said):
+    with pytest.raises(kincheck.KincheckError, match=said):
+        kincheck.compare(old, new, **given)

@@ -11,10 +11,9 @@ from kincheck import cases
 from kincheck.core import Revolute
 from kincheck.core.cli import main
 from kincheck.core.cli.joint_loading import named_joint
-from kincheck.core.cli.option_types import whole
 from kincheck.core.harness.provenance import truth_of
-from kincheck.core.report.meter import Meter
-from kincheck.core.report.terminal import columns, console
+from kincheck.core.options import whole
+from kincheck.core.report.terminal import Meter, columns, console
 
 from ..support.fakes import Fake
 
@@ -42,7 +41,7 @@ def test_a_pattern_names_all_cases_that_match(kincheck_main, capsys):
 def test_a_command_for_one_case_refuses_a_pattern_of_several(kincheck_main, capsys):
     assert kincheck_main("explain", "cran*", engines=[RIGHT]) == 2
     said = capsys.readouterr().err
-    assert "'cran*' matches 2 cases: crank, crank_two; name one of them" in said
+    assert "'cran*' matches 2 cases: crank, crank_two. Name one of them" in said
 
 
 def test_a_pattern_names_files_too(kincheck_main, tmp_path, capsys):
@@ -112,7 +111,7 @@ def test_records_stand_below_their_case_on_a_narrow_console(
 
 def test_progress_says_how_much_time_is_left(capsys, monkeypatch):
     now = iter([0.0, 0.0, 90.0, 100.0])
-    monkeypatch.setattr("kincheck.core.report.meter.perf_counter", lambda: next(now))
+    monkeypatch.setattr("kincheck.core.report.terminal.perf_counter", lambda: next(now))
     with Meter("stress", every=5.0) as meter:
         meter("arms", 0.0)
         meter("folds", 0.25)

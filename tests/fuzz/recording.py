@@ -2,7 +2,6 @@
 the options --map in lines "# map NAME=COLUMN". What is read is judged. And descriptions of FMUs.
 """
 
-import argparse
 import importlib.util
 import io
 import re
@@ -16,7 +15,8 @@ from typing import Any
 import numpy as np
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.cli.recorded_options import recorded_engines
+from kincheck.core.case.io.reader_options import CurveOptions
+from kincheck.core.cli.run_options import recorded_engines
 from kincheck.core.recorded.engine import RecordedEngine
 from kincheck.core.recorded.fmu import read_fmu
 
@@ -113,10 +113,7 @@ def packed(description: bytes) -> Path:
 
 
 def _judged(name: str, data: bytes, maps: list[str]) -> None:
-    said = argparse.Namespace(
-        recorded=[written(name, data)], map=maps, analysis=None, sheet=None, accuracy=[]
-    )
-    found, engines = recorded_engines(said, crank())
+    found, engines = recorded_engines([written(name, data)], crank(), CurveOptions(maps))
     for each in engines:
         assert isinstance(each, RecordedEngine)
         each.report(found)

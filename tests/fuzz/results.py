@@ -11,10 +11,9 @@ from kincheck.core.harness.record import to_json
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.harness.scene import scene
 from kincheck.core.report.junit import to_junit
-from kincheck.core.report.matrix import print_matrix, to_markdown
 from kincheck.core.report.page_model import Material
 from kincheck.core.report.report import render
-from kincheck.core.report.table import print_table
+from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
 from ..support.made_up import results
 from .fuzzing import changing, read_or_refused, written

@@ -17,7 +17,7 @@ from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError, on_cluster
-from kincheck.core.harness.workers.messages import pack
+from kincheck.core.harness.workers.serve import pack
 
 from ..support.bad_engine import Bad
 from ..support.drill import Slow
@@ -163,7 +163,7 @@ def test_no_scheduler_is_a_message(monkeypatch):
     """Where nobody listens, and where somebody does who is none and says nothing."""
     monkeypatch.setattr(ours, "ANSWER", 0.25)
     with pytest.raises(
-        ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"
+        ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\). Start one with"
     ):
         run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
     with socket.create_server(("127.0.0.1", 0)) as silent:
@@ -196,7 +196,7 @@ def test_invalid_scheduler_address_is_refused(address, monkeypatch):
     message = str(caught.value)
     assert message.startswith(f"scheduler {address}: found no address (")
     assert message.endswith(
-        "), expected HOST:PORT or tcp://HOST:PORT; write it as `dask scheduler` prints it"
+        "), expected HOST:PORT or tcp://HOST:PORT. Write it as `dask scheduler` prints it"
     )
 
 

@@ -163,7 +163,7 @@ FORCES = {
     ),
     "a body missing": (
         lambda found: changed(found, bodies={"crank": found.bodies["crank"]}),
-        "motions of bodies crank, but 'slider' is missing; give those of all moving bodies",
+        "motions of bodies crank, but 'slider' is missing. Give those of all moving bodies",
     ),
     "a body too many": (
         lambda found: changed(found, bodies={**found.bodies, "wall": found.bodies["crank"]}),

@@ -19,11 +19,9 @@ from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.store import HistoryError, Store
-from kincheck.core.report.caveats import caveats
-from kincheck.core.report.junit import to_junit
-from kincheck.core.report.regression_junit import to_regression_junit
-from kincheck.core.report.regression_summary import to_markdown
-from kincheck.core.report.report import headline
+from kincheck.core.report.junit import to_junit, to_regression_junit
+from kincheck.core.report.regressions import to_markdown
+from kincheck.core.report.report import caveats, headline
 
 from ..history.test_regression import kinds, reported
 from ..support.nights import FACTS, changed, keep, nights, records

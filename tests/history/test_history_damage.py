@@ -7,7 +7,7 @@ import sqlite3
 
 import pytest
 from kincheck.core.cli.main import main
-from kincheck.core.history.schema import MIGRATIONS
+from kincheck.core.history.database import MIGRATIONS
 from kincheck.core.history.store import Store
 
 from ..support.fakes import crank

@@ -11,8 +11,8 @@ from kincheck.core.case.io.atomic_files import written
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.history.findings import Kind
-from kincheck.core.history.run_recorder import keep as begin
-from kincheck.core.history.run_selection import find, find_against
+from kincheck.core.history.runs import find, find_against
+from kincheck.core.history.runs import keep as begin
 from kincheck.core.history.store import Store
 
 from ..harness.test_unfinished import killed
@@ -188,7 +188,7 @@ def test_report_refuses_running_run(path, capsys):
     nights(path, 1)
     killed(path, 3, owner=None)
     assert main.main(f"report 2 --history {path}".split()) == 2
-    assert "run 2 is still running; report it when it has ended" in capsys.readouterr().err
+    assert "run 2 is still running. Report it when it has ended" in capsys.readouterr().err
 
 
 def test_page_of_killed_run_names_missing_pairs(path, tmp_path):

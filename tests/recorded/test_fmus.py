@@ -198,7 +198,7 @@ def test_wrong_output_of_a_co_simulation_fails(judged):
         ({"maps": ["sum=swing"]}, 'say --map "sum=swing [UNIT]"'),
         ({"maps": ["free_x=swing"]}, "unit 'mm' of column 'free_x'"),
         ({"maps": ["sum=turn [rad]", "x=tip_x"]}, "found sum for turn, expected an input"),
-        ({"jobs": "0"}, "--fmu runs foreign machine code in workers alone; leave out --jobs 0"),
+        ({"jobs": "0"}, "--fmu runs foreign machine code in workers alone. Leave out --jobs 0"),
     ],
 )
 def test_fmus_that_cannot_run_are_refused(judged, capsys, options, text):

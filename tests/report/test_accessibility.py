@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 from kincheck.core.harness.labels import output_label
-from kincheck.core.report.figure_data import Effort, Past, precision_figure
-from kincheck.core.report.figures import Style
+from kincheck.core.report.figures import Effort, Past, Style, precision_figure
 from kincheck.core.report.page_model import Plot
 from kincheck.core.report.report import write_report
 from kincheck.core.report.sections import Diagram, Report, Section, page

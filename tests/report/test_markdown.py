@@ -1,7 +1,7 @@
 """Markdown in which foreign text is text."""
 
 import pytest
-from kincheck.core.report.markdown import code, escaped, row
+from kincheck.core.report.table import code, escaped, row
 
 
 @pytest.mark.parametrize(

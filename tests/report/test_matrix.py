@@ -11,7 +11,7 @@ import pytest
 from kincheck.core.cli import main as cli
 from kincheck.core.harness.record import Results
 from kincheck.core.joints import Coupler, Joint
-from kincheck.core.report.matrix import print_matrix
+from kincheck.core.report.table import print_matrix
 
 from ..support.fakes import Fake, crank, off, raising
 from ..support.made_up import GRID, record

@@ -14,9 +14,9 @@ import pytest
 from kincheck.core import solve
 from kincheck.core.harness.labels import number
 from kincheck.core.harness.record import Results
-from kincheck.core.report import page_parts
-from kincheck.core.report.page_parts import parted
+from kincheck.core.report import sections
 from kincheck.core.report.report import headline
+from kincheck.core.report.sections import parted
 from kincheck.core.studies.bench.ring import ring
 
 from ..kinematics.test_chain import chain
@@ -156,9 +156,9 @@ def test_nothing_is_fetched(tmp_path: Path) -> None:
 
 
 def test_page_scripts_are_stripped_and_valid(tmp_path: Path) -> None:
-    folder = Path(page_parts.__file__).parent
-    assert sorted(page_parts.SCRIPTS) == sorted(path.name for path in folder.glob("*.js"))
-    script = page_parts.figure_parts({})["script"]
+    folder = Path(sections.__file__).parent
+    assert sorted(sections.SCRIPTS) == sorted(path.name for path in folder.glob("*.js"))
+    script = sections.figure_parts({})["script"]
     assert not re.search(r"^\s", script, re.MULTILINE)
     assert not re.search(r"^//", script, re.MULTILINE)
     (file := tmp_path / "page.js").write_text(script, "utf-8")

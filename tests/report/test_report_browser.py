@@ -14,7 +14,7 @@ import pytest
 from kincheck import cases
 from kincheck.core.harness.record import Outcome, Results
 from kincheck.core.harness.scene import scene
-from kincheck.core.report.figure_data import Effort, Past
+from kincheck.core.report.figures import Effort, Past
 
 from ..support.made_up import GRID, distances, record, results, series
 

@@ -11,8 +11,7 @@ import pytest
 from kincheck.core.harness.labels import number
 from kincheck.core.harness.record import Deviation, Deviations, Outcome, Record, Results
 from kincheck.core.report.axis import SAMPLES
-from kincheck.core.report.figure_data import Past
-from kincheck.core.report.figures import SYMBOLS
+from kincheck.core.report.figures import SYMBOLS, Past
 from kincheck.core.report.report import write_report
 
 from ..support.made_up import CRANK, GRID, distances, judged, record, results, series

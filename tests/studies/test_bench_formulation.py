@@ -11,9 +11,8 @@ from kincheck.core.cli import main
 from kincheck.core.kinematics import solve
 from kincheck.core.report.sections import Report, Section, page
 from kincheck.core.studies.paper import formulation as bench_formulation
-from kincheck.core.studies.paper import formulation_runtime as bench_whole
 from kincheck.core.studies.paper import roundoff as bench_roundoff
-from kincheck.core.studies.paper.formulation_runtime import AT_DESIGN, AWAY, BACK, DIFFERENCE
+from kincheck.core.studies.paper.formulation import AT_DESIGN, AWAY, BACK, DIFFERENCE
 from kincheck.core.studies.paper.operations import (
     DOTS,
     FROM_THE_LEFT,
@@ -262,14 +261,14 @@ def test_far_sweeps_lose_rounded_digits_only(found):
 
 
 def test_mechanism_moved_back_is_rounded_once(case):
-    away = bench_whole._moved(case.mechanism, bench_whole.FAR)
-    back = bench_whole._moved(away, tuple(-x for x in bench_whole.FAR))
-    assert bench_whole._moved(back, bench_whole.FAR) == away
+    away = bench_formulation._moved(case.mechanism, bench_formulation.FAR)
+    back = bench_formulation._moved(away, tuple(-x for x in bench_formulation.FAR))
+    assert bench_formulation._moved(back, bench_formulation.FAR) == away
     for one, other in zip(case.mechanism.points, back.points, strict=True):
         assert one.position != other.position
         assert other.position == pytest.approx(one.position, abs=1.2e-10)
     assert away.joints[-1].points[0] == pytest.approx(
-        [x + y for x, y in zip((1.115, 0.665, 0.118), bench_whole.FAR, strict=True)]
+        [x + y for x, y in zip((1.115, 0.665, 0.118), bench_formulation.FAR, strict=True)]
     )
 
 

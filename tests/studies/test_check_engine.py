@@ -12,7 +12,7 @@ import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.core.case.joint_probe import probe
-from kincheck.core.cli import engine_loading, main
+from kincheck.core.cli import class_loading, main
 from kincheck.core.harness.execution import here
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw
@@ -34,7 +34,7 @@ def few(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT))
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Planar, Gear)])
     monkeypatch.setattr(force_cases, "probes", lambda: [probe(Screw)])
-    monkeypatch.setattr("kincheck.core.cli.check_engine.TOPOLOGIES", {"one loop": "rssr"})
+    monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})
 
 
 def failures(report):
@@ -98,7 +98,7 @@ def test_check_engine_stops_on_protocol_error(few):
 @pytest.mark.parametrize(
     ("where", "message"),
     [
-        (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
+        (f"{HERE}:Fauly", "has no class 'Fauly'. Did you mean 'Faulty'?"),
         (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
         (
             f"{HERE}:np",
@@ -134,9 +134,9 @@ def offered(monkeypatch):
 
     def offer(**points):
         made = {
-            name: EntryPoint(name, value, engine_loading.GROUP) for name, value in points.items()
+            name: EntryPoint(name, value, class_loading.GROUP) for name, value in points.items()
         }
-        monkeypatch.setattr(engine_loading, "entry_points", lambda: made)
+        monkeypatch.setattr(class_loading, "entry_points", lambda: made)
         monkeypatch.syspath_prepend(str(ROOT))
 
     return offer
@@ -163,11 +163,11 @@ def test_the_entry_point_group_is_asked_for(monkeypatch):
         asked.append(group)
         return [EntryPoint("own", "own:Own", group)]
 
-    engine_loading.entry_points.cache_clear()
+    class_loading.entry_points.cache_clear()
     monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
-    assert engine_loading.offered(["native"]) == ("own",)
+    assert class_loading.offered(["native"]) == ("own",)
     assert asked == ["kincheck.engines"]
-    engine_loading.entry_points.cache_clear()
+    class_loading.entry_points.cache_clear()
 
 
 @pytest.mark.parametrize(("samples", "compared"), [(21, False), (22, True)])

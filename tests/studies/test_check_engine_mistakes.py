@@ -18,7 +18,7 @@ def here_alone(monkeypatch):
     monkeypatch.setattr(checking, "in_workers", lambda *_: here)
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Universal)])
     monkeypatch.setattr(force_cases, "probes", lambda: [probe(Universal)])
-    monkeypatch.setattr("kincheck.core.cli.check_engine.TOPOLOGIES", {"one loop": "rssr"})
+    monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def without_loads(monkeypatch):
 @pytest.fixture
 def with_loads(monkeypatch):
     monkeypatch.setattr(checking, "probes", list)
-    monkeypatch.setattr("kincheck.core.cli.check_engine.TOPOLOGIES", {})
+    monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {})
 
 
 def failing(fault):

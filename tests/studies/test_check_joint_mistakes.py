@@ -304,7 +304,7 @@ def test_mistakes_are_caught(mistake, few, monkeypatch):
 
 def test_joint_without_rows_is_reported():
     assert (
-        "has 0 rows, expected one or more; return its primitives"
+        "has 0 rows, expected one or more. Return its primitives"
         in check_joint(MISTAKES["no rows"][1]())["equations"].message
     )
 

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError
-from kincheck.core.harness.workers.messages import pack
+from kincheck.core.harness.workers.serve import pack
 from kincheck.core.studies.tolerance import sweep as chunk_execution
 from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import on_cluster, solve_there, sweep_designs
@@ -109,7 +109,7 @@ def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})
     with pytest.raises(
-        ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\); start one with"
+        ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\). Start one with"
     ):
         sweep_designs(case, variation, samples=5, source=on_cluster("tcp://127.0.0.1:1"))
     monkeypatch.setattr(
@@ -129,6 +129,6 @@ def test_cluster_worker_reuses_its_model(tmp_path):
     assert kept in chunk_execution._ready.values()
     with pytest.raises(
         ClusterError,
-        match=r"on the cluster's worker, expected 0.0.1 as in the sweep; install the same there",
+        match=r"on the cluster's worker, expected 0.0.1 as in the sweep. Install the same there",
     ):
         solve_there(packed, 0, "0.0.1")

@@ -30,7 +30,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.cli.main import main
-from kincheck.core.harness.program_account import explain
+from kincheck.core.harness.native_engine import explain
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.harness.run import run

@@ -229,7 +229,7 @@ FAULTS = [
     ),
     (
         {"a": {"at": "points.wheel_axis.position", "sigma": 1.0}},
-        "which follows from wheel_center and wheel_axis, expected one of these; name it",
+        "which follows from wheel_center and wheel_axis, expected one of these. Name it",
     ),
     ({"a": {"at": "damper_lower", "sigma": 1.0}}, "which nothing of the case follows"),
     (

@@ -194,7 +194,7 @@ def test_one_at_a_time_gives_effects(tmp_path):
     assert [each.variant for each in long] == [*range(1, 401)]
     np.testing.assert_allclose([each.offset for each in long], np.linspace(-1e-3, 1e-3, 400))
     with pytest.raises(
-        KincheckError, match="one_at_a_time has 4 variants as listed, none is drawn; leave it out"
+        KincheckError, match=r"one_at_a_time has 4 variants as listed, none is drawn. Leave it out"
     ):
         sweep_designs(case, variation, samples=3)
 
@@ -216,7 +216,9 @@ def test_a_grid_is_swept_as_a_whole(tmp_path):
         KincheckError, match="999700029999 variants, expected 1 to 10000000000; vary less"
     ):
         sweep_designs(case, vary(tmp_path, case, "grid", tip=tip))
-    with pytest.raises(KincheckError, match="draws as many variants as it is told; give --samples"):
+    with pytest.raises(
+        KincheckError, match=r"draws as many variants as it is told. Give --samples"
+    ):
         sweep_designs(case, vary(tmp_path, case, tip=TIP))
 
 

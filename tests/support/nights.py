@@ -9,7 +9,7 @@ import msgspec
 from kincheck.core.harness.record import Seconds
 from kincheck.core.harness.run import run
 from kincheck.core.history.comparison import regressions
-from kincheck.core.history.run_selection import find, find_against
+from kincheck.core.history.runs import find, find_against
 from kincheck.core.history.store import Store
 
 from .fakes import Fake, crank, off

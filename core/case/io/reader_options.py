@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import ClassVar
+
+from ...options import option, positive, switch
+
+HARDPOINTS, MODELS = "hardpoints", "models"
 
 
 @dataclass(frozen=True)
@@ -11,60 +17,147 @@ class Supplied:
     """Options of the readers of foreign files, as typed; the readers check them.
 
     Attributes:
-        template: suspension template of the hardpoints.
-        units: unit of the coordinates in a file of hardpoints: "mm", "m", ...
-        axes: directions of x, y and z in a file of hardpoints: "forward,left,up", ...
-        travel: wheel travel of a suspension, up and down: "METRES", "METRES:SAMPLES" or
-            "START:STOP:SAMPLES".
-        rack: simultaneous travel of the rack to the left: "METRES" or "START:STOP".
-        ask_names: whether to refuse names of hardpoints that are guessed.
-        side: side of the wheel of hardpoints, "left" or "right"; by default from the points.
-        corner: corner of a car of which hardpoints are read: "FL", "rear right", ...
-        sheet: sheet of a workbook with several tables.
-        names: file of the user's own names of hardpoints, by role of the template; written if new.
-        wheel_radius: loaded radius of the wheel of hardpoints [m].
-        wheelbase: wheelbase of the vehicle of hardpoints [m].
-        axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
-        position: axle of hardpoints, "front" or "rear", for anti-values.
-        cg_height: height of the centre of gravity of the vehicle of hardpoints above the road [m].
-        rack_per_turn: travel of the rack per turn of the steering wheel [m].
-        brake_share, drive_share: shares of the vehicle's forces at the axle of hardpoints [-].
-        drive: driven joints of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in their
-            coordinates [rad, m].
-        hold: joints or free bodies of a model to hold in place.
-        hold_rest: whether to hold further joints of a model as needed.
-        start: start of a model: "keyframe:NAME", "JOINT=VALUE" [rad, m].
-        without: elements of a model to leave out, by tag, name or TAG/NAME, or statements of a
-            dataset of Adams that force the motion: KIND or KIND/id.
         recorded: whether a recording is there, whose motion a dataset without its own follows.
         bushings: file of the bushings of hardpoints.
-        closure: tolerance of rows redundant but for the digits of a file [m].
     """
 
-    template: str | None = None
-    units: str | None = None
-    axes: str | None = None
-    travel: str | None = None
-    rack: str | None = None
-    names: Path | None = None
-    wheel_radius: str | None = None
-    wheelbase: str | None = None
-    axle: str | None = None
-    position: str | None = None
-    cg_height: str | None = None
-    rack_per_turn: str | None = None
-    brake_share: str | None = None
-    drive_share: str | None = None
-    ask_names: bool = False
-    side: str | None = None
-    corner: str | None = None
-    sheet: str | None = None
-    drive: tuple[str, ...] = ()
-    hold: tuple[str, ...] = ()
-    hold_rest: bool = False
-    start: tuple[str, ...] = ()
-    closure: float | None = None
-    without: tuple[str, ...] = ()
+    HEADINGS: ClassVar[Mapping[str, str]] = {
+        HARDPOINTS: (
+            "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv, .xlsx), trees"
+            " (.yaml, .json) and scripts (.m)."
+        ),
+        MODELS: (
+            "Models (MJCF, URDF, SDF), which do not state drivers, and datasets of Adams (.adm)."
+        ),
+    }
+
+    template: str | None = option(
+        "type of suspension, if the file does not state it; kincheck templates prints them",
+        metavar="NAME",
+        heading=HARDPOINTS,
+    )
+    units: str | None = option(
+        "unit of the coordinates, such as mm or m, if the file does not state it",
+        metavar="UNIT",
+        heading=HARDPOINTS,
+    )
+    axes: str | None = option(
+        "directions of x, y and z, if the file does not state them: forward,left,up or"
+        " rearward,right,up, ...",
+        metavar="X,Y,Z",
+        heading=HARDPOINTS,
+    )
+    side: str | None = option(
+        "side of the wheel, left or right; without it, the side follows from the points",
+        metavar="SIDE",
+        heading=HARDPOINTS,
+    )
+    names: Path | None = option(  # noqa: RUF009
+        'names of the points in the file: TOML, with a line ROLE = "NAME" for each; a new FILE'
+        " is written",
+        Path,
+        metavar="FILE",
+        heading=HARDPOINTS,
+    )
+    ask_names: bool = switch(
+        "refuse names that are only like those of the template, with a guess for each",
+        heading=HARDPOINTS,
+    )
+    wheel_radius: str | None = option(
+        "radius of the loaded wheel, such as 300mm, if no point is its contact: for roll"
+        " centre, scrub radius and trail",
+        metavar="M",
+        heading=HARDPOINTS,
+    )
+    wheelbase: str | None = option(
+        "wheelbase [m], for Ackermann, turning circle and anti-values",
+        metavar="M",
+        heading=HARDPOINTS,
+    )
+    rack_per_turn: str | None = option(
+        "travel of the rack per turn of the steering wheel [m], for the steering ratio",
+        metavar="M",
+        heading=HARDPOINTS,
+    )
+    axle: str | None = option(
+        "motion of both wheels, the right one a mirror image of the left, and a rack: heave,"
+        " roll or steer, over --travel of the left wheel or of the rack",
+        metavar="MOTION",
+        heading=HARDPOINTS,
+    )
+    travel: str | None = option(
+        "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
+        " up: --travel=-40:120mm:33; in metres without a unit",
+        metavar="M[:SAMPLES]",
+        heading=HARDPOINTS,
+    )
+    rack: str | None = option(
+        "travel of the rack while the wheel goes up, such as 20mm, positive to the left: -M to"
+        " M, or START:STOP; in metres without a unit",
+        metavar="M",
+        heading=HARDPOINTS,
+    )
+    position: str | None = option(
+        "axle, front or rear, for anti-values; with --wheelbase, --cg-height and a share",
+        metavar="AXLE",
+        heading=HARDPOINTS,
+    )
+    cg_height: str | None = option(
+        "height of the vehicle's centre of gravity above the road [m]",
+        metavar="M",
+        heading=HARDPOINTS,
+    )
+    brake_share: str | None = option(
+        "share of the braking force at this axle, 0 to 1", metavar="X", heading=HARDPOINTS
+    )
+    drive_share: str | None = option(
+        "share of the driving force at this axle, 0 to 1", metavar="X", heading=HARDPOINTS
+    )
+    corner: str | None = option(
+        "wheel of a table of the whole car: FL, FR, RL, RR, or in words",
+        metavar="NAME",
+        heading=HARDPOINTS,
+    )
+    sheet: str | None = option(
+        "sheet of a workbook with several tables, or section of a tree, such as front",
+        metavar="NAME",
+        heading=HARDPOINTS,
+    )
+    drive: tuple[str, ...] = option(
+        "a joint that moves, as qpos, in rad or m without a unit: knee:-30:30deg:61; several"
+        " move together",
+        metavar="JOINT:START:STOP[:SAMPLES]",
+        several="repeated",
+        heading=MODELS,
+    )
+    hold: tuple[str, ...] = option(
+        "joints or free bodies that do not move", metavar="NAME", several="together", heading=MODELS
+    )
+    hold_rest: bool = switch(
+        "hold as many joints as needed: free bodies, joints with an actuator, others",
+        heading=MODELS,
+    )
+    without: tuple[str, ...] = option(
+        "elements of a model to leave out, by tag, name or TAG/NAME, or statements of a dataset"
+        " of Adams, as BUSHING or BUSHING/3; a note beside every verdict says so",
+        metavar="NAME",
+        several="together",
+        heading=MODELS,
+    )
+    start: tuple[str, ...] = option(
+        "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
+        " the start is assembled to close, and a note says by how far joints moved",
+        metavar="WHERE",
+        several="together",
+        heading=MODELS,
+    )
+    closure: float | None = option(
+        "accept gaps up to X [m] that stem from rounded digits of the file: rows that are"
+        " redundant within X are left out; default: [closure] tolerance of a case file, else 0;"
+        " for a model, from its digits",
+        positive,
+        metavar="X",
+    )
     recorded: bool = False
     bushings: Path | None = None
 
@@ -88,3 +181,52 @@ WITHOUT = "left out by --without: "
 """Begin of the note on what the user leaves out of a model."""
 LEFT_OUT = "; left out: "
 """Separator in the source of a case, before the list of omitted content of its file."""
+
+
+CURVES = "measured curves"
+
+
+@dataclass(frozen=True)
+class CurveOptions:
+    """What the user states of a curve."""
+
+    HEADINGS: ClassVar[Mapping[str, str]] = {
+        CURVES: "Facts that the file of --reference does not state; for one case."
+    }
+
+    columns: Sequence[str] = option(
+        'output of a column, if its name does not state it: "Toe Angle=toe [deg]"; with the'
+        " opposite sign: COLUMN=-OUTPUT",
+        metavar="COLUMN=OUTPUT",
+        flag="--map",
+        several="repeated",
+        heading=CURVES,
+    )
+    signs: str | None = option(
+        "iso8855 or sae_j670, if the file has no comment '# signs: CONVENTION'",
+        metavar="CONVENTION",
+        heading=CURVES,
+    )
+    accuracy: Sequence[str] = option(
+        'uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"; without'
+        " a unit in that of the column",
+        metavar="OUTPUT=NUMBER UNIT",
+        several="repeated",
+        heading=CURVES,
+    )
+    citation: str | None = option(
+        "source of the curve; without it, agreement is not called validated",
+        metavar="TEXT",
+        heading=CURVES,
+    )
+    sheet: str | None = option(
+        "sheet of a workbook with several tables",
+        metavar="NAME",
+        flag="--reference-sheet",
+        heading=CURVES,
+    )
+    own_samples: bool = switch(
+        "solve at the samples of the curve, instead of interpolating it",
+        flag="--at-reference",
+        heading=CURVES,
+    )

@@ -20,6 +20,7 @@ from ..case import TIME, Case, Origin, Quantity, Truth
 from ..suspension import Convention, PerTravel, SuspensionOutput
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import decimal, fault, shown, unknown_name
+from .reader_options import CurveOptions
 from .reference import compared
 from .reference_file import sha256
 from .reference_samples import (
@@ -62,27 +63,6 @@ _SIDES = {
 # A rig may go farther than the sweep. Millimetres taken for metres are 1000 times as far, degrees
 # for radians 57 times.
 FARTHER = 20.0
-
-
-@dataclass(frozen=True)
-class CurveOptions:
-    """What the user states of a curve.
-
-    Attributes:
-        columns: what columns hold: "COLUMN=[-]OUTPUT [UNIT]".
-        signs: convention of signs, if the file names none.
-        accuracy: tolerances of outputs: "OUTPUT=NUMBER UNIT".
-        citation: source of the values.
-        sheet: sheet of a workbook with several tables.
-        own_samples: whether the sweep takes the samples of the curve.
-    """
-
-    columns: Sequence[str] = ()
-    signs: str | None = None
-    accuracy: Sequence[str] = ()
-    citation: str | None = None
-    sheet: str | None = None
-    own_samples: bool = False
 
 
 def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, list[str]]:

@@ -26,8 +26,8 @@ from ...version import VERSION
 from ..execution import Attempt, Attempts, Failure, Pair, Solver, error_text
 from ..record import Outcome
 from ..resource_limits import Limits
-from .messages import pack
-from .worker import WorkerSlot
+from .pool import WorkerSlot
+from .serve import pack
 
 # Longest time for a port to answer [s], and then for its scheduler. Each takes milliseconds unless
 # packets are lost, which are sent again after 1 s and after 3 s.
@@ -89,14 +89,14 @@ def connected(distributed: Any, address: str) -> Generator[Any]:
             client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
         except OSError as error:
             raise ClusterError(
-                f"scheduler {address}: does not answer ({error_text(error)}); start one with"
+                f"scheduler {address}: does not answer ({error_text(error)}). Start one with"
                 " `dask scheduler` and workers with `dask worker ADDRESS`, where kincheck and the"
-                " engines are installed"
+                " engines are installed."
             ) from error
         except (ValueError, TypeError) as error:
             raise ClusterError(
                 f"scheduler {address}: found no address ({error_text(error)}), expected HOST:PORT"
-                " or tcp://HOST:PORT; write it as `dask scheduler` prints it"
+                " or tcp://HOST:PORT. Write it as `dask scheduler` prints it."
             ) from error
         with client:
             yield client

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ...harness.standard import STANDARD
-from ...report.figure_data import precision_figure, ticked_axis
-from ...report.figures import Figure, Style
+from ...report.figures import Figure, Style, precision_figure, ticked_axis
 from ...report.page_model import Plot
 from ...report.sections import Diagram
 from .engines import Bench, effort

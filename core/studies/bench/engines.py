@@ -19,7 +19,7 @@ from ...harness.native_engine import NativeEngine
 from ...harness.provenance import circumstances
 from ...program.llvm import compiler
 from ...program.llvm.jit import compiled_at_once
-from ...report.figure_data import Effort
+from ...report.figures import Effort
 from ..paper.formulation import Formulation
 from . import native_breakdown
 from .designs import Batch, StudyRate, measure_batches, measure_studies

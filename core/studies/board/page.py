@@ -8,8 +8,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from ...harness.labels import number
-from ...report.figure_data import floored, ticked_axis
-from ...report.figures import Figure, Style
+from ...report.figures import Figure, Style, floored, ticked_axis
 from ...report.page_model import Plot
 from ...report.sections import Diagram, Report, Section
 from .results import Board, Row, Run, TruthFacts

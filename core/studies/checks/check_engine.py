@@ -18,8 +18,7 @@ import numpy as np
 from ...case.case import TIME, Case
 from ...case.joint_probe import probe, probes
 from ...errors import shortened
-from ...harness.engine import Engine, may_run_here
-from ...harness.engine_versions import versions
+from ...harness.engine import Engine, may_run_here, versions
 from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, error_text, here
 from ...harness.record import Outcome, Record
 from ...harness.resource_limits import Limits

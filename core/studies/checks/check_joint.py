@@ -35,7 +35,6 @@ from ...harness.engine import Engine
 from ...joints import Joint, Kind
 from ...trajectory import Array
 from .findings import Finding, Report, Verdict, skipped, stated
-from .joint_drivers import driver
 from .joint_equations import (
     axis_lengths,
     composition,
@@ -51,7 +50,7 @@ from .joint_equations import (
     round_off,
     size_and_place,
 )
-from .joint_loops import loops
+from .joint_loops import driver, loops
 from .manifold import Specimen, branches, moved_specimen
 from .traced_joint import BODIES, Place
 
@@ -113,7 +112,7 @@ def check_joint(
         list(specimens) if specimens is not None else specimens_of(joint_class, rng, SPECIMENS)
     )
     if not offered:
-        raise SpecimenError(f"{joint_class.__name__}: no specimens were offered; give one or more")
+        raise SpecimenError(f"{joint_class.__name__}: no specimens were offered. Give one or more.")
     found = [
         finding
         for k, joint in enumerate(offered)
@@ -214,8 +213,8 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
     ]
     if unknown:
         raise SpecimenError(
-            f"{joint_class.__name__}: field {unknown[0]!r} has no kind; declare it by position(),"
-            f" direction(), positions(), directions() or length(), or {remedy}"
+            f"{joint_class.__name__}: field {unknown[0]!r} has no kind. Declare it by position(),"
+            f" direction(), positions(), directions() or length(), or {remedy}."
         )
     makers = (partial(_value, rng=rng, angle=math.radians(angle)) for angle in ANGLES)
     try:

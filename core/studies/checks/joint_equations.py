@@ -18,7 +18,7 @@ from ...kinematics import Style
 from ...primitives.base import NoFormError
 from ...trajectory import Array
 from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated
-from .joint_drivers import coordinate
+from .joint_loops import coordinate
 from .manifold import NEAR, STEP, Specimen, min_norm, newton, rank, smallest, times
 from .traced_joint import COLUMNS, POSES, Place, TracedJoint, execute, precise, turned
 

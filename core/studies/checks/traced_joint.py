@@ -202,7 +202,7 @@ class TracedJoint:
             self.names += [f"{kind.__name__} row {k + 1}" for k in range(count)]
         if not self.names:
             raise MechanismError(
-                f"{joint}: has 0 rows, expected one or more; return its primitives"
+                f"{joint}: has 0 rows, expected one or more. Return its primitives."
             )
         lengths = {name: len(self.programs[name].outputs) for name in ("phi", "nu", "gamma")}
         lengths["rows"] = len(self.programs["rows"].outputs) // self.columns
@@ -216,7 +216,7 @@ class TracedJoint:
             not isinstance(each, Relation) and each.primitive.body_axes for each in found
         ):
             raise MechanismError(
-                f"{joint}: its primitives have rows in body axes; write them in global axes"
+                f"{joint}: its primitives have rows in body axes. Write them in global axes."
             )
 
     def _trace(self, equations: Cartesian) -> None:

@@ -15,7 +15,7 @@ from ...case.compliance import Load
 from ...harness.record import Record, Results
 from ...report.figures import Figure, Style
 from ...report.page_model import Plot
-from ...report.page_parts import environment, figure_parts
+from ...report.sections import environment, figure_parts
 from ...trajectory import Array
 from ...unit_text import with_unit
 from .study import ComplianceCurves, ComplianceResults

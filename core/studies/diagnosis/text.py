@@ -12,8 +12,7 @@ from rich.text import Text
 
 from ...kinematics import NamedRow, describe_screws
 from ...report.terminal import columns, listed
-from .determinacy import Determinacy
-from .diagnose import Diagnosis, Sample
+from .diagnose import Determinacy, Diagnosis, Sample
 
 # Rows of tables, which only show where to look; the JSON has all.
 SAMPLES, PLACES, TERMS = 9, 5, 6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...report.markdown import escaped, row
 from ...report.sections import Report, Section
+from ...report.table import escaped, row
 from ...trajectory import QUANTITIES
 from .results import Cell, Finding, Stress, largest
 from .verdicts import ELSEWHERE, SILENT, Verdict

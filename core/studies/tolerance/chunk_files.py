@@ -20,7 +20,7 @@ import numpy as np
 from ...case.io.atomic_files import whole
 from ...errors import KincheckError
 from ...extras import library
-from ...history.run_recorder import digest
+from ...history.runs import digest
 from ..variation.variation import Coordinate
 from .study import Chunk, Study
 
@@ -72,8 +72,8 @@ class Part:
                 if file.read(len(head)) != head:
                     raise KincheckError(
                         f"--resume: {self.path} is the part of another study: the case, what"
-                        " varies, the options, versions or the machine differ; give the same, or"
-                        " leave out --resume to begin anew"
+                        " varies, the options, versions or the machine differ. Give the same, or"
+                        " leave out --resume to begin anew."
                     )
                 for index in range(study.chunks):
                     chunk = _next(file)
@@ -181,8 +181,8 @@ class ParquetStore:
             self._writer = parquet.ParquetWriter(self._whole.__enter__(), self._schema)
         except OSError as error:
             raise KincheckError(
-                f"--store {path}: cannot be written ({error.strerror or error}); give a file"
-                " elsewhere"
+                f"--store {path}: cannot be written ({error.strerror or error}). Give a file"
+                " elsewhere."
             ) from error
 
     def __enter__(self) -> Self:

@@ -95,8 +95,8 @@ def require_able(study: Study, check: Check) -> None:
         Outcome.UNSUPPORTED,
     ):
         raise KincheckError(
-            f"--check {check.engine.name}: {result.outcome}: {result.message}; check with"
-            " another engine"
+            f"--check {check.engine.name}: {result.outcome}: {result.message}. Check with"
+            " another engine."
         )
 
 

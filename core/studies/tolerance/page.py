@@ -13,7 +13,7 @@ from ...harness.labels import notes, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import Axis, driver_axis
 from ...report.figures import Figure, layout_over
-from ...report.page_parts import environment, figure_parts
+from ...report.sections import environment, figure_parts
 from ...unit_text import with_unit
 from .conformance import Capability, Histogram
 from .results import Envelope, Gradient, Numbers, SweepResults

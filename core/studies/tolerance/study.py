@@ -225,8 +225,8 @@ class Study:
         for each in self.variation.limits:
             if each.output not in names:
                 raise KincheckError(
-                    f"limits of {each.output}: the study has no such row; give --order 1 for"
-                    " velocities and 2 for accelerations too"
+                    f"limits of {each.output}: the study has no such row. Give --order 1 for"
+                    " velocities and 2 for accelerations too."
                 )
         return tuple(
             RowLimit(names.index(each.output), each.low, each.high)

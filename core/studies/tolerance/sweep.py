@@ -27,7 +27,7 @@ from ...harness.execution import error_text
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
-from ...harness.workers.messages import pack
+from ...harness.workers.serve import pack
 from ...version import VERSION
 from ..variation.study_choices import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
@@ -125,8 +125,8 @@ def solve_there(packed: bytes, index: int, version: str) -> Chunk:
     """
     if version != VERSION:
         raise ClusterError(
-            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep;"
-            " install the same there"
+            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep."
+            " Install the same there."
         )
     key = hashlib.sha256(packed).digest()
     with _lock:  # a worker's threads share the model; a worker keeps the models of two studies
@@ -315,18 +315,18 @@ def how_many(variation: Variation, samples: int | None) -> int:
     if listed is None:
         if samples is None:
             raise KincheckError(
-                f"{variation.mode} draws as many variants as it is told; give --samples"
+                f"{variation.mode} draws as many variants as it is told. Give --samples."
             )
         listed = samples
     elif samples is not None:
         raise KincheckError(
-            f"--samples: {variation.mode} has {listed} variants as listed, none is drawn; leave"
-            " it out"
+            f"--samples: {variation.mode} has {listed} variants as listed, none is drawn. Leave"
+            " it out."
         )
     if not 1 <= listed <= MOST_VARIANTS:
         raise KincheckError(
-            f"{listed} variants, expected 1 to {MOST_VARIANTS}; vary less at once, or in fewer"
-            " steps"
+            f"{listed} variants, expected 1 to {MOST_VARIANTS}. Vary less at once, or in fewer"
+            " steps."
         )
     return listed
 

@@ -14,8 +14,8 @@ from ...case.io.escape import cell
 from ...errors import number_of
 from ...harness.labels import notes, number
 from ...report import terminal
-from ...report.fitting_table import FittingTable
 from ...report.table import print_signs
+from ...report.terminal import FittingTable
 from ..variation.study_choices import Incomplete
 from .conformance import Capability, sparkline
 from .results import Gradient, SweepResults

@@ -173,7 +173,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
             raise DefectError(
                 f"{case.name}: the closed form is {moved[k]:.2g} of the mechanism's size off at"
                 f" {case.sweep.driver} = {case.sweep.values[chunk[k]]!r}, condition"
-                f" {size[k]:.2g}; correct the family"
+                f" {size[k]:.2g}. Correct the family."
             )
         found.reach[chunk] = Reach.REACHED
         found.singular[chunk] = size >= SINGULAR

@@ -59,7 +59,7 @@ def require_extended() -> None:
     if np.finfo(np.longdouble).eps > 1e-18:
         raise KincheckError(
             "kincheck stress: numpy's longdouble is no wider than a double on this machine, so"
-            " the truth has no extra digits; run it on x86-64 Linux"
+            " the truth has no extra digits. Run it on x86-64 Linux."
         )
 
 
@@ -241,8 +241,8 @@ class Rows:
         for coupler in mechanism.couplers:
             if coupler.curve:
                 raise NotStatedError(
-                    f"{coupler}: the stress truth has no polynomial conditions; use a linear"
-                    " coupler"
+                    f"{coupler}: the stress truth has no polynomial conditions. Use a linear"
+                    " coupler."
                 )
             row = self.row(coupler.name)
             units = [self.unit if each == "translation" else 1.0 for each in coupler.freedoms]

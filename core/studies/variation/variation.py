@@ -218,15 +218,15 @@ def check_count(sampling: Sampling, coordinates: int, count: int) -> None:
     """Raise KincheckError if a sampling cannot have as many points."""
     if sampling is Sampling.SOBOL and count > 2**BITS:
         raise KincheckError(
-            f"--sampling sobol: {count} variants, expected at most {2**BITS}; take fewer, or"
-            " --sampling random"
+            f"--sampling sobol: {count} variants, expected at most {2**BITS}. Take fewer, or"
+            " --sampling random."
         )
     size = 4 * coordinates * count
     if sampling is Sampling.LATIN and size > LATIN_BYTES:
         raise KincheckError(
             f"--sampling latin: the orders of {count} variants and {coordinates} coordinates take"
-            f" {size / 1e9:.3g} GB of memory, expected at most {LATIN_BYTES / 1e9:g}; take fewer"
-            " variants, or --sampling sobol, which needs none"
+            f" {size / 1e9:.3g} GB of memory, expected at most {LATIN_BYTES / 1e9:g}. Take fewer"
+            " variants, or --sampling sobol, which needs none."
         )
 
 
@@ -382,7 +382,7 @@ class Variation:
         """
         if sampling is not Sampling.RANDOM and self.mode is not Mode.MONTE_CARLO:
             raise KincheckError(
-                f"--sampling {sampling}: {self.mode} draws nothing; leave it out, or set mode ="
+                f"--sampling {sampling}: {self.mode} draws nothing. Leave it out, or set mode ="
                 ' "monte_carlo"'
             )
         check_count(sampling, len(self.coordinates), count)

@@ -47,7 +47,7 @@ def unit_of_offsets(
         raise fault(
             file,
             "units.length",
-            f'missing, expected "m" or "mm" for {key}; say which unit it is in',
+            f'missing, expected "m" or "mm" for {key}. Say which unit it is in.',
         )
     length = LENGTHS[units.length or "m"]
     angle = RADIAN if units.angle is None else ANGLES[units.angle]
@@ -99,7 +99,7 @@ def limits_of_texts(texts: Iterable[str], case: Case, units: FileUnits) -> tuple
             if None in parts or len(stated) > 1:
                 raise ValueError
         except ValueError:
-            raise KincheckError(f"--limit: found {text!r}, {_EXPECTED}; correct it") from None
+            raise KincheckError(f"--limit: found {text!r}, {_EXPECTED}. Correct it.") from None
         try:
             found.append(limit_of(case, units, name, low, high, *stated))
         except ValueError as error:
@@ -133,13 +133,13 @@ def limit_of(
         size = known[0](1.0)
     numbers = [each for each in (low, high) if each is not None]
     if not numbers:
-        raise ValueError("found neither low nor high, expected one limit at least; give one")
+        raise ValueError("found neither low nor high, expected one limit at least. Give one.")
     if not all(map(math.isfinite, numbers)):
-        raise ValueError(f"found {numbers}, expected finite numbers; leave out what has no limit")
+        raise ValueError(f"found {numbers}, expected finite numbers. Leave out what has no limit.")
     if len(numbers) == 2 and numbers[0] >= numbers[1]:
         raise ValueError(
-            f"found low = {numbers[0]:g} and high = {numbers[1]:g}, expected low below high;"
-            " correct them"
+            f"found low = {numbers[0]:g} and high = {numbers[1]:g}, expected low below high."
+            " Correct them."
         )
     return Limit(
         name,
@@ -159,7 +159,7 @@ def _found(case: Case, name: str) -> tuple[Quantity, int]:
         raise ValueError(f"there is no output {name!r} of the case; {remedy(name, known)}")
     output = known[base]
     if derivative >= output.orders:
-        raise ValueError(f"output {base!r} has no {quantity}; limit its value")
+        raise ValueError(f"output {base!r} has no {quantity}. Limit its value.")
     return output, derivative
 
 
@@ -266,7 +266,7 @@ class CoordinateReader:
                 self.file,
                 join(self.key, "distribution"),
                 f"found {shown(keys.distribution)}, expected none, for {self.mode} draws"
-                " nothing; leave it out",
+                " nothing. Leave it out.",
             )
         takes = _LISTED.get(self.mode) or _DRAWN[keys.distribution]
         if given in takes:
@@ -276,7 +276,7 @@ class CoordinateReader:
         what = self.mode if keys.distribution is None else f"distribution {keys.distribution}"
         if keys.distribution is None and given == _BOTH:
             choices += ', or both with distribution = "truncated_normal"'
-        raise self._fault(f"found {there}, expected for {what}: {choices}; correct the keys")
+        raise self._fault(f"found {there}, expected for {what}: {choices}. Correct the keys.")
 
     def _sizes(self, given: float | list[float] | None, count: int) -> list[float]:
         """Return the size of the offsets of each coordinate; empty if the file gives none."""
@@ -286,7 +286,7 @@ class CoordinateReader:
             return [given] * count
         if count == 1:
             raise self._fault(
-                f"found {shown(given)}, expected one number, for it is {self._single}; give one"
+                f"found {shown(given)}, expected one number, for it is {self._single}. Give one."
             )
         return given
 
@@ -313,9 +313,9 @@ class CoordinateReader:
                 ", or three of them" if count == 3 else f", for it is {self._single}"
             )
             what = f"found {shown(given)}, expected {expected}"
-            raise fault(self.file, key, f"{what}; correct the lists")
+            raise fault(self.file, key, f"{what}. Correct the lists.")
         if any(len(set(each)) < len(each) for each in found):
-            raise fault(self.file, key, "found an offset twice, expected each once; remove one")
+            raise fault(self.file, key, "found an offset twice, expected each once. Remove one.")
         return found
 
     @property
@@ -367,7 +367,9 @@ class _Reader:
         coordinates = [each for block in blocks.values() for _, each in block.coordinates]
         if not coordinates:
             raise fault(
-                self.file, "hardpoints", "nothing varies, expected an offset other than 0; give one"
+                self.file,
+                "hardpoints",
+                "nothing varies, expected an offset other than 0. Give one.",
             )
         moves: dict[str, Array] = {}
         column = 0
@@ -418,7 +420,7 @@ class _Reader:
             if each not in there:
                 at = f"does not follow {moved.name}" if moved.row else f"is not at {moved.name}"
                 problem = f"found {shown(each)}, which {at} at design; expected some of"
-                raise fault(self.file, key, f"{problem} {', '.join(there)}; correct the list")
+                raise fault(self.file, key, f"{problem} {', '.join(there)}. Correct the list.")
         return self.geometry.only(moved, chosen)
 
     def _check_owners(self, blocks: Mapping[str, Variable]) -> None:
@@ -430,7 +432,7 @@ class _Reader:
                 rows = each.row and other.row and each.name != other.name
                 if owner != name and not rows:
                     problem = f"moves {place}, as does hardpoints.{owner}, expected one of them to"
-                    raise fault(self.file, join("hardpoints", name), f"{problem}; give one `only`")
+                    raise fault(self.file, join("hardpoints", name), f"{problem}. Give one `only`.")
 
     def _found(self, key: str, name: str, find: Callable[[str], _Named]) -> _Named:
         try:
@@ -452,7 +454,7 @@ class _Reader:
                 raise fault(
                     self.file,
                     join(key, each),
-                    f"found {place}, {kind.value}, expected {wanted.value}; name another",
+                    f"found {place}, {kind.value}, expected {wanted.value}. Name another.",
                 )
         direction = np.array(self.geometry.values[axis])
         way = np.subtract(self.geometry.values[ends[1]], self.geometry.values[ends[0]])
@@ -463,7 +465,7 @@ class _Reader:
                 f"found {axis}, which does not go through {ends[0]} and {ends[1]} at design,"
                 " expected the line between them"
             )
-            raise fault(self.file, join(key, "through"), f"{problem}; correct the names")
+            raise fault(self.file, join(key, "through"), f"{problem}. Correct the names.")
         still = np.zeros((3, len(next(iter(moves.values()))[0])))
         follows = moves.get(ends[1], still) - moves.get(ends[0], still)
         follows *= math.copysign(float(np.linalg.norm(direction)) / long, cosine)
@@ -472,7 +474,7 @@ class _Reader:
             raise fault(
                 self.file,
                 join(key, "axis"),
-                f"found {axis}, which varies by itself, expected one that follows; leave out one",
+                f"found {axis}, which varies by itself, expected one that follows. Leave out one.",
             )
         if follows.any():
             moves.setdefault(axis, follows)
@@ -495,7 +497,7 @@ class _Reader:
                 raise fault(
                     self.file,
                     "hardpoints",
-                    f"{problem}, expected relative = true; drive it so, or leave the point",
+                    f"{problem}, expected relative = true. Drive it so, or leave the point.",
                 )
 
 
@@ -515,7 +517,7 @@ def read_correlations(
         raise fault(
             file,
             "correlations",
-            f"found some, expected none, for {keys.mode} draws nothing; leave them out, or set mode"
+            f"found some, expected none, for {keys.mode} draws nothing. Leave them out, or set mode"
             ' = "monte_carlo"',
         )
     found: list[Correlation] = []
@@ -532,7 +534,7 @@ def read_correlations(
                     file,
                     join(key, "coordinates"),
                     f"found {coordinate!r} here and in correlations.{owner}, expected each"
-                    " coordinate once; write one matrix of all that correlate",
+                    " coordinate once. Write one matrix of all that correlate.",
                 )
             owners[coordinate] = name
         if problem := problem_of(each.matrix, each.coordinates):

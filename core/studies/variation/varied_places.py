@@ -105,7 +105,7 @@ class Geometry:
         if (row := self._by_name.get(name)) is not None:
             if not row.moves:
                 raise PlaceError(
-                    "which nothing of the case follows, expected another row; leave it"
+                    "which nothing of the case follows, expected another row. Leave it."
                 )
             return row
         place = self.find(name)
@@ -116,7 +116,7 @@ class Geometry:
         movers = [each for each in self.rows.values() if place in each.moves]
         if len(movers) > 1:
             rows = " and ".join(each.name for each in movers)
-            raise PlaceError(f"which follows from {rows}, expected one of these; name it")
+            raise PlaceError(f"which follows from {rows}, expected one of these. Name it.")
         if movers:
             return movers[0]
         together = self.together(place)
@@ -168,7 +168,7 @@ class Geometry:
             raise PlaceError(f"expected {rows}{what}; {remedy(name, known)}")
         if any(place not in self.together(found[0]) for place in found):
             raise PlaceError(
-                f"which may be {' or '.join(found)}, expected one place; write it in full"
+                f"which may be {' or '.join(found)}, expected one place. Write it in full."
             )
         return found[0]
 

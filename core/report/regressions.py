@@ -5,13 +5,22 @@ versions.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TextIO
 
-from ..errors import shortened
+from markupsafe import Markup
+from rich.console import Console
+from rich.text import Text
+
+from ..case.io.escape import visible
+from ..errors import number_of, shortened
 from ..harness.labels import motion_unit, number, product, unread_count
-from ..history.findings import Finding, Kind, Loose, Regressions, Step
+from ..history.findings import WHY, Finding, Kind, Loose, Regressions, Step
 from ..unit_text import value_text
+from . import terminal
+from .sections import environment
+from .table import escaped, row
 
 LONGEST = 12
 """Largest number of rows shown in a group; a broken engine has one for every case. The JSON has
@@ -205,3 +214,131 @@ def loose_says(loose: Sequence[Loose]) -> list[str]:
         )
         lines.append(f"{case}: {many}, {factor}, by {least.runs} runs{reason}")
     return lines
+
+
+def to_markdown(found: Regressions) -> str:
+    """Return the changes in Markdown, the worst first; long parts are folded."""
+    return "\n".join([f"## {escaped(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
+
+
+def to_markup(found: Regressions) -> Markup:
+    """Return the changes as a part of an HTML page."""
+    groups = [
+        (
+            kind,
+            WHY[kind],
+            len(pairs(found, kind)),
+            rows(each for each in found.findings if each.kind is kind),
+        )
+        for kind in Kind
+    ]
+    return Markup(
+        environment()
+        .get_template("regressions.html")
+        .render(
+            headline=headline(found),
+            found=found,
+            groups=[group for group in groups if group[2]],
+            steps=[
+                (over, title, step_lines(found.steps, over=over)) for over, title in STEPS.items()
+            ],
+            passed_by=passed_by_says(found),
+            loose=loose_says(found.loose),
+            longest=LONGEST,
+        )
+    )
+
+
+def _lines(found: Regressions) -> Iterator[str]:
+    if found.changes:
+        yield f"Changed: {escaped(', '.join(map(str, found.changes)))}."
+    elif found.against is not None:
+        yield "Neither versions nor machine nor commit changed."
+    yield ""
+    yield from [passed_by_says(found), ""] if found.passed_by else []
+    for kind in Kind:
+        group = rows(each for each in found.findings if each.kind is kind)
+        if not group:
+            continue
+        folded = not found.fails(kind) and kind not in (Kind.FIXED, Kind.JUDGED)
+        title = f"{kind.capitalize()} ({len(pairs(found, kind))}): {WHY[kind]}"
+        yield from (
+            [f"<details><summary>{escaped(title)}</summary>", ""]
+            if folded
+            else [f"**{escaped(title)}**", ""]
+        )
+        yield from ("| engine | case | what |", "| --- | --- | --- |")
+        for each in group[:LONGEST]:
+            yield row(map(escaped, (each.engine, each.where, each.what)))
+        yield ""
+        if len(group) > LONGEST:
+            yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
+        yield from ["</details>", ""] if folded else []
+    for over, title in STEPS.items():
+        lines = step_lines(found.steps, over=over)
+        if lines:
+            yield from (
+                [f"<details><summary>{title} ({len(lines)})</summary>", ""]
+                if over
+                else [f"**{title}**", ""]
+            )
+            yield from (f"- {escaped(line)}" for line in lines[:LONGEST])
+            rest = len(lines) - LONGEST
+            yield from [f"- and {rest} more, all in the JSON"] if rest > 0 else []
+            yield from ["", "</details>", ""] if over else [""]
+    if found.loose:
+        lines = loose_says(found.loose)
+        title = f"Tolerances that could be tightened ({number_of(len(lines), 'case')})"
+        yield from (f"<details><summary>{title}</summary>", "")
+        yield from (f"- {escaped(line)}" for line in lines)
+        yield from ("", "</details>", "")
+
+
+def print_regressions(found: Regressions, file: TextIO) -> None:
+    """Print the changes, the worst first."""
+    console = terminal.console(file)
+    _print_line(console, headline(found), "bold")
+    if found.changes:
+        _print_line(console, f"changed: {', '.join(map(str, found.changes))}")
+    elif found.against is not None:
+        _print_line(console, "neither versions nor machine nor commit changed")
+    if passed_by := passed_by_says(found):
+        _print_line(console, passed_by)
+    for kind in Kind:
+        _print_kind(console, found, kind)
+    for over, title in STEPS.items():
+        _print_list(console, title.lower(), step_lines(found.steps, over=over))
+    _print_list(console, "tolerances that could be tightened", loose_says(found.loose))
+
+
+def _print_kind(console: Console, found: Regressions, kind: Kind) -> None:
+    group = rows(each for each in found.findings if each.kind is kind)
+    if not group:
+        return
+    style = "bold red" if found.fails(kind) else "bold"
+    _print_line(console, "")
+    _print_line(console, f"{kind} ({len(pairs(found, kind))}): {WHY[kind]}", style)
+    table = terminal.columns("engine", "case", "what")
+    for each in group[:LONGEST]:
+        table.add_row(*(Text(visible(cell)) for cell in (each.engine, each.where, each.what)))
+    console.print(terminal.indented(table))
+    _print_rest(console, len(group))
+
+
+def _print_list(console: Console, title: str, lines: list[str]) -> None:
+    if not lines:
+        return
+    _print_line(console, "")
+    _print_line(console, f"{title} ({len(lines)})", "bold")
+    for line in lines[:LONGEST]:
+        _print_line(console, f"  {line}")
+    _print_rest(console, len(lines))
+
+
+def _print_rest(console: Console, count: int) -> None:
+    if count > LONGEST:
+        _print_line(console, f"  and {count - LONGEST} more, all in the JSON")
+
+
+def _print_line(console: Console, line: str, style: str = "") -> None:
+    console.print(Text(visible(line), style=style), soft_wrap=True)

@@ -1,0 +1,272 @@
+"""Commands that check: kincheck check-joint, check-engine and reference."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from ..case.io.escape import file_name, visible
+from ..errors import KincheckError
+from ..options import (
+    CASES,
+    argument,
+    destination,
+    joint_types,
+    option,
+    options,
+    switch,
+    verbosity,
+    whole,
+)
+from .parser import Command
+from .registry import Registry, Status
+from .run_options import TOL
+
+if TYPE_CHECKING:
+    from ..case.io.reference_file import Reference
+    from ..harness.engine import Engine
+    from ..report.terminal import FittingTable
+    from ..studies.checks.findings import Report
+    from ..studies.verified_reference import NativeError
+
+
+@options
+class CheckJoint(Command):
+    """Check a joint type: its equations against their derivatives, its branches, and a closed loop
+    in every engine.
+    """
+
+    about: ClassVar[str] = "check your own joint type, or a built-in one"
+    joint: str = argument(
+        "a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
+        " built-in type, such as revolute",
+        "JOINT",
+    )
+    seed: int = option("seed of the random poses; default %(default)s", whole(0), "N", default=0)
+    quiet: bool = verbosity("print only the failed checks and the count")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..studies.checks.check_joint import check_joint
+        from .joint_loading import named_joint
+
+        report = check_joint(
+            named_joint(self.joint),
+            seed=self.seed,
+            engines=[*map(registry.engine, registry.engines)],
+        )
+        report.print(sys.stdout, quiet=self.quiet)
+        return Status.WITHIN if report.passed else Status.DEVIATES
+
+
+TOPOLOGIES = {
+    "one loop": "rssr",
+    "open and closed": "spatial_slider_crank",
+    "several loops": "andrews_squeezer",
+    "parallel robot": "stewart_platform",
+    "redundant rows": "bennett",
+    "two drivers": "mcpherson_steered",
+    "outputs of orientation": "mcpherson_suspension",
+}
+"""Built-in cases by a word on their structure."""
+
+
+@options
+class CheckEngine(Command):
+    """Check an engine: every joint type, several topologies, its rates against differences, its
+    refusals, and repeated answers. Each pair is solved in a worker process.
+    """
+
+    about: ClassVar[str] = "check your own engine"
+    engine: str | Engine | None = argument(
+        "the class, in a module of this folder or an installed one; or an engine's name",
+        "MODULE:CLASS",
+        "?",
+        default=None,
+    )
+    engine_command: str | None = option(
+        'a program as an engine, "prog {case} {samples} {out}"; see run',
+        metavar="COMMAND",
+        default=None,
+    )
+    quiet: bool = verbosity("print only the failed checks and the count")
+
+    def answer(self, registry: Registry) -> Report:
+        """Check an engine, given by itself, by name, or as MODULE:CLASS.
+
+        Raises:
+            KincheckError: there is no such engine, or a member of the engine protocol is missing.
+        """
+        from ..harness.standard import STANDARD
+        from ..recorded.program import ProgramEngine
+        from ..report.progress import progress
+        from ..studies.checks.check_engine import check_engine
+
+        program = self.engine_command
+        engine = ProgramEngine(program) if program is not None else self.engine
+        problems = list[str]()
+        found = registry.find_engines([engine], problems)
+        if problems:
+            raise KincheckError("\n".join(problems))
+        cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}
+        native = registry.engine(STANDARD)
+        return check_engine(found[0], native, cases, tol=TOL, progress=progress([]))
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        if (self.engine is None) == (self.engine_command is None):
+            raise KincheckError("Name one engine to check: MODULE:CLASS or --engine-command.")
+        report = self.answer(registry)
+        report.print(sys.stdout, quiet=self.quiet)
+        return Status.WITHIN if report.passed else Status.DEVIATES
+
+
+# A double has 17 digits; beyond 1000 digits only the time grows.
+FEWEST, DIGITS, MOST = 17, 30, 1000
+# Largest number of unproved samples in the output; the file has all of them.
+NAMED = 5
+
+
+@options
+class ProveReferences(Command):
+    """Prove that exactly one solution exists near each sample of the native engine, and enclose its
+    outputs.
+
+    Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not
+    do its work.
+    """
+
+    about: ClassVar[str] = "prove the samples of cases to any number of digits"
+    case: tuple[str, ...] = argument(CASES, "CASE", "*")
+    joint_type: tuple[str, ...] = joint_types()
+    out: Path | None = destination(
+        "write CASE.reference.json there, for run --reference or a case file", Path, "DIR"
+    )
+    digits: int = option(
+        "accuracy of the outputs, 10^-N; default %(default)s",
+        whole(FEWEST, MOST),
+        "N",
+        default=DIGITS,
+    )
+    decimal: bool = switch(
+        "take the numbers of a case as their printed decimals, instead of as the doubles that"
+        " engines get"
+    )
+    quiet: bool = verbosity("print one line for each case")
+    verbose: bool = verbosity("print every unproved sample", "-v")
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import unwritable, written
+        from ..harness.record import to_json
+        from ..report.terminal import indented, page
+        from ..studies.verified_reference import prove_case
+
+        unread: dict[str, str] = {}
+        cases = registry.find_cases(self.case or [*registry.cases()], unread)
+        problems = [*unread.values()]
+        if self.out is not None:
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                problems.append(
+                    f"--out {self.out}: cannot be made a folder ({error.strerror}); give"
+                    " another one"
+                )
+        names = [f"{file_name(case.name)}.reference.json" for case in cases]
+        if self.out is not None:
+            problems += unwritable(
+                (case.name, self.out / name) for case, name in zip(cases, names, strict=True)
+            )
+        if problems:
+            raise KincheckError("\n".join(problems))
+        complete = True
+        for case, name in zip(cases, names, strict=True):
+            numbers = "decimal" if self.decimal else "double"
+            found, errors = prove_case(case, digits=self.digits, numbers=numbers, tol=TOL)
+            complete &= found.proved == len(found.samples)
+            lines = _lines(found, len(found.samples) if self.verbose else NAMED)
+            print(*(lines[:1] if self.quiet else lines), sep="\n", flush=True)
+            if errors and not self.quiet:
+                page(None).print(indented(_table(errors)))
+            if self.out is not None:
+                problems += written(self.out / name, to_json(found))
+        if problems:
+            raise KincheckError("\n".join(problems))
+        return Status.WITHIN if complete else Status.DEVIATES
+
+
+def _lines(found: Reference, named: int) -> list[str]:
+    """Return the lines of a report on proved and unproved samples."""
+    count, proved = len(found.samples), [sample for sample in found.samples if sample.proved]
+    each = 1e3 * found.seconds / max(1, count)
+    lines = [
+        f"{found.case}: {len(proved)} of {count} samples proved to 1e-{found.digits},"
+        f" {found.seconds:.2g} s, {each:.2g} ms each"
+    ]
+    if proved:
+        lines.append(
+            f"  each solution is the only one within {min(s.alone or 0.0 for s in proved):.2g} of"
+            " the mechanism's size"
+        )
+    if found.redundant:
+        worst, contradicted = (
+            max((s.redundant or 0.0 for s in proved), default=0.0),
+            sum(s.contradicted > 0 for s in proved),
+        )
+        closes = (
+            f"; not zero at {contradicted} samples: the geometry, as rounded, closes only without"
+            " them"
+            if contradicted
+            else ""
+        )
+        lines.append(
+            f"  {len(found.redundant)} redundant rows, {worst:.1e} or less at the solutions{closes}"
+        )
+    lines += [
+        f"  {name}: no proof: {each.reason}" for name, each in found.outputs.items() if each.reason
+    ]
+    lines += _missing(found, named)
+    lines += [
+        f"  signs: {words}"
+        for words in dict.fromkeys(each.signs for each in found.outputs.values())
+        if words
+    ]
+    return lines
+
+
+def _table(errors: Sequence[NativeError]) -> FittingTable:
+    """Return the native engine's errors."""
+    from rich.text import Text
+
+    from ..report.terminal import columns
+    from ..trajectory import QUANTITIES
+
+    table = columns("native error", *(f">{quantity}" for quantity in QUANTITIES), "unit")
+    for error in errors:
+        cells = (_cell(*pair) for pair in zip(error.largest, error.ulps, strict=True))
+        table.add_row(*map(Text, (visible(error.output), *cells, visible(error.unit))))
+    return table
+
+
+def _cell(largest: float | None, ulps: float | None) -> str:
+    if largest is None:
+        return "–"
+    return f"{largest:.1e}" + (f" {ulps:6.1f} ulp" if ulps is not None else "")
+
+
+def _missing(found: Reference, named: int) -> list[str]:
+    """Return the lines about samples without a proof."""
+    name, values = next(iter(found.driver.items()))
+    missing = [(k, sample.reason) for k, sample in enumerate(found.samples) if not sample.proved]
+    lines = [
+        f"  sample {k} ({name} = {values[k]:.9g}) not proved: {reason}"
+        for k, reason in missing[:named]
+    ]
+    return lines + (
+        [f"  and {len(missing) - named} more; -v prints all, --out writes them"]
+        if len(missing) > named
+        else []
+    )

@@ -1,0 +1,304 @@
+"""Commands that print what kincheck knows: kincheck list, schema and completion."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import msgspec
+
+from ..case.io.atomic_files import to_standard_output
+from ..extras import how_to_install, installed_version, is_extra
+from ..options import argument, joint_types, options, switch, verbosity
+from .parser import Command
+from .registry import Registry, Status
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..harness.engine import Engine
+
+
+SOURCE_WIDTH = 100
+"""Longest line of the docstrings that `--schema` prints [characters]."""
+BROKEN = 96
+"""Shortest length, with the next word, of a line that may have been broken [characters]."""
+CUT = {"no_wrap": True, "overflow": "ellipsis", "crop": True}
+
+
+@options
+class List(Command):
+    """List the built-in cases with the kind and source of their references, and the engines with
+    the installed versions (kincheck doctor also imports them); or list the keys and types of files.
+    """
+
+    about: ClassVar[str] = "list cases and engines"
+    schema: bool = switch("list the keys of a case file, and of a file of variations")
+    joints: bool = switch("list the types a case file can name: joints, drivers, motions")
+    outputs: bool = switch("list the types of outputs a case file can name, with their signs")
+    quiet: bool = verbosity("print only the names: cases, then engines")
+    verbose: bool = verbosity("print sources in full on narrow terminals, too", "-v")
+    joint_type: tuple[str, ...] = joint_types()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..report.terminal import page
+
+        console = page(None)
+        # a line for each case: cut at the edge of a terminal, whole in a pipe
+        how: Any = {"soft_wrap": True} if self.verbose or not console.is_terminal else CUT
+        print_line = partial(console.print, **how)
+        if self.schema or self.joints or self.outputs:
+            _print_references(self, console)
+            return Status.WITHIN
+        cases = registry.cases()
+        if self.quiet:
+            print(*cases, *dict.fromkeys((*registry.engines, *registry.simulations)), sep="\n")
+            return Status.WITHIN
+        print_line("cases:")
+        for name in cases:
+            kind, source = registry.summary(name)
+            print_line(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
+        print_line("engines:")
+        engines: list[Engine] = [
+            *map(registry.engine, registry.engines),
+            *(registry.engine(name, "simulate") for name in registry.simulations),
+        ]
+        width = max(len(engine.name) for engine in engines)
+        for engine in engines:
+            version = _version(engine)
+            state = (
+                f"not installed: {how_to_install(engine.name)}"
+                if version is None
+                else f"{version}  {engine.mode}, loop: {engine.loop}"
+            )
+            console.print(f"  {engine.name:{width}}  {state}", soft_wrap=True)
+        return Status.WITHIN
+
+
+def _version(engine: Engine) -> str | None:
+    """Return the installed version of an engine; a simulator with an extra is not imported."""
+    from ..harness.engine import versions
+
+    return installed_version(engine.name) if is_extra(engine.name) else versions([engine])[0]
+
+
+def _print_references(options: List, console: Console) -> None:
+    """Print keys and types, with whole lines for a pipe and broken lines for a terminal."""
+    from ..case.io import catalogue
+    from ..report.terminal import LOG_WIDTH, indented, unheaded
+
+    if options.schema:
+        lines = [*_keys()]
+        if console.width < SOURCE_WIDTH:
+            lines = [part for line in _joined(lines) for part in _hung(line, console.width)]
+        console.print(*lines, sep="\n", soft_wrap=True)
+    if console.width >= LOG_WIDTH:
+        lines = [
+            *(catalogue.catalogue() if options.joints else ()),
+            *(catalogue.output_catalogue() if options.outputs else ()),
+        ]
+        if lines:
+            console.print(*lines, sep="\n", soft_wrap=True)
+        return
+    for wanted, remarks, tables in (
+        (options.joints, catalogue.ON_TYPES, catalogue.type_tables),
+        (options.outputs, (), catalogue.output_tables),
+    ):
+        if wanted:
+            console.print(*remarks, sep="\n")
+        for heading, rows in tables().items() if wanted else ():
+            console.print(heading)
+            console.print(indented(unheaded(rows)))
+    if options.outputs:
+        console.print(catalogue.ON_OUTPUTS)
+
+
+def _keys() -> Iterator[str]:
+    """Yield the lines on the keys of case and variation files, from their readers."""
+    from ..case.io import schema
+    from ..studies.variation import variation_schema
+
+    for module in (schema, variation_schema):
+        what, _, keys = (module.__doc__ or "").partition("Reference. ")
+        yield from (what.splitlines()[0], "", *keys.splitlines(), "")
+
+
+def _joined(lines: Sequence[str]) -> list[str]:
+    """Return the lines, joined where only the width of the source file broke them: the next line
+    stands below the text, begins no key, and its first word did not fit.
+    """
+    found: list[str] = []
+    last = ""
+    for line in lines:
+        text = line.lstrip()
+        new = not text or re.match(r"\(?\w+\)? = ", text)
+        broken = not new and last and len(last) + 1 + len(text.split()[0]) > BROKEN
+        if broken and len(line) - len(text) == _start(found[-1]):
+            found[-1] += f" {text}"
+        else:
+            found.append(line)
+        last = line
+    return found
+
+
+def _start(line: str) -> int:
+    """Return the column of a line's text: after its indentation, or after a key and its gap."""
+    found = re.match(r" *(?:\S.*?\S {2,}(?=\S))?", line)
+    return found.end() if found else 0
+
+
+def _hung(line: str, width: int) -> list[str]:
+    """Return the line in parts that fit the width, aligned below its text."""
+    parts = textwrap.wrap(
+        line,
+        width,
+        subsequent_indent=" " * _start(line),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return parts or [""]
+
+
+def _case() -> dict[str, Any]:
+    from ..case.io.catalogue import case_schema
+
+    return case_schema()
+
+
+def _variation() -> dict[str, Any]:
+    from ..studies.variation.variation_schema import variation_schema
+
+    return variation_schema()
+
+
+def _results() -> dict[str, Any]:
+    from ..harness.record import Results
+
+    return msgspec.json.schema(Results)
+
+
+def _regression() -> dict[str, Any]:
+    from ..history.findings import Regressions
+
+    return msgspec.json.schema(Regressions)
+
+
+def _live() -> dict[str, Any]:
+    from ..live.protocol import live_schema
+
+    return live_schema()
+
+
+def _board() -> dict[str, Any]:
+    from ..studies.board.results import Board
+
+    return msgspec.json.schema(Board)
+
+
+SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "case": _case,
+    "variation": _variation,
+    "results": _results,
+    "regression": _regression,
+    "live": _live,
+    "board": _board,
+}
+
+
+@options
+class PrintSchema(Command):
+    """Print the JSON Schema of a file, for editors and validators, made from the types of its
+    reader and writer.
+    """
+
+    about: ClassVar[str] = "print the JSON Schema of a file"
+    name: str = argument(
+        f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
+        "NAME",
+        choices=[*SCHEMAS],
+    )
+    joint_type: tuple[str, ...] = joint_types()
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        found = msgspec.json.encode(SCHEMAS[self.name]())
+        to_standard_output(msgspec.json.format(found, indent=2) + b"\n")
+        return Status.WITHIN
+
+
+SHELLS = ("bash", "zsh", "tcsh")
+FILES = ("FILE", "FILE.html", "RUN")
+# Functions of the shells: engine options complete to engine names, cases to built-in names and
+# files.
+ENGINES = ("engine", "require")
+PREAMBLE = {
+    "bash": 'kincheck_cases() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}',
+    "zsh": "kincheck_cases() {{ compadd {names}; _files; }}",
+    "tcsh": "",
+}
+
+
+@options
+class Completion(Command):
+    """Print a shell script for the completion of commands, options, built-in cases, engines and
+    files. Repeat this after an update.
+    """
+
+    about: ClassVar[str] = "print the completion script of a shell"
+    epilog: ClassVar[str | None] = (
+        "bash: echo 'eval \"$(kincheck completion bash)\"' >> ~/.bashrc. zsh: kincheck"
+        " completion zsh > a folder of $fpath, as _kincheck. tcsh: kincheck completion tcsh >"
+        " ~/.kincheck.tcsh, and source that in ~/.tcshrc. Then open a new shell."
+    )
+    shell: str = argument(", ".join(SHELLS), "SHELL", choices=SHELLS)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        import shtab
+
+        from ..case.models.hardpoints.templates import TEMPLATES
+        from ..joints import Joint
+        from ..studies.stress.families import FAMILIES
+        from .main import parser
+
+        names = {
+            **{
+                each: [*dict.fromkeys((*registry.engines, *registry.simulations))]
+                for each in ENGINES
+            },
+            "family": [*FAMILIES],
+            "template": [*TEMPLATES],
+            "to": [*registry.writers],
+            "joint": sorted(Joint.registry),
+            "export": [*registry.writers],
+        }
+        found = parser([])
+        for each in (found, *_below(found)):
+            for action in each.arguments():
+                if action.metavar == "CASE":
+                    action.complete = {  # pyright: ignore[reportAttributeAccessIssue]
+                        "bash": "kincheck_cases",
+                        "zsh": "kincheck_cases",
+                        "tcsh": "f",
+                    }
+                elif action.metavar in FILES:
+                    action.complete = shtab.FILE  # pyright: ignore[reportAttributeAccessIssue]
+                elif action.metavar == "DIR":
+                    action.complete = shtab.DIRECTORY  # pyright: ignore[reportAttributeAccessIssue]
+                elif action.choices is None:
+                    action.choices = names.get(action.dest)
+        # a dictionary by shell, which the library's types omit
+        preamble: Any = {self.shell: PREAMBLE[self.shell].format(names=" ".join(registry.cases()))}
+        print(shtab.complete(found, self.shell, preamble=preamble))
+        return Status.WITHIN
+
+
+def _below(parser: Any) -> Iterable[Any]:
+    """Yield the parsers of all commands below a parser."""
+    for each in parser.commands().values():
+        yield each
+        yield from _below(each)
