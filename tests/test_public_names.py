@@ -10,7 +10,7 @@ import kincheck.adapters
 import kincheck.core
 import pytest
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.primitives import Dot10
+from kincheck.core.primitives.dot10 import Dot10
 
 from .support.sources import ROOT
 

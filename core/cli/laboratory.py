@@ -34,7 +34,7 @@ from .run_options import MODE, MODES, TOL
 if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..studies.bench.engines import Bench
-    from ..studies.stress.families import FAMILIES
+    from ..studies.stress.families import Family
     from ..studies.stress.results import Stress
 
 
@@ -329,7 +329,7 @@ class StressEngines(Command):
                 " or give --replay."
             )
         wanted = dict.fromkeys(self.family or FAMILIES)
-        problems += [unknown("family", name, [*FAMILIES]) for name in wanted if name not in FAMILIES]
+        problems += [unknown("family", name, FAMILIES) for name in wanted if name not in FAMILIES]
         problems += delivery.Destinations.of(self).problems(FILES)
         if problems:
             raise KincheckError("\n".join(problems))

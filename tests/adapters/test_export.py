@@ -27,7 +27,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.case.models.files import load
 from kincheck.core.cli import main
-from kincheck.core.cli.export import FORMATS
+from kincheck.core.cli.files import FORMATS
 from kincheck.core.kinematics import NativeSolver, largest_residual
 from kincheck.core.mechanism.tree import Branch, SpanningTree, spanning_tree
 from kincheck.core.trajectory import BodyMotion

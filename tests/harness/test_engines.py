@@ -14,10 +14,9 @@ from kincheck.core import Distance
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
-from kincheck.core.harness.engine_versions import versions
+from kincheck.core.harness.engine import Unloadable, versions
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
-from kincheck.core.harness.unloadable import Unloadable
 
 from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 from ..support.mechanisms import placed

@@ -23,12 +23,10 @@ from kincheck.core.harness.run import run
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
-from kincheck.core.report import junit, matrix
-from kincheck.core.report.caveats import caveats
-from kincheck.core.report.junit import to_junit
-from kincheck.core.report.regression_junit import to_regression_junit
-from kincheck.core.report.regression_summary import to_markdown
-from kincheck.core.report.report import headline, write_report
+from kincheck.core.report import junit, table
+from kincheck.core.report.junit import to_junit, to_regression_junit
+from kincheck.core.report.regressions import to_markdown
+from kincheck.core.report.report import caveats, headline, write_report
 from msgspec import UNSET
 
 from ..support.fakes import SAMPLES, Fake, crank, off, partial, solution
@@ -76,15 +74,15 @@ def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):
     assert told.out.rstrip().endswith("1 pass, 1 not judged")
     skips = [skip.get("message") for skip in ET.fromstring(junit.to_junit(results)).iter("skipped")]
     assert skips == [f"not judged: {WHY}"] * 2  # an output each
-    assert f"Not judged: crank in native: {WHY}." in matrix.to_markdown(results)
-    assert "| not judged, residual 1e-15 |" in matrix.to_markdown(results)
+    assert f"Not judged: crank in native: {WHY}." in table.to_markdown(results)
+    assert "| not judged, residual 1e-15 |" in table.to_markdown(results)
     assert (f"Not judged: {RIGHT.name} on crank", WHY) in caveats(results)
     assert headline(results) == "The one comparison is within tolerance, 1 not judged"
     write_report(results, tmp_path / "page.html")
     page = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", (tmp_path / "page.html").read_text()))
     assert "? not judged 1" in page
     assert f"? not judged native on crank: {WHY}" in page
-    for text in (told.out, page, matrix.to_markdown(results)):
+    for text in (told.out, page, table.to_markdown(results)):
         assert "unjudged" not in text
         assert "compared with nothing" not in text
 

@@ -18,12 +18,11 @@ from kincheck.core.harness.evidence import digest
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.harness.slips import FACTORS, Held, slips
+from kincheck.core.harness.suspects import FACTORS, Held, slips
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
-from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
-from kincheck.core.report.table import messages
+from kincheck.core.report.table import messages, to_markdown
 from kincheck.core.trajectory import Trajectory
 
 from ..support.case_texts import BASE, CSV, INLINE, complains, write

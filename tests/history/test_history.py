@@ -15,10 +15,10 @@ import pytest
 from kincheck.core.cli import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.record import Outcome, Results, to_json
-from kincheck.core.history.export import NUMBERS, export
-from kincheck.core.history.queries import faultless, read
+from kincheck.core.history.export import NUMBERS
+from kincheck.core.history.queries import export, faultless, read
 from kincheck.core.history.store import HistoryError, Store
-from kincheck.core.report.figure_data import Past, trend_figures
+from kincheck.core.report.figures import Past, trend_figures
 from kincheck.core.report.trends import trends
 
 from ..support.nights import changed, keep, nights, records, reported, times
@@ -121,7 +121,7 @@ def test_trends_of_a_pair_and_its_steps(path, capsys):
 def test_history_refuses_unknown_names_and_files(path, capsys, monkeypatch):
     monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
     assert main.main(["history"]) == 2
-    assert "no file is given; give --history FILE, or set KINCHECK_HIST" in capsys.readouterr().err
+    assert "no file is given. Give --history FILE, or set KINCHECK_HIST" in capsys.readouterr().err
     assert history(path) == 2
     assert "there is no such file" in capsys.readouterr().err
     nights(path, 1)

@@ -10,10 +10,8 @@ from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, OutputSeries, Seconds, to_json
 from kincheck.core.history.findings import Kind, Regressions
 from kincheck.core.history.store import Store
-from kincheck.core.report.regression_junit import to_regression_junit
-from kincheck.core.report.regression_labels import headline, rows
-from kincheck.core.report.regression_summary import to_markdown
-from kincheck.core.report.regression_text import print_regressions
+from kincheck.core.report.junit import to_regression_junit
+from kincheck.core.report.regressions import headline, print_regressions, rows, to_markdown
 
 from ..support.nights import FACTS, RESULTS, changed, keep, nights, records, reported, times, worse
 from ..support.printed import Terminal, coloured

@@ -16,8 +16,8 @@ import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.harness.provenance import calibration, git_state
 from kincheck.core.harness.run import run
-from kincheck.core.history import schema
-from kincheck.core.history.run_recorder import digest, keep
+from kincheck.core.history import database
+from kincheck.core.history.runs import digest, keep
 from kincheck.core.history.store import HistoryError, Store, alive, owner
 
 from ..harness.test_workers import timeless
@@ -252,7 +252,7 @@ def test_schema_check_is_one_statement(path):
     statements = []
     connection = sqlite3.connect(path)
     connection.set_trace_callback(statements.append)
-    assert schema.check(connection) == 0
+    assert database.check(connection) == 0
     connection.close()
     # those of the functions inside a statement are comments
     assert len([each for each in statements if not each.startswith("--")]) == 1
@@ -265,9 +265,9 @@ def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
     keeping, results = kept(path, [crank()], ENGINES)
     with monkeypatch.context() as patch:
         patch.setattr(
-            schema,
+            database,
             "MIGRATIONS",
-            (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
+            (*database.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
         )
         with pytest.raises(HistoryError, match="table runs already exists"):
             Store(path)

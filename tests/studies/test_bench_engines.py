@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from kincheck.core.case.case import Truth
-from kincheck.core.cli import bench as command
+from kincheck.core.cli import laboratory as command
 from kincheck.core.cli import main
 from kincheck.core.extras import THREADS
 from kincheck.core.harness.engine import Floor

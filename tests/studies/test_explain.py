@@ -39,7 +39,7 @@ from kincheck.core.kinematics import NativeSolver, Ranks, kinds
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.report.terminal import console
 from kincheck.core.studies.diagnosis import diagnose
-from kincheck.core.studies.diagnosis.determinacy import determinacy
+from kincheck.core.studies.diagnosis.diagnose import determinacy
 from kincheck.core.studies.diagnosis.text import _directions, _forces
 
 from ..support.mechanisms import four_bar, mcpherson, slider_crank

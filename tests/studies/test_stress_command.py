@@ -255,7 +255,7 @@ def test_written_names_are_quoted(tmp_path):
 def test_stress_replay_refuses_output_files(tmp_path, capsys):
     file = tmp_path / "case.toml"
     assert main.main(f"stress --replay {file} --json {tmp_path / 'found.json'}".split()) == 2
-    assert "--replay only prints its findings; leave out --out and" in capsys.readouterr().err
+    assert "--replay only prints its findings. Leave out --out and" in capsys.readouterr().err
 
 
 # Reduction of bad cases to small ones
