@@ -7,7 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -25,15 +25,12 @@ from ..compiled.routes import Start, solve_from_start, start_of
 from ..compiled.solution import Columns, solution
 from ..continuation.singular_poses import (
     CONTINUED,
-    EIGHT,
     NEARLY,
     Numbers,
-    around,
-    cross,
+    Passage,
     interpolated,
     listed,
-    numbers_of,
-    on_curve,
+    pass_over,
 )
 from ..continuation.walk import Walk, longest, part_of_step
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
@@ -399,27 +396,33 @@ class BlockSweep:
         on one smooth curve, with the pose at the sample if it is known.
         """
         time, k = float(side.times[at]), int(side.order[at])
-        reach = self._reach(side.path, tol)
-        speed = float(np.abs(sound.numbers.rates).max(initial=0.0))
-        for poses in around(sound, time, time - sound.time, reach):
-            whole = np.stack([each.motions for each in poses], axis=1)
-            off = max(
-                max(each.error for each in poses),
-                interpolated(self._columns.by_vector, whole, self._lanes.unit, speed),
-            )
-            curve = numbers_of(poses).state
-            if off <= AMPLIFIED * tol and (
-                near is None or on_curve(curve, near.numbers.state, NEARLY)
-            ):
-                found.table[:, k] = whole @ EIGHT
-                tests = found.worst[:, k]
-                tests[np.isnan(tests)] = 0.0
-                found.notes.append(
-                    f"passes a singular pose at {side.path.where(time)}; {CONTINUED}, interpolated"
-                    f" there to {off:.1g} of the mechanism's size and of the rates"
-                )
-                return True
-        return False
+        passed = self._pass_over(side.path, sound, near, time, time - sound.time, tol)
+        if passed is None:
+            return False
+        found.table[:, k] = passed.motions
+        tests = found.worst[:, k]
+        tests[np.isnan(tests)] = 0.0
+        found.notes.append(
+            f"passes a singular pose at {side.path.where(time)}; {CONTINUED}, interpolated"
+            f" there to {passed.error:.1g} of the mechanism's size and of the rates"
+        )
+        return True
+
+    def _pass_over(
+        self,
+        path: Path,
+        sound: Anchor,
+        near: Anchor | None,
+        time: float,
+        way: float,
+        tol: float,
+        *,
+        rates: bool = True,
+    ) -> Passage[Anchor] | None:
+        measure = partial(interpolated, self._columns.by_vector, self._lanes.unit, rates=rates)
+        known = near and (near.numbers.state, NEARLY)
+        reach = self._reach(path, tol)
+        return pass_over(sound, known, time, way, reach, measure, AMPLIFIED * tol)
 
     @cached_property
     def _sides(self) -> list[_Side]:
@@ -495,20 +498,18 @@ class BlockSweep:
             at = int(left[0])
             wanted, last = float(times[at]), float(times[at - 1]) if at else None
             near = lanes.anchor(ahead.time)
-            beyond = (
-                None
-                if failure.kind is FailureKind.TOO_MANY_PARTS
-                else cross(ahead.sound, near, wanted, self._reach(path, tol))
-            )
+            way, passed = wanted - near.time, None
+            if failure.kind is not FailureKind.TOO_MANY_PARTS:
+                passed = self._pass_over(path, ahead.sound, near, near.time, way, tol, rates=False)
             lanes.accept(tol)
-            if beyond is None:
+            if passed is None:
                 found.failures.append(failure.kind)
                 found.messages.append(path.ended(ahead.time, wanted, last, str(failure)))
                 return None
             found.notes.append(
                 f"crosses a singular pose near {path.where(ahead.time)}; {CONTINUED}"
             )
-            start = beyond[-1]
+            start = passed.poses[-1]
             beside = left[np.abs(times[left] - ahead.time) <= abs(start.time - ahead.time)]
             left = left[len(beside) :]
             lanes.restore(start)
@@ -529,7 +530,7 @@ class BlockSweep:
         return came
 
     def _reach(self, path: Path, tol: float) -> Callable[[Anchor, float, bool], Anchor | None]:
-        """Return what goes from a pose to a time of a path, see `cross`."""
+        """Return what goes from a pose to a time of a path, see `pass_over`."""
         lanes = self._lanes
 
         def reach(at: Anchor, time: float, crossing: bool) -> Anchor | None:

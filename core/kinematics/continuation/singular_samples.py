@@ -27,6 +27,7 @@ from ..compiled.routes import LONGEST_KEPT, Route
 from ..formulation.acceptance_criteria import AMPLIFIED, WORSE
 from .segments import BETTER, Followed, Passage
 from .singular_poses import (
+    BEYOND,
     CONTINUED,
     REGULAR,
     Singularity,
@@ -383,8 +384,9 @@ class _Scrutiny:
         if found is None:
             return False
         tests = self.rows[TESTS[0]].start
-        wanted = slice(None if passed else tests)  # a sample that was reached has tests of its own
-        self.found.kept[wanted, k] = found.kept[wanted]
+        self.found.kept[:tests, k] = found.motions[:tests]
+        if passed:  # a sample that was reached has tests of its own
+            self.found.kept[tests:, k] = found.poses[BEYOND - 1].motions[tests:]
         singularity = examine(
             system, system.state(near[:, None]), self.route.sampled(np.array([time]))
         )
@@ -392,7 +394,7 @@ class _Scrutiny:
         what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
             f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated"
-            f" there to {found.off:.1g} of the mechanism's size and of the rates"
+            f" there to {found.error:.1g} of the mechanism's size and of the rates"
         )
         return True
 
