@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side, Table
+from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Program
 from .tape import LEAVES, NODES, operands, place_of
 
@@ -82,14 +82,8 @@ class NumpyExecutor:
         return self.block[slots]
 
     def window(self, slots: range) -> Array:
-        """Return a view of slots in memory, shaped as the result of `arranged`."""
+        """Return a view of slots in memory, lane by lane as an executor arranges them."""
         return self.block[slots.start : slots.stop]
-
-    def arranged(self, table: Table) -> Table:
-        """Return a table of slots by lanes in memory layout; the last lane fills up the last
-        vector.
-        """
-        return table
 
     def run(self, name: str) -> None:
         """Run one of `Plan.programs` over all lanes."""

@@ -15,7 +15,7 @@ iteration.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from typing import Any
 
 from ...algebra import Scalar, Vec3, quat, vec
@@ -146,8 +146,10 @@ class Tracer:
     @cached_property
     def selection(self) -> Selection:
         """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
-        select = select_section if self._section else partial(select_rows, wanted=self.request.rows)
-        return select(*self._numbers)
+        mechanism, frame, formulation = self._numbers
+        if self._section:
+            return select_section(mechanism, formulation)
+        return select_rows(mechanism, frame, formulation, self.request.rows)
 
     def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]

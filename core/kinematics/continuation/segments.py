@@ -72,14 +72,7 @@ class Choice:
         if not model.selection.dropped:
             return None
         system, sample = system_of(model), route.sampled(lane[[slots[FROM + TIME]]])
-        found = system.equations(system.state(lane[:, None]), sample)
-        matrix = np.empty(
-            (len(model.selection.chosen) + len(model.selection.dropped), system.unknowns)
-        )
-        matrix[[*model.selection.chosen]], matrix[[*model.selection.dropped]] = (
-            found.jacobian[0],
-            found.redundant[0],
-        )
+        (matrix,) = system.jacobian(system.evaluate(system.state(lane[:, None]), sample)[2])
         if not np.isfinite(matrix).all():
             return None
         largest = float(lane[slots[FROM + LARGEST_SIGMA]])
