@@ -280,7 +280,7 @@ class NumpyExecutor:
         return call
 
 
-def _leading(margins: Array) -> int:
+def leading(margins: Array) -> int:
     """Return the number of accepted lanes before the first rejected one."""
     good = margins > 0.0
     return len(good) if good.all() else int(good.argmin())
@@ -334,7 +334,7 @@ class NumpyTrack:
         finally:  # after an interrupt the executor is used again
             executor.heads[:] = [0]
         lanes = [block[:, end - count : end] for count, end in zip(counts, ends, strict=True)]
-        reached = [_leading(each[plan.slots[MARGIN]]) for each in lanes]
+        reached = [leading(each[plan.slots[MARGIN]]) for each in lanes]
         for side, each, accepted in zip(self._sides, lanes, reached, strict=True):
             if accepted:
                 self._keep(side, 0, each[:, :accepted])
@@ -376,7 +376,7 @@ class NumpyTrack:
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
             executor.settle("extrapolate" if smooth else "predict", plan.joined)
-            accepted = _leading(block[plan.slots[MARGIN], :count])
+            accepted = leading(block[plan.slots[MARGIN], :count])
             if accepted:
                 self._keep(self._sides[side], at, block[:, :accepted])
             elif smooth:  # continue from the last accepted sample by its rates
