@@ -1,4 +1,4 @@
-"""Memory of executors: windows, tables, heads, and slots that are read, written and carried."""
+"""Memory of executors: windows, tables, and slots that are read, written and carried."""
 
 from __future__ import annotations
 
@@ -78,19 +78,6 @@ def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
         for source, target in moves:
             slots[target] = slots[source]
     assert one == other
-
-
-def test_a_lane_that_is_a_head_has_none_before_it():
-    tape = Tape()
-    plan = Plan(
-        {"f": program("f", tape, {2: before(tape.input(0), tape.input(1))})},
-        {str(k): k for k in range(3)},
-    )
-    executor = NumpyExecutor(plan, 6)
-    executor.put([0, 1], np.arange(12.0).reshape(2, 6))
-    executor.heads[:] = [0, 4]
-    executor.run("f")
-    assert executor.get([2]).tolist() == [[6.0, 0.0, 1.0, 2.0, 10.0, 4.0]]
 
 
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")

@@ -142,6 +142,12 @@ def examine(system: System, state: Array, sample: Array) -> Singularity:
     )
 
 
+def examine_lane(route: Route, lane: Array, time: float) -> Singularity:
+    """Return the singularity nearest to the pose of a lane, with the drivers at a time."""
+    system = system_of(route.model)
+    return examine(system, system.state(lane[:, None]), route.sampled(np.array([time])))
+
+
 def _shares(weights: Mapping[str, float]) -> list[str]:
     least = SHARE * max(weights.values())
     return sorted(
