@@ -180,11 +180,11 @@ def _lanes(
 
     Redundant rows may be matched with its unknowns, and the rows it needs with those of others.
     """
-    from .blocks.component_lanes import Cascade, ComponentLanes
+    from .blocks.component_lanes import ComponentLanes
     from .blocks.sparse_lanes import SparseLanes
 
     try:
-        return ComponentLanes(Cascade(mechanism, request, parts))
+        return ComponentLanes(mechanism, request, parts)
     except SolveError as error:
         if error.kind is not FailureKind.LOCKED or parts is None:
             raise

@@ -34,7 +34,7 @@ its lanes and holds its `Plan`, `Model` makes code of the plan, and an executor 
 """
 
 from .elimination import Elimination
-from .numpy_executor import NumpyExecutor
+from .numpy_executor import NumpyExecutor, leading
 from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Prepared, Program, program
 from .tape import (
@@ -70,6 +70,7 @@ __all__ = [
     "before",
     "cos",
     "groups_behind",
+    "leading",
     "maximum",
     "minimum",
     "place_of",

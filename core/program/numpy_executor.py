@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side, Table
+from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Program
 from .tape import LEAVES, NODES, operands, place_of
 
@@ -57,7 +57,6 @@ class NumpyExecutor:
     Attributes:
         lanes, group: number of lanes, and of those that a track attempts together.
         margin: samples that a track may read beyond the last.
-        heads: lanes without a lane before them.
     """
 
     margin = 0
@@ -66,7 +65,6 @@ class NumpyExecutor:
         self.lanes = self.group = lanes
         self.block: Array = np.zeros((len(plan.slots), lanes))
         self.plan = plan
-        self.heads: list[int] = [0]
         self._calls: dict[str, list[Call]] = {}
 
     def clear(self) -> None:
@@ -82,14 +80,8 @@ class NumpyExecutor:
         return self.block[slots]
 
     def window(self, slots: range) -> Array:
-        """Return a view of slots in memory, shaped as the result of `arranged`."""
+        """Return a view of slots in memory, lane by lane as an executor arranges them."""
         return self.block[slots.start : slots.stop]
-
-    def arranged(self, table: Table) -> Table:
-        """Return a table of slots by lanes in memory layout; the last lane fills up the last
-        vector.
-        """
-        return table
 
     def run(self, name: str) -> None:
         """Run one of `Plan.programs` over all lanes."""
@@ -140,7 +132,7 @@ class NumpyExecutor:
 
     def _before(self, x: Array, first: Array, out: Array) -> None:
         out[..., 1:] = x[..., :-1]
-        out[..., self.heads] = first[..., self.heads]
+        out[..., :1] = first[..., :1]
 
     def _bind(self, program: Program) -> list[Call]:
         """Return the calls of a program; a register is free again after its last reader."""
@@ -286,7 +278,7 @@ class NumpyExecutor:
         return call
 
 
-def _leading(margins: Array) -> int:
+def leading(margins: Array) -> int:
     """Return the number of accepted lanes before the first rejected one."""
     good = margins > 0.0
     return len(good) if good.all() else int(good.argmin())
@@ -324,36 +316,7 @@ class NumpyTrack:
 
         The anchor of a completed side is invalid: no program prepares it for a continuation.
         """
-        executor, counts = self._executor, [side.count for side in self._sides]
-        if sum(counts) > executor.lanes:
-            return [self.follow(k, 0, count, anew=True) for k, count in enumerate(counts)]
-        plan, block = executor.plan, executor.block
-        source, target = np.array(plan.carried).T
-        ends = np.cumsum(counts)
-        block[target] = self._start[:, None]
-        for side, end in zip(self._sides, ends, strict=True):
-            block[list(plan.sampled), end - side.count :] = side.samples[:, -1:]
-            block[list(plan.sampled), end - side.count : end] = side.samples
-        executor.heads[:] = [0, *ends[:-1]]
-        try:
-            executor.settle("predict", plan.joined)
-        finally:  # after an interrupt the executor is used again
-            executor.heads[:] = [0]
-        lanes = [block[:, end - count : end] for count, end in zip(counts, ends, strict=True)]
-        reached = [_leading(each[plan.slots[MARGIN]]) for each in lanes]
-        for side, each, accepted in zip(self._sides, lanes, reached, strict=True):
-            if accepted:
-                self._keep(side, 0, each[:, :accepted])
-        if reached == counts:
-            return counts
-        for name in plan.remaining:
-            executor.run(name)
-        for anchor, each, accepted in zip(self.anchors, lanes, reached, strict=True):
-            anchor[:] = each[source, accepted - 1] if accepted else self._start
-        return [
-            self.follow(k, at, count, anew=False) if 0 < at < count else at
-            for k, (at, count) in enumerate(zip(reached, counts, strict=True))
-        ]
+        return [self.follow(k, 0, side.count, anew=True) for k, side in enumerate(self._sides)]
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
         """Attempt the next samples of a side as neighbouring lanes, and go on from the last
@@ -382,7 +345,7 @@ class NumpyTrack:
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
             executor.settle("extrapolate" if smooth else "predict", plan.joined)
-            accepted = _leading(block[plan.slots[MARGIN], :count])
+            accepted = leading(block[plan.slots[MARGIN], :count])
             if accepted:
                 self._keep(self._sides[side], at, block[:, :accepted])
             elif smooth:  # continue from the last accepted sample by its rates

@@ -7,7 +7,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,9 +123,6 @@ def shifted(past: int, remembered: Sequence[int], behind: int) -> Sequence[tuple
     count = len(remembered)
     places = [*range(past, past + (behind - 1) * count), *remembered]
     return list(zip(places[count:], places, strict=False))
-
-
-Table = TypeVar("Table", bound=NDArray[Any])
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck.core import Body, Point, solve
 from kincheck.core.kinematics import Method, NativeSolver
-from kincheck.core.kinematics.blocks.component_lanes import LANES, Cascade, ComponentLanes
+from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import WORST
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.compiled.routes import start_of
@@ -88,11 +88,11 @@ def test_components_iterate_no_more_than_is_asked_for():
 
 
 def test_components_built_alike_share_a_program():
-    cascade = Cascade(chain(40), Request(("turn",), ("end",)))
+    cascade = ComponentLanes(chain(40), Request(("turn",), ("end",)))
     assert len(cascade.parts) == 41
     # the crank, the one with the point, all others
     assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]
-    assert cascade.largest == 12
+    assert cascade.details["largest_component"] == 12
 
 
 def test_a_chain_of_two_hundred_loops_closes_to_round_off():
@@ -112,9 +112,8 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
         Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
         Request(("turn",), ("end",), compiled=compiled),
     )
-    cascade = Cascade(chain(3), request)
     for count in (LANES, 5):  # all that there are, or the last ones are as the last
-        going, carrying = (ComponentLanes(cascade) for _ in range(2))
+        going, carrying = (ComponentLanes(chain(3), request) for _ in range(2))
         for lanes in (going, carrying):
             lanes.accept(1e-12)
             lanes.depart(0.0, path)
@@ -127,7 +126,7 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
         ends = [lanes.anchor(0.3).pose for lanes in (going, carrying)]
         for a, b in zip(*ends, strict=True):
             np.testing.assert_array_equal(a, b)
-        model = cascade.kinds[0].model
+        model = going.kinds[0].model
         time = [*model.plan.fixed].index(model.slots[FROM + TIME])
         assert ends[0][0][0, time] == pytest.approx(0.3)
 
@@ -143,20 +142,19 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
         Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
         Request(("turn",), ("end",), compiled=compiled),
     )
-    cascade = Cascade(chain(3), request)
-    lanes, times = ComponentLanes(cascade), np.linspace(0.005, 0.1, LANES)
+    lanes, times = ComponentLanes(chain(3), request), np.linspace(0.005, 0.1, LANES)
     lanes.accept(1e-12)
     lanes.depart(0.0, path)
-    assert len(cascade.parts) == 4
+    assert len(lanes.parts) == 4
     assert (lanes.attempt(times, path) > 0.0).all()
     np.testing.assert_array_equal(
         lanes.worst[WORST.index("closure")], lanes.each("closure").max(axis=0)
     )
     np.testing.assert_array_equal(lanes.worst[WORST.index(SIGMA)], lanes.each(SIGMA).min(axis=0))
-    kind, member = cascade.place[part]
+    kind, member = lanes.place[part]
     anchor, model = lanes.anchor(0.0), kind.model
     column = [*model.plan.fixed].index(model.vectors[FROM + "q b0"][0])
-    anchor.pose[cascade.kinds.index(kind)][member, column] = np.nan
+    anchor.pose[lanes.kinds.index(kind)][member, column] = np.nan
     lanes.restore(anchor)
     assert not (lanes.attempt(times, path) > 0.0).any()
     for name in ("closure", MARGIN):

@@ -7,7 +7,7 @@ import pytest
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.kinematics import Method, NativeSolver
-from kincheck.core.kinematics.blocks.component_lanes import Cascade
+from kincheck.core.kinematics.blocks.component_lanes import ComponentLanes
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 
@@ -88,10 +88,10 @@ def test_what_it_cannot_take_apart_is_refused():
         [Gear("gear", ("pivot0", "pivot1"), ratio=1.0)],
     )
     with pytest.raises(SolveError, match="couplers"):
-        Cascade(coupled, Request(("turn",), ()))
+        ComponentLanes(coupled, Request(("turn",), ()))
     free = type(m)(m.name, m.bodies, m.joints, m.points, [])
     with pytest.raises(SolveError, match="not driven enough"):
-        Cascade(free, Request((), ()))
+        ComponentLanes(free, Request((), ()))
     assert isinstance(m.drivers[0], JointAngle)
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.blocks import component_lanes as cascade
-from kincheck.core.kinematics.blocks import sparse_lanes
+from kincheck.core.kinematics.blocks import component_lanes, sparse_lanes
 from kincheck.core.kinematics.blocks import sweep as block_sweep
 from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled import routes as samples
@@ -122,9 +121,9 @@ def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
     class Hinge(Revolute):
         type = "hinge_of_mine"
 
-    made, make = [], cascade.Cascade.__init__
+    made, make = [], component_lanes.ComponentLanes.__init__
     monkeypatch.setattr(
-        cascade.Cascade,
+        component_lanes.ComponentLanes,
         "__init__",
         lambda self, *given: (made.append(self), make(self, *given))[1],
     )
@@ -231,7 +230,7 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
 @pytest.mark.parametrize(
     ("large", "kind"),
     [
-        (chain(21), (cascade.Cascade, "__init__")),
+        (chain(21), (component_lanes.ComponentLanes, "__init__")),
         (circle(22).mechanism, (sparse_lanes.SparseLanes, "__init__")),
     ],
 )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kincheck.core import solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.blocks.component_lanes import Cascade, ComponentLanes
+from kincheck.core.kinematics.blocks.component_lanes import ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import BlockSweep
 from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import Model, compile_model
@@ -105,9 +105,9 @@ def test_many_designs_compile_their_programs():
 def test_many_components_compile_their_programs():
     mechanism = chain(15)
     parts = components(mechanism, frames(mechanism))
-    cascade = Cascade(mechanism, Request(("turn",), ()), parts)
+    cascade = ComponentLanes(mechanism, Request(("turn",), ()), parts)
     path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 65))
-    solver = BlockSweep(ComponentLanes(cascade), path)
+    solver = BlockSweep(cascade, path)
     assert all(kind.model._code.interpreted for kind in cascade.kinds)
     solver.solve(1e-12)
     assert not any(kind.model._code.interpreted for kind in cascade.kinds if len(kind.members) > 1)

@@ -1,4 +1,4 @@
-"""Memory of executors: windows, tables, heads, and slots that are read, written and carried."""
+"""Memory of executors: windows, tables, and slots that are read, written and carried."""
 
 from __future__ import annotations
 
@@ -80,19 +80,6 @@ def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
     assert one == other
 
 
-def test_a_lane_that_is_a_head_has_none_before_it():
-    tape = Tape()
-    plan = Plan(
-        {"f": program("f", tape, {2: before(tape.input(0), tape.input(1))})},
-        {str(k): k for k in range(3)},
-    )
-    executor = NumpyExecutor(plan, 6)
-    executor.put([0, 1], np.arange(12.0).reshape(2, 6))
-    executor.heads[:] = [0, 4]
-    executor.run("f")
-    assert executor.get([2]).tolist() == [[6.0, 0.0, 1.0, 2.0, 10.0, 4.0]]
-
-
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")
 def test_tables_begin_with_a_cache_line():
     mechanism = mcpherson()
@@ -110,19 +97,22 @@ def test_tables_begin_with_a_cache_line():
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_a_window_is_memory_and_takes_what_is_arranged(compiled, lanes):
+def test_window_of_slots_is_their_memory(compiled, lanes):
     tape = Tape()
     plan = Plan(
         {"f": program("f", tape, {3: tape.input(1) - tape.input(2)})}, {str(k): k for k in range(4)}
     )
     executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
     values = np.random.default_rng(1).normal(size=(2, lanes))
-    executor.window(range(1, 3))[:] = executor.arranged(values)
+    executor.put(range(1, 3), values)
+    window = executor.window(range(1, 3))
+    before = window.copy()
+    executor.clear()
+    assert not executor.get(range(1, 3)).any()
+    window[:] = before
     np.testing.assert_array_equal(executor.get(range(1, 3)), values)
     executor.run("f")
-    found = np.full(lanes, np.nan)
-    found[executor.arranged(np.arange(lanes)[None])] = executor.window(range(3, 4))
-    np.testing.assert_array_equal(found, values[0] - values[1])
+    np.testing.assert_array_equal(executor.get([3])[0], values[0] - values[1])
     copy = executor.get(range(1, 3))
     executor.clear()
     np.testing.assert_array_equal(copy, values)

@@ -194,8 +194,7 @@ class Closing:
             iterations[active] += 1
             # and this step, still taken, makes it round-off
             done |= np.abs(phi[self.kept]).max(axis=0) < tol
-            matrix = np.zeros((len(active), len(phi), system.unknowns))
-            matrix[:, system.rows, system.columns] = entries.T[active]
+            matrix = system.jacobian(entries[:, active])
             step = np.zeros((n, system.unknowns))
             step[active] = self._steps(phi.T[active], matrix)
             state = system.stepped(state, step.T)

@@ -76,13 +76,31 @@ class ComponentType:
         return range(start + rows.start, start + rows.stop)
 
 
-class Cascade:
-    """The components of a mechanism with their programs, ready to be solved along paths.
+# Samples at once: all are predicted from one pose, and the farther they are from it the more
+# iterations they take, and the more are tried in vain; and what a large chain takes its time for is
+# memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8 one of 16 loops takes 1.3
+# times as long.
+LANES = 16
+# Numbers of all components that stay in the second-level cache beside their programs; of more, half
+# as many samples are taken at once: a chain of 1,000 loops takes 0.7 times as long.
+CACHED = 500_000
+BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
+STILL = 0.0, 0.0, 0.0
+
+
+class ComponentLanes(Lanes):
+    """The components of a mechanism bound to lanes: the world, and calls for the components in
+    order, one for neighbours of one type. Each lane is attempted alone.
 
     Args:
         request: as for `compile_model`; accelerations are computed whatever its order, to predict
             from.
         parts: its components, if known already.
+
+    Attributes:
+        parts, kinds: the components in order, and their types.
+        points: names of the points of each component that are wanted or driven.
+        world: all solved quantities, shape (rows, room).
 
     Raises:
         SolveError: the mechanism has couplers, is not driven enough, or does not close at the
@@ -113,21 +131,50 @@ class Cascade:
         for k, each in enumerate(sections):
             alike.setdefault(each.signature, []).append(k)
         self.kinds: list[ComponentType] = []
-        self.rows = 0
+        rows = 0
         for members in alike.values():
-            kind = self._kind([sections[k] for k in members], members)
+            kind = self._kind([sections[k] for k in members], members, rows)
             self.kinds.append(kind)
-            self.rows += len(members) * kind.model.kept
+            rows += len(members) * kind.model.kept
         self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
+        self.many = LANES if rows * LANES <= CACHED else LANES // 2
+        self.details = self._details()
+        self._bind(rows)
+        self._columns, self._rows, self._still = self._outputs()
+        self.design = self.anchor(0.0)
 
-    @property
-    def largest(self) -> int:
-        """Unknowns of the largest component."""
-        return max(kind.model.selection.account.moving_coordinates for kind in self.kinds)
+    def _bind(self, rows: int) -> None:
+        executors = [kind.model.executor(self.many) for kind in self.kinds]
+        room, self._groups = max(each.room for each in executors), executors[0].groups
+        self.world = aligned(rows * room).reshape(-1, room)
+        self.world[:] = 0.0
+        self.worst = aligned(len(WORST) * room).reshape(-1, room)
+        self._best = self.kinds[0].model.plan.best
+        self._fixed, self._ahead = ([kind.fixed.copy() for kind in self.kinds] for _ in range(2))
+        self._samples = [
+            aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in self.kinds
+        ]
+        self._carried = [_carried(kind.model.plan) for kind in self.kinds]
+        # from what is fixed now, and from what is ahead
+        self._calls: list[list[Callable[[int], object]]] = [[], []]
+        self._tables: list[Parts] = []  # calls know addresses, not arrays
+        for k, run in groupby(
+            range(len(self.parts)), key=lambda part: self.kinds.index(self.place[part][0])
+        ):
+            parts, both = [*run], (self._fixed[k], self._ahead[k])
+            members = np.array([self.place[part][1] for part in parts], dtype=np.int64)
+            given = [
+                [row for body in self.parts[part].given for row in self.body_rows(body)]
+                for part in parts
+            ]
+            taken = np.array(given, dtype=np.int64).reshape(len(parts), -1)
+            samples, base = self._samples[k], self.kinds[k].base
+            for calls, (fixed, ahead) in zip(self._calls, (both, both[::-1]), strict=True):
+                table = Parts(members, fixed, ahead, samples, taken, self.world, base, self.worst)
+                self._tables.append(table)
+                calls.append(executors[k].parts(table))
 
-    @cached_property
-    def details(self) -> dict[str, Any]:
-        """The cascade as the record of every solution shows it."""
+    def _details(self) -> dict[str, Any]:
         unknowns, rows, redundant, sizes = 0, 0, list[str](), dict[str, dict[str, int]]()
         for kind in self.kinds:
             account, like = kind.model.selection.account, self.parts[kind.members[0]].bodies[0]
@@ -143,7 +190,9 @@ class Cascade:
         return {
             **counted(self.mechanism, unknowns, rows, redundant).details,
             "components": len(self.parts),
-            "largest_component": self.largest,
+            "largest_component": max(
+                kind.model.selection.account.moving_coordinates for kind in self.kinds
+            ),
             "program": sizes,
         }
 
@@ -152,7 +201,9 @@ class Cascade:
         wanted = [self.mechanism.body(name) for name in part.bodies if name in self.request.bodies]
         return section(part, self.unit, origins, points, wanted)
 
-    def _kind(self, sections: Sequence[Section], members: Sequence[int]) -> ComponentType:
+    def _kind(
+        self, sections: Sequence[Section], members: Sequence[int], base: int
+    ) -> ComponentType:
         first, values = sections[0], [places(each.mechanism) for each in sections]
         varied = tuple(
             place
@@ -185,7 +236,7 @@ class Cascade:
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]
         return ComponentType(
-            model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows
+            model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), base
         )
 
     def body_rows(self, name: str) -> list[int]:
@@ -195,124 +246,51 @@ class Cascade:
         u, q, v, a = (kind.rows(label, member) for label in (f"u b{k}", f"q b{k}", RATE, RATE_T))
         return [*u, *q, *v[6 * k : 6 * k + 6], *a[6 * k : 6 * k + 6]]
 
-
-# Samples at once: all are predicted from one pose, and the farther they are from it the more
-# iterations they take, and the more are tried in vain; and what a large chain takes its time for is
-# memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8 one of 16 loops takes 1.3
-# times as long.
-LANES = 16
-# Numbers of all components that stay in the second-level cache beside their programs; of more, half
-# as many samples are taken at once: a chain of 1,000 loops takes 0.7 times as long.
-CACHED = 500_000
-BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
-STILL = 0.0, 0.0, 0.0
-
-
-class ComponentLanes(Lanes):
-    """A cascade bound to lanes: the world, and calls for its components in order, one for
-    neighbours of one type. Each lane is attempted alone. Their number suits the cascade's size,
-    unless it is given.
-
-    Attributes:
-        world: all solved quantities, shape (rows, room); see `Cascade`.
-    """
-
-    def __init__(self, cascade: Cascade, lanes: int = 0) -> None:
-        lanes = lanes or (LANES if cascade.rows * LANES <= CACHED else LANES // 2)
-        self.cascade, self.many = cascade, lanes
-        self.mechanism, self.request = cascade.mechanism, cascade.request
-        self.unit, self.details = cascade.unit, cascade.details
-        executors = {id(kind): kind.model.executor(lanes) for kind in cascade.kinds}
-        room, self._groups = (
-            max(each.room for each in executors.values()),
-            next(iter(executors.values())).groups,
-        )
-        self.world = aligned(cascade.rows * room).reshape(-1, room)
-        self.world[:] = 0.0
-        self.worst = aligned(len(WORST) * room).reshape(-1, room)
-        self._best = cascade.kinds[0].model.plan.best
-        self._fixed = [kind.fixed.copy() for kind in cascade.kinds]
-        self._ahead = [kind.fixed.copy() for kind in cascade.kinds]
-        self._samples = [
-            aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in cascade.kinds
-        ]
-        self._carried = [_carried(kind.model.plan) for kind in cascade.kinds]
-        # from what is fixed now, and from what is ahead
-        self._calls: list[list[Callable[[int], object]]] = [[], []]
-        self._parts: list[Parts] = []  # calls know addresses, not arrays
-        number = {id(kind): k for k, kind in enumerate(cascade.kinds)}
-        for k, run in groupby(
-            range(len(cascade.parts)), key=lambda part: number[id(cascade.place[part][0])]
-        ):
-            kind, parts = cascade.kinds[k], [*run]
-            members = np.array([cascade.place[part][1] for part in parts], dtype=np.int64)
-            rows = [
-                [row for body in cascade.parts[part].given for row in cascade.body_rows(body)]
-                for part in parts
-            ]
-            taken = np.array(rows, dtype=np.int64).reshape(len(parts), -1)
-            now, ahead = self._fixed[k], self._ahead[k]
-            for calls, (fixed, other) in zip(
-                self._calls, ((now, ahead), (ahead, now)), strict=True
-            ):
-                self._parts.append(
-                    Parts(
-                        members,
-                        fixed,
-                        other,
-                        self._samples[k],
-                        taken,
-                        self.world,
-                        kind.base,
-                        self.worst,
-                    )
-                )
-                calls.append(executors[id(kind)].parts(self._parts[-1]))
-        self._columns, self._rows, self._still = self._outputs()
-        self.design = self.anchor(0.0)
-
     def _outputs(self) -> tuple[Indices, Indices, Array]:
         """Return the columns of moving outputs with their rows of the world, and a column of the
         outputs at rest.
         """
-        cascade, request = self.cascade, self.cascade.request
+        request = self.request
         every = Columns.of(request)
         columns, rows, still = list[int](), list[int](), np.zeros((every.count, 1))
 
-        def add(vector: str, part: int | None, own: str, at_rest: Sequence[float]) -> None:
-            place = every.by_vector[vector]
-            if part is None:
-                still[place, 0] = at_rest
-                return
-            kind, member = cascade.place[part]
-            columns.extend(range(place.start, place.stop))
-            rows.extend(kind.rows(own, member))
+        def add(
+            name: str,
+            part: int | None,
+            own: str,
+            labels: Sequence[str],
+            at_rest: Mapping[str, Sequence[float]],
+        ) -> None:
+            for label in labels:
+                place = every.by_vector[f"{label} {name}"]
+                if part is None:
+                    still[place, 0] = at_rest.get(label, STILL)
+                    continue
+                kind, member = self.place[part]
+                columns.extend(range(place.start, place.stop))
+                rows.extend(kind.rows(f"{label} {own}", member))
 
         for name in request.points:
-            point = cascade.mechanism.point(name)
-            part = cascade.part_of.get(point.body)
-            own = "" if part is None else f"p{cascade.points[part].index(name)}"
-            at_rest = {"position": point.position}
-            for label in QUANTITIES[: request.order + 1]:
-                add(f"{label} {name}", part, f"{label} {own}", at_rest.get(label, STILL))
+            point = self.mechanism.point(name)
+            part = self.part_of.get(point.body)
+            own = "" if part is None else f"p{self.points[part].index(name)}"
+            add(name, part, own, QUANTITIES[: request.order + 1], {"position": point.position})
         for name in request.bodies:
-            body = cascade.mechanism.body(name)
-            part = cascade.part_of.get(name)
-            own = "" if part is None else f"b{cascade.parts[part].bodies.index(name)}"
+            body, part = self.mechanism.body(name), self.part_of.get(name)
+            own = "" if part is None else f"b{self.parts[part].bodies.index(name)}"
             at_rest = {"r": body.origin, "p": body.euler_parameters}
-            for label in BODY[: 2 * (request.order + 1)]:
-                add(f"{label} {name}", part, f"{label} {own}", at_rest.get(label, STILL))
+            add(name, part, own, BODY[: 2 * (request.order + 1)], at_rest)
         return np.array(columns, np.intp), np.array(rows, np.intp), still
 
     def accept_by(self, limits: Mapping[str, float]) -> None:
         """See `Lanes`."""
         self._tol = limits["tolerance"]
-        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+        for kind, fixed in zip(self.kinds, self._fixed, strict=True):
             fixed[:, [kind.column[name] for name in limits]] = [*limits.values()]
 
     def depart(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`. The rates of the path where the mechanism stands are those of a sample."""
-        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+        for kind, fixed in zip(self.kinds, self._fixed, strict=True):
             fixed[:, [kind.column[FROM + TIME], kind.column[EARLIER + TIME]]] = time
         self.attempt(np.array([time]), path)
         self.carry(0)
@@ -329,7 +307,7 @@ class ComponentLanes(Lanes):
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`: by component type; types without drivers share one table."""
-        models, alone = (kind.model for kind in self.cascade.kinds), times[None]
+        models, alone = (kind.model for kind in self.kinds), times[None]
         return [each.samples(path, times) if each.request.drivers else alone for each in models]
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
@@ -371,10 +349,10 @@ class ComponentLanes(Lanes):
 
     def _state(self, lane: int) -> Array:
         """Return the state of a lane as the equations of the whole mechanism have it."""
-        names, cascade = self._whole.system.names, self.cascade
+        names = self._whole.system.names
         found = np.zeros(len(self._whole.system.design))
-        for k, part in enumerate(cascade.parts):
-            kind, member = cascade.place[k]
+        for k, part in enumerate(self.parts):
+            kind, member = self.place[k]
             for name in kind.model.state:
                 what, own = name.split(" ", 1)
                 if what == "x":
@@ -384,13 +362,13 @@ class ComponentLanes(Lanes):
                     whole = f"{what} {part.bodies[int(own[1:])]}"
                 length = what == "u" or name.endswith(".translation")
                 values = self.world[kind.rows(name, member), lane]
-                found[names[whole]] = values * (cascade.unit / self._whole.unit if length else 1.0)
+                found[names[whole]] = values * (self.unit / self._whole.unit if length else 1.0)
         return found
 
     def each(self, name: str) -> Array:
         """Return a kept test of all components, shape (components, room)."""
         found: list[Array] = []
-        for kind in self.cascade.kinds:
+        for kind in self.kinds:
             size, first = kind.model.kept, kind.base + kind.model.rows[name].start
             found.append(self.world[first : kind.base + size * len(kind.members) : size])
         return np.concatenate(found)
@@ -400,7 +378,7 @@ class ComponentLanes(Lanes):
         those.
         """
         found: tuple[list[Array], list[Array]] = ([], [])
-        for kind, fixed in zip(self.cascade.kinds, pose, strict=True):
+        for kind, fixed in zip(self.kinds, pose, strict=True):
             place, model = {slot: k for k, slot in enumerate(kind.model.plan.fixed)}, kind.model
             for each, names in zip(found, (model.state, (RATE, RATE_T)), strict=True):
                 slots = slots_of(model.vectors, (FROM + name for name in names))
@@ -410,7 +388,7 @@ class ComponentLanes(Lanes):
     @property
     def sound(self) -> bool:
         """See `Lanes`."""
-        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
+        for kind, fixed in zip(self.kinds, self._fixed, strict=True):
             sigma, largest = (fixed[:, kind.column[FROM + name]] for name in (SIGMA, LARGEST_SIGMA))
             if not (sigma >= SOUND * largest).all():
                 return False
@@ -424,7 +402,7 @@ class ComponentLanes(Lanes):
     def carry(self, lane: int) -> None:
         """See `Lanes`."""
         for kind, fixed, samples, carried in zip(
-            self.cascade.kinds, self._fixed, self._samples, self._carried, strict=True
+            self.kinds, self._fixed, self._samples, self._carried, strict=True
         ):
             size, count = kind.model.kept, len(kind.members)
             solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)
@@ -437,17 +415,16 @@ class ComponentLanes(Lanes):
 
     def failure(self, tol: float) -> PoseFailure:
         """See `Lanes`: that of its unsolved component, or of the one nearest to singular."""
-        cascade = self.cascade
         closure, sigma = (self.each(name)[:, self.last] for name in ("closure", SIGMA))
         closes = bool((closure <= tol).all())
         worst = int(np.nanargmin(sigma) if closes else np.nan_to_num(closure, nan=np.inf).argmax())
-        order = [part for kind in cascade.kinds for part in kind.members]
+        order = [part for kind in self.kinds for part in kind.members]
         return PoseFailure(
             FailureKind.SINGULAR_AHEAD if closes else FailureKind.NOT_CONVERGED,
             closure[worst],
             tol,
             sigma=sigma[worst],
-            where=f"the component of {', '.join(cascade.parts[order[worst]].bodies)}: ",
+            where=f"the component of {', '.join(self.parts[order[worst]].bodies)}: ",
         )
 
 

@@ -219,7 +219,7 @@ class SparseLanes(Lanes):
                 self._scale[at] = frame.unit / extent
         names = ["time", *(f"drive {name}.{k}" for name in request.drivers for k in range(5))]
         self._angles = [names.index(name) for name in turns(mechanism, request.drivers)]
-        self._columns = Columns.of(request)
+        self._vectors = [*Columns.of(request).by_vector]
         self.worst = np.zeros((len(WORST), POSES))
         self.here = self._closed()
         self.design = self.anchor(0.0)
@@ -439,9 +439,7 @@ class SparseLanes(Lanes):
         slopes = slope_between(sigmas, previous(sigmas, here.sigmas), moved)
         least = least_slope(slope)[:, None]
         known = maximum(previous(slopes, slope), least)
-        highest = sigmas.copy()
-        for k in range(1, POSES):
-            np.maximum(highest[:, k], highest[:, k - 1], out=highest[:, k])
+        highest: Array = np.maximum.accumulate(sigmas, axis=1)
         largest, high = (maximum(each[:, None], highest) for each in (here.largest, here.high))
         sigma = folded(np.minimum, sigmas)
         candidate = Candidate(
@@ -521,10 +519,8 @@ class SparseLanes(Lanes):
 
     def motions(self, count: int) -> Array:
         """See `Lanes`."""
-        found = np.empty((self._columns.count, count))
-        for name, at in self._columns.by_vector.items():
-            found[at] = self.outputs[name][:, :count]
-        return found
+        none = np.empty((0, count))
+        return np.concatenate([none, *(self.outputs[k][:, :count] for k in self._vectors)])
 
     def uncertain(self, count: int, path: Path) -> Mapping[int, float]:
         """See `Lanes`."""

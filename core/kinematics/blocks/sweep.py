@@ -7,7 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...errors import number_of
 from ...failures import FailureKind, PoseFailure
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
-from ...program import ITERATIONS, MARGIN
+from ...program import ITERATIONS, MARGIN, leading
 from ...trajectory import Array, Trajectory, largest_found
 from ..compiled.compiled_model import CLOSED
 from ..compiled.request import LARGEST_OF_PARTS, SIGMA, SMALLEST_OF_PARTS, Request, accept_by
@@ -25,15 +25,12 @@ from ..compiled.routes import Start, solve_from_start, start_of
 from ..compiled.solution import Columns, solution
 from ..continuation.singular_poses import (
     CONTINUED,
-    EIGHT,
     NEARLY,
     Numbers,
-    around,
-    cross,
+    Passage,
     interpolated,
     listed,
-    numbers_of,
-    on_curve,
+    pass_over,
 )
 from ..continuation.walk import Walk, longest, part_of_step
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
@@ -182,126 +179,6 @@ Keep = Callable[[Indices], None]
 """Takes samples, by their number outwards, from as many lanes."""
 
 
-class BlockWalk(Walk):
-    """The walk over samples of a path, from the pose before the lanes.
-
-    Args:
-        samples: numbers of the samples, in their order: all up or all down.
-        times: of all samples [s].
-        given: tables of all samples, see `Lanes.sampled`.
-        start: that pose.
-        tol: largest accepted residual.
-        watch: look for sound poses all the way, not only where a step fails.
-
-    Attributes:
-        time: of the pose before the lanes [s].
-        sound: the last sound pose before the lanes.
-    """
-
-    def __init__(
-        self,
-        lanes: Lanes,
-        samples: Indices,
-        times: Array,
-        given: Sequence[Array],
-        path: Path,
-        keep: Keep,
-        *,
-        start: Anchor,
-        tol: float,
-        watch: bool = False,
-    ) -> None:
-        self.watch = watch
-        self.lanes, self.samples, self.times, self.given = lanes, samples, times, given
-        self.path, self.keep, self.tol = path, keep, tol
-        self.time, self.sound = start.time, start
-
-    def run(self) -> tuple[int, PoseFailure | None]:
-        """Follow all samples; see `advance`."""
-        return self.advance(0, len(self.samples))
-
-    def follow(self, at: int, stop: int, parts: int) -> int:
-        """Follow as many samples at once as there are lanes, up to the first failure."""
-        lanes, ahead = self.lanes, self.samples[at : min(at + self.lanes.many, stop)]
-        self._parts = parts
-        if self.watch and lanes.sound:
-            self.sound = lanes.anchor(self.time)
-        first, last = int(ahead[0]), int(ahead[-1])
-        step = 1 if last >= first else -1
-        end = last + step
-        run = slice(first, end if end >= 0 else None, step)
-        good = lanes.attempt_at([each[:, run] for each in self.given], neighbours=True) > 0.0
-        accepted = len(ahead) if good.all() else int(good.argmin())
-        if not accepted:
-            if lanes.sound and not self.watch:
-                self.sound = lanes.anchor(self.time)
-            return at
-        self.keep(ahead[:accepted])
-        if accepted == len(ahead):
-            lanes.go_on()
-        else:
-            lanes.carry(accepted - 1)
-        self.time = float(self.times[ahead[accepted - 1]])
-        return at + accepted
-
-    def follow_part(self, at: int) -> PoseFailure | None:
-        """Follow equal parts of a step that fails, as neighbours, and else the longest accepted
-        part.
-        """
-        lanes, wanted = self.lanes, float(self.times[self.samples[at]])
-        if not self._parts:
-            many = lanes.many - 1  # the last part is left: a sample ends an iteration of its own
-            parts = np.arange(1.0, many + 1.0) / lanes.many
-            times: Array = self.time + (wanted - self.time) * parts
-            good = lanes.attempt_at(lanes.sampled(times, self.path), neighbours=True) > 0.0
-            accepted = many if good.all() else int(good.argmin())
-            if accepted:
-                lanes.carry(accepted - 1)
-                self.time = float(times[accepted - 1])
-                return None
-        reached = part_of_step(
-            self.time,
-            wanted,
-            lambda times: self.lanes.attempt(times, self.path),
-            self.lanes.many,
-        )
-        if reached is None:
-            return self.lanes.failure(self.tol)
-        lane, self.time = reached
-        self.lanes.carry(lane)
-        return None
-
-
-@dataclass
-class _Results:
-    """What a sweep found: the motions and tests of all samples, the bounds of errors of those that
-    are refused, and words on the way.
-    """
-
-    table: Array
-    worst: Array
-    refused: dict[int, float] = field(default_factory=dict[int, float])
-    messages: list[str] = field(default_factory=list[str])
-    notes: list[str] = field(default_factory=list[str])
-    failures: list[FailureKind] = field(default_factory=list[FailureKind])
-
-    def take_away(self, path: Path, tol: float) -> None:
-        """Take away the samples left uncertain, and say so."""
-        refused = self.refused
-        if refused:
-            self.table[:, [*refused]] = np.nan
-            self.worst[:, [*refused]] = np.nan
-            worst = max(refused, key=refused.__getitem__)
-            there = path.where(float(path.times[worst]))
-            self.messages.append(
-                f"refused at {number_of(len(refused), 'sample')} so near a singular pose that"
-                " residuals leave the pose or its rates uncertain, by up to"
-                f" {refused[worst]:.2g} (at {there}), allowed {AMPLIFIED * tol:.2g}; keep away"
-                " from it"
-            )
-            self.failures.append(FailureKind.UNCERTAIN)
-
-
 @dataclass(frozen=True, eq=False)
 class _Side:
     """Samples on one side of the start, outwards.
@@ -318,151 +195,113 @@ class _Side:
     given: Sequence[Array]
 
 
-class BlockSweep:
-    """A path through blocks bound to lanes; solved as often as wanted."""
+class BlockWalk(Walk):
+    """The walk over samples of a side, from the pose before the lanes.
 
-    def __init__(self, lanes: Lanes, path: Path, start: Start | None = None) -> None:
-        self._lanes, self._mechanism, self.path = lanes, lanes.mechanism, path
-        self.start = start or start_of(self._mechanism, path)
-        self._columns = Columns.of(lanes.request)
+    Args:
+        samples: numbers of the samples, in their order: all up or all down.
+        start: the pose before the lanes.
+        watch: take the last sound pose along all the way, not only where the walk ends.
 
-    def solve(self, tol: float) -> Trajectory:
-        """The motion at all samples; see `solve`."""
+    Attributes:
+        time: of the last pose.
+        sound: the last pose far from singular before it.
+    """
 
-        def by(start: Start) -> Trajectory:
-            own = start is self.start
-            return (self if own else BlockSweep(self._lanes, self.path, start))._solve(tol)
-
-        return solve_from_start(
-            self.start, self._mechanism, self.path, by, compare=np.isfinite(tol)
-        )
-
-    def _solve(self, tol: float) -> Trajectory:
-        lanes, n = self._lanes, len(self.path.times)
-        departure, before = self._departure
-        found = _Results(
-            np.full((self._columns.count, n), np.nan),
-            np.full((len(WORST), n), np.nan),
-            messages=[*before.messages],
-            notes=[*before.notes],
-            failures=[*before.failures],
-        )
-        lanes.begin()
-        for side in self._sides if departure else ():
-            assert departure is not None
-            lanes.restore(departure)
-            lanes.accept(tol)
-            self._follow(side, departure, self._keep(side, found), tol, found)
-        if departure and len(found.refused) <= BRIDGED:
-            self._interpolate_refused(departure, found, tol)
-        found.take_away(self.path, tol)
-        return self._trajectory(found)
-
-    def _keep(self, side: _Side, found: _Results) -> Keep:
-        lanes = self._lanes
-
-        def keep(samples: Indices) -> None:
-            at, count = side.order[samples], len(samples)
-            found.table[:, at] = lanes.motions(count)
-            found.worst[:, at] = lanes.worst[:, :count]
-            for lane, error in lanes.uncertain(count, side.path).items():
-                found.refused[int(at[lane])] = error
-
-        return keep
-
-    def _interpolate_refused(self, departure: Anchor, found: _Results, tol: float) -> None:
-        """Replace refused samples by interpolation between both sides of them, where the motion
-        continues.
-        """
-        lanes = self._lanes
-        for side in self._sides:
-            for at in np.flatnonzero([int(k) in found.refused for k in side.order]).tolist():
-                lanes.restore(departure)
-                lanes.accept(tol)
-                ahead = _Side(side.path, side.order, side.times[: at + 1], side.given)
-                came = self._follow(
-                    ahead, departure, _nothing, tol, _Results(*_NOTHING), watch=True
-                )
-                if came is not None and self._interpolate(side, at, *came, found, tol):
-                    del found.refused[int(side.order[at])]
-
-    def _interpolate(
+    def __init__(
         self,
+        lanes: Lanes,
         side: _Side,
-        at: int,
-        sound: Anchor,
-        near: Anchor | None,
-        found: _Results,
-        tol: float,
-    ) -> bool:
-        """Replace a sample by interpolation between eight poses around it; return whether they are
-        on one smooth curve, with the pose at the sample if it is known.
-        """
-        time, k = float(side.times[at]), int(side.order[at])
-        reach = self._reach(side.path, tol)
-        speed = float(np.abs(sound.numbers.rates).max(initial=0.0))
-        for poses in around(sound, time, time - sound.time, reach):
-            whole = np.stack([each.motions for each in poses], axis=1)
-            off = max(
-                max(each.error for each in poses),
-                interpolated(self._columns.by_vector, whole, self._lanes.unit, speed),
-            )
-            curve = numbers_of(poses).state
-            if off <= AMPLIFIED * tol and (
-                near is None or on_curve(curve, near.numbers.state, NEARLY)
-            ):
-                found.table[:, k] = whole @ EIGHT
-                tests = found.worst[:, k]
-                tests[np.isnan(tests)] = 0.0
-                found.notes.append(
-                    f"passes a singular pose at {side.path.where(time)}; {CONTINUED}, interpolated"
-                    f" there to {off:.1g} of the mechanism's size and of the rates"
-                )
-                return True
-        return False
-
-    @cached_property
-    def _sides(self) -> list[_Side]:
-        """The samples of each side of the start, outwards."""
-        path, sides = self.path, outwards(self.path.times, self.start.time)
-        return [
-            _Side(path, side, path.times[side], self._lanes.sampled(path.times[side], path))
-            for side in sides
-        ]
-
-    @cached_property
-    def _departure(self) -> tuple[Anchor | None, _Results]:
-        """The start of the sweep: the pose there, None if it cannot be reached, and words on the
-        way.
-        """
-        lanes, path, begin, found = self._lanes, self.path, self.start, _Results(*_NOTHING)
-        lanes.restore(lanes.design)
-        lanes.accept(CLOSED)
-        if way := begin.lead:
-            times = np.array([0.0, 1.0])
-            lanes.depart(0.0, way)
-            side = _Side(way, np.arange(2), times, lanes.sampled(times, way))
-            self._follow(side, lanes.anchor(0.0), _nothing, CLOSED, found)
-            if found.messages:
-                found.messages[:] = [f"on the way to {begin.name}: {found.messages[0]}"]
-                return None, found
-        failure = lanes.depart(begin.time, path)
-        if failure is not None:
-            where = path.where(begin.time)
-            found.messages.append(f"the motion cannot start at {where}: {failure}")
-            found.failures.append(failure.kind)
-            return None, found
-        return lanes.anchor(begin.time), found
-
-    def _follow(
-        self,
-        side: _Side,
-        start: Anchor,
+        samples: Indices,
         keep: Keep,
+        start: Anchor,
         tol: float,
-        found: _Results,
         *,
-        watch: bool = False,
+        watch: bool,
+    ) -> None:
+        self.lanes, self.side, self.samples, self.keep = lanes, side, samples, keep
+        self.tol, self.watch = tol, watch
+        self.time, self.sound = start.time, start
+
+    def run(self) -> tuple[int, PoseFailure | None]:
+        """Follow all samples; see `advance`."""
+        return self.advance(0, len(self.samples))
+
+    def follow(self, at: int, stop: int, parts: int) -> int:
+        """Follow as many samples at once as there are lanes, up to the first failure."""
+        lanes, ahead = self.lanes, self.samples[at : min(at + self.lanes.many, stop)]
+        self._parts = parts
+        if self.watch and lanes.sound:
+            self.sound = lanes.anchor(self.time)
+        tables = [each[:, ahead] for each in self.side.given]
+        accepted = leading(lanes.attempt_at(tables, neighbours=True))
+        if not accepted:
+            if lanes.sound and not self.watch:
+                self.sound = lanes.anchor(self.time)
+            return at
+        self.keep(ahead[:accepted])
+        if accepted == len(ahead):
+            lanes.go_on()
+        else:
+            lanes.carry(accepted - 1)
+        self.time = float(self.side.times[ahead[accepted - 1]])
+        return at + accepted
+
+    def follow_part(self, at: int) -> PoseFailure | None:
+        """Follow equal parts of a step that fails, as neighbours, and else the longest accepted
+        part.
+        """
+        lanes, path, wanted = self.lanes, self.side.path, float(self.side.times[self.samples[at]])
+        if not self._parts:
+            # the last part is left: a sample ends an iteration of its own
+            parts = np.arange(1.0, lanes.many) / lanes.many
+            times: Array = self.time + (wanted - self.time) * parts
+            accepted = leading(lanes.attempt_at(lanes.sampled(times, path), neighbours=True))
+            if accepted:
+                lanes.carry(accepted - 1)
+                self.time = float(times[accepted - 1])
+                return None
+        reached = part_of_step(
+            self.time, wanted, lambda times: lanes.attempt(times, path), lanes.many
+        )
+        if reached is None:
+            return lanes.failure(self.tol)
+        lane, self.time = reached
+        lanes.carry(lane)
+        return None
+
+
+class _Run:
+    """One solution of a sweep: the motions and tests of samples, the bounds of errors of those that
+    are refused, and words on the way.
+
+    Args:
+        count: number of samples to keep.
+    """
+
+    def __init__(self, lanes: Lanes, tol: float, count: int = 0) -> None:
+        self.lanes, self.tol, self.columns = lanes, tol, Columns.of(lanes.request)
+        self.table = np.full((self.columns.count, count), np.nan)
+        self.worst = np.full((len(WORST), count), np.nan)
+        self.refused = dict[int, float]()
+        self.messages, self.notes = list[str](), list[str]()
+        self.failures = list[FailureKind]()
+
+    def end(self, message: str, failure: FailureKind) -> None:
+        """Add the reason of missing samples."""
+        self.messages.append(message)
+        self.failures.append(failure)
+
+    def keep(self, side: _Side, samples: Indices) -> None:
+        """Keep the samples of a side that are in the first lanes."""
+        at, count = side.order[samples], len(samples)
+        self.table[:, at] = self.lanes.motions(count)
+        self.worst[:, at] = self.lanes.worst[:, :count]
+        for lane, error in self.lanes.uncertain(count, side.path).items():
+            self.refused[int(at[lane])] = error
+
+    def follow(
+        self, side: _Side, start: Anchor, keep: Keep, *, watch: bool = False
     ) -> tuple[Anchor, Anchor | None] | None:
         """Follow the samples of a side outwards, over singular poses too; add the message of an
         end.
@@ -471,22 +310,13 @@ class BlockSweep:
             A sound pose before the last sample, and the pose there, None if it was reached from
             beyond; None if it is not reached.
         """
-        lanes, path, times, left, refused = (
-            self._lanes,
-            side.path,
-            side.times,
-            np.arange(len(side.times)),
-            list[int](),
-        )
-
-        def walk(samples: Indices, start: Anchor) -> BlockWalk:
-            return BlockWalk(
-                lanes, samples, times, side.given, path, keep, start=start, tol=tol, watch=watch
-            )
-
+        lanes, path, times = self.lanes, side.path, side.times
+        left, refused = np.arange(len(times)), list[int]()
+        lanes.restore(start)
+        lanes.accept(self.tol)
         came: tuple[Anchor, Anchor | None] | None = None
         while len(left):
-            ahead = walk(left, start)
+            ahead = BlockWalk(lanes, side, left, keep, start, self.tol, watch=watch)
             count, failure = ahead.run()
             left = left[count:]
             if failure is None:
@@ -494,43 +324,48 @@ class BlockSweep:
                 break
             at = int(left[0])
             wanted, last = float(times[at]), float(times[at - 1]) if at else None
-            near = lanes.anchor(ahead.time)
-            beyond = (
-                None
-                if failure.kind is FailureKind.TOO_MANY_PARTS
-                else cross(ahead.sound, near, wanted, self._reach(path, tol))
-            )
-            lanes.accept(tol)
-            if beyond is None:
-                found.failures.append(failure.kind)
-                found.messages.append(path.ended(ahead.time, wanted, last, str(failure)))
+            near, passed = lanes.anchor(ahead.time), None
+            if failure.kind is not FailureKind.TOO_MANY_PARTS:
+                way = wanted - near.time
+                passed = self.pass_over(path, ahead.sound, near, near.time, way, rates=False)
+            if passed is None:
+                self.end(path.ended(ahead.time, wanted, last, str(failure)), failure.kind)
                 return None
-            found.notes.append(
-                f"crosses a singular pose near {path.where(ahead.time)}; {CONTINUED}"
-            )
-            start = beyond[-1]
+            self.notes.append(f"crosses a singular pose near {path.where(ahead.time)}; {CONTINUED}")
+            start = passed.poses[-1]
             beside = left[np.abs(times[left] - ahead.time) <= abs(start.time - ahead.time)]
             left = left[len(beside) :]
             lanes.restore(start)
-            reached, _ = walk(beside[::-1], start).run()
+            lanes.accept(self.tol)
+            back = BlockWalk(lanes, side, beside[::-1], keep, start, self.tol, watch=watch)
+            reached, _ = back.run()
             for each in beside[: len(beside) - reached].tolist()[:BRIDGED]:
-                if not self._interpolate(side, each, ahead.sound, None, found, tol):
+                if not self.interpolate(side, each, ahead.sound, None):
                     refused.append(each)
             lanes.restore(start)
-            lanes.accept(tol)
+            lanes.accept(self.tol)
             came = start, None
         if refused:
-            found.failures.append(FailureKind.UNCERTAIN)
             places = listed([path.where(float(times[k])) for k in refused])
-            found.messages.append(
+            self.end(
                 f"refused at {places}: so near a singular pose that neither side reaches it; keep"
-                " away from it"
+                " away from it",
+                FailureKind.UNCERTAIN,
             )
         return came
 
-    def _reach(self, path: Path, tol: float) -> Callable[[Anchor, float, bool], Anchor | None]:
-        """Return what goes from a pose to a time of a path, see `cross`."""
-        lanes = self._lanes
+    def pass_over(
+        self,
+        path: Path,
+        sound: Anchor,
+        near: Anchor | None,
+        time: float,
+        way: float,
+        *,
+        rates: bool = True,
+    ) -> Passage[Anchor] | None:
+        """Pass a time on a path, see `continuation.singular_poses.pass_over`."""
+        lanes, tol = self.lanes, self.tol
 
         def reach(at: Anchor, time: float, crossing: bool) -> Anchor | None:
             lanes.restore(at)
@@ -548,36 +383,142 @@ class BlockSweep:
                 here = float(parts[part])
             return None
 
-        return reach
+        measure = partial(interpolated, self.columns.by_vector, lanes.unit, rates=rates)
+        known = near and (near.numbers.state, NEARLY)
+        return pass_over(sound, known, time, way, reach, measure, AMPLIFIED * tol)
 
-    def _trajectory(self, found: _Results) -> Trajectory:
-        tests = dict(zip(WORST, found.worst, strict=True))
+    def interpolate(self, side: _Side, at: int, sound: Anchor, near: Anchor | None) -> bool:
+        """Replace a sample by interpolation between eight poses around it; return whether they are
+        on one smooth curve, with the pose at the sample if it is known.
+        """
+        time, k = float(side.times[at]), int(side.order[at])
+        passed = self.pass_over(side.path, sound, near, time, time - sound.time)
+        if passed is None:
+            return False
+        self.table[:, k] = passed.motions
+        tests = self.worst[:, k]
+        tests[np.isnan(tests)] = 0.0
+        self.notes.append(
+            f"passes a singular pose at {side.path.where(time)}; {CONTINUED}, interpolated"
+            f" there to {passed.error:.1g} of the mechanism's size and of the rates"
+        )
+        return True
+
+    def interpolate_refused(self, side: _Side, start: Anchor) -> None:
+        """Replace refused samples by interpolation between both sides of them, where the motion
+        continues.
+        """
+        for at in np.flatnonzero([int(k) in self.refused for k in side.order]).tolist():
+            ahead = replace(side, times=side.times[: at + 1])
+            came = _Run(self.lanes, self.tol).follow(ahead, start, _nothing, watch=True)
+            if came is not None and self.interpolate(side, at, *came):
+                del self.refused[int(side.order[at])]
+
+    def take_away(self, path: Path) -> None:
+        """Take away the samples left uncertain, and say so."""
+        refused = self.refused
+        if refused:
+            self.table[:, [*refused]] = np.nan
+            self.worst[:, [*refused]] = np.nan
+            worst = max(refused, key=refused.__getitem__)
+            there = path.where(float(path.times[worst]))
+            self.end(
+                f"refused at {number_of(len(refused), 'sample')} so near a singular pose that"
+                " residuals leave the pose or its rates uncertain, by up to"
+                f" {refused[worst]:.2g} (at {there}), allowed {AMPLIFIED * self.tol:.2g}; keep away"
+                " from it",
+                FailureKind.UNCERTAIN,
+            )
+
+    def trajectory(self) -> Trajectory:
+        """Return what is kept."""
+        tests = dict(zip(WORST, self.worst, strict=True))
         solved = ~np.isnan(tests["closure"])
         closure, leftover, sigma = (
             largest_found(each[solved])
             for each in (tests["closure"], tests["leftover"], -tests[SIGMA])
         )
         return solution(
-            found.table.T,
-            self._columns.points,
-            self._columns.bodies,
-            unit=self._lanes.unit,
+            self.table.T,
+            self.columns.points,
+            self.columns.bodies,
+            unit=self.lanes.unit,
             solved=solved,
             iterations=tests[ITERATIONS],
             closure=closure,
             leftover=leftover,
-            message="; ".join(found.messages),
-            failures=found.failures,
-            account=self._lanes.details,
+            message="; ".join(self.messages),
+            failures=self.failures,
+            account=self.lanes.details,
             findings={
                 "smallest_singular_value": min(-sigma, 1.0),
-                **self._lanes.findings,
-                **({"notes": found.notes} if found.notes else {}),
+                **self.lanes.findings,
+                **({"notes": self.notes} if self.notes else {}),
             },
         )
 
 
-_NOTHING = np.empty((0, 0)), np.empty((0, 0))
+class BlockSweep:
+    """A path through blocks bound to lanes; solved as often as wanted."""
+
+    def __init__(self, lanes: Lanes, path: Path, start: Start | None = None) -> None:
+        self._lanes, self._mechanism, self.path = lanes, lanes.mechanism, path
+        self.start = start or start_of(self._mechanism, path)
+
+    def solve(self, tol: float) -> Trajectory:
+        """The motion at all samples; see `solve`."""
+
+        def by(start: Start) -> Trajectory:
+            own = start is self.start
+            return (self if own else BlockSweep(self._lanes, self.path, start))._solve(tol)
+
+        return solve_from_start(
+            self.start, self._mechanism, self.path, by, compare=np.isfinite(tol)
+        )
+
+    def _solve(self, tol: float) -> Trajectory:
+        departure, way = self._departure
+        run = _Run(self._lanes, tol, len(self.path.times))
+        run.messages, run.notes, run.failures = [*way.messages], [*way.notes], [*way.failures]
+        self._lanes.begin()
+        if departure is not None:
+            for side in self._sides:
+                run.follow(side, departure, partial(run.keep, side))
+            for side in self._sides if len(run.refused) <= BRIDGED else ():
+                run.interpolate_refused(side, departure)
+        run.take_away(self.path)
+        return run.trajectory()
+
+    @cached_property
+    def _sides(self) -> list[_Side]:
+        """The samples of each side of the start, outwards."""
+        path, sides = self.path, outwards(self.path.times, self.start.time)
+        return [
+            _Side(path, side, path.times[side], self._lanes.sampled(path.times[side], path))
+            for side in sides
+        ]
+
+    @cached_property
+    def _departure(self) -> tuple[Anchor | None, _Run]:
+        """The start of the sweep: the pose there, None if it cannot be reached, and words on the
+        way.
+        """
+        lanes, path, begin, run = self._lanes, self.path, self.start, _Run(self._lanes, CLOSED)
+        lanes.restore(lanes.design)
+        lanes.accept(CLOSED)
+        if way := begin.lead:
+            times = np.array([0.0, 1.0])
+            lanes.depart(0.0, way)
+            side = _Side(way, np.arange(2), times, lanes.sampled(times, way))
+            run.follow(side, lanes.anchor(0.0), _nothing)
+            if run.messages:
+                run.messages[:] = [f"on the way to {begin.name}: {run.messages[0]}"]
+                return None, run
+        failure = lanes.depart(begin.time, path)
+        if failure is not None:
+            run.end(f"the motion cannot start at {path.where(begin.time)}: {failure}", failure.kind)
+            return None, run
+        return lanes.anchor(begin.time), run
 
 
 def _nothing(samples: Indices) -> None:

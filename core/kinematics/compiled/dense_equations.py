@@ -160,11 +160,6 @@ class System:
         ]
 
     @property
-    def model_rows(self) -> tuple[Sequence[int], Sequence[int]]:
-        """The rows solved and those left out, as they are selected at the design position."""
-        return self.tracer.selection.chosen, self.tracer.selection.dropped
-
-    @property
     def owners(self) -> list[str]:
         """Joint or driver of every kept row."""
         return [self.tracer.formulation.owners[k][0] for k in self.tracer.selection.chosen]
@@ -202,12 +197,17 @@ class System:
         phi, nu, entries = (executor.get(self._vectors[k]) for k in ("phi", "nu", "entries"))
         return phi, nu, entries
 
+    def jacobian(self, entries: Array) -> Array:
+        """Return the Jacobian of all rows by its entries, shape (m, rows, n)."""
+        matrix = np.zeros((entries.shape[1], len(self.tracer.formulation.owners), self.unknowns))
+        matrix[:, self.rows, self.columns] = entries.T
+        return matrix
+
     def equations(self, state: Array, sample: Array) -> Equations:
         """Return the kept rows at states and samples, see `evaluate`."""
         phi, nu, entries = self.evaluate(state, sample)
-        chosen, dropped = ([*each] for each in self.model_rows)
-        matrix = np.zeros((state.shape[1], len(phi), self.unknowns))
-        matrix[:, self.rows, self.columns] = entries.T
+        selection, matrix = self.tracer.selection, self.jacobian(entries)
+        chosen, dropped = [*selection.chosen], [*selection.dropped]
         return Equations(
             phi[chosen].T, matrix[:, chosen], nu[chosen].T, matrix[:, dropped], phi[dropped].T
         )

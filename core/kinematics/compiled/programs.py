@@ -15,7 +15,7 @@ iteration.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from typing import Any
 
 from ...algebra import Scalar, Vec3, quat, vec
@@ -83,7 +83,7 @@ class Tracer:
         )
         # the angle of a torsional spring is a coordinate, followed through any number of turns
         self.named = angles(mechanism) if request.forces else []
-        self._numbers = mechanism, self.frame, self._formulate({})
+        self._described = mechanism, self.frame, self.prescribed  # without traced numbers
         if selection is not None:
             self.selection = selection
         known = every_place(mechanism)
@@ -100,7 +100,7 @@ class Tracer:
             )
         self.prescribed = {name: self._moved(name) for name in self.prescribed}
         self.drives = {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
-        self.formulation = self._formulate(self.drives)
+        self.formulation = self._formulate(self.mechanism, self.frame, self.prescribed, self.drives)
         design = self.formulation.design
         for label in BLOCKS:
             for name, value in design.items():
@@ -110,11 +110,17 @@ class Tracer:
         )
         self.unknowns = self.formulation.unknowns
 
-    def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
-        found = constraints(self.mechanism, self.frame, drives, self.request.style, self.named)
+    def _formulate(
+        self,
+        mechanism: Mechanism,
+        frame: Frames,
+        prescribed: Mapping[str, PrescribedBody],
+        drives: Mapping[str, Drive],
+    ) -> Formulation:
+        found = constraints(mechanism, frame, drives, self.request.style, self.named)
         if self.request.style is Style.RELATIVE:
-            return Relative.of(self.mechanism, self.frame, found)
-        return Cartesian(found, self.frame.moving, prescribed=self.prescribed)
+            return Relative.of(mechanism, frame, found)
+        return Cartesian(found, frame.moving, prescribed=prescribed)
 
     def _moved(self, name: str) -> PrescribedBody:
         """A prescribed body, its motion read from slots."""
@@ -146,8 +152,11 @@ class Tracer:
     @cached_property
     def selection(self) -> Selection:
         """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
-        select = select_section if self._section else partial(select_rows, wanted=self.request.rows)
-        return select(*self._numbers)
+        mechanism, frame, _ = self._described
+        formulation = self._formulate(*self._described, {})
+        if self._section:
+            return select_section(mechanism, formulation)
+        return select_rows(mechanism, frame, formulation, self.request.rows)
 
     def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]

@@ -72,14 +72,7 @@ class Choice:
         if not model.selection.dropped:
             return None
         system, sample = system_of(model), route.sampled(lane[[slots[FROM + TIME]]])
-        found = system.equations(system.state(lane[:, None]), sample)
-        matrix = np.empty(
-            (len(model.selection.chosen) + len(model.selection.dropped), system.unknowns)
-        )
-        matrix[[*model.selection.chosen]], matrix[[*model.selection.dropped]] = (
-            found.jacobian[0],
-            found.redundant[0],
-        )
+        (matrix,) = system.jacobian(system.evaluate(system.state(lane[:, None]), sample)[2])
         if not np.isfinite(matrix).all():
             return None
         largest = float(lane[slots[FROM + LARGEST_SIGMA]])
@@ -333,11 +326,12 @@ class Followed:
         if passed is None:
             return None
         self.passages.append(Passage(end.lane, here, end.route))
+        over = passed.poses[-1].lane
         if number is None:
-            return self._arrive(onward(end.route, passed.beyond, end.route.path.times))
+            return self._arrive(onward(end.route, over, end.route.path.times))
         missing = self._missing(number, side, end.wanted)
-        ends = self._follow(onward(end.route, passed.beyond, self.times[missing]), missing)
-        beyond = _time(end.route, passed.beyond)
+        ends = self._follow(onward(end.route, over, self.times[missing]), missing)
+        beyond = _time(end.route, over)
         back = [each for each in ends if side * (each.wanted - beyond) < 0.0]
         # a sample right beyond the pose is not given up for want of better rows
         while back and back[0].failure is FailureKind.LEFT_OFF:

@@ -13,15 +13,15 @@ motions, or the motion turns back, the formula does not hold or there are no eig
 turns a corner too narrow for these poses, or has a gap as narrow, the last followed pose before the
 singular one does not lie on the polynomial.
 
-`bridge` passes a pose of one program and interpolates samples there. `cross` passes a pose of any
-solver that can go from a pose to a time: without an interpolation it is enough to see one curve.
+`pass_over` is for every solver that can go from a pose to a time; `bridge` is it for one program.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeVar
+from functools import partial
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,9 @@ from numpy.typing import NDArray
 from ...errors import shortened
 from ...mechanism.motions import Path
 from ...trajectory import QUANTITIES, Array
+from ..compiled.compiled_model import Model
 from ..compiled.dense_equations import System, system_of
-from ..compiled.request import FROM, ORIENTATION, RATE, SIGMA, TESTS, TIME
+from ..compiled.request import FROM, RATE, SIGMA, TESTS, TIME, slots_of
 from ..compiled.routes import Route
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
 from .walk import arrived, march
@@ -139,6 +140,12 @@ def examine(system: System, state: Array, sample: Array) -> Singularity:
         owners=tuple(_shares(weights)),
         moves=_moves(system, state[:, 0], z[-1]),
     )
+
+
+def examine_lane(route: Route, lane: Array, time: float) -> Singularity:
+    """Return the singularity nearest to the pose of a lane, with the drivers at a time."""
+    system = system_of(route.model)
+    return examine(system, system.state(lane[:, None]), route.sampled(np.array([time])))
 
 
 def _shares(weights: Mapping[str, float]) -> list[str]:
@@ -284,30 +291,14 @@ COVERED = 30.0
 # A smallest singular value above this part of its largest is sound enough to look over a singular
 # pose from.
 SOUND = 0.1
-# Nothing is interpolated by `cross`: it is enough to see that there is one curve, and other
-# assemblies are farther off.
+# Of all states and rates, whatever is wanted of them, it is enough to see that they are on one
+# curve: other assemblies are farther off.
 SMOOTH = 1e-7
 # The last pose before is followed to where rounding leaves rates uncertain by a hundredth: itself
 # by this.
 NEARLY = 1e-7
 # Number of the first of the eight that is beyond.
 BEYOND = 4
-
-
-@dataclass(frozen=True, eq=False)
-class Bridge:
-    """A singular pose on a motion.
-
-    Attributes:
-        kept: the kept rows there (`Model.rows`), shape (kept,); its tests are those of a pose right
-            before it.
-        off: bound of its errors: of the pose by the mechanism's size, of rates by their own.
-        beyond: a lane beyond it.
-    """
-
-    kept: Array
-    off: float
-    beyond: Array
 
 
 class Numbers(NamedTuple):
@@ -330,64 +321,92 @@ class Followed(Protocol):
         """The numbers of the pose."""
         ...
 
+    @property
+    def motions(self) -> Array:
+        """The motions wanted there, shape (rows,); not read of the first pose."""
+        ...
+
+    @property
+    def error(self) -> float:
+        """A bound of the error of the pose by its tests [units]; not read of the first pose."""
+        ...
+
 
 AnyPose = TypeVar("AnyPose", bound=Followed)
+
+
+@dataclass(frozen=True, eq=False)
+class Passage(Generic[AnyPose]):
+    """A singular pose on a motion.
+
+    Attributes:
+        poses: eight around it, half of them beyond.
+        motions: those wanted, interpolated there, shape (rows,).
+        error: bound of their errors: of the pose by the mechanism's size, of rates by their own.
+    """
+
+    poses: Sequence[AnyPose]
+    motions: Array
+    error: float
 
 
 Reach = Callable[[AnyPose, float, bool], AnyPose | None]
 """Goes from a pose to a time, over a singular pose if that is true; None if it is out of reach."""
 
 
-def cross(
-    sound: AnyPose, near: AnyPose, aim: float, reach: Reach[AnyPose]
-) -> Sequence[AnyPose] | None:
-    """Return eight poses around a singular pose, or None if the motion is not known to go on: they
-    and the last one before it are on one smooth curve.
+def pass_over(
+    sound: AnyPose,
+    near: tuple[Array, float] | None,
+    time: float,
+    way: float,
+    reach: Reach[AnyPose],
+    measure: Callable[[Array, float], float],
+    limit: float,
+) -> Passage[AnyPose] | None:
+    """Return the passage over a singular pose, or None if the motion is not known to go on, or not
+    well enough.
 
     Args:
         sound: the last pose far from singular.
-        near: the last pose before the singular one.
-        aim: time of a sample out of reach from there.
-    """
-    for poses in around(sound, near.time, aim - near.time, reach):
-        state, rates = numbers_of(poses)
-        off = [
-            float(np.abs(x @ (EIGHT - SIX)).max() / max(1.0, np.abs(x).max()))
-            for x in (state, rates)
-        ]
-        if max(off) <= SMOOTH and on_curve(state, near.numbers.state, NEARLY):
-            return poses
-    return None
-
-
-def around(
-    sound: AnyPose, time: float, way: float, reach: Reach[AnyPose]
-) -> Iterator[Sequence[AnyPose]]:
-    """Yield eight poses around a time, at different distances, for a motion in the direction of a
-    way.
+        near: state of the last followed pose at or right before the singular one, and its error: it
+            must be on the same curve. Without one, the interpolated pose may be accepted, but not
+            the continuation of the motion.
+        time: of the singular pose.
+        way: its sign is the direction of the motion.
+        measure: bounds the errors of motions interpolated between eight, shape (rows, 8), at a
+            largest rate, see `interpolated`.
+        limit: of the errors.
     """
     speed = float(np.abs(sound.numbers.rates).max(initial=0.0))
     for node in NODES if speed > 0.0 else ():
-        here: AnyPose | None = sound
-        found: list[AnyPose] = []
-        for k, each in enumerate((time + np.copysign(node / speed, way) * PLACES).tolist()):
-            here = reach(here, each, k == BEYOND)
-            if here is None:
-                break
-            found.append(here)
-        if len(found) == len(PLACES):
-            yield found
+        poses = _eight(sound, time + np.copysign(node / speed, way) * PLACES, reach)
+        if poses is None:
+            continue
+        whole, state, rates = (
+            np.stack(each, axis=1)
+            for each in zip(*((pose.motions, *pose.numbers) for pose in poses), strict=True)
+        )
+        smooth = all(
+            np.abs(x @ (EIGHT - SIX)).max() <= SMOOTH * max(1.0, np.abs(x).max())
+            for x in (state, rates)
+        )
+        error = max(*(pose.error for pose in poses), measure(whole, speed))
+        if smooth and error <= limit and (near is None or _on_curve(state, *near)):
+            return Passage(poses, whole @ EIGHT, error)
+    return None
 
 
-def numbers_of(poses: Sequence[Followed]) -> Numbers:
-    """Return the numbers of poses, shape (numbers, poses)."""
-    state, rates = (
-        np.stack(each, axis=1) for each in zip(*(pose.numbers for pose in poses), strict=True)
-    )
-    return Numbers(state, rates)
+def _eight(sound: AnyPose, times: Array, reach: Reach[AnyPose]) -> Sequence[AnyPose] | None:
+    here, found = sound, list[AnyPose]()
+    for k, time in enumerate(times.tolist()):
+        after = reach(here, time, k == BEYOND)
+        if after is None:
+            return None
+        found.append(here := after)
+    return found
 
 
-def on_curve(eight: Array, near: Array, error: float) -> bool:
+def _on_curve(eight: Array, near: Array, error: float) -> bool:
     """Return whether a state, known to an error, is on the polynomial through eight others at the
     middle time.
     """
@@ -406,72 +425,68 @@ def onward(route: Route, lane: Array, times: Array) -> Route:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class RoutePose:
+    """A lane on a route as a pose; its motions are the kept rows (`Model.rows`)."""
+
+    model: Model
+    lane: Array
+    motions: Array
+
+    @property
+    def time(self) -> float:
+        """See `Followed`."""
+        return float(self.lane[self.model.slots[FROM + TIME]])
+
+    @property
+    def numbers(self) -> Numbers:
+        """See `Followed`: the rates of the unknowns alone."""
+        vectors = self.model.vectors
+        state = slots_of(vectors, (FROM + name for name in self.model.state))
+        return Numbers(self.lane[state], self.lane[vectors[FROM + RATE]])
+
+    @property
+    def error(self) -> float:
+        """See `Followed`."""
+        closure, sigma = (self.motions[self.model.rows[name].start] for name in ("closure", SIGMA))
+        return WORSE * float(max(closure, EPSILON) / sigma)
+
+
 def bridge(
     route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True
-) -> Bridge | None:
-    """Pass a time on a route, from a lane; return None if the motion does not continue, or is not
-    known well enough.
+) -> Passage[RoutePose] | None:
+    """Pass a time on a route, from a lane; see `pass_over`.
 
     Args:
-        near: last followed lane at or right before the singular pose: it must be on the same curve.
-            Without one, the interpolated pose may be accepted, but not the continuation of the
-            motion.
+        near: last followed lane.
         rates: whether they are wanted there too. A passage needs only the pose, even if the request
             wants rates elsewhere.
     """
-    model = route.model
-    speed = float(np.abs(lane[model.vectors[FROM + RATE]]).max())
-    side = 1.0 if time >= lane[model.slots[FROM + TIME]] else -1.0
-    for node in NODES if speed > 0.0 else ():
-        found = _eight(route, lane, time + side * node / speed * PLACES, tol)
-        if found is None:
-            continue
-        whole, lanes = found
-        closure, sigma = (whole[model.rows[name].start] for name in ("closure", SIGMA))
-        own = WORSE * float((np.maximum(closure, EPSILON) / sigma).max())
-        off = max(own, interpolated(model.rows, whole, model.frame.unit, speed, rates=rates))
-        if off <= AMPLIFIED * tol and (near is None or _on_curve(route, lanes, near)):
-            kept = whole @ EIGHT
-            tests = slice(model.rows[TESTS[0]].start, None)
-            kept[tests] = whole[tests, 3]
-            return Bridge(kept, off, lanes[:, -1])
-    return None
+    model, known = route.model, None
 
+    def reach(at: RoutePose, time: float, crossing: bool) -> RoutePose | None:
+        found = march(onward(route, at.lane, np.array([time])), tol, {0}, crossing=crossing)
+        return RoutePose(model, found.visited[0], found.kept[:, 0]) if found.visited else None
 
-def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, Array] | None:
-    """Return the kept rows of poses at eight times, and their lanes; a singular pose lies between
-    the fourth and the fifth.
-    """
-    before = march(onward(route, lane, times[:4]), tol, visit=range(4))
-    if not before.solved.all():
-        return None
-    beyond = march(onward(route, before.visited[3], times[4:]), tol, visit=range(4), crossing=True)
-    turned = beyond.kept[route.model.rows[ORIENTATION].start]
-    if not (beyond.solved.all() and (turned == turned[0]).all()):
-        return None
-    lanes = [march.visited[k] for march in (before, beyond) for k in range(4)]
-    return np.hstack([before.kept, beyond.kept]), np.stack(lanes, axis=1)
-
-
-def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
-    """Return whether the pose of a lane at the middle time is on the polynomial through eight
-    others.
-    """
-    system, time = system_of(route.model), near[[route.model.slots[FROM + TIME]]]
-    solved = solve_closely(system, system.state(near[:, None]), route.sampled(time))
-    return on_curve(system.state(lanes), solved.state[:, 0], WORSE * float(solved.error[0, 0]))
+    if near is not None:
+        system, at = system_of(model), near[[model.slots[FROM + TIME]]]
+        solved = solve_closely(system, system.state(near[:, None]), route.sampled(at))
+        known = solved.state[:, 0], WORSE * float(solved.error[0, 0])
+    sound = RoutePose(model, lane, np.empty(0))
+    measure = partial(interpolated, model.rows, model.frame.unit, rates=rates)
+    return pass_over(sound, known, time, time - sound.time, reach, measure, AMPLIFIED * tol)
 
 
 def interpolated(
-    rows: Mapping[str, slice], whole: Array, unit: float, speed: float, *, rates: bool = True
+    rows: Mapping[str, slice], unit: float, whole: Array, speed: float, *, rates: bool = True
 ) -> float:
     """Return a bound of the errors of motions interpolated between eight poses: of positions by the
     mechanism's size, of rates by their own.
 
     Args:
         rows: of every motion; tests are left out.
-        whole: the motions at the poses, shape (rows, 8).
         unit: the mechanism's size [m].
+        whole: the motions at the poses, shape (rows, 8).
         speed: largest rate of the unknowns.
         rates: whether they are wanted.
     """

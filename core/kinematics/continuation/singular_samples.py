@@ -27,11 +27,13 @@ from ..compiled.routes import LONGEST_KEPT, Route
 from ..formulation.acceptance_criteria import AMPLIFIED, WORSE
 from .segments import BETTER, Followed, Passage
 from .singular_poses import (
+    BEYOND,
     CONTINUED,
     REGULAR,
     Singularity,
     bridge,
     examine,
+    examine_lane,
     listed,
     smallest_singular_values,
     solve_closely,
@@ -109,113 +111,34 @@ class Findings:
         )
 
 
-def add_passages(findings: Findings, followed: Followed) -> None:
-    """Add the singular poses passed between samples."""
-    said = [pose["time"] for pose in findings.poses if pose["outcome"] == "passed"]
-    others = [
-        each
-        for each in followed.passages
-        if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)
-    ]
-    for each in others[:NAMED]:
-        _crossed(findings, each, followed.route)
-    if len(others) > NAMED:
-        findings.notes.append(f"crosses {len(others) - NAMED} more singular poses, between samples")
-
-
-def _crossed(findings: Findings, passage: Passage, asked: Route) -> None:
-    path, time, where = passage.route.path, passage.time, passage.route.path.where
-    system = system_of(passage.route.model)
-    singularity = examine(
-        system, system.state(passage.lane[:, None]), passage.route.sampled(np.array([time]))
-    )
-    if singularity.regular:  # the motion knows nothing of the choice of rows
-        return
-    findings.add_pose("crossed", path, time, singularity)
-    if path.motions is asked.path.motions:
-        places = np.append(asked.path.times, asked.start)
-        low, high = (
-            where(float(side))
-            for side in (places[places <= time].max(), places[places >= time].min())
-        )
-        beside = f"between {low} and {high}, "
-    else:
-        beside = f"on the way to {asked.begin.name}, "
-    findings.notes.append(
-        f"crosses a singular pose {beside}near {where(time)}: {singularity.words}; {CONTINUED}"
-    )
-
-
-def add_end(findings: Findings, end: End, tol: float) -> None:
-    """Add the reason why a side ended: a limit point ahead, or the singularity nearest to its last
-    pose.
-    """
-    findings.failures.append(end.failure)
-    if end.failure is FailureKind.TOO_MANY_PARTS:
-        findings.messages.append(end.message)
-        return
-    model, path = end.route.model, end.route.path
-    system, time = system_of(model), float(end.lane[model.slots[FROM + TIME]])
-    state = system.state(end.lane[:, None])
-    ahead = limit_ahead(system, path, state, time, 1 if end.wanted > time else -1, tol)
-    if ahead is None:
-        singularity = examine(system, state, end.route.sampled(np.array([time])))
-        regular = f"the pose is regular there, smallest singular value {singularity.sigma:.3g}"
-        findings.messages.append(
-            f"{end.message}; there, {singularity.words}"
-            if singularity.sigma < REGULAR
-            else f"{end.message}; {regular}"
-        )
-        return
-    findings.add_pose("limit", path, ahead.value, ahead.singularity)
-    findings.messages.append(
-        f"{end.message}; the limit of travel is {path.where(ahead.value)}:"
-        f" {ahead.singularity.words}; kincheck trace goes on beyond"
-    )
-
-
 # A fine sweep has some tens of samples beside a singular pose that cannot be told from it.
 BRIDGED = 64
 # Unknowns up to which a dense decomposition is worth its time, a second.
 LARGEST = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class _Remembered:
-    """A march before and after a scrutiny, kept rows and solved samples of each, and its findings.
-    A route that is marched again gives the same poses, to the last digit.
-    """
-
-    before: tuple[Array, NDArray[np.bool_]]
-    after: tuple[Array, NDArray[np.bool_]]
-    findings: Findings
+_Poses = tuple[Array, NDArray[np.bool_]]
 
 
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
     """Solve doubtful samples again, in place, and those beyond passed ends; return the findings.
 
-    The last scrutiny of a route is remembered: of a Bennett loop it takes two thirds of the time,
-    of a torus of cranks nearly all.
+    The last scrutiny of a route is remembered, with the poses before and after it: of a Bennett
+    loop it takes two thirds of the time, of a torus of cranks nearly all. A route that is marched
+    again gives the same poses, to the last digit.
     """
     if len(found.solved) > LONGEST_KEPT:
         return _scrutinised(route, found, tol)
-    poses = found.kept, found.solved
-
-    def anew() -> _Remembered:
-        before = found.kept.copy(), found.solved.copy()
-        findings = _scrutinised(route, found, tol)
-        return _Remembered(before, (found.kept.copy(), found.solved.copy()), findings)
-
-    known: list[_Remembered] = route.bound(("scrutinised", tol), list[_Remembered])
-    for each in known:
-        if all(
-            np.array_equal(*pair, equal_nan=True) for pair in zip(each.before, poses, strict=True)
-        ):
-            for array, values in zip(poses, each.after, strict=True):
+    poses, before = (found.kept, found.solved), (found.kept.copy(), found.solved.copy())
+    known = route.bound(("scrutinised", tol), list[tuple[_Poses, _Poses, Findings]])
+    for same, after, findings in known:
+        if all(np.array_equal(*pair, equal_nan=True) for pair in zip(same, before, strict=True)):
+            for array, values in zip(poses, after, strict=True):
                 array[:] = values
-            return each.findings
-    known[:] = [anew()]
-    return known[0].findings
+            return findings
+    findings = _scrutinised(route, found, tol)
+    known[:] = [(before, (found.kept.copy(), found.solved.copy()), findings)]
+    return findings
 
 
 def _scrutinised(route: Route, found: March, tol: float) -> Findings:
@@ -225,9 +148,9 @@ def _scrutinised(route: Route, found: March, tol: float) -> Findings:
     scrutiny.followed.go_on()
     scrutiny.samples()
     scrutiny.stuck()
-    add_passages(scrutiny.findings, scrutiny.followed)
+    scrutiny.passages()
     for end in scrutiny.followed.ends:
-        add_end(scrutiny.findings, end, tol)
+        scrutiny.end(end)
     scrutiny.findings.renewed = scrutiny.followed.renewed
     scrutiny.findings.uncertain = [k for k in scrutiny.findings.uncertain if not found.solved[k]]
     return scrutiny.findings
@@ -378,21 +301,20 @@ class _Scrutiny:
     def _bridged(
         self, route: Route, k: int, lane: Array, near: Array, *, passed: bool = False
     ) -> bool:
-        time, system = float(self.times[k]), system_of(route.model)
+        time = float(self.times[k])
         found = bridge(route, lane, time, self.tol, None if passed else near)
         if found is None:
             return False
         tests = self.rows[TESTS[0]].start
-        wanted = slice(None if passed else tests)  # a sample that was reached has tests of its own
-        self.found.kept[wanted, k] = found.kept[wanted]
-        singularity = examine(
-            system, system.state(near[:, None]), self.route.sampled(np.array([time]))
-        )
+        self.found.kept[:tests, k] = found.motions[:tests]
+        if passed:  # a sample that was reached has tests of its own
+            self.found.kept[tests:, k] = found.poses[BEYOND - 1].motions[tests:]
+        singularity = examine_lane(route, near, time)
         self.findings.add_pose("passed", self.route.path, time, singularity, k)
         what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
             f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated"
-            f" there to {found.off:.1g} of the mechanism's size and of the rates"
+            f" there to {found.error:.1g} of the mechanism's size and of the rates"
         )
         return True
 
@@ -428,6 +350,64 @@ class _Scrutiny:
             )
         self.findings.messages.append(f"refused at {places}: {why}")
         self.findings.failures.append(FailureKind.UNCERTAIN)
+
+    def passages(self) -> None:
+        """Add the singular poses passed between samples."""
+        said = [pose["time"] for pose in self.findings.poses if pose["outcome"] == "passed"]
+        others = [
+            each
+            for each in self.followed.passages
+            if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)
+        ]
+        for each in others[:NAMED]:
+            self._crossed(each)
+        if len(others) > NAMED:
+            more = f"crosses {len(others) - NAMED} more singular poses, between samples"
+            self.findings.notes.append(more)
+
+    def _crossed(self, passage: Passage) -> None:
+        path, time = passage.route.path, passage.time
+        singularity = examine_lane(passage.route, passage.lane, time)
+        if singularity.regular:  # the motion knows nothing of the choice of rows
+            return
+        self.findings.add_pose("crossed", path, time, singularity)
+        if path.motions is self.route.path.motions:
+            places = np.append(self.times, self.route.start)
+            low, high = (
+                path.where(float(side))
+                for side in (places[places <= time].max(), places[places >= time].min())
+            )
+            beside = f"between {low} and {high}, "
+        else:
+            beside = f"on the way to {self.route.begin.name}, "
+        self.findings.notes.append(
+            f"crosses a singular pose {beside}near {path.where(time)}: {singularity.words};"
+            f" {CONTINUED}"
+        )
+
+    def end(self, end: End) -> None:
+        """Add the reason why a side ended: a limit point ahead, or the singularity nearest to its
+        last pose.
+        """
+        message, route, slots = end.message, end.route, end.route.model.slots
+        if end.failure is not FailureKind.TOO_MANY_PARTS:
+            system, time = system_of(route.model), float(end.lane[slots[FROM + TIME]])
+            state, way = system.state(end.lane[:, None]), 1 if end.wanted > time else -1
+            ahead = limit_ahead(system, route.path, state, time, way, self.tol)
+            if ahead is not None:
+                self.findings.add_pose("limit", route.path, ahead.value, ahead.singularity)
+                message += (
+                    f"; the limit of travel is {route.path.where(ahead.value)}:"
+                    f" {ahead.singularity.words}; kincheck trace goes on beyond"
+                )
+            elif (nearest := examine_lane(route, end.lane, time)).sigma < REGULAR:
+                message += f"; there, {nearest.words}"
+            else:
+                message += (
+                    f"; the pose is regular there, smallest singular value {nearest.sigma:.3g}"
+                )
+        self.findings.messages.append(message)
+        self.findings.failures.append(end.failure)
 
     def _where(self, time: float) -> str:
         return self.route.path.where(time)

@@ -23,10 +23,10 @@ from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, extent, unit_near
-from ..formulation.formulation import Formulation, row_names
+from ..formulation.formulation import Formulation
 from ..formulation.parameters import places
 from ..formulation.state_vectors import jacobian
-from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection
+from .degrees_of_freedom import Selection, counted, selected
 from .redundancy import independent_rows
 
 ORIGIN = "origin "
@@ -266,7 +266,7 @@ def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[f
     ]
 
 
-def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
+def select_section(mechanism: Mechanism, formulation: Formulation) -> Selection:
     """Select the rows of a section to solve, drivers first.
 
     Raises:
@@ -274,7 +274,6 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
     """
     matrix, drivers = jacobian(formulation), len(mechanism.drivers)
     kept = independent_rows(matrix, drivers, formulation.conditions)
-    names = row_names(formulation)
     if len(kept) < formulation.unknowns:
         raise SolveError(
             f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can"
@@ -282,15 +281,5 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
             " lock-up, dead centre or too few drivers; shift the design",
             FailureKind.LOCKED,
         )
-    taken = set(kept)
-    dropped = tuple(k for k in range(len(matrix)) if k not in taken)
-    found = FreedomAccount(
-        bodies=len(frame.moving),
-        coordinates=COORDINATES * len(frame.moving),
-        equations=sum(joint.rows for joint in mechanism.joints) + len(frame.moving),
-        moving_coordinates=formulation.unknowns,
-        rows=len(matrix) - drivers,
-        rank=len(kept) - drivers,
-        redundant_rows=tuple(names[k] for k in dropped),
-    )
-    return Selection(found, tuple(kept), dropped)
+    found = counted(mechanism, formulation.unknowns, len(matrix) - drivers, ())
+    return selected(found, formulation, kept)

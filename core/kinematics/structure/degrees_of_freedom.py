@@ -166,12 +166,16 @@ def select_rows(
     kept = wanted or independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
         raise SolveError(_locked(mechanism, formulation, matrix), FailureKind.LOCKED)
-    taken = set(kept)
-    dropped = tuple(k for k in range(len(matrix)) if k not in taken)
-    names = row_names(formulation)
     # drivers first and in this formulation, other rows may be left out
-    found = replace(found, redundant_rows=tuple(names[k] for k in dropped))
-    return Selection(found, tuple(kept), dropped)
+    return selected(found, formulation, kept)
+
+
+def selected(found: FreedomAccount, formulation: Formulation, kept: Sequence[int]) -> Selection:
+    """Return the selection of rows, with the names of the others in the account."""
+    names, solved = row_names(formulation), set(kept)
+    dropped = tuple(k for k in range(len(names)) if k not in solved)
+    redundant = tuple(names[k] for k in dropped)
+    return Selection(replace(found, redundant_rows=redundant), tuple(kept), dropped)
 
 
 def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from ...trajectory import Array
 from ..numpy_executor import NumpyExecutor
-from ..plan import BYTES, LINE, Parts, Plan, Side, Table, address, aligned
+from ..plan import BYTES, LINE, Parts, Plan, Side, address, aligned
 from .jit import LlvmCode
 from .loops import MOTION, SIDE
 
@@ -41,7 +41,7 @@ class LlvmExecutor:
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `NumpyExecutor`."""
         # equal values of all lanes need no arrangement
-        self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self.arranged(values)
+        self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self._arranged(values)
 
     def get(self, slots: Sequence[int]) -> Array:
         """See `NumpyExecutor`."""
@@ -53,15 +53,16 @@ class LlvmExecutor:
         """See `NumpyExecutor`."""
         return self._memory[:, _places(slots)]
 
-    def arranged(self, table: Table) -> Table:
-        """See `NumpyExecutor`."""
+    def _arranged(self, table: Array) -> Array:
+        """Return a table of slots by lanes in memory layout; the last lane fills up the last
+        vector.
+        """
         padded = table
         if self.room > self.lanes:
-            padded = np.empty((len(table), self.room), table.dtype)
+            padded = np.empty((len(table), self.room))
             padded[:, : self.lanes] = table
             padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
-        found: Any = padded.reshape(len(table), self._groups, self.group).transpose(1, 0, 2)
-        return found
+        return padded.reshape(len(table), self._groups, self.group).transpose(1, 0, 2)
 
     def run(self, name: str) -> None:
         """See `NumpyExecutor`."""
