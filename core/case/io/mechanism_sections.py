@@ -497,4 +497,5 @@ def with_bushings(case: Case, file: Path) -> Case:
             " hardpoints, [bushings.ROLE]; add one"
         )
     bushings = (*case.mechanism.bushings, *found)
-    return replace(case, mechanism=replace(case.mechanism, bushings=bushings))
+    with explained(file, "joints", LENGTHS["m"], root.at("joints").value):
+        return replace(case, mechanism=replace(case.mechanism, bushings=bushings))
