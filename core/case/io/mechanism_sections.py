@@ -29,7 +29,7 @@ from ...mechanism.motions import (
 )
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Free, Sweep
-from ..units import RADIAN, SECOND, FileUnits, Unit, plain
+from ..units import LENGTHS, RADIAN, SECOND, FileUnits, Unit, plain
 from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
 from .schema import (
