@@ -321,7 +321,8 @@ class _Tracer:
         known = f" ({', '.join(map(str, own))} {verb} not)" if own else ""
         raise SolveError(
             f"{motion_of(self.formulation.columns, motion)} freely: no joint, spring or bushing"
-            f" holds it at the design position{known}; give stiffness or turning_stiffness there, or hold a driver"
+            f" holds it at the design position{known}; give stiffness or turning_stiffness there,"
+            " or hold a driver"
         )
 
     def _newton(self, factor: Elimination, left: Sequence[Scalar], at_design: _AtDesign) -> Program:
