@@ -19,8 +19,19 @@ if TYPE_CHECKING:
     from ..case.case import Case
 
 
-def add_options(command: argparse.ArgumentParser) -> None:
-    """Add the options to a command's parser."""
+TRAVEL = (
+    "M[:SAMPLES]",
+    "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive up:"
+    " --travel=-40:120mm:33; in metres without a unit",
+)
+
+
+def add_options(command: argparse.ArgumentParser, travel: tuple[str, str] = TRAVEL) -> None:
+    """Add the options to a command's parser.
+
+    Args:
+        travel: form and help of --travel.
+    """
     add_joint_types(command)
     command.add_argument(
         "--closure",
@@ -102,14 +113,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
             " roll or steer, over --travel of the left wheel or of the rack"
         ),
     )
-    points.add_argument(
-        "--travel",
-        metavar="M[:SAMPLES]",
-        help=(
-            "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
-            " up: --travel=-40:120mm:33; in metres without a unit"
-        ),
-    )
+    points.add_argument("--travel", metavar=travel[0], help=travel[1])
     points.add_argument(
         "--rack",
         metavar="M",

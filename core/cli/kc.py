@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
 
-MOST = 100_000
+MOST, UNLESS_GIVEN = 100_000, "25"
+TRAVEL = (
+    "A:B[:N]",
+    "travel of the wheel from design, or of the steering with --axle steer: N samples, default 25,"
+    " from A to B: --travel=-60mm:60mm:25, which is the default; one number is one sample; in"
+    " metres without a unit",
+)
 
 
 def add(commands: Any) -> None:
@@ -46,7 +52,8 @@ def add(commands: Any) -> None:
         metavar="NAME=A:B:N",
         help=(
             "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
-            " braking or aligning; one number is a load that acts over all travel; may be repeated"
+            " braking or aligning; 25 samples unless given; one number is a load that acts over all"
+            " travel; may be repeated"
         ),
     )
     command.add_argument(
@@ -81,14 +88,13 @@ def add(commands: Any) -> None:
         "--out", type=Path, metavar="DIR", help="write the page DIR/kc.html, and results.json"
     )
     execution_options.add_options(command, positive)
-    import_options.add_options(command)
+    import_options.add_options(command, TRAVEL)
 
 
 def _kc(options: argparse.Namespace, registry: Registry) -> int:
     """Find the equilibria of a suspension with springs, bushings and loads, and their compliance.
 
-    Joints with bushings give way to them. --travel=A:B:N is of the wheel, from design, in m or with
-    a unit: --travel=-60mm:60mm:25. --axle heave, roll or steer moves both wheels of an axle.
+    Joints with bushings give way to them. --axle heave, roll or steer moves both wheels of an axle.
 
     Exit status: 0 all samples have an equilibrium, and all engines agree; 1 an engine deviates or
     ends in an error; 2 a sample has no equilibrium, and its message gives the last load that has
@@ -223,15 +229,18 @@ def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
 
     parts = text.split(":")
     bare, other = [*units][:2]
-    count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else ""
+    count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else UNLESS_GIVEN
+    if len(parts) == 2 and option == "--travel" and parts[1].isdecimal() and text[0] != "-":
+        count = ""  # as run has it, up and down
     try:
         ends, _ = interval(parts[:2], units, bare)
     except ValueError:
         ends = [math.nan]
     if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
-            f"{option} {text}: expected START:STOP:SAMPLES, numbers in {' or '.join(units)}, {bare}"
-            f" without a unit, and 1 to {MOST} samples; write -60{other}:60{other}:25"
+            f"{option} {text}: expected START:STOP:SAMPLES or START:STOP, numbers in"
+            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples; write"
+            f" -60{other}:60{other}:25"
         )
     start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
     return [start + (stop - start) * (k / steps) for k in range(int(count))]

@@ -20,8 +20,8 @@ from ....mechanism.body import Body
 from ....mechanism.loads import Bushing, ForceElement, SpringDamper
 from ....mechanism.mechanism import GROUND, Vector
 from ...case import Case
-from ...io.document import Section, explained, parse, read_text
-from ...io.mechanism_sections import LARGEST_BUSHINGS, with_bushings
+from ...io.document import explained
+from ...io.mechanism_sections import bushings_in, with_bushings
 from ...units import LENGTHS
 from .table import HardpointTable, number
 from .templates import KNUCKLE, TIEROD_INNER, Template
@@ -226,8 +226,7 @@ def with_file(
     Raises:
         CaseError: the file cannot be read, or a role has no joint for a bushing.
     """
-    text = read_text(file, LARGEST_BUSHINGS, "it holds the bushings of one suspension")
-    root, found = Section(file, "", parse(file, text)), dict[str, Any]()
+    root, found = bushings_in(file), dict[str, Any]()
     known = [role for role in at if joint_at(template, role)]
     for role, section in root.at("bushings").each() if root.at("bushings").value else ():
         if role not in known:
