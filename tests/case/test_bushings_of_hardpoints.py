@@ -179,3 +179,16 @@ def test_bushings_that_do_not_fit_a_table_are_refused(tmp_path, capsys, text, ex
     rubber.write_text(text)
     with pytest.raises(KincheckError, match=expected):
         load(table, Supplied(bushings=rubber))
+
+
+def test_slopes_that_kc_lacks_are_named(tmp_path, capsys):
+    table = sample(tmp_path, capsys, "double_wishbone")
+    files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
+    assert main(["kc", str(table), "--travel=-10mm:10mm", *files]) == 0
+    said = capsys.readouterr()
+    assert "–" not in said.out
+    assert "not computed: roll_center_height.per_travel, jacking_coefficient.per_travel" in said.err
+    found = json.loads((tmp_path / "json").read_text())
+    assert len(found["travel"]) == 25
+    assert not {"spring_ratio.per_travel"} & {*found["outputs"], *found["rigid"]}
+    assert None not in sum((x["position"] for x in found["outputs"].values()), [])
