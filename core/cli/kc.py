@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,13 +139,15 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
     if to.csv is not None:
         write("--csv", to.csv, views.table(results).encode())
-    checked = _checked(options, engines, results.cases, problems) if engines else None
+    if engines:
+        results = replace(results, checked=_checked(options, engines, results.cases, problems))
+    checked = results.checked
     if to.out is not None:
         if checked is not None:
             write("--out", to.out / "results.json", to_json(checked))
-        write("--out", to.out / "kc.html", views.page(results, checked).encode())
+        write("--out", to.out / "kc.html", views.page(results).encode())
     out = sys.stderr if options.json == "-" else sys.stdout
-    with with_json(views.as_data(results, checked), options.json):
+    with with_json(views.as_data(results), options.json):
         print(*views.lines(results), sep="\n", file=out)
         if checked is not None:
             print_table(checked, out, reactions=True)

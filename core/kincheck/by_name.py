@@ -74,14 +74,21 @@ def run(
         KincheckError: a case cannot be read, there is no engine of a name, or a member of the
             engine protocol is missing.
     """
-    known, problems = registry(), list[str]()
+    known = registry()
     named = known.cases() if cases is None else _several(cases)
     found = [each if isinstance(each, Case) else known.find_case(str(each)) for each in named]
     if reference is not None:
         found = _judged_by(found, Path(reference))
     every = known.simulations if mode == "simulate" else known.engines
-    team = list[Engine]()
-    for each in every if engines is None else _several(engines):
+    team = _team(every if engines is None else engines, mode)
+    solver, _ = solver_for(team, jobs)
+    results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
+    return with_scenes(results, found)
+
+
+def _team(engines: str | Engine | Sequence[str | Engine], mode: str | None = None) -> list[Engine]:
+    known, problems, team = registry(), list[str](), list[Engine]()
+    for each in _several(engines):
         team += (
             known.find_engines([each], problems, mode)
             if isinstance(each, str)
@@ -89,9 +96,7 @@ def run(
         )
     if problems:
         raise KincheckError("\n".join(problems))
-    solver, _ = solver_for(team, jobs)
-    results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
-    return with_scenes(results, found)
+    return team
 
 
 def compliance(
@@ -99,6 +104,9 @@ def compliance(
     travel: Sequence[float] | None = None,
     loads: Mapping[str, float | Sequence[float]] | None = None,
     axle: str = "heave",
+    *,
+    engines: str | Engine | Sequence[str | Engine] = (),
+    jobs: int | None = None,
 ) -> ComplianceResults:
     """Return the kinematics and compliance of a suspension, as the command `kincheck kc` does.
 
@@ -109,15 +117,25 @@ def compliance(
         loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
             applied at design; one number acts over all travel.
         axle: motion of both wheels: "heave", "roll" or "steer".
+        engines: names or engines that find the equilibria by themselves; `checked` has their
+            records, judged against native.
+        jobs: number of worker processes, as of `run`.
 
     Raises:
         KincheckError: the case lacks facts, or a sample has no equilibrium; the message gives the
             last load with one.
     """
+    team = _team(engines)
     found = study.compliance(case if isinstance(case, Case) else load(case), travel, loads, axle)
     if found.failures:
         raise KincheckError("\n".join(found.failures))
-    return found
+    if not team:
+        return found
+    native = registry().baseline(team)
+    team = [native, *team] if native is not None else team
+    solver, _ = solver_for(team, jobs)
+    checked = running.run(found.cases, team, tol=TOL, solver=solver)
+    return replace(found, checked=checked)
 
 
 def _judged_by(cases: Sequence[Case], file: Path) -> list[Case]:

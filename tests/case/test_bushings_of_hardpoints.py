@@ -191,4 +191,4 @@ def test_slopes_that_kc_lacks_are_named(tmp_path, capsys):
     found = json.loads((tmp_path / "json").read_text())
     assert len(found["travel"]) == 25
     assert not {"spring_ratio.per_travel"} & {*found["outputs"], *found["rigid"]}
-    assert None not in sum((x["position"] for x in found["outputs"].values()), [])
+    assert all(None not in each["position"] for each in found["outputs"].values())

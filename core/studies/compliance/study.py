@@ -27,6 +27,7 @@ from ...case.measures import DriverEffort
 from ...case.quantity import ORDERS, Output, Quantity, with_markers
 from ...case.suspension import PerTravel
 from ...errors import KincheckError, SolveError
+from ...harness.record import Results
 from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, solve
 from ...mechanism.mechanism import Mechanism
@@ -96,6 +97,7 @@ class ComplianceResults:
 
     Attributes:
         cases: the same equilibria for engines, in the same order.
+        checked: records of engines.
     """
 
     case: str
@@ -103,6 +105,7 @@ class ComplianceResults:
     loads: Mapping[Load, ComplianceCurves] = field(default_factory=dict[Load, ComplianceCurves])
     signs: str = ""
     cases: tuple[Case, ...] = ()
+    checked: Results | None = None
 
     @property
     def failures(self) -> list[str]:
@@ -277,8 +280,8 @@ class _Study:
         if self.lacking:
             listed = ", ".join(output.name for output in self.lacking)
             notes.append(
-                f"not computed: {listed}: slopes of what is a slope by itself; kincheck run has them"
-                " for rigid joints"
+                f"not computed: {listed}: slopes of what is a slope by itself; kincheck run has"
+                " them for rigid joints"
             )
         if not self.mechanism.forces:
             notes.append(
