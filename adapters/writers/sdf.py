@@ -16,6 +16,7 @@ import numpy as np
 
 from ...core.algebra import triple
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.models.trees.robot_elements import BUSHING, STRUT, STRUT_LAW
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -37,8 +38,6 @@ TIES = ("a ball constraint", "three ball constraints", "a link on a cross and a 
 KINDS = {"slide": "prismatic", "hinge": "revolute", "ball": "ball", "fixed": "fixed"}
 WORLD = "world"
 MIMIC = "drake:mimic"
-SPRING, BUSHING = "drake:linear_spring_damper", "drake:linear_bushing_rpy"
-DRAKE = "http://drake.mit.edu"
 
 
 def write(
@@ -68,7 +67,7 @@ def write(
     left_out += text.own_law(mechanism, model.sprung, "Drake")
     note = NOTE.format(masses, at and f" ({at})", model.loops, zero + left_out)
     add_note(model.root, note)
-    kinds = (["link", "frame", "joint", "drake:ball_constraint"], [SPRING])
+    kinds = (["link", "frame", "joint", "drake:ball_constraint"], [STRUT])
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}
 
 
@@ -77,7 +76,7 @@ class _Model:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.tree = mechanism, hung(mechanism)
-        self.root = ET.Element("sdf", {"version": "1.11", "xmlns:drake": DRAKE})
+        self.root = ET.Element("sdf", {"version": "1.11", "xmlns:drake": text.DRAKE})
         self.model = ET.SubElement(self.root, "model", name=mechanism.name)
         self.joints: dict[str, ET.Element] = {}
         self.loops = loops(self.tree.ties, TIES)
@@ -184,12 +183,7 @@ class _Model:
                 options = {"relative_to": body, "rotation_format": "quat_xyzw"}
                 add_text(frame, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
                 add_text(element, f"drake:bushing_frame{side}", name)
-            for what, values in (
-                ("torque_stiffness", each.turning_stiffness),
-                ("torque_damping", each.turning_damping),
-                ("force_stiffness", each.stiffness),
-                ("force_damping", each.damping),
-            ):
+            for what, values in text.bushing_law(each).items():
                 add_text(element, f"drake:bushing_{what}", numbers(values))
             self.model.append(element)
             self.sprung.add(each.name)
@@ -199,18 +193,14 @@ class _Model:
         if getattr(force, "curve", None):
             return False
         if isinstance(force, SpringDamper):
-            assert (
-                force.free_length is not None
-            )  # a spring without a free length has its design length
-            if force.free_length <= 0.0:  # Drake refuses it
+            if not force.free_length:  # Drake refuses it
                 return False
-            element = ET.SubElement(self.model, SPRING, name=force.name)
+            element = ET.SubElement(self.model, STRUT, name=force.name)
             for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
-                add_text(element, f"{SPRING}_body_{side}", link)
-                add_text(element, f"{SPRING}_p_{side}{end}", numbers(self.local(link, P)))
-            add_text(element, f"{SPRING}_free_length", numbers([force.free_length]))
-            add_text(element, f"{SPRING}_stiffness", numbers([force.stiffness]))
-            add_text(element, f"{SPRING}_damping", numbers([force.damping]))
+                add_text(element, f"{STRUT}_body_{side}", link)
+                add_text(element, f"{STRUT}_p_{side}{end}", numbers(self.local(link, P)))
+            for key in STRUT_LAW:
+                add_text(element, f"{STRUT}_{key}", numbers([getattr(force, key)]))
             return True
         if isinstance(force, TorsionSpringDamper):
             name = self.tree.coordinates.get((force.joint, "rotation"))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.case.io.model_writer import Zeros
+from ...core.case.models.trees.robot_elements import BUSHING_LAW
 from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
 from ...core.joints import Distance
@@ -24,6 +25,7 @@ from ..shared.tree_plan import CHAINS
 # Simulators require mass and inertia of every moving body. A point mass has an inertia far below
 # that about joints some centimetres away, per mass [m^2].
 POINT = 1e-10
+DRAKE = "http://drake.mit.edu"
 PLAIN = "Masses and inertias are placeholders."
 
 
@@ -100,6 +102,14 @@ def own_law(mechanism: Mechanism, sprung: Collection[str], title: str) -> str:
 def plain_bushing(each: Bushing) -> bool:
     """Return whether a bushing has neither curve nor preload, which formats lack."""
     return not each.curve and not any(each.preload)
+
+
+def bushing_law(each: Bushing) -> dict[str, tuple[float, ...]]:
+    """Return the numbers of Drake's bushing by its keys."""
+    return {
+        key: getattr(each, key.replace("torque_", "turning_").removeprefix("force_"))
+        for key in BUSHING_LAW
+    }
 
 
 def add_text(

@@ -7,7 +7,7 @@ body that every chain connects by a ball floats, and its joints are conditions (
 `constraints`). In a file with masses every moving link has one, because some simulators take 1 kg
 for none; for the same reason points are no links, but stand in the JSON file. Hinges are
 "revolute" with very large limits, not "continuous": their coordinate is then the angle including
-full turns.
+full turns. Springs between two points and bushings are Drake's elements.
 """
 
 from __future__ import annotations
@@ -16,13 +16,18 @@ import json
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import atan2, hypot
 from typing import Any, cast
+
+import numpy as np
 
 from ...core.algebra import vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.models.trees.robot_elements import BUSHING, STRUT, STRUT_LAW
 from ...core.joints import Joint
+from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
-from ...core.trajectory import BodyMotion
+from ...core.trajectory import Array, BodyMotion
 from ..shared.constraints import (
     CLOSURES,
     Coincident,
@@ -94,7 +99,7 @@ def write(
         },
         "start": {"drivers": dict(start), "coordinates": model.q},
     }
-    found = document(model.root, (["link"], ["joint"]))
+    found = document(model.root, (["link", "frame"], ["joint"], [STRUT]))
     return {".urdf": found, ".constraints.json": _json(beside)}
 
 
@@ -182,6 +187,7 @@ class _Model:
                 case Relation():
                     self.relate(part)
         masses, left_out = "Nothing has a mass.", ""
+        sprung = {each.name for each in mechanism.forces if self.add_spring(each)}
         if mechanism.has_loads:
             known = {body.name: body for body in mechanism.bodies if body.mass or not body.fixed}
             frames = [
@@ -191,7 +197,8 @@ class _Model:
             ]
             for frame in frames:
                 self.weigh(frame)
-            masses, left_out = text.facts(mechanism, (), False, frames)
+            masses, left_out = text.facts(mechanism, sprung, False, frames)
+            left_out += text.own_law(mechanism, sprung, "Drake")
         closed = dict.fromkeys(each["joint"] for each in self.constraints)
         closed = f": {', '.join(closed)}" if closed else ""
         add_note(self.root, NOTE.format(masses, closed, zero + left_out))
@@ -222,6 +229,33 @@ class _Model:
         ET.SubElement(inertial, "mass", value=numbers([text.mass_of(body)]))
         values = [numbers([x]) for x in text.six(text.inertia_of(body))]
         ET.SubElement(inertial, "inertia", dict(zip(ENTRIES, values, strict=True)))
+
+    def add_spring(self, force: ForceElement) -> bool:
+        """Add a spring between points, or a bushing; return whether Drake has it."""
+        if isinstance(force, SpringDamper):
+            if force.curve or not force.free_length:  # Drake refuses springs of no length
+                return False
+            element = ET.SubElement(self.root, STRUT, name=force.name)
+            for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
+                ET.SubElement(element, f"{STRUT}_body_{side}", name=link)
+                place = numbers(self.arm(link, P))
+                ET.SubElement(element, f"{STRUT}_p_{side}{end}", value=place)
+            for key in STRUT_LAW:
+                ET.SubElement(element, f"{STRUT}_{key}", value=numbers([getattr(force, key)]))
+        elif isinstance(force, Bushing) and text.plain_bushing(force):
+            turn = numbers(_roll_pitch_yaw(np.array(force.triad).T))
+            element = ET.Element(BUSHING, name=force.name)
+            for side, link in zip("AC", force.bodies, strict=True):
+                name, place = f"{force.name}.{side}", numbers(self.arm(link, force.point))
+                ET.SubElement(self.root, "frame", name=name, link=link, xyz=place, rpy=turn)
+                ET.SubElement(element, f"drake:bushing_frame{side}", name=name)
+            for key, values in text.bushing_law(force).items():
+                ET.SubElement(element, f"drake:bushing_{key}", value=numbers(values))
+            self.root.append(element)
+        else:
+            return False
+        self.root.set("xmlns:drake", text.DRAKE)
+        return True
 
     def arm(self, link: str, P: Sequence[float]) -> list[float]:
         """Return a point of a link from its design position."""
@@ -282,6 +316,15 @@ class _Model:
             "origin": self.arm(body.name, body.origin),
             "euler_parameters": [*body.euler_parameters],
         }
+
+
+def _roll_pitch_yaw(R: Array) -> list[float]:
+    """Return the angles of turns about the fixed axes x, y, z that make a rotation matrix."""
+    level = hypot(R[0, 0], R[1, 0])
+    pitch = atan2(-R[2, 0], level)
+    if level < np.finfo(float).eps:  # upright: roll and yaw are about one axis
+        return [atan2(-R[1, 2], R[1, 1]), pitch, 0.0]
+    return [atan2(R[2, 1], R[2, 2]), pitch, atan2(R[1, 0], R[0, 0])]
 
 
 def _turns(joint: Joint) -> bool:

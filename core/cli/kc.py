@@ -7,12 +7,14 @@ import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from . import execution_options, import_options
 from .option_types import add_several, positive
+from .parser import Parser
 from .registry import Registry, Status
 from .run_options import TOL
 
@@ -22,12 +24,18 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
 
-MOST = 100_000
+MOST, UNLESS_GIVEN = 100_000, "25"
+TRAVEL = (
+    "A:B[:N]",
+    "travel of the wheel from design, or of the steering with --axle steer: N samples, default 25,"
+    " from A to B: --travel=-60mm:60mm:25, which is the default; one number is one sample; in"
+    " metres without a unit",
+)
 
 
 def add(commands: Any) -> None:
     """Add the command to the parser."""
-    command: argparse.ArgumentParser
+    command: Parser
     command = commands.add_parser(
         "kc",
         help="kinematics and compliance: equilibria on bushings over travel and loads",
@@ -46,7 +54,8 @@ def add(commands: Any) -> None:
         metavar="NAME=A:B:N",
         help=(
             "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
-            " braking or aligning; one number is a load that acts over all travel; may be repeated"
+            " braking or aligning; 25 samples unless given; one number is a load that acts over all"
+            " travel; may be repeated"
         ),
     )
     command.add_argument(
@@ -82,13 +91,14 @@ def add(commands: Any) -> None:
     )
     execution_options.add_options(command, positive)
     import_options.add_options(command)
+    (travel,) = (each for each in command.arguments() if each.dest == "travel")
+    travel.metavar, travel.help = TRAVEL
 
 
 def _kc(options: argparse.Namespace, registry: Registry) -> int:
     """Find the equilibria of a suspension with springs, bushings and loads, and their compliance.
 
-    Joints with bushings give way to them. --travel=A:B:N is of the wheel, from design, in m or with
-    a unit: --travel=-60mm:60mm:25. --axle heave, roll or steer moves both wheels of an axle.
+    Joints with bushings give way to them. --axle heave, roll or steer moves both wheels of an axle.
 
     Exit status: 0 all samples have an equilibrium, and all engines agree; 1 an engine deviates or
     ends in an error; 2 a sample has no equilibrium, and its message gives the last load that has
@@ -132,13 +142,15 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
     if to.csv is not None:
         write("--csv", to.csv, views.table(results).encode())
-    checked = _checked(options, engines, results.cases, problems) if engines else None
+    if engines:
+        results = replace(results, checked=_checked(options, engines, results.cases, problems))
+    checked = results.checked
     if to.out is not None:
         if checked is not None:
             write("--out", to.out / "results.json", to_json(checked))
-        write("--out", to.out / "kc.html", views.page(results, checked).encode())
+        write("--out", to.out / "kc.html", views.page(results).encode())
     out = sys.stderr if options.json == "-" else sys.stdout
-    with with_json(views.as_data(results, checked), options.json):
+    with with_json(views.as_data(results), options.json):
         print(*views.lines(results), sep="\n", file=out)
         if checked is not None:
             print_table(checked, out, reactions=True)
@@ -223,15 +235,18 @@ def _values(option: str, text: str, units: Mapping[str, Unit]) -> list[float]:
 
     parts = text.split(":")
     bare, other = [*units][:2]
-    count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else ""
+    count = parts[2] if len(parts) == 3 else "1" if len(parts) == 1 else UNLESS_GIVEN
+    if len(parts) == 2 and option == "--travel" and parts[1].isdecimal() and text[0] != "-":
+        count = ""  # as run has it, up and down
     try:
         ends, _ = interval(parts[:2], units, bare)
     except ValueError:
         ends = [math.nan]
     if not all(map(math.isfinite, ends)) or not count.isdecimal() or not 1 <= int(count) <= MOST:
         raise KincheckError(
-            f"{option} {text}: expected START:STOP:SAMPLES, numbers in {' or '.join(units)}, {bare}"
-            f" without a unit, and 1 to {MOST} samples; write -60{other}:60{other}:25"
+            f"{option} {text}: expected START:STOP:SAMPLES or START:STOP, numbers in"
+            f" {' or '.join(units)}, {bare} without a unit, and 1 to {MOST} samples; write"
+            f" -60{other}:60{other}:25"
         )
     start, stop, steps = ends[0], ends[-1], max(1, int(count) - 1)
     return [start + (stop - start) * (k / steps) for k in range(int(count))]

@@ -1,6 +1,7 @@
 """Functions on cases and engines by name, as on the command line."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar
 
@@ -14,8 +15,9 @@ from kincheck.core.cli.main import registry
 from kincheck.core.cli.registry import Registry
 from kincheck.core.cli.run import Run
 from kincheck.core.cli.sweep import Sweep
+from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
-from kincheck.core.options import function_of
+from kincheck.core.options import function_of, several
 from kincheck.core.report.report import write_report
 from kincheck.core.studies.compliance import study
 from kincheck.core.studies.compliance.study import ComplianceResults
@@ -64,6 +66,9 @@ def compliance(
     travel: Sequence[float] | None = None,
     loads: Mapping[str, float | Sequence[float]] | None = None,
     axle: str = "heave",
+    *,
+    engines: str | Engine | Sequence[str | Engine] = (),
+    jobs: int | None = None,
 ) -> ComplianceResults:
     """Return the kinematics and compliance of a suspension, as the command `kincheck kc` does.
 
@@ -74,6 +79,9 @@ def compliance(
         loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
             applied at design; one number acts over all travel.
         axle: motion of both wheels: "heave", "roll" or "steer".
+        engines: names or engines that find the equilibria by themselves; `checked` has their
+            records, judged against native.
+        jobs: number of worker processes, as of `run`.
 
     Raises:
         KincheckError: the case lacks facts, or a sample has no equilibrium; the message gives the
@@ -82,7 +90,9 @@ def compliance(
     found = study.compliance(case if isinstance(case, Case) else load(case), travel, loads, axle)
     if found.failures:
         raise KincheckError("\n".join(found.failures))
-    return found
+    if not (team := several(engines)):
+        return found
+    return replace(found, checked=run(found.cases, ("native", *team), jobs=jobs))
 
 
 def report(results: Results, file: str | Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import held, require_finite, triple
+from ..joints import Distance
 from ..joints.base import AxialJoint, Joint, Kind, unit
 from ..joints.coupler import Coupler
 from ..joints.gap import gap
@@ -22,6 +23,7 @@ from ..trajectory import MARKER
 from .body import Body, Vector
 from .loads import Bushing, ForceElement, TorsionSpringDamper
 from .motions import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
+from .rods import end_of, rod_in_rubber
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -233,9 +235,13 @@ class Mechanism:
             _known(str(bushing), "joint", bushing.joint, self._named["joints"], key)
             for name in bushing.bodies:
                 _known(str(bushing), "body", name, bodies, key)
+            if isinstance(rod := self.joint(bushing.joint), Distance):
+                end_of(rod, bushing)
 
     def released(self) -> Mechanism:
         """Return the mechanism with the bushings of joints as force elements in their place.
+
+        A rod with bushings, a distance joint, is a body without mass.
 
         Raises:
             MechanismError: a coupler or a torsional spring needs such a joint.
@@ -251,13 +257,23 @@ class Mechanism:
                 " another joint, or remove the bushings",
                 f"joints.{name}.bushings",
             )
+        joints = [
+            each
+            for each in (*self.joints, *self.grounded)
+            if self.given_name(each.name) not in soft
+        ]
+        bodies, bushings = [*self.bodies], list[Bushing]()
+        for name in dict.fromkeys(each.joint for each in self.bushings):
+            own = [each for each in self.bushings if each.joint == name]
+            if isinstance(rod := self.joint(name), Distance):
+                body, others, own = rod_in_rubber(rod, own)
+                bodies.append(body)
+                joints += others
+            bushings += (replace(each, joint="") for each in own)
         return replace(
             self,
-            joints=[
-                each
-                for each in (*self.joints, *self.grounded)
-                if self.given_name(each.name) not in soft
-            ],
+            bodies=bodies,
+            joints=joints,
             grounded=(),
             drivers=[
                 each
@@ -265,7 +281,7 @@ class Mechanism:
                 if not isinstance(each, JointDriver) or each.joint not in soft
             ],
             reduced=[each for each in self.reduced if each.joint.name not in soft],
-            forces=(*self.forces, *(replace(each, joint="") for each in self.bushings)),
+            forces=(*self.forces, *bushings),
             bushings=(),
         )
 

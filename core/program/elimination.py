@@ -241,6 +241,12 @@ class Elimination:
         digits = [reduce(mul, signs[k::DIGITS]) for k in range(min(DIGITS, len(signs)))]
         return sum((2.0**k * digit for k, digit in enumerate(digits)), 0.0)
 
+    def determinant(self, per_pivot: float) -> Scalar:
+        """Return the size of the determinant but for a constant; each pivot is multiplied by a
+        number, so that the product stays in the range of floats.
+        """
+        return reduce(mul, (per_pivot * absolute(x) for x in self.pivots), 1.0)
+
     def _signs(self) -> Iterator[Scalar]:
         for _, x in self._alone:
             yield _sign(x)

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..case.io.document import fault, read_bytes, read_text, shown
 from ..case.io.reference_samples import layout_of, read_table, samples_of
-from ..case.io.table import unit_of_head
+from ..case.io.table import Table, unit_of_head
 from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, remedy, shortened
 from .mat_files import of_mat
@@ -25,6 +26,10 @@ _DEGREES = re.compile(r"^\s*inDegrees\s*=\s*(yes|no)\s*$", re.IGNORECASE | re.MU
 # Blocks of an analysis that are no motion.
 _NO_MOTION = ("modelInput", "initialConditions")
 _POSE = "_XFORM"
+_LONG = (
+    *("case", "engine", "mode", "output", "unit", "sample", "driver", "driver_unit"),
+    *("driver_value", "position", "velocity", "acceleration"),
+)
 
 UNREAD: Mapping[str, str] = {
     ".abf": "a binary result of MotionSolve; in HyperGraph, export the curves as CSV",
@@ -65,7 +70,7 @@ def read_recording(
 
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     opensim = file.suffix.lower() in _OPENSIM
-    table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
+    table = _widened(read_table(file, sheet, "--sheet NAME", _END if opensim else ""))
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
     samples = samples_of(table, chosen, remarks=True, gaps=True)
@@ -85,6 +90,40 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     angle = "deg" if stated[1].lower() == "yes" else "rad"
     note = f"{file}: angles without a unit in {angle}, as its head says"
     return Recording(file, columns, "OpenSim", angle, [note, *notes])
+
+
+def _widened(table: Table) -> Table:
+    """Return a table with a row for each output, as `run --csv --long` writes, with a row for each
+    sample; others as they are.
+
+    Raises:
+        CaseError: it has several cases.
+    """
+    rows = table.rows()
+    heads = [str(cell).strip() for cell in next(rows, ("", ()))[1]]
+    if not {*_LONG} <= {*heads}:
+        return table
+    samples, columns = dict[tuple[str, ...], dict[str, str]](), dict[str, None]()
+    for _, cells in rows:
+        at = dict(zip(heads, map(str, cells), strict=False))
+        name, unit = at["output"], at["unit"]
+        found = {f"{at['driver']} [{at['driver_unit']}]": at["driver_value"]}
+        for what, time in zip(("", ".velocity", ".acceleration"), ("", "/s", "/s^2"), strict=True):
+            value = at[what.removeprefix(".") or "position"]
+            if value or not what:
+                found[f"{name}{what} [{unit}{time}]"] = value
+        columns |= dict.fromkeys(found)
+        key = at["case"], at["engine"], at["mode"], at["sample"]
+        samples.setdefault(key, {}).update(found)
+    cases = [*dict.fromkeys(case for case, *_ in samples)]
+    if len(cases) > 1:
+        listed = shortened([shown(case) for case in cases], MOST_NAMED)
+        problem = f"found the cases {listed}, expected one; write a file for each"
+        raise fault(table.file, "case", problem)
+    body = [
+        (f"sample {k}", [row.get(name, "") for name in columns]) for (*_, k), row in samples.items()
+    ]
+    return replace(table, lines=(), sheet=[("line 1", [*columns]), *body])
 
 
 def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:

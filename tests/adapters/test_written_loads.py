@@ -20,6 +20,8 @@ from kincheck.core import (
 )
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import way_to, written
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
 from kincheck.core.mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.mechanism.motions import JointAngle
@@ -110,7 +112,7 @@ def turned(vector):
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ vector
 
 
-def start(springs, loads, bushing=None):
+def start(springs, loads, bushing=None, clock=SPRINGS[1]):
     """Return the angular acceleration of the arm at rest [rad/s^2]."""
     torque = np.cross(turned(CENTER), MASSES.sum() * GRAVITY)
     if bushing is not None:
@@ -120,7 +122,7 @@ def start(springs, loads, bushing=None):
         pull = HOOK - eye
         length = np.linalg.norm(pull)
         torque += np.cross(eye, 250.0 * (length - 0.375) * pull / length)
-        torque += -7.0 * (ANGLE + 0.5) * AXIS
+        torque += -clock.stiffness * (ANGLE + 0.5) * AXIS
     if loads:
         torque += np.cross(turned(EYE), turned(PUSH) + PUSH) + turned(TWIST)
     return torque @ AXIS / (AXIS @ cloud(np.zeros(3)) @ AXIS)
@@ -129,12 +131,12 @@ def start(springs, loads, bushing=None):
 SPEED = 2.0
 
 
-def slowed():
+def slowed(clock=SPRINGS[1]):
     """Return the change of the angular acceleration by the dampers at that speed [rad/s^2]."""
     eye = turned(EYE)
     along = (HOOK - eye) / np.linalg.norm(HOOK - eye)
     arm_of_pull = np.cross(eye, along) @ AXIS
-    damping = 5.0 * arm_of_pull**2 + 0.25
+    damping = 5.0 * arm_of_pull**2 + clock.damping
     return -damping * SPEED / (AXIS @ cloud(np.zeros(3)) @ AXIS)
 
 
@@ -213,31 +215,60 @@ def test_pinocchio_begins_to_turn():
     assert acceleration[0] == pytest.approx(start(springs=False, loads=False), rel=1e-12)
     inertia = model.inertias[1]
     np.testing.assert_allclose(inertia.inertia, cloud(CENTER), atol=1e-14)
-    assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'spring' (spr" in found[".urdf"]
+    assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'clock' (tors" in found[".urdf"]
 
 
-def test_drake_begins_to_turn():
+@pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
+@pytest.mark.parametrize("to", ["sdf", "urdf"])
+def test_drake_begins_to_turn(to, bodies):
+    """URDF has no springs at hinges."""
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
-    soft = rubber("cardan", (0.0, 0.0, 0.0), (200.0, 200.0, 200.0))  # the same in any law
-    found = texts("sdf", arm(forces=[*SPRINGS, *LOADS, soft]))[".sdf"]
+    still = (0.0, 0.0, 0.0), (200.0, 200.0, 200.0)  # the same in any law
+    soft = rubber("cardan", *still, bodies)
+    springs = SPRINGS if to == "sdf" else SPRINGS[:1]
+    files = texts(to, arm(forces=[*springs, *LOADS, soft]))
+    found = files[f".{to}"]
     plant = plants.MultibodyPlant(0.0)
     parsing = importlib.import_module("pydrake.multibody.parsing")
-    parsing.Parser(plant).AddModelsFromString(found, "sdf")
+    parsing.Parser(plant).AddModelsFromString(found, to)
     plant.mutable_gravity_field().set_gravity_vector(GRAVITY)
+    if to == "urdf":
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("ground"))
     plant.Finalize()
     context = plant.CreateDefaultContext()
+    if to == "urdf":  # its joints are at zero at design
+        plant.SetPositions(context, [ANGLE])
 
     def acceleration():
         return plant.EvalTimeDerivatives(context).CopyToVector()[-1]
 
-    assert acceleration() == pytest.approx(
-        start(springs=True, loads=False, bushing=soft), rel=1e-12
-    )
-    still = acceleration()
+    clock = SPRINGS[1] if to == "sdf" else replace(SPRINGS[1], stiffness=0.0, damping=0.0)
+    expected = start(springs=True, loads=False, bushing=soft, clock=clock)
+    assert acceleration() == pytest.approx(expected, rel=1e-12)
+    rest = acceleration()
     plant.SetVelocities(context, [SPEED])
-    assert acceleration() - still == pytest.approx(slowed(), rel=1e-9)
+    assert acceleration() - rest == pytest.approx(slowed(clock), rel=1e-9)
     assert "By Drake's own law" in found
     assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'push' (force), f" in found
+
+
+@pytest.mark.parametrize("turning", [0.0, 30.0])
+def test_written_urdf_has_the_same_bushing(tmp_path, turning):
+    """Its axes are oblique; the point and the numbers are as written, to the last digits."""
+    soft = rubber("euler_parameters", (turning, 0.0, 5.0))
+    mechanism = arm(forces=[*SPRINGS[:1], replace(soft, damping=(1.0, 2.0, 3.0))])
+    case = Case("c", "s", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.array([ANGLE])), ())
+    for suffix, text in written(case, adapters.writer("urdf")).items():
+        (tmp_path / f"arm{suffix}").write_text(text)
+    spring, found = load(tmp_path / "arm.urdf", Supplied(drive=("pin:0:1",))).mechanism.forces
+    assert vars(spring) == vars(SPRINGS[0])
+    given = mechanism.forces[1]
+    for key, value in vars(given).items():
+        if key not in ("axes", "point", "preload"):
+            assert getattr(found, key) == value
+    assert np.array(found.axes) == pytest.approx(np.array(given.axes), abs=1e-15)
+    assert found.point == pytest.approx(given.point, abs=1e-15)
+    assert found.preload == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
 
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])

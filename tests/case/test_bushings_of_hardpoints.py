@@ -2,6 +2,8 @@
 
 import json
 import tomllib
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
+from kincheck.core.mechanism.loads import SpringDamper
 from kincheck.core.studies.compliance.study import compliance
 
 from ..support.sources import ROOT
@@ -93,20 +96,50 @@ def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
     assert (top.joint, top.axes) == ("strut_top", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
 
-RODS = ["five_link", "reduced_double_wishbone"]
-
-
-@pytest.mark.parametrize("template", [name for name in TEMPLATES if name not in RODS])
+@pytest.mark.parametrize("template", TEMPLATES)
 def test_sample_bushings_have_roles_of_sample_table(tmp_path, capsys, template):
     rubber = sample(tmp_path, capsys, template, "--bushings")
     case = load(sample(tmp_path, capsys, template), Supplied(bushings=rubber))
-    assert len(case.mechanism.bushings) == len(tomllib.loads(rubber.read_text())["bushings"])
+    roles = tomllib.loads(rubber.read_text())["bushings"]
+    assert len(case.mechanism.bushings) == len(roles) > 0
 
 
-@pytest.mark.parametrize("template", RODS)
-def test_template_without_bushings_says_so(template, capsys):
-    assert main(["templates", template, "--bushings"]) == 2
-    assert f"template {template}: its links are rods" in capsys.readouterr().err
+def test_rods_in_rubber_are_springs_in_series(tmp_path, capsys):
+    """Bushings of both ends, along all axes alike, against springs in place of the rods."""
+    table = sample(tmp_path, capsys, "five_link")
+    rubber = tmp_path / "rubber.toml"
+    ends = {"upper_front_inner": 4e6, "upper_front_outer": 6e6, "lower_rear_outer": 3e5}
+    rubber.write_text("".join(f"[bushings.{x}]\nstiffness = {k}\n" for x, k in ends.items()))
+    case = load(table, Supplied(bushings=rubber))
+    rods = {"upper_front": 4e6 * 6e6 / 10e6, "lower_rear": 3e5}
+    springs = [
+        SpringDamper(name, "ground", "knuckle", case.mechanism.joint(name).points, k)
+        for name, k in rods.items()
+    ]
+    joints = [joint for joint in case.mechanism.joints if joint.name not in rods]
+    sprung = replace(case.mechanism, joints=joints, forces=springs, bushings=())
+    loads = {"lateral": 3000.0, "braking": 2000.0}
+    found, expected = (
+        compliance(each, [-0.04, 0.05], loads).travel
+        for each in (case, replace(case, mechanism=sprung))
+    )
+    assert found.wheel_center == pytest.approx(expected.wheel_center, abs=1e-14)
+    assert found.wheel_load == pytest.approx(expected.wheel_load, abs=1e-8)
+    largest = np.abs(expected.compliance).max()
+    assert found.compliance == pytest.approx(expected.compliance, abs=1e-13 * largest)
+
+
+def test_rod_held_by_rubber_at_one_end_carries_no_side_force(tmp_path, capsys):
+    """A ball at its other end: soft across and stiff along is a stiff rod, until it tilts."""
+    table = sample(tmp_path, capsys, "five_link")
+    rubber = tmp_path / "rubber.toml"
+    C = dict[str, Any]()
+    for name, stiffness in (("along", [1.0, 4e6, 1.0]), ("all", 4e6)):
+        rubber.write_text(f"[bushings.tierod_inner]\nstiffness = {stiffness}\n")
+        text = table.read_text().replace("tierod_outer,-150,690,250", "tierod_outer,-180,690,260")
+        table.write_text(text)
+        C[name] = compliance(load(table, Supplied(bushings=rubber)), [0.0]).travel.compliance[0]
+    assert C["along"] == pytest.approx(C["all"], abs=1e-12 * np.abs(C["all"]).max())
 
 
 def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
@@ -125,7 +158,15 @@ def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
     ("text", "expected"),
     [
         ("[bushings.lca_frnt]\nstiffness = 5e6\n", "did you mean 'lca_front'"),
-        ("[bushings.tierod_inner]\nstiffness = 5e6\n", "expected a role of a joint"),
+        ("[bushings.wheel_center]\nstiffness = 5e6\n", "expected a role of a joint"),
+        (
+            "[joints.tie_rod.bushings.a]\nstiffness = 5e6\npoint = [0.07, 0.22, 0.16]\n",
+            r"at neither end of the rod; give the one on 'ground', \[0.07 m, 0.22 m, 0.15 m\]",
+        ),
+        (
+            '[joints.tie_rod.bushings.a]\nstiffness = 5e6\nbodies = ["ground", "lca"]\n',
+            "are not those of the rod, 'ground' and 'knuckle'; leave bodies out",
+        ),
         ("[bushings.lca_front]\nstiffness = -3.0\n", "zero or more"),
         ("[bushings.lca_front]\nstifness = 3.0\n", "did you mean 'stiffness'"),
         ("[bushings.lca_front]\n", "has no stiffness"),
@@ -138,3 +179,16 @@ def test_bushings_that_do_not_fit_a_table_are_refused(tmp_path, capsys, text, ex
     rubber.write_text(text)
     with pytest.raises(KincheckError, match=expected):
         load(table, Supplied(bushings=rubber))
+
+
+def test_slopes_that_kc_lacks_are_named(tmp_path, capsys):
+    table = sample(tmp_path, capsys, "double_wishbone")
+    files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
+    assert main(["kc", str(table), "--travel=-10mm:10mm", *files]) == 0
+    said = capsys.readouterr()
+    assert "–" not in said.out
+    assert "not computed: roll_center_height.per_travel, jacking_coefficient.per_travel" in said.err
+    found = json.loads((tmp_path / "json").read_text())
+    assert len(found["travel"]) == 25
+    assert not {"spring_ratio.per_travel"} & {*found["outputs"], *found["rigid"]}
+    assert all(None not in each["position"] for each in found["outputs"].values())

@@ -293,6 +293,101 @@ def test_reactions_turn_with_frame_and_move_with_point(tmp_path):
         assert found["m"] == pytest.approx(found["o"] + G * 0.2 * np.cos(turn), abs=1e-11)
 
 
+TURNED = """
+[bodies.beam]
+euler_parameters = [0.5, 0.5, 0.5, 0.5]
+mass = 2.0
+center_of_mass = [0.5, 0.0, 0.0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "beam"]
+point = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[points.post]
+body = "ground"
+position = [0.25, 0.1, 0.3]
+[drivers.turn]
+type = "joint_angle"
+joint = "pin"
+[sweep]
+driver = "turn"
+start = 0.0
+stop = 0.6
+steps = 3
+rate = 0
+"""
+
+
+@pytest.mark.parametrize("engine", ["native", "mujoco", "exudyn"])
+def test_reactions_about_a_point_in_turned_frames(tmp_path, engine):
+    """The beam's own y is up at design, its z forward; the joint's z is its axis."""
+    head = ARM.partition("[bodies.arm]")[0]
+    outputs = "".join(
+        f'[outputs.{frame}_{x}]\ntype = "joint_{kind}"\njoint = "pin"\ncomponent = "{x}"\n'
+        f'frame = "{frame}"\n' + 'about = "post"\n' * (kind == "moment")
+        for frame, kind in (("global", "moment"), ("body", "force"), ("joint", "moment"))
+        for x in "xyz"
+    )
+    found = values(read(tmp_path, head + TURNED + outputs), engine)
+    turn, weight = np.array([0.0, 0.3, 0.6]), np.full(3, 2.0 * G)
+    expected = {
+        "global_x": -0.1 * weight,
+        "global_y": 0.25 * weight,
+        "body_y": weight * np.cos(turn),
+        "body_z": -weight * np.sin(turn),
+        "joint_z": 0.25 * weight,
+    }
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, abs=1e-10)
+    across = np.hypot(found["joint_x"], found["joint_y"])
+    assert across == pytest.approx(0.1 * weight, abs=1e-10)
+
+
+PARALLEL = "".join(
+    f"""[bodies.{name}]
+mass = {mass}
+center_of_mass = {center}
+euler_parameters = {turn}
+"""
+    for name, mass, center, turn in (
+        ("crank", 2.0, [0.0, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]),
+        ("rod", 3.0, [1.0, 0.0, 1.0], [0.8, 0.6, 0.0, 0.0]),
+        ("rocker", 2.0, [2.0, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0]),
+    )
+) + "".join(
+    f"""[joints.{name}]
+type = "revolute"
+bodies = ["{i}", "{j}"]
+point = [{x}, 0.0, {z}]
+axis = [0.0, 1.0, 0.0]
+"""
+    for name, i, j, x, z in (
+        ("a", "ground", "crank", 0.0, 0.0),
+        ("b", "crank", "rod", 0.0, 1.0),
+        ("c", "rod", "rocker", 2.0, 1.0),
+        ("d", "ground", "rocker", 2.0, 0.0),
+    )
+)
+
+
+def test_redundant_rows_leave_turned_components_undetermined(tmp_path):
+    """Each end bears half of the rod; along the axis, and what a body's own axes mix with it,
+    rigid bodies tell nothing.
+    """
+    head, sweep = ARM.partition("[bodies.arm]")[0], TURNED[TURNED.index("[drivers.turn]") :]
+    outputs = "".join(
+        f'[outputs.{frame}_{x}]\ntype = "joint_force"\njoint = "b"\ncomponent = "{x}"\n'
+        f'frame = "{frame}"\n'
+        for frame in ("global", "body", "joint")
+        for x in "xyz"
+    )
+    text = head + PARALLEL + sweep.replace('"pin"', '"a"') + outputs
+    found = values(read(tmp_path, text), "pinocchio")
+    assert found["global_z"] == pytest.approx(np.full(3, 1.5 * G), abs=1e-11)
+    lost = {name for name, value in found.items() if np.isnan(value).all()}
+    assert lost == {"global_y", "body_y", "body_z", "joint_z"}
+
+
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [

@@ -19,7 +19,7 @@ from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDa
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
 ORIGIN = (0.0, 0.0, 0.0)
@@ -171,6 +171,70 @@ def test_snap_through_gives_last_reachable_load():
     assert heights == pytest.approx([facts["height_at_limit"]] * 5, abs=1e-5)
     with pytest.raises(SolveError, match=r"no equilibrium at 90\.57.*last is at 90\.57.*snap"):
         found.require_reached(lambda k, share: f"{share * -loads[k, 2]:.2f} N")
+
+
+@pytest.mark.parametrize(
+    ("a", "h", "stiffness", "side"),
+    [
+        ((0.103, 0.416), 0.1725, (52700.0, 316.0), 6280.0),
+        ((0.636, 0.0805), 0.244, (5e5, 3e6), 0.0),
+        ((0.3, 0.3), 0.06, (1e5, 1e5), 0.0),
+    ],
+    ids=["steep", "uneven", "flat"],
+)
+def test_load_far_beyond_snap_through_is_refused(a, h, stiffness, side):
+    """The stiffness is as much before as behind, so its sign alone tells nothing. A second body
+    on a soft spring, which moves more, bears the load.
+    """
+    at, top = (0.0, 0.0, h), (0.0, 0.0, h + 0.3)
+
+    def force(z):
+        pulls = (
+            k * (math.hypot(x, z) - math.hypot(x, h)) * z / math.hypot(x, z)
+            for x, k in zip(a, stiffness, strict=True)
+        )
+        return -sum(pulls) + side * (h - z)
+
+    limit = -minimize_scalar(lambda z: -force(z), bounds=(0.0, h), method="bounded").fun
+    ends = [(a[0], 0.0, 0.0), (-a[1], 0.0, 0.0)]
+    springs = [
+        SpringDamper(f"s{end}", "slider", GROUND, (at, end), k)
+        for end, k in zip(ends, stiffness, strict=True)
+    ]
+    soft = (0.0, 0.0, limit / 0.05)
+    forces = [*springs, Bushing("soft", "slider", "top", at, stiffness=soft)]
+    forces.append(SpringDamper("side", "slider", GROUND, (at, (0.0, 0.0, h + 1.0)), side))
+    bodies = {"slider": at, "top": top}
+    guides = [Translational(f"{x} guide", GROUND, x, bodies[x], (0.0, 0.0, 1.0)) for x in bodies]
+    mechanism = Mechanism("snap", [Body(*x) for x in bodies.items()], guides, forces=forces)
+    factors = np.array([0.3, 0.99, 1.01, 1.5, 7.0, 30.0, 100.0])
+    loads = np.zeros((len(factors), 6))
+    loads[:, 2] = -factors * limit
+    for body, place in bodies.items():
+        found = StaticModel(mechanism, [LoadPoint("p", body, place)]).solve({"p": loads}, {})
+        assert found.reached.tolist() == [x < 1.0 for x in factors]
+        assert (found.share * factors)[2:] == pytest.approx([1.0] * 5, rel=1e-8)
+        heights = found.place("slider", at)[:2, 2]
+        assert [force(z) for z in heights] == pytest.approx([0.3 * limit, 0.99 * limit], rel=1e-9)
+
+
+def test_torque_over_dead_centre_is_refused():
+    """A spring from an arm's end to a point of the base pulls at most k r d sin of an angle."""
+    r, d, k = 0.2, 0.5, 4e3
+    base = (0.6 * d, 0.8 * d, 0.0)
+    spring = SpringDamper("s", "arm", GROUND, ((r, 0.0, 0.0), base), k, free_length=0.0)
+    hinge = Revolute("hinge", GROUND, "arm", ORIGIN, (0.0, 0.0, 1.0))
+    mechanism = Mechanism("arm", [Body("arm", ORIGIN)], [hinge], forces=[spring])
+    model = StaticModel(mechanism, [LoadPoint("o", "arm", ORIGIN)])
+    # at rest it points to the base; turned from there, the torque k r d sin(turn) holds it
+    loads = np.zeros((4, 6))
+    loads[:, 5] = k * r * d * np.array([-0.7, 0.999, 1.001, 40.0])
+    found = model.solve({"o": loads}, {})
+    assert found.reached.tolist() == [True, True, False, False]
+    x, y, _ = found.turned("arm", (1.0, 0.0, 0.0))[:2].T
+    turns = np.arctan2(y, x) - math.atan2(0.8, 0.6)
+    assert turns == pytest.approx([math.asin(-0.7), math.asin(0.999)], abs=1e-12)
+    assert found.share[2:] == pytest.approx([1.0 / 1.001, 1.0 / 40.0], rel=1e-8)
 
 
 def strut(factor=1.0, turning=1.0, rigid=False):

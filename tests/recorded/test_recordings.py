@@ -529,3 +529,29 @@ def test_wheel_half_a_turn_off_fails_where_turns_are_known(kincheck_main, tmp_pa
     file.write_text("\n".join(rows))
     given = ["run", case, "--recorded", file, "--quiet"]
     assert kincheck_main(*given, engines=[NATIVE]) == 1
+
+
+@pytest.mark.parametrize(
+    ("column", "outcome"),
+    [(None, "pass"), ("position", "fail"), ("velocity", "fail"), ("acceleration", "fail")],
+)
+def test_long_curves_of_a_run_are_read(judged, kincheck_main, tmp_path, column, outcome):
+    """With its rates; a single number that is wrong by a thousandth shows."""
+    file = tmp_path / "curves.csv"
+    options = ["--csv", file, "--long", "--quiet"]
+    kincheck_main("run", CASE, *options, engines=[NATIVE])
+    head, *rows = csv.reader(file.read_text().splitlines())
+    k = next(k for k, row in enumerate(rows) if row[1] == "native" and row[5] == "17")
+    if column is not None:
+        rows[k][head.index(column)] = repr(1.001 * float(rows[k][head.index(column)]))
+    file.write_text("".join(",".join(row) + "\n" for row in (head, *rows)))
+    status, record = judged(file)
+    assert (status, record["outcome"]) == (int(outcome == "fail"), outcome)
+
+
+def test_long_curves_of_two_cases_are_refused(judged, kincheck_main, tmp_path, capsys):
+    file = tmp_path / "curves.csv"
+    options = ["--csv", file, "--long", "--quiet"]
+    kincheck_main("run", CASE, "crank", *options, engines=[NATIVE])
+    assert judged(file)[0] == 2
+    assert "'crank', expected one; write a file for each" in capsys.readouterr().err

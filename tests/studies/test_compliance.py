@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import kincheck
 import numpy as np
 import pytest
 from kincheck import adapters, cases
@@ -532,3 +533,15 @@ def test_body_between_two_bushings_is_a_series_of_springs(tmp_path, capsys, name
     expected = 1.0 / 3e5 + 1.0 / 2e6 + 0.3**2 * 2.0 / 5e5
     assert found["compliance"][0][1][1] == pytest.approx(expected, rel=1e-12)
     assert {row["outcome"] for row in found["agreement"]} == {"pass", "not judged"}
+
+
+def test_python_has_verdicts_of_engines(tmp_path):
+    """A stiff engine by itself, and a simulator by its name."""
+    engine_of("pinocchio")
+    case = strut(tmp_path)
+    found = kincheck.compliance(case, [0.0, 0.02], engines=["pinocchio", Stiff()], jobs=0)
+    outcomes = {each.engine: each.outcome.shown for each in found.checked.records}
+    assert outcomes == {"native": "not judged", "pinocchio": "pass", "stiff": "fail"}
+    assert kincheck.compliance(case, [0.0]).checked is None
+    with pytest.raises(KincheckError, match="did you mean 'pinocchio'"):
+        kincheck.compliance(case, [0.0], engines="pinochio")

@@ -29,7 +29,7 @@ from ...mechanism.motions import (
 )
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Free, Sweep
-from ..units import RADIAN, SECOND, FileUnits, Unit, plain
+from ..units import LENGTHS, RADIAN, SECOND, FileUnits, Unit, plain
 from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
 from .schema import (
@@ -48,7 +48,7 @@ from .schema import (
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
 }
-LARGEST_BUSHINGS = 1_000_000
+LARGEST = 1_000_000
 # Defaults of a body.
 PLAIN = Body("plain")
 _EVEN: Mapping[str, str] = {
@@ -477,6 +477,22 @@ def sweep_lines(case: Case, values: Array, *, own_grid: bool) -> list[str]:
     return toml_table({"driver": sweep.driver, **grid, **rate}, "sweep")
 
 
+def bushings_in(file: Path) -> Section:
+    """Return the tables of a file of bushings.
+
+    Raises:
+        CaseError: the file cannot be read.
+    """
+    text = read_text(file, LARGEST, "it holds the bushings of one suspension")
+    try:
+        return Section(file, "", parse(file, text))
+    except CaseError as error:
+        raise CaseError(
+            f"{error}; --bushings takes TOML, [bushings.ROLE] as kincheck templates NAME --bushings"
+            " prints, or [joints.NAME.bushings.X]"
+        ) from None
+
+
 def with_bushings(case: Case, file: Path) -> Case:
     """Return a case with the bushings in a file of tables [joints.NAME.bushings.X], in SI units,
     beside its own: tables of hardpoints have none.
@@ -484,8 +500,7 @@ def with_bushings(case: Case, file: Path) -> Case:
     Raises:
         CaseError: the file cannot be read, or names an unknown joint.
     """
-    text = read_text(file, LARGEST_BUSHINGS, "it holds the bushings of one suspension")
-    root, joints = Section(file, "", parse(file, text)), case.mechanism.given_joints
+    root, joints = bushings_in(file), case.mechanism.given_joints
     names = [joint.name for joint in joints]
     for name, section in root.at("joints").each():
         if name not in names:
@@ -497,4 +512,5 @@ def with_bushings(case: Case, file: Path) -> Case:
             " hardpoints, [bushings.ROLE]; add one"
         )
     bushings = (*case.mechanism.bushings, *found)
-    return replace(case, mechanism=replace(case.mechanism, bushings=bushings))
+    with explained(file, "joints", LENGTHS["m"], root.at("joints").value):
+        return replace(case, mechanism=replace(case.mechanism, bushings=bushings))

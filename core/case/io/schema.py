@@ -153,7 +153,8 @@ Earth). Points and vectors are global, at the design position. Results are alway
                          centre of mass, global axes at design [kg length^2]; the products have the
                          sign of the matrix entry, Ixy = -sum of m x y; default: zero, a point mass
     [joints.NAME.bushings.X]   keys of a bushing; bodies and point are the joint's unless given; it
-                         stands for its bushings in `run`, and they for it in `kc`
+                         stands for its bushings in `run`, and they for it in `kc`; those of a
+                         "distance" are at its points
     [forces.NAME]        type = "spring_damper": bodies = [first, second], points = [on first, on
                          second], stiffness [N/length], (damping) = 0 [N s/length],
                          (free_length), default: the length at design; tension is positive

@@ -7,7 +7,8 @@ equations are traced at the state after the step, differentiated by the chain ru
 step is set to zero, so that all terms fold as in other programs. The tangent is exact for these
 equations. `rest` is the unbalance at design, taken away little by little.
 
-    newton       one iteration: state, multipliers, size of the step, signs of the determinant
+    newton       one iteration: state, multipliers, size of the step, signs and size of the
+                 determinant
     compliance   derivatives of the step and of the drivers' efforts by loads and drivers
     tangent      the entries of the tangent
 """
@@ -49,8 +50,8 @@ from ..formulation.formulation import GROUND_ACCELERATION
 from ..formulation.state_vectors import jacobian as rows_at
 from ..structure.redundancy import independent_rows
 
-STEP, SIGNS = "step", "signs"
-"""Slots: the largest component of the step, and the signs of the blocks' determinants."""
+STEP, SIGNS, DETERMINANT = "step", "signs", "determinant"
+"""Slots: the largest component of the step, and signs and size of the blocks' determinants."""
 LOAD = "load "
 """Before the name of a load: its force and torque [N, N m], global axes."""
 DRIVE = "drive "
@@ -200,7 +201,7 @@ class _Tracer:
         )
         programs = [
             at_design.program,
-            self._newton(factor, [*left, *balance[self.n :]], scale),
+            self._newton(factor, [*left, *balance[self.n :]], at_design),
             self._compliance(factor, slopes, efforts, scale),
         ]
         return StaticEquations(
@@ -302,7 +303,9 @@ class _Tracer:
         largest = float(np.abs(stiffness).max(initial=0.0))
         self._require_held(stiffness, largest)
         scale = 2.0 ** round(np.log2(largest)) if largest else 1.0
-        return _AtDesign(found, scale, carried, executor.get(out)[:, 0])
+        stiffness /= scale
+        exponent = float(np.linalg.slogdet(matrix)[1]) / np.log(2.0)
+        return _AtDesign(found, scale, exponent, carried, executor.get(out)[:, 0])
 
     def _require_held(self, stiffness: Array, largest: float) -> None:
         free = null_space(self.matrix, self.n)
@@ -314,13 +317,15 @@ class _Tracer:
         motion = free @ loose[:, 0]
         name, _ = moved_most(self.formulation.columns, motion)
         own = [each for each in self.mechanism.forces if name in each.bodies]
-        known = f" ({', '.join(map(str, own))} do not)" if own else ""
+        verb = "does" if len(own) == 1 else "do"
+        known = f" ({', '.join(map(str, own))} {verb} not)" if own else ""
         raise SolveError(
             f"{motion_of(self.formulation.columns, motion)} freely: no joint, spring or bushing"
-            f" holds it{known}; give stiffness or turning_stiffness there, or hold a driver"
+            f" holds it at the design position{known}; give stiffness or turning_stiffness there,"
+            " or hold a driver"
         )
 
-    def _newton(self, factor: Elimination, left: Sequence[Scalar], scale: float) -> Program:
+    def _newton(self, factor: Elimination, left: Sequence[Scalar], at_design: _AtDesign) -> Program:
         found, out = factor.solve(left), dict[int, Scalar]()
         by_step = [-x for x in found[: self.n]]
         new = self.formulation.retract(self.formulation.configuration(self.state), by_step)
@@ -328,9 +333,11 @@ class _Tracer:
             out |= zip(self.layout.vectors[name], values, strict=True)
         multipliers = zip(self.multipliers, found[self.n :], strict=True)
         slots = self.layout.vectors[MULTIPLIERS]
-        out |= zip(slots, (x - scale * change for x, change in multipliers), strict=True)
+        out |= zip(slots, (x - at_design.scale * change for x, change in multipliers), strict=True)
         out[self.layout.scalar(STEP)] = reduce(maximum, map(absolute, by_step))
         out[self.layout.scalar(SIGNS)] = factor.orientation
+        per_pivot = 2.0 ** -round(at_design.exponent / max(1, len(factor.pivots)))
+        out[self.layout.scalar(DETERMINANT)] = factor.determinant(per_pivot)
         return program("newton", self.tape, out)
 
     def _compliance(
@@ -384,12 +391,13 @@ class _Tracer:
 
 @dataclass(frozen=True, eq=False)
 class _AtDesign:
-    """The program of the tangent, the scale of its stiffness, the multipliers that carry most of
-    the forces, and the rest of them.
+    """The program of the tangent, the scale of its stiffness, the binary exponent of its
+    determinant, the multipliers that carry most of the forces, and the rest of them.
     """
 
     program: Program
     scale: float
+    exponent: float
     multipliers: Array
     unbalanced: Array
 

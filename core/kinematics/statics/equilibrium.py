@@ -5,11 +5,13 @@ away the unbalance at design (weight, springs, preload); the second brings loads
 in proportion. A step is accepted if
 
 - Newton's corrections contract as Kantorovich's theorem asks,
-- the determinant of the tangent keeps the signs of its blocks, and
-- points between its ends are near the path too, with the same signs.
+- the determinant of the tangent keeps the signs of its blocks,
+- points between its ends are near the path too, with the same signs, and
+- the size of the determinant changes little from point to point.
 
 Otherwise it is halved. So no walk leaps over a turning point of the load to an equilibrium far
-away: there the stiffness has another sign between the ends.
+away: there the stiffness has another sign between the ends, and the determinant goes through zero.
+Its ratios, unlike sizes of corrections, show this of one body among others that move further.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS
 from .equations import (
     BY,
+    DETERMINANT,
     DRIVE,
     EFFORTS,
     LOAD,
@@ -60,6 +63,12 @@ CONTRACTION = 0.25
 SETTLED, ROUND_OFF = 1e-8, 1e-13
 # Steps of larger corrections are looked at in three places, others in their middle.
 LONG = 1e-2
+# Longest first correction of a step. In a longer one, a turning point could lie between the places
+# that are looked at.
+LONGEST = 0.25
+# Largest ratio of the determinants at two places in line. A path that turns back between them has
+# a zero there, and on its way to this zero the determinant falls by more.
+STEADY = 2.0
 MOST_ITERATIONS = 12
 # Steps are halved to this part of the way so far. A turning point is then known to eleven digits.
 SHORTEST = 2.0**-36
@@ -174,12 +183,12 @@ class StaticModel:
         vectors = self.equations.vectors
         names = [*self.equations.design, MULTIPLIERS]
         self._state = [slot for name in names for slot in vectors[name]]
-        self._tests = [self.equations.plan.slots[name] for name in (STEP, SIGNS)]
+        self._tests = [self.equations.plan.slots[name] for name in (STEP, SIGNS, DETERMINANT)]
         if compiled := available():
             make_loops_ready()
         self._code = LlvmCode(self.equations.plan) if compiled else None
         self._bound: dict[int, Executor] = {}
-        self._signs = self._signs_at_design()
+        self._signs, self._determinant = self._at_design()
 
     def executor(self, lanes: int) -> Executor:
         """Return the programs bound to lanes at design."""
@@ -194,22 +203,25 @@ class StaticModel:
         return made
 
     @cached_property
-    def rest(self) -> tuple[Array, float]:
-        """State and multipliers in equilibrium without loads and travel, and the share of weight
-        and springs at the end of the walk: one, unless there is no such equilibrium.
+    def rest(self) -> tuple[Array, float, float]:
+        """State and multipliers in equilibrium without loads and travel, the share of weight and
+        springs at the end of the walk, one unless there is no such equilibrium, and the determinant
+        there.
         """
         executor = self.executor(1)
-        share, _ = self._walk(executor, partial(self._put_rest, executor))
-        return executor.get(self._state), float(share[0])
+        put = partial(self._put_rest, executor)
+        share, determinant, _ = self._walk(executor, put, self._determinant)
+        return executor.get(self._state), float(share[0]), float(determinant[0])
 
-    def _signs_at_design(self) -> float:
-        """Return the signs of the tangent's blocks at design, where what is out of balance is held.
-        No walk changes them.
+    def _at_design(self) -> tuple[float, float]:
+        """Return signs and size of the determinant at design, where what is out of balance is held.
+        No walk changes the signs.
         """
         executor = self.executor(1)
         self._put_rest(executor, np.zeros(1))
         executor.run("newton")
-        return float(executor.get(self._tests)[1, 0])
+        _, signs, determinant = executor.get(self._tests)[:, 0].tolist()
+        return signs, determinant
 
     def _put_rest(self, executor: Executor, share: Array) -> None:
         left = self.equations.rest[:, None]
@@ -241,7 +253,7 @@ class StaticModel:
     def _solve(
         self, loads: Mapping[str, Array], travel: Mapping[str, Array], n: int, slopes: bool
     ) -> Equilibria:
-        state, settled = self.rest  # it takes an executor of one lane to itself
+        state, settled, determinant = self.rest  # it takes an executor of one lane to itself
         executor, vectors = self.executor(n), self.equations.vectors
         if settled == 1.0:
             executor.put(self._state, state)
@@ -251,6 +263,8 @@ class StaticModel:
                 f" position it follows {settled:.3g} of its weight and of its springs' forces;"
                 " correct free lengths and preloads, hold a driver, or give loads"
             )
+        else:
+            determinant = self._determinant
 
         def put(share: Array) -> None:
             if settled < 1.0:  # only loads hold it: they come with weight and springs
@@ -261,7 +275,7 @@ class StaticModel:
                 values = self._drive(name, share * values)
                 executor.put(vectors[f"{DRIVE}{name}"][: len(values)], values)
 
-        share, iterations = self._walk(executor, put)
+        share, _, iterations = self._walk(executor, put, determinant)
         executor.run("compliance")
         return self._read(executor, share, iterations, slopes)
 
@@ -271,54 +285,65 @@ class StaticModel:
         return values[None] / self.equations.frame.unit  # cosine and sine are of no angle
 
     def _walk(
-        self, executor: Executor, put: Callable[[Array], None]
-    ) -> tuple[Array, NDArray[np.int64]]:
-        """Walk from share zero to one; return the last share in equilibrium, and iterations."""
+        self, executor: Executor, put: Callable[[Array], None], start: float
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Walk from share zero, with its determinant, to one; return the last share in equilibrium,
+        the determinant there, and iterations.
+        """
         n = executor.lanes
         share, step, count = np.zeros(n), np.ones(n), np.zeros(n, np.int64)
+        determinant = np.full(n, start)
         state, signs = executor.get(self._state), self._signs
         while (active := (share < 1.0) & (step >= SHORTEST * np.maximum(share, SHORTEST))).any():
             target = np.where(active, np.minimum(1.0, share + step), share)
             put(target)
-            accepted, used, first = self._newton(executor, signs)
+            accepted, used, first, end = self._newton(executor, signs)
             accepted &= active
-            found = executor.get(self._state)
+            found, last = executor.get(self._state), determinant
             longest = first[accepted].max(initial=0.0)
-            for part in (0.5, 0.25, 0.75)[: 3 if longest > LONG else 1 if longest > SETTLED else 0]:
+            parts = (0.25, 0.5, 0.75) if longest > LONG else (0.5,) * int(longest > SETTLED)
+            for part in parts:
                 put(share + part * (target - share))
                 executor.put(self._state, state + part * (found - state))
                 executor.run("newton")
-                size, at_part = executor.get(self._tests)
+                size, at_part, here = executor.get(self._tests)
                 accepted &= (size <= CONTRACTION * first + SETTLED) & (at_part == signs)
+                accepted &= _steady(last, here)
+                last = here
                 used += 1
+            accepted &= _steady(last, end)
             count += np.where(active, used, 0)
             state = np.where(accepted, found, state)
+            determinant = np.where(accepted, end, determinant)
             executor.put(self._state, state)
             share = np.where(accepted, target, share)
             step = np.where(accepted, 2.0 * step, 0.5 * step)
         put(share)
-        return share, count
+        return share, determinant, count
 
-    def _newton(self, executor: Executor, signs: float) -> tuple[Lanes, NDArray[np.int64], Array]:
-        """Return the lanes with an equilibrium by contracting corrections, the iterations, and the
-        size of the first correction.
+    def _newton(
+        self, executor: Executor, signs: float
+    ) -> tuple[Lanes, NDArray[np.int64], Array, Array]:
+        """Return the lanes with an equilibrium by contracting corrections, the iterations, the size
+        of the first correction, and of the last determinant.
         """
         n = executor.lanes
-        first = np.full(n, np.nan)
+        first = determinant = np.full(n, np.nan)
         last, used = np.full(n, np.inf), np.zeros(n, np.int64)
         good, settled = np.ones(n, np.bool_), np.zeros(n, np.bool_)
         for _ in range(MOST_ITERATIONS):
             executor.run("newton")
-            size, found = executor.get(self._tests)
+            size, found, determinant = executor.get(self._tests)
             first = np.where(np.isnan(first), size, first)
             used += good & ~settled
+            good &= first <= LONGEST
             slow = ~(size <= CONTRACTION * last)
             settled |= good & (size <= SETTLED) & (slow | (size <= ROUND_OFF)) & (found == signs)
             good &= settled | ~(slow & ~((size <= SETTLED) & (found == signs)))
             last = size
             if (settled | ~good).all():
                 break
-        return good & settled, used, first
+        return good & settled, used, first, determinant
 
     def _read(
         self, executor: Executor, share: Array, iterations: NDArray[np.int64], slopes: bool
@@ -388,6 +413,10 @@ class StaticModel:
 
     def _motion(self, motion: Any) -> str:
         return motion_of(self.equations.columns, motion)
+
+
+def _steady(one: Array, other: Array) -> Lanes:
+    return (one <= STEADY * other) & (other <= STEADY * one)
 
 
 def _joined(parts: Sequence[Equilibria]) -> Equilibria:

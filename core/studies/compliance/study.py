@@ -27,6 +27,7 @@ from ...case.measures import DriverEffort
 from ...case.quantity import ORDERS, Output, Quantity, with_markers
 from ...case.suspension import PerTravel
 from ...errors import KincheckError, SolveError
+from ...harness.record import Results
 from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, solve
 from ...mechanism.mechanism import Mechanism
@@ -96,6 +97,7 @@ class ComplianceResults:
 
     Attributes:
         cases: the same equilibria for engines, in the same order.
+        checked: records of engines.
     """
 
     case: str
@@ -103,6 +105,7 @@ class ComplianceResults:
     loads: Mapping[Load, ComplianceCurves] = field(default_factory=dict[Load, ComplianceCurves])
     signs: str = ""
     cases: tuple[Case, ...] = ()
+    checked: Results | None = None
 
     @property
     def failures(self) -> list[str]:
@@ -154,6 +157,7 @@ def compliance(
 class _Study:
     def __init__(self, case: Case, axle: AxleMotion) -> None:
         self.case, self.axle, self.rig = case, axle, case.rig or Rig()
+        self.lacking = [x for x in case.outputs if not x.forces and x.orders < ORDERS - 1]
         soft = case.mechanism.released()
         held = held_drivers(case, self.rig, soft)
         self.wheels = wheels_of(case, held, soft)
@@ -273,6 +277,12 @@ class _Study:
             if way and ok
         ]
         notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
+        if self.lacking:
+            listed = ", ".join(output.name for output in self.lacking)
+            notes.append(
+                f"not computed: {listed}: slopes of what is a slope by itself; kincheck run has"
+                " them for rigid joints"
+            )
         if not self.mechanism.forces:
             notes.append(
                 "nothing is elastic: there is no bushing and no spring, so nothing gives way to a"
@@ -333,7 +343,7 @@ class _Study:
         by_load = {load: self._step(found, load) for load in self.rig.loads}
         curves = dict[str, Curve]()
         for output in self.case.outputs:
-            if output.forces:
+            if output.forces or output in self.lacking:
                 continue
             value = self._value(output, found, np.asarray(by_travel))
             curves[output.name] = Curve(value.x, output.unit, output.sense)
@@ -419,7 +429,7 @@ class _Study:
             return {}
         found = dict[str, Array]()
         for output in self.case.outputs:
-            if output.forces:
+            if output.forces or output in self.lacking:
                 continue
             at, design = dict[str, Vec3](), dict[str, Vec3]()
             for name in output.points:

@@ -40,12 +40,8 @@ SHOWN: Mapping[str, tuple[str, float]] = {
 _HERE = Path(__file__).parent
 
 
-def as_data(results: ComplianceResults, checked: Results | None = None) -> dict[str, Any]:
-    """Return the results as plain data in SI; null without an equilibrium.
-
-    Args:
-        checked: records of engines.
-    """
+def as_data(results: ComplianceResults) -> dict[str, Any]:
+    """Return the results as plain data in SI; null without an equilibrium."""
     return {
         "schema": SCHEMA,
         "case": results.case,
@@ -53,7 +49,7 @@ def as_data(results: ComplianceResults, checked: Results | None = None) -> dict[
         **_data(results.travel),
         "loads": {str(name): _data(each) for name, each in results.loads.items()},
         "failures": results.failures,
-        **({"agreement": agreement(checked)} if checked else {}),
+        **({"agreement": agreement(results.checked)} if results.checked else {}),
     }
 
 
@@ -161,12 +157,8 @@ def lines(results: ComplianceResults) -> Iterator[str]:
         yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
 
 
-def page(results: ComplianceResults, checked: Results | None = None) -> str:
-    """Return the page: curves over travel with the rigid ones beside, then over each load.
-
-    Args:
-        checked: records of engines.
-    """
+def page(results: ComplianceResults) -> str:
+    """Return the page: curves over travel with the rigid ones beside, then over each load."""
     figures: dict[str, Figure] = {}
     sections: list[tuple[str, list[Style], list[Plot]]] = []
     soft, rigid = Style.number(0, "with bushings"), Style.number(1, "rigid joints")
@@ -200,7 +192,7 @@ def page(results: ComplianceResults, checked: Results | None = None) -> str:
             results=results,
             sections=sections,
             matrix=_matrix(results.travel),
-            agreement=agreement(checked) if checked else [],
+            agreement=agreement(results.checked) if results.checked else [],
             **figure_parts(figures),
         )
     )

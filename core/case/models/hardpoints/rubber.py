@@ -20,11 +20,11 @@ from ....mechanism.body import Body
 from ....mechanism.loads import Bushing, ForceElement, SpringDamper
 from ....mechanism.mechanism import GROUND, Vector
 from ...case import Case
-from ...io.document import Section, explained, parse, read_text
-from ...io.mechanism_sections import LARGEST_BUSHINGS, with_bushings
+from ...io.document import explained
+from ...io.mechanism_sections import bushings_in, with_bushings
 from ...units import LENGTHS
 from .table import HardpointTable, number
-from .templates import KNUCKLE, Template
+from .templates import KNUCKLE, TIEROD_INNER, Template
 
 Three = float | tuple[float, float, float]
 # A steel ball joint is stiff, rubber is not: numbers of a passenger car [N/m, N m/rad].
@@ -60,16 +60,18 @@ class Rubber:
 
 
 def joint_at(template: Template, role: str) -> str | None:
-    """Return the joint that a bushing at a role replaces, one on the chassis first; a rod has
-    none.
+    """Return the joint that a bushing at a role replaces: a pivot or a ball, one on the chassis
+    first, else the rod that ends there; none where two rods meet.
     """
-    found = [
-        name
-        for name, (kind, _, _, *roles) in template.joint_rows.items()
-        if role in roles and Joint.registry[kind] is not Distance
-    ]
-    on_chassis = [name for name in found if GROUND in template.joint_rows[name]]
-    return next(iter((*on_chassis, *found)), None)
+    found = [name for name, (_, _, _, *roles) in template.joint_rows.items() if role in roles]
+    rods = [name for name in found if _is_rod(template, name)]
+    others = [name for name in found if name not in rods]
+    on_chassis = [name for name in others if GROUND in template.joint_rows[name]]
+    return next(iter((*on_chassis, *others, *(rods if len(rods) == 1 else ()))), None)
+
+
+def _is_rod(template: Template, joint: str) -> bool:
+    return Joint.registry[template.joint_rows[joint][0]] is Distance
 
 
 def with_rubber(
@@ -224,8 +226,7 @@ def with_file(
     Raises:
         CaseError: the file cannot be read, or a role has no joint for a bushing.
     """
-    text = read_text(file, LARGEST_BUSHINGS, "it holds the bushings of one suspension")
-    root, found = Section(file, "", parse(file, text)), dict[str, Any]()
+    root, found = bushings_in(file), dict[str, Any]()
     known = [role for role in at if joint_at(template, role)]
     for role, section in root.at("bushings").each() if root.at("bushings").value else ():
         if role not in known:
@@ -242,7 +243,7 @@ def with_file(
 def sample_bushings(template: Template) -> str:
     """Return the text of a file of bushings to begin one's own with; its numbers are invented.
 
-    It is empty if no role of the sample table takes a bushing.
+    It has the places on the chassis, but for the steered rod, which has often none.
     """
     lines = [f"# bushings of template {template.name}: kincheck kc TABLE --bushings FILE; SI units"]
     lines.append("# one number serves all axes; the third is the joint's own axis, if it has one")
@@ -250,10 +251,15 @@ def sample_bushings(template: Template) -> str:
         if role.name not in template.sample:
             continue
         name = joint_at(template, role.name)
-        if name is None or GROUND not in template.joint_rows[name][1:3]:
+        if name is None or name == template.steered:
             continue
-        axial = template.joint_rows[name][0] == "revolute"
+        kind, i, j, first, *_ = template.joint_rows[name]
+        if GROUND not in (i, j) or (_is_rod(template, name) and role.name != first):
+            continue
+        axial = kind == "revolute"
         turning = [SAMPLE_TURNING, SAMPLE_TURNING, 0.0] if axial else [SAMPLE_TURNING] * 3
         lines += ["", f"[bushings.{role.name}]  # {role.meaning}"]
         lines += [f"stiffness = {SAMPLE_STIFFNESS:g}  # N/m", f"turning_stiffness = {turning}"]
-    return "\n".join(lines) if len(lines) > 2 else ""
+    if template.steered:
+        lines += ["", f"# {TIEROD_INNER} takes one too, as the stiffness of rack or steering"]
+    return "\n".join(lines)

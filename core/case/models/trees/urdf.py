@@ -43,11 +43,11 @@ from .tree import WORLD, Kind, Mass, Move, Tree
 
 GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
 JOINTS, CONSTRAINTS = ("joint", DRAKE_JOINT), ("constraint", "loop_joint")
-READ = ("link", *JOINTS, *CONSTRAINTS, BALL, STRUT, BUSHING)
+READ = ("link", "frame", *JOINTS, *CONSTRAINTS, BALL, STRUT, BUSHING)
 IN_ROBOT = (
     *(*READ, GAZEBO),
     *words(
-        "material transmission ros2_control frame fixed_frame sensor mujoco author version"
+        "material transmission ros2_control fixed_frame sensor mujoco author version"
         " disable_collisions enable_collisions disable_default_collisions group group_state"
         " end_effector virtual_joint passive_joint capability speed_limit"
     ),

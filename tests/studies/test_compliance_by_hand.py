@@ -1,0 +1,227 @@
+"""K&C of a double wishbone with parallel equal arms, whose slopes and rates are short formulas.
+
+Arms along y at the heights 0.15 and 0.45 m, from pivots at 0.3 to balls at 0.7 m. Each pivot has
+two bushings 0.4 m apart along x. The tie rod is rigid, at half height, 0.15 m behind. The wheel's
+centre is 0.05 m outside the balls at half height, and the contact 0.3 m below it.
+"""
+
+import kincheck
+import numpy as np
+import pytest
+from kincheck.core.cli.main import main
+
+KX, KY, KZ = 2e5, 4e5, 3e5
+SPRING, BAR, TIRE = 6e4, 700.0, 2e5
+BRACKET = 0.05
+# Of a ball: along y, and along x, where the arm turns on its bushings too.
+BY_Y, BY_X = 1.0 / (2.0 * KY), 1.0 / (2.0 * KX) + 0.4**2 / (2.0 * KY * 0.2**2)
+# Of one ball's force against the other's, by a moment at the arm of 0.3 m.
+LEAN = 2.0 * BY_Y / 0.3**2
+
+
+def rise(spring):
+    """Return the wheel's rise by an upward force: spring at half the arm, bushing, and lean."""
+    return 4.0 / spring + 1.0 / (2.0 * KZ) + BRACKET**2 * LEAN
+
+
+def corner(name, side, factor):
+    """Return bodies, joints and springs of a side."""
+
+    def at(x, y, z):
+        return [factor * x, factor * side * y, factor * z]
+
+    text = f'[bodies.knuckle{name}]\n[points.center{name}]\nbody = "knuckle{name}"\n'
+    text += f"position = {at(0.0, 0.75, 0.3)}\n"
+    for arm, z in (("lower", 0.15), ("upper", 0.45)):
+        text += f'[bodies.{arm}{name}]\n[joints.{arm}_ball{name}]\ntype = "spherical"\n'
+        text += f'bodies = ["{arm}{name}", "knuckle{name}"]\npoint = {at(0.0, 0.7, z)}\n'
+        text += (
+            f'[joints.{arm}_pivot{name}]\ntype = "revolute"\nbodies = ["ground", "{arm}{name}"]\n'
+        )
+        text += f"point = {at(0.0, 0.3, z)}\naxis = [1.0, 0.0, 0.0]\n"
+        for end, x in (("front", 0.2), ("rear", -0.2)):
+            text += f"[joints.{arm}_pivot{name}.bushings.{end}]\npoint = {at(x, 0.3, z)}\n"
+            text += f"stiffness = {[KX / factor, KY / factor, KZ / factor]}\n"
+    text += f'[joints.tie{name}]\ntype = "distance"\nbodies = ["ground", "knuckle{name}"]\n'
+    text += f"points = [{at(-0.15, 0.3, 0.3)}, {at(-0.15, 0.7, 0.3)}]\n"
+    text += f'[forces.spring{name}]\ntype = "spring_damper"\nbodies = ["ground", "lower{name}"]\n'
+    text += (
+        f"points = [{at(0.0, 0.5, 0.55)}, {at(0.0, 0.5, 0.15)}]\nstiffness = {SPRING / factor}\n"
+    )
+    text += f'[drivers.jounce{name}]\ntype = "point_coordinate"\npoint = "center{name}"\n'
+    return text + "direction = [0.0, 0.0, 1.0]\n"
+
+
+def wheel(convention="iso8855", side="left", radius=0.3, more=""):
+    return f"""[sweep]
+driver = "jounce"
+start = -0.05
+stop = 0.05
+steps = 3
+[suspension]
+convention = "{convention}"
+side = "{side}"
+forward = [1.0, 0.0, 0.0]
+up = [0.0, 0.0, 1.0]
+wheel_center = "center"
+wheel_radius = {radius}
+travel = "jounce"
+{more}
+[outputs.toe]
+type = "toe"
+[outputs.camber]
+type = "camber"
+"""
+
+
+def study(tmp_path, text, *args, **options):
+    file = tmp_path / "car.toml"
+    file.write_text('schema = "kincheck-case/1"\nname = "car"\nsource = "by hand"\n' + text)
+    return kincheck.compliance(file, *args, **options)
+
+
+@pytest.mark.parametrize("convention", ["iso8855", "sae_j670"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_slopes_have_signs_of_side_and_convention(tmp_path, side, convention):
+    """A force on the contact towards the middle leans the wheel out at its top; the tie rod behind
+    the axis then steers it in.
+    """
+    text = corner("", 1.0 if side == "left" else -1.0, 1.0) + wheel(convention, side)
+    found = study(tmp_path, text, [0.0]).travel
+    values = {name: curve.values[0] for name, curve in found.outputs.items()}
+    inward = -1.0 if (side == "left") == (convention == "iso8855") else 1.0
+    steer = 0.5 * BY_Y / 0.15  # both balls together move by half of one ball's alone
+    assert values["toe.per_lateral_force"] == pytest.approx(inward * steer, rel=1e-12)
+    # the force at the bracket that holds the height leans the wheel back a little
+    held = 0.3 * LEAN * (1.0 - BRACKET**2 * LEAN / rise(SPRING))
+    assert values["camber.per_lateral_force"] == pytest.approx(inward * held, rel=1e-12)
+    turn = 0.5 * BY_Y / 0.15**2
+    assert values["toe.per_aligning_torque"] == pytest.approx(inward * turn, rel=1e-12)
+    assert values["toe.per_longitudinal_force"] == pytest.approx(BRACKET * turn, rel=1e-12)
+    assert values["toe.per_braking_force"] == pytest.approx(-BRACKET * turn, rel=1e-12)
+    lean = -BRACKET * LEAN / rise(SPRING)
+    assert values["camber.per_travel"] == pytest.approx(lean, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "load"), [("brakes", "braking"), ("drive", "longitudinal")], ids=["brakes", "drive"]
+)
+@pytest.mark.parametrize("place", ["inboard", "outboard"])
+def test_torque_of_brake_or_drive_winds_up_the_knuckle(tmp_path, key, load, place):
+    """Outboard the force acts at the contact: the lower ball has 1.5 of it; else both have half."""
+    text = corner("", 1.0, 1.0) + wheel(more=f'{key} = "{place}"')
+    text += '[points.low]\nbody = "knuckle"\nposition = [0.0, 0.7, 0.15]\n'
+    text += '[outputs.low]\npoint = "low"\ncomponent = "x"\n'
+    found = study(tmp_path, text, [0.0]).travel.outputs[f"low.per_{load}_force"].values[0]
+    sign = -1.0 if load == "braking" else 1.0
+    part = 1.5 if place == "outboard" else 0.5
+    assert found == pytest.approx(sign * part * BY_X, rel=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1000.0], ids=["m", "mm"])
+def test_wheel_and_tire_are_springs_in_series(tmp_path, factor, capsys):
+    """In units of the file; the JSON file is in SI, the table in N/mm."""
+    text = "" if factor == 1.0 else '[units]\nlength = "mm"\n'
+    text += corner("", 1.0, factor) + wheel(radius=factor * 0.3)
+    text += f"[compliance]\ntire_stiffness = {TIRE / factor}\n"
+    values = {k: x.values[0] for k, x in study(tmp_path, text, [0.0]).travel.outputs.items()}
+    series, arm = 1.0 / (rise(SPRING) + 1.0 / TIRE), 2.0 * 0.75**2
+    assert values["wheel_rate"] == pytest.approx(1.0 / rise(SPRING), rel=1e-12)
+    assert values["ride_rate"] == pytest.approx(series, rel=1e-12)
+    assert values["roll_stiffness"] == pytest.approx(arm / rise(SPRING), rel=1e-12)
+    assert values["roll_rate"] == pytest.approx(arm * series, rel=1e-12)
+    assert main(["kc", str(tmp_path / "car.toml"), "--travel=0"]) == 0
+    out = capsys.readouterr().out
+    assert f"wheel_rate [N/mm]  {1e-3 / rise(SPRING):.6g}" in out
+    assert f"toe.per_lateral_force [deg/kN]  {-np.degrees(500.0 * BY_Y / 0.15):.6g}" in out
+
+
+BAR_TEXT = "".join(
+    f"""[bodies.bar{name}]
+origin = [0.4, {side * 0.3}, 0.05]
+[joints.link{name}]
+type = "distance"
+bodies = ["bar{name}", "lower{name}"]
+points = [[0.0, {side * 0.5}, 0.05], [0.0, {side * 0.5}, 0.15]]
+[joints.hinge{name}]
+type = "revolute"
+bodies = ["ground", "bar{name}"]
+point = [0.4, {side * 0.3}, 0.05]
+axis = [0.0, 1.0, 0.0]
+"""
+    for name, side in (("", 1.0), ("_right", -1.0))
+)
+BAR_TEXT += f"""[forces.bar]
+type = "bushing"
+bodies = ["bar", "bar_right"]
+point = [0.4, 0.0, 0.05]
+turning_stiffness = [0.0, {BAR}, 0.0]
+"""
+OTHER = '[suspension.other]\nwheel_center = "center_right"\ntravel = "jounce_right"\n'
+OTHER += '[drivers.jounce_right.motion]\ntype = "ramp"\nrate = 1.0\n'
+
+
+def axle():
+    text = corner("", 1.0, 1.0) + corner("_right", -1.0, 1.0) + BAR_TEXT + OTHER
+    return text + wheel() + f"[compliance]\ntire_stiffness = {TIRE}\n"
+
+
+def test_bar_of_an_axle_stiffens_roll_alone(tmp_path):
+    """Half bars of 0.4 m: by a rise d of each link they twist by 2 d / 0.4 against each other."""
+    found = study(tmp_path, axle(), [0.0]).travel
+    values = {name: curve.values[0] for name, curve in found.outputs.items()}
+    alike, against = (1.0 / rise(k) for k in (SPRING, SPRING + BAR * 2.0 / 0.4**2))
+    assert values["wheel_rate"] == pytest.approx(alike, rel=1e-11)
+    assert values["wheel_rate_opposite"] == pytest.approx(against, rel=1e-11)
+    assert values["roll_stiffness"] == pytest.approx(2.0 * 0.75**2 * against, rel=1e-11)
+    assert values["anti_roll_share"] == pytest.approx((against - alike) / against, rel=1e-10)
+    tired = 1.0 / (1.0 / against + 1.0 / TIRE)
+    assert values["roll_rate"] == pytest.approx(2.0 * 0.75**2 * tired, rel=1e-11)
+
+
+@pytest.mark.parametrize(("motion", "sign"), [("heave", 1.0), ("roll", -1.0)])
+def test_loads_of_an_axle_act_alike_or_against(tmp_path, motion, sign):
+    """Lateral forces on both contacts, along the axes; the bar couples lean by the held heights."""
+    values = {"lateral": [0.0, 10.0]}
+    curves = study(tmp_path, axle(), [0.0], values, axle=motion).loads["lateral"]
+    C = curves.compliance[0]
+    camber = curves.outputs["camber.per_lateral_force"].values[0]
+    assert -camber == pytest.approx(C[3, 1] + sign * C[3, 7], rel=1e-12)
+    assert C[7, 7] == pytest.approx(C[1, 1], rel=1e-12)
+    slope = 0.1 * (curves.outputs["camber"].values[1] - curves.outputs["camber"].values[0])
+    assert slope == pytest.approx(camber, rel=1e-4)
+
+
+SOFT = 8e5
+GUIDED = """[bodies.carrier]
+[joints.guide]
+type = "translational"
+bodies = ["ground", "carrier"]
+point = [0.0, 0.3, 0.3]
+axis = [0.0, 1.0, 0.0]
+[forces.soft]
+type = "bushing"
+bodies = ["ground", "carrier"]
+point = [0.0, 0.3, 0.3]
+"""
+
+
+@pytest.mark.parametrize("law", ["stiffness", "curve"])
+def test_rack_and_subframe_are_springs_in_series(tmp_path, law):
+    """A guided body on rubber between the car and the tie rod, or both arms. A progressive curve
+    starts with the same rate.
+    """
+    rates = {
+        "stiffness": f"stiffness = [0.0, {SOFT}, 0.0]\n",
+        "curve": f"curve = [[], {[[k * 1e-3, k * 1e-3 * SOFT] for k in range(-3, 4)]}, []]\n",
+    }
+    plain = GUIDED + rates[law] + corner("", 1.0, 1.0) + wheel()
+    rack = plain.replace('["ground", "knuckle"]', '["carrier", "knuckle"]')
+    found = study(tmp_path, rack, [0.0]).travel.outputs["toe.per_aligning_torque"].values[0]
+    assert found == pytest.approx(-(0.5 * BY_Y + 1.0 / SOFT) / 0.15**2, rel=1e-12)
+    frame = plain.replace('["ground", "lower"]\npoint', '["carrier", "lower"]\npoint')
+    frame = frame.replace('["ground", "upper"]', '["carrier", "upper"]')
+    found = study(tmp_path, frame, [0.0]).travel
+    assert found.outputs["toe.per_lateral_force"].values[0] == pytest.approx(
+        -(0.5 * BY_Y + 1.0 / SOFT) / 0.15, rel=1e-12
+    )
