@@ -71,7 +71,7 @@ class Variants:
     messages: Mapping[int, str]
 
 
-def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
+def solve_variants(route: Route, geometry: Array, tol: float, *, divided: bool = True) -> Variants:
     """Solve all variants at all samples. Drivers are measured from the design position of each
     variant.
 
@@ -82,6 +82,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         route: of a model with varied places.
         geometry: numbers of the varied places in their order, shape (numbers, V).
         tol: as for `solve`.
+        divided: whether to divide steps that fail, which takes many times as long; otherwise a
+            variant ends there.
     """
     _recycle()
     model = route.model
@@ -91,7 +93,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
     failed = np.flatnonzero(np.isnan(worst[SIGMA]))
     solved[:, failed] = ~np.isnan(closure[:, failed])
     again = failed[closes[failed]]
-    if FINER[0] * len(closure) <= ROOM:
+    if divided and FINER[0] * len(closure) <= ROOM:
         for first in range(0, len(again), SOME):
             some = again[first : first + SOME]
             filled = np.resize(some, SOME)  # the executor of as many is kept
@@ -106,6 +108,9 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
                 "does not close at its design position; check the points, axes and lengths of this"
                 " variant"
             )
+            continue
+        if not divided:
+            messages[k] = "ends at the first step that fails; steps were not divided"
             continue
         found = march(
             replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin),

@@ -208,7 +208,7 @@ const DIRECTIONS = {
     if (link.isDue("solve")) return;
     parts.figures.draw(true);
     const late = opening.outputs.some(({ name }) => !state.fresh.has(name));
-    if (late && !parts.whole) {
+    if ((late || !state.answer.solved.every(Boolean)) && !parts.whole) {
       parts.whole = true;
       return ask(true);
     }

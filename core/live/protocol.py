@@ -43,7 +43,8 @@ class Solve(_Message, frozen=True):
     """Solve a table with these points.
 
     Attributes:
-        whole: whether outputs that need another solution, which takes longer, are wanted.
+        whole: whether outputs that need another solution are wanted, and samples beyond a step
+            that has to be divided: both take longer.
     """
 
     points: Rows

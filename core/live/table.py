@@ -62,6 +62,8 @@ FRAMES = 41
 """Most drawn samples: as many as a hand can tell apart on the slider."""
 VARIANTS = 512
 """Variants of a histogram: its bins hold some tens of them."""
+PARTS = 16
+"""Parts of a step on a path with velocities by some drivers alone: of eight, some fail."""
 MOVED = 2e-5
 """Half of the difference for derivatives [m]: its square times a third derivative is far below the
 three digits shown, and rounding of 1e-15 m over it too."""
@@ -148,7 +150,7 @@ class LiveTable:
 
     def answer(self, number: int, points: Rows, *, whole: bool = True) -> Answer | Refused:
         """Return the motion of an edited table, or why there is none; if it is not to be whole,
-        without the outputs that need another solution.
+        without the outputs that need another solution, and only up to a step that fails.
         """
         begin = perf_counter()
         try:
@@ -157,7 +159,7 @@ class LiveTable:
             return self.refusal(number, error)
         read = perf_counter()
         designs, geometry = self._prepared(case), _numbers(case)
-        found = designs.solve(geometry, TOL)
+        found = designs.solve(geometry, TOL, divided=whole)
         solved = perf_counter()
         outputs = [each for each in case.outputs if whole or _alone(each) not in self._held]
         values = {
@@ -277,7 +279,7 @@ class LiveTable:
         with _at_once():  # otherwise an edit in between waits for the compiler
             designs = prepared(path)
             self._held = {
-                alone: prepared(held_case(case, alone).sweep.path)
+                alone: prepared(_in_parts(held_case(case, alone).sweep.path))
                 for alone in dict.fromkeys(map(_alone, case.outputs))
                 if alone and not _moves_alone(path, alone)
             }
@@ -308,7 +310,7 @@ class LiveTable:
         with np.errstate(all="ignore"):
             for alone in dict.fromkeys(by for _, by in computed):
                 # the same poses, with velocities by some drivers while the others rest
-                held = self._held[alone].solve(geometry, TOL) if alone in self._held else found
+                held = self._along(alone, geometry) if alone in self._held else found
                 at = {name: _moving(designs.motion(held, name)) for name in names}
                 known = held.solved & _same_place(case, designs, found, held)
                 for each in (each for each, by in computed if by == alone):
@@ -316,6 +318,11 @@ class LiveTable:
                     jet = counted(case.mechanism, case.sweep.path, each, moved, design)
                     values[each.name] = np.where(known, jet.x, np.nan)
         return values
+
+    def _along(self, alone: tuple[str, ...], geometry: Array) -> Variants:
+        """Return the poses with velocities by some drivers while the others rest."""
+        found = self._held[alone].solve(geometry, TOL)
+        return replace(found, kept=found.kept[:, ::PARTS], solved=found.solved[::PARTS])
 
     def _drawing(
         self, case: Case, designs: PreparedDesigns, found: Variants
@@ -449,6 +456,15 @@ def _moves_alone(path: Way, drivers: Sequence[str]) -> bool:
     return all(
         np.all(rates.get(name, 0.0) == (first if name in drivers else 0.0)) for name in names
     )
+
+
+def _in_parts(path: Way) -> Way:
+    """Return a path with its steps in equal parts, which are followed whole: the velocities at its
+    samples do not point to the next ones.
+    """
+    samples = np.arange(len(path.times))
+    parts = np.arange(PARTS * (len(samples) - 1) + 1) / PARTS
+    return replace(path, times=np.interp(parts, samples, path.times))
 
 
 def _moving(motion: Sequence[Array]) -> Vec3:

@@ -19,6 +19,7 @@ import pytest
 from kincheck import load, run, sweep
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.kinematics import design_batch
 from kincheck.core.live.model import LiveModel
 from kincheck.core.live.protocol import LARGEST_MESSAGE, MOST_MESSAGES, live_schema
 from kincheck.core.live.table import LiveTable
@@ -416,6 +417,22 @@ def test_axle_answers_all_outputs_as_run(car, axle):
         assert values == pytest.approx(wanted, rel=1e-9, abs=1e-11, nan_ok=True), name
     soon = live.answer(2, live.positions, whole=False).outputs
     assert ("left_roll_center_height" in soon) == (axle == "heave")
+
+
+@pytest.mark.parametrize(
+    ("axle", "travel", "whole"),
+    [("roll", "0.06:161", True), ("steer", "0.04:161", True), ("steer", "0.06:161", False)],
+)
+def test_edit_of_an_axle_divides_no_step(car, monkeypatch, axle, travel, whole):
+    """Each divided step is found by itself, some hundred times as long as the others; the rack of
+    the last case locks up, which may wait until a gesture rests.
+    """
+    live = LiveTable(car, Supplied(travel=travel, axle=axle))
+    marches = []
+    monkeypatch.setattr(design_batch, "march", lambda *_: marches.append(1))
+    answer = live.answer(1, live.positions, whole=whole)
+    assert marches == []
+    assert all(answer.solved) == whole
 
 
 RIG = "# signs: iso8855\ntravel [mm],Toe Angle [deg]\n-30,0.22\n0,0.01\n30,-0.18\n"
