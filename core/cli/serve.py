@@ -146,7 +146,7 @@ def _measured(live: Live, count: int) -> None:
     import statistics
     from time import perf_counter, process_time
 
-    from ..live.protocol import Answer, encode
+    from ..live.protocol import Solve, encode
     from ..live.table import LiveTable
 
     if not isinstance(live, LiveTable):
@@ -156,10 +156,8 @@ def _measured(live: Live, count: int) -> None:
     for k in range(count):
         moved = [(x, y + 1e-3 * size * (k % 11 - 5) / 5, z) for x, y, z in points]
         begin, worked = perf_counter(), process_time()
-        found = live.answer(k, moved)
+        found = live.solve(Solve(points=moved))
         sent = encode(found)
-        if not isinstance(found, Answer):
-            raise KincheckError(f"--measure: edit {k}: {found.message}")
         whole = {"answer": perf_counter() - begin, "processor": process_time() - worked}
         steps.setdefault("bytes", []).append(float(len(sent)))
         for name, each in (found.milliseconds | {k: 1e3 * v for k, v in whole.items()}).items():

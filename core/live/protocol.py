@@ -5,6 +5,7 @@ Lengths of points are in the unit and along the axes of the file; everything els
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
@@ -23,7 +24,8 @@ Rows: TypeAlias = Annotated[
 ]
 """The points of a table in its order."""
 Name: TypeAlias = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
-Values: TypeAlias = list[float | None]
+Values: TypeAlias = Sequence[float | None]
+"""Numbers that are not known are NaN, which JSON has as null."""
 
 
 class _Message(
@@ -169,7 +171,7 @@ class LiveAxis(msgspec.Struct, frozen=True):
     up: int
 
 
-class Opening(_Message, frozen=True):
+class Opening(_Message, frozen=True, kw_only=True):
     """The file as it is: the first message to a page.
 
     Attributes:
@@ -181,21 +183,21 @@ class Opening(_Message, frozen=True):
         varied: whether there is a file of tolerances.
     """
 
-    protocol: int
+    protocol: int = VERSION
     kind: str
     file: str
     source: str
     unit: str
-    axes: str
-    points: list[LivePoint]
+    axes: str = ""
+    points: list[LivePoint] = []
     outputs: list[LiveOutput]
     axis: LiveAxis
-    drivers: list[LiveDriver]
+    drivers: list[LiveDriver] = []
     engines: list[str]
-    save: str
+    save: str = ""
     reference: dict[str, LiveReference]
-    limits: dict[str, tuple[float | None, float | None]]
-    varied: bool
+    limits: Mapping[str, tuple[float | None, float | None]] = {}
+    varied: bool = False
 
 
 class Answer(_Message, frozen=True):
@@ -209,7 +211,7 @@ class Answer(_Message, frozen=True):
         milliseconds: time of each step.
     """
 
-    outputs: dict[str, Values]
+    outputs: Mapping[str, Values]
     solved: list[bool]
     drawing: dict[str, Any]
     frames: list[int]
@@ -234,7 +236,7 @@ class Pose(_Message, frozen=True):
     drivers: dict[str, float]
     share: float
     bodies: dict[str, list[float]]
-    outputs: dict[str, float | None]
+    outputs: Mapping[str, float | None]
     distance: float | None
     reactions: dict[str, list[float]]
     message: str

@@ -48,8 +48,8 @@ from .protocol import (
     Move,
     Rank,
     Reach,
+    Refused,
     Save,
-    Saved,
     Solve,
     Told,
     Vary,
@@ -305,36 +305,26 @@ class Conversation:
         try:
             if isinstance(message, Check | Export):
                 self._judge(message)
-            else:
-                with self.server.lock:
-                    answer = self._found(message)
-                self.tell(answer)
+                return
+            answer: Callable[[Asked], Told] | None
+            answer = getattr(self.live, type(message).__name__.lower(), None)
+            if answer is None:
+                kind = type(message).__name__.lower()
+                raise KincheckError(f"a {self.live.kind} has no answer to {kind!r}")
+            with self.server.lock:
+                found = answer(message)
         except KincheckError as error:
-            self.tell(
-                self.live.refusal(message.id, error)
-                if isinstance(self.live, LiveTable) and isinstance(message, Solve)
-                else Invalid(id=message.id, message=str(error))
-            )
+            found = self._refused(message, str(error))
+        self.tell(msgspec.structs.replace(found, id=message.id))
 
-    def _found(self, message: Asked) -> Told:
-        live = self.live
-        match live, message:
-            case LiveTable(), Solve():
-                return live.answer(message.id, message.points, whole=message.whole)
-            case LiveTable(), Rank():
-                return live.ranking(message.id, message.points, message.output)
-            case LiveTable(), Vary():
-                return live.spread(message.id, message.points, message.output)
-            case LiveTable(), Save():
-                return Saved(id=message.id, name=live.save(message.points, message.name))
-            case LiveModel(), Solve():
-                return live.answer(message.id)
-            case LiveModel(), Move():
-                return live.pose(message.id, message.drivers, measured=message.measured)
-            case LiveModel(), Reach():
-                return live.reach(message.id, message.driver)
-            case _:
-                raise KincheckError(f"a {live.kind} has no answer to {type(message).__name__}")
+    def _refused(self, message: Asked, text: str) -> Invalid | Refused:
+        """Return a message about an error; of a design, with the row of the table in its text."""
+        if not isinstance(message, Solve):
+            return Invalid(message=text)
+        names = self.live.names if isinstance(self.live, LiveTable) else []
+        text = text.removeprefix(f"{self.live.file}: ")
+        named = (each for each in names if re.search(rf"\b{re.escape(each)}\b", text))
+        return Refused(message=text, point=next(named, ""))
 
     def _judge(self, message: Check | Export) -> None:
         """Tell the verdict of each engine as it ends, or hand out a file of the results."""

@@ -21,7 +21,15 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.kinematics import design_batch
 from kincheck.core.live.model import LiveModel
-from kincheck.core.live.protocol import LARGEST_MESSAGE, MOST_MESSAGES, live_schema
+from kincheck.core.live.protocol import (
+    LARGEST_MESSAGE,
+    MOST_MESSAGES,
+    Move,
+    Reach,
+    Solve,
+    Vary,
+    live_schema,
+)
 from kincheck.core.live.table import LiveTable
 from kincheck.core.program.llvm import jit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -316,7 +324,7 @@ def test_check_tells_each_engine_and_ignores_strange_ones(page):
 def test_model_closes_its_loops_at_every_slider_value(tmp_path):
     live = LiveModel(tmp_path / "rssr", load("rssr"))
     (driver,) = live.drivers.values()
-    found = live.pose(1, {driver.name: driver.design + 0.3}, measured=True)
+    found = live.move(Move(drivers={driver.name: driver.design + 0.3}, measured=True))
     assert found.share == 1.0
     assert found.distance is not None
     assert found.distance > 0.0
@@ -327,7 +335,7 @@ def test_model_at_rest_has_the_reactions_of_run(tmp_path):
     case = load("mcpherson_strut_loaded")
     live = LiveModel(tmp_path / "strut", case)
     (driver,) = live.drivers.values()
-    found = live.pose(1, {driver.name: driver.design + 0.02}, measured=True)
+    found = live.move(Move(drivers={driver.name: driver.design + 0.02}, measured=True))
     force = np.array(found.reactions["tie_rod"])
     sweep = replace(case.sweep, values=np.array([0.0, 0.02]), rate=0.0)
     (record,) = run(replace(case, sweep=sweep, reference={}), "native").records
@@ -340,14 +348,14 @@ def test_model_at_rest_has_the_reactions_of_run(tmp_path):
     arm = A(np.array(knuckle.euler_parameters)).T @ (np.array(ends["knuckle"]) - knuckle.origin)
     rod = r + A(p) @ arm - np.array(ends["rack"])
     assert np.cross(force, rod) == pytest.approx([0.0] * 3, abs=1e-9 * np.abs(force).max())
-    assert live.pose(2, {}, measured=False).reactions == {}
+    assert live.move(Move(drivers={})).reactions == {}
 
 
 def test_model_out_of_reach_shows_the_last_pose(tmp_path):
     live = LiveModel(tmp_path / "strut", load("mcpherson_strut"))
     (driver,) = live.drivers.values()
-    found = live.pose(1, {driver.name: 5.0}, measured=False)
-    reached = live.reach(2, driver.name)
+    found = live.move(Move(drivers={driver.name: 5.0}))
+    reached = live.reach(Reach(driver=driver.name))
     assert 0.0 < found.share < 1.0
     assert found.message
     assert reached.high < driver.high
@@ -399,7 +407,7 @@ def test_axle_answers_for_both_wheels(car):
 
     live = LiveTable(car, Supplied(travel="0.03:5", axle="roll"))
     points = [each.position for each in live.opening([]).points]
-    outputs = live.answer(1, points).outputs
+    outputs = live.solve(Solve(points=points)).outputs
     assert outputs["left_camber"] == pytest.approx(outputs["right_camber"][::-1], abs=1e-12)
 
 
@@ -409,13 +417,12 @@ def test_axle_answers_all_outputs_as_run(car, axle):
     supplied = Supplied(travel="0.01:5", axle=axle)
     live = LiveTable(car, supplied)
     (record,) = run(load(car, supplied), "native").records
-    outputs = live.answer(1, live.positions).outputs
+    outputs = live.solve(Solve(points=live.positions)).outputs
     assert {*outputs} == {*record.outputs}
     for name, expected in record.outputs.items():
-        values = [np.nan if each is None else each for each in outputs[name]]
         wanted = [np.nan if each is None else each for each in expected.position]
-        assert values == pytest.approx(wanted, rel=1e-9, abs=1e-11, nan_ok=True), name
-    soon = live.answer(2, live.positions, whole=False).outputs
+        assert outputs[name] == pytest.approx(wanted, rel=1e-9, abs=1e-11, nan_ok=True), name
+    soon = live.solve(Solve(points=live.positions, whole=False)).outputs
     assert ("left_roll_center_height" in soon) == (axle == "heave")
 
 
@@ -430,7 +437,7 @@ def test_edit_of_an_axle_divides_no_step(car, monkeypatch, axle, travel, whole):
     live = LiveTable(car, Supplied(travel=travel, axle=axle))
     marches = []
     monkeypatch.setattr(design_batch, "march", lambda *_: marches.append(1))
-    answer = live.answer(1, live.positions, whole=whole)
+    answer = live.solve(Solve(points=live.positions, whole=whole))
     assert marches == []
     assert all(answer.solved) == whole
 
@@ -459,7 +466,7 @@ def test_reference_has_its_tolerance_and_judges(car, tmp_path):
     live = LiveTable(car, TRAVEL, lambda case: with_curve(case, tmp_path / "rig.csv", options)[0])
     found = live.opening([]).reference["toe"]
     assert found.tolerance == pytest.approx(np.radians(0.02 + 0.005))  # and half a digit
-    known = [each for each in found.values if each is not None]
+    known = [each for each in found.values if np.isfinite(each)]
     assert np.degrees(known) == pytest.approx([0.22, 0.01, -0.18])
     judged = live.referenced(live.edited(live.positions))
     (record,) = run(judged, "native").records
@@ -471,8 +478,8 @@ def test_spread_is_that_of_the_sweep(car, tmp_path):
     live = LiveTable(car, TRAVEL, vary=tmp_path / "vary.toml")
     opening = live.opening([])
     assert opening.varied
-    assert opening.limits == {"toe": (None, pytest.approx(np.radians(0.3)))}
-    found = live.spread(3, live.positions, "toe")
+    assert opening.limits == {"toe": (-np.inf, pytest.approx(np.radians(0.3)))}
+    found = live.vary(Vary(points=live.positions, output="toe"))
     assert found.samples == [0, 10, 20]
     assert found.bins[1] is None  # toe at design is a number of the table
     case = load(car, TRAVEL)
@@ -507,5 +514,5 @@ def test_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
     points = [list(each) for each in live.positions]
     for k in range(60):
         points[5][2] += 0.01 * k
-        assert all(live.answer(k, points).solved)
+        assert all(live.solve(Solve(points=points)).solved)
     assert compiled == []
