@@ -131,7 +131,7 @@ IMPORTS = {
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
     "kincheck": (
         "case case/io harness harness/workers report studies studies/checks "
-        "studies/compliance studies/diagnosis studies/tolerance studies/variation cli "
+        "studies/compliance studies/diagnosis studies/tolerance studies/variation live cli "
         "primitives __init__"
     ),
 }

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         compliance,
         explain,
         free,
+        live,
         load,
         report,
         run,
@@ -31,12 +32,23 @@ if TYPE_CHECKING:
     )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-_BY_NAME = ("check_engine", "compliance", "explain", "free", "load", "report", "run", "sweep")
+_BY_NAME = (
+    "check_engine",
+    "compliance",
+    "explain",
+    "free",
+    "live",
+    "load",
+    "report",
+    "run",
+    "sweep",
+)
 __all__ = [
     "check_engine",
     "compliance",
     "explain",
     "free",
+    "live",
     "load",
     "primitives",
     "report",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case, Free
@@ -15,6 +15,7 @@ from kincheck.core.cli.check_engine import examined
 from kincheck.core.cli.engine_loading import made
 from kincheck.core.cli.main import registry
 from kincheck.core.cli.run_options import TOL
+from kincheck.core.cli.serve import judge_by, opened
 from kincheck.core.harness import run as running
 from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
@@ -30,6 +31,9 @@ from kincheck.core.studies.free import FreeResult, free_of
 from kincheck.core.studies.tolerance.results import SweepResults
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
+
+if TYPE_CHECKING:
+    from kincheck.core.live.server import Live, LiveServer
 
 _One = TypeVar("_One")
 
@@ -118,6 +122,44 @@ def compliance(
     if found.failures:
         raise KincheckError("\n".join(found.failures))
     return found
+
+
+def live(
+    case: str | Path | Case,
+    supplied: Supplied = NOTHING,
+    *,
+    reference: str | Path | None = None,
+    variation: str | Path | None = None,
+) -> "LiveServer":
+    """Serve the page of `kincheck serve`; a notebook on this machine shows it in a frame.
+
+    The server's `case` has the numbers of the page, and its `close` ends it.
+
+    Args:
+        case: path of a table of hardpoints or of another file, name of a case, or a case.
+        supplied: facts missing in a file of another tool.
+        reference: measured curve, or proved reference, to lay over the curves.
+        variation: file of tolerances of a table.
+
+    Raises:
+        KincheckError: the file cannot be read, or a library is missing.
+    """
+    from kincheck.core.live.model import LiveModel
+    from kincheck.core.live.server import LiveServer
+
+    known = registry()
+
+    def referenced(case: Case) -> Case:
+        return case if reference is None else _judged_by([case], Path(reference))[0]
+
+    def read() -> "Live":
+        if isinstance(case, Case):
+            return LiveModel(Path(case.name), referenced(case))
+        return opened(known, str(case), supplied, referenced, vary)
+
+    vary = None if variation is None else Path(variation)
+    file = Path(case.name if isinstance(case, Case) else case)
+    return LiveServer(file, read, known.engines, judge_by(known), framed=True)
 
 
 def _judged_by(cases: Sequence[Case], file: Path) -> list[Case]:

@@ -71,7 +71,7 @@ class Variants:
     messages: Mapping[int, str]
 
 
-def solve_variants(route: Route, geometry: Array, tol: float, *, divided: bool = True) -> Variants:
+def solve_variants(route: Route, geometry: Array, tol: float, *, alone: bool = True) -> Variants:
     """Solve all variants at all samples. Drivers are measured from the design position of each
     variant.
 
@@ -82,8 +82,8 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, divided: bool =
         route: of a model with varied places.
         geometry: numbers of the varied places in their order, shape (numbers, V).
         tol: as for `solve`.
-        divided: whether to divide steps that fail, which takes many times as long; otherwise a
-            variant ends there.
+        alone: whether to solve variants alone that fail in parts of steps too, which takes a
+            hundred times as long; otherwise they end there.
     """
     _recycle()
     model = route.model
@@ -93,7 +93,7 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, divided: bool =
     failed = np.flatnonzero(np.isnan(worst[SIGMA]))
     solved[:, failed] = ~np.isnan(closure[:, failed])
     again = failed[closes[failed]]
-    if divided and FINER[0] * len(closure) <= ROOM:
+    if FINER[0] * len(closure) <= ROOM:
         for first in range(0, len(again), SOME):
             some = again[first : first + SOME]
             filled = np.resize(some, SOME)  # the executor of as many is kept
@@ -109,8 +109,8 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, divided: bool =
                 " variant"
             )
             continue
-        if not divided:
-            messages[k] = "ends at the first step that fails; steps were not divided"
+        if not alone:
+            messages[k] = "ends at the first step that fails in equal parts too"
             continue
         found = march(
             replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin),

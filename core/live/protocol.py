@@ -17,7 +17,8 @@ MOST_MESSAGES = 1_000
 """Most messages of a page in a second: a page asks again after an answer, and a hand makes 100."""
 MOST_POINTS = 1_000
 
-Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e100, le=1e100)]
+"""A number that can be squared; the reader judges its size."""
 Identifier: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Rows: TypeAlias = Annotated[
     list[tuple[Number, Number, Number]], msgspec.Meta(max_length=MOST_POINTS)
@@ -51,6 +52,14 @@ class Solve(_Message, frozen=True):
 
     points: Rows
     whole: bool = True
+
+
+class Read(_Message, frozen=True):
+    """Read a text typed for a coordinate that the page takes for no number."""
+
+    point: Name
+    axis: Literal["x", "y", "z"]
+    text: Annotated[str, msgspec.Meta(max_length=200)]
 
 
 class Rank(_Message, frozen=True):
@@ -113,7 +122,7 @@ class Measured(_Message, frozen=True):
     milliseconds: Annotated[list[Number], msgspec.Meta(min_length=1, max_length=10_000)]
 
 
-Asked: TypeAlias = Solve | Rank | Vary | Move | Reach | Check | Export | Save | Measured
+Asked: TypeAlias = Solve | Read | Rank | Vary | Move | Reach | Check | Export | Save | Measured
 
 
 class LivePoint(msgspec.Struct, frozen=True):

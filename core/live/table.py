@@ -20,7 +20,7 @@ from ..case.closing import held_case
 from ..case.io.reader_options import Supplied
 from ..case.models.files import read_hardpoints
 from ..case.models.hardpoints.read import case_of_hardpoints
-from ..case.models.hardpoints.table import Hardpoint, axes_of, unit_of
+from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
 from ..case.quantity import Output, Quantity
 from ..case.turns import counted
 from ..errors import KincheckError, unknown
@@ -41,6 +41,7 @@ from .protocol import (
     Answer,
     Bins,
     Effect,
+    Invalid,
     LiveAxis,
     LiveOutput,
     LivePoint,
@@ -48,6 +49,7 @@ from .protocol import (
     Opening,
     Rank,
     Ranking,
+    Read,
     Rows,
     Save,
     Saved,
@@ -153,7 +155,7 @@ class LiveTable:
         case = self.edited(asked.points)
         times.append(perf_counter())
         designs, geometry = self._prepared(case), _geometry(case)
-        found = designs.solve(geometry, TOL, divided=asked.whole)
+        found = designs.solve(geometry, TOL, alone=asked.whole)
         times.append(perf_counter())
         outputs = [each for each in case.outputs if asked.whole or _alone(each) not in self._held]
         values = {
@@ -162,7 +164,7 @@ class LiveTable:
         }
         times.append(perf_counter())
         solved = found.solved[:, 0]
-        frames = drawn_frames(solved, key_samples(case))
+        frames = drawn_frames(solved, key_samples(case, found.solved))
         poses = {
             body.name: designs.pose(found, body.name)[:, frames, 0].T
             for body in case.mechanism.moving
@@ -179,6 +181,16 @@ class LiveTable:
             milliseconds={name: 1e3 * each for name, each in steps},
         )
 
+    def read(self, asked: Read) -> Invalid:
+        """Return what the reader says to a text typed for a coordinate.
+
+        Raises:
+            KincheckError: the text is no number.
+        """
+        where = self.table.points[asked.point].where if asked.point in self.names else ""
+        value = number(self.file, f"{where}: {asked.point}: {asked.axis}", asked.text, ",")
+        return Invalid(message=f"found {asked.text!r}, expected {value!r} without signs between")
+
     def rank(self, asked: Rank) -> Ranking:
         """Return the derivatives of an output by each number of the table, by differences.
 
@@ -192,8 +204,8 @@ class LiveTable:
         moved = {
             name: each.reshape(len(steps), -1).T for name, each in case.geometry(offsets).items()
         }
-        _, values = self._of_variants(case, asked.output, _geometry(case, moved))
-        samples = key_samples(self.case)
+        found, values = self._of_variants(case, asked.output, _geometry(case, moved))
+        samples = key_samples(self.case, found.solved)
         slopes = ((values[:, ::2] - values[:, 1::2]) / (2 * MOVED))[samples]
         order: list[int] = np.argsort(
             -np.nan_to_num(np.abs(slopes)).max(axis=0), kind="stable"
@@ -216,7 +228,7 @@ class LiveTable:
         varied = variation.geometry(variation.offsets(0, 0, count))
         geometry = _geometry(case, _by_place(variation.places, varied))
         found, values = self._of_variants(case, asked.output, geometry)
-        samples = key_samples(case)
+        samples = key_samples(case, found.solved)
         bins = [histogram([values], sample) for sample in samples]
         return Spread(
             output=asked.output,
@@ -271,7 +283,7 @@ class LiveTable:
         if name not in known:
             raise KincheckError(unknown("output", name, known))
         designs = self._prepared(case)
-        found = designs.solve(geometry, TOL)
+        found = designs.solve(geometry, TOL, alone=False)
         return found, self._outputs(case, designs, found, geometry, [known[name]])[name]
 
     def _outputs(
@@ -368,9 +380,15 @@ def sweep_axis(case: Case) -> Axis:
     return replace(axis, values=values, kept=[*range(len(values))])
 
 
-def key_samples(case: Case) -> list[int]:
-    """Return the first sample, the one nearest to design and the last."""
-    return [0, int(np.abs(case.sweep.change).argmin()), len(case.sweep.values) - 1]
+def key_samples(case: Case, solved: NDArray[np.bool_]) -> list[int]:
+    """Return the first sample that most of V variants reach, the one nearest to design and the
+    last.
+
+    Args:
+        solved: shape (n, V).
+    """
+    known: list[int] = np.flatnonzero(solved.mean(axis=1) > 0.5).tolist() or [0]
+    return [known[0], int(np.abs(case.sweep.change).argmin()), known[-1]]
 
 
 def _live_output(output: Quantity) -> LiveOutput:

@@ -13,22 +13,21 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
-import jsonschema
 import numpy as np
 import pytest
-from kincheck import load, run, sweep
+from kincheck import KincheckError, load, run, sweep
+from kincheck import live as kincheck_live
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
-from kincheck.core.kinematics import design_batch
 from kincheck.core.live.model import LiveModel
 from kincheck.core.live.protocol import (
     LARGEST_MESSAGE,
     MOST_MESSAGES,
     Move,
+    Rank,
     Reach,
     Solve,
     Vary,
-    live_schema,
 )
 from kincheck.core.live.table import LiveTable
 from kincheck.core.program.llvm import jit
@@ -36,7 +35,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from ..oracles.naive import A
-from .conftest import CAR, TRAVEL
+from .conftest import CAR, TRAVEL, Page, page_of
 
 
 def status(server, path, method="GET", **headers):
@@ -179,20 +178,78 @@ def test_message_beyond_the_limit_ends_the_page(page):
         page.told("answer")
 
 
-def test_messages_follow_the_schema(page, served):
-    schema = live_schema()
-    told = {"$ref": "#/told", **schema}
-    jsonschema.validate(page.opening, told)
-    asked = [
-        {"type": "solve", "id": 1, "points": page.points},
-        {"type": "rank", "id": 2, "points": page.points, "output": "toe"},
-        {"type": "solve", "id": 3, "points": page.moved("uca_outer", 2, -400)},
-    ]
-    for message, kind in zip(asked, ("answer", "ranking", "refused"), strict=True):
-        jsonschema.validate(message, {"$ref": "#/asked", **schema})
-        page.say(**message)
-        jsonschema.validate(found := page.told(kind), told)
-        assert found["id"] == message["id"]
+def test_every_answer_has_the_number_asked(page):
+    """`Page` holds both ways against the schema."""
+    numbers = {"points": page.points}
+    asked = {
+        "answer": {"type": "solve", **numbers},
+        "ranking": {"type": "rank", **numbers, "output": "toe"},
+        "refused": {"type": "solve", "points": page.moved("uca_outer", 2, -400)},
+        "invalid": {"type": "vary", **numbers, "output": "toe"},
+        "verdict": {"type": "check", **numbers, "engines": ["native"]},
+        "saved": {"type": "save", **numbers, "name": "new.csv"},
+        "exported": {"type": "export", "kind": "csv", "engines": ["native"]},
+    }
+    for number, (kind, message) in enumerate(asked.items(), 5):
+        page.say(**message, id=number)
+        assert page.told(kind)["id"] == number
+
+
+def test_mechanism_speaks_the_schema():
+    """Opened from Python, as in a notebook."""
+    server = kincheck_live("mcpherson_strut_loaded")
+    with page_of(server) as socket:
+        page = Page(socket)
+        (driver,) = page.opening["drivers"]
+        page.say(type="solve", points=[])
+        page.told("answer")
+        page.say(type="reach", driver=driver["name"])
+        assert page.told("reached")["low"] < driver["design"]
+        for measured in (False, True):
+            page.say(type="move", drivers={driver["name"]: 0.02}, measured=measured)
+            pose = page.told("pose")
+            assert ("tie_rod_force_y" in pose["outputs"]) == measured
+            assert bool(pose["reactions"]) == measured
+        page.say(type="move", drivers={"strok": 0.0})
+        assert "strok" in page.told("invalid")["message"]
+        page.say(type="rank", points=[], output="toe")
+        assert page.told("invalid")["message"] == "a model has no answer to 'rank'"
+    server.close()
+
+
+def test_case_from_python_follows_the_page(car):
+    server = kincheck_live(car, TRAVEL)
+    with page_of(server) as socket:
+        page = Page(socket)
+        page.say(type="solve", points=page.moved("uca_outer", 2, -400))
+        page.told("refused")
+        assert server.case.mechanism == load(car, TRAVEL).mechanism
+        page.say(type="solve", points=page.moved("uca_outer", 1, 2.0))
+        page.told("answer")
+    assert server.case.mechanism.point("uca_outer").position[1] == pytest.approx(0.542)
+    assert server.address in server._repr_html_()
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("nan", "found 'nan', expected a coordinate; correct the number"),
+        ("1e400", "found '1e400', expected a coordinate; correct the number"),
+        ("", "found '', expected a coordinate; correct the number"),
+        ("12 mm", "leave the unit out, and state it in the head or by --units"),
+        ("1 200", "remove the separators of thousands"),
+        ("=A1", "write the value of the formula"),
+    ],
+)
+def test_typed_text_has_the_message_of_the_file(page, car, text, told):
+    page.say(type="read", point="uca_outer", axis="y", text=text)
+    message = page.told("invalid")["message"]
+    assert told in message
+    car.write_text(CAR.replace("-15,540,", f'-15,"{text}",'), "utf-8")
+    with pytest.raises(KincheckError) as error:
+        load(car)
+    assert str(error.value) == message
 
 
 def test_edit_answers_what_run_gives_for_the_saved_table(page, car):
@@ -337,6 +394,7 @@ def test_model_at_rest_has_the_reactions_of_run(tmp_path):
     (driver,) = live.drivers.values()
     found = live.move(Move(drivers={driver.name: driver.design + 0.02}, measured=True))
     force = np.array(found.reactions["tie_rod"])
+    assert found.outputs["tie_rod_force_y"] == force[1]
     sweep = replace(case.sweep, values=np.array([0.0, 0.02]), rate=0.0)
     (record,) = run(replace(case, sweep=sweep, reference={}), "native").records
     assert force[1] == pytest.approx(record.outputs["tie_rod_force_y"].position[-1], rel=1e-9)
@@ -436,8 +494,11 @@ def test_edit_of_an_axle_divides_no_step(car, monkeypatch, axle, travel, whole):
     """
     live = LiveTable(car, Supplied(travel=travel, axle=axle))
     marches = []
-    monkeypatch.setattr(design_batch, "march", lambda *_: marches.append(1))
+    march = "kincheck.core.kinematics.design_batch.march"
+    monkeypatch.setattr(march, lambda *_: marches.append(1))
     answer = live.solve(Solve(points=live.positions, whole=whole))
+    ranking = live.rank(Rank(points=live.positions, output="left_toe"))
+    assert np.isfinite(ranking.effects[0].slopes).all()
     assert marches == []
     assert all(answer.solved) == whole
 
