@@ -196,10 +196,12 @@ def with_suspension_outputs(
         watched += [prefix + role for role in template.watched]
     if motion is not None:
         left, right = vehicles.values()
-        for name, role in template.across.items():
-            if role in at:
-                between = tuple(f"{side}_{role}" for side in Side)
-                add(name, "motion_ratio", left, between=between)
+        for name, ends in template.across.items():
+            if at.keys() >= {*ends}:
+                between = tuple(f"{side}_{role}" for side, role in zip(Side, ends, strict=True))
+                # heave does not move an unlike pair of ends: one wheel travels, the other is held
+                alone = left if len({*ends}) == 1 else replace(left, travel=left.travel[:1])
+                add(name, "motion_ratio", alone, between=between)
         for kind in _defined_of_axle(vehicle, motion, steered=steered):
             own = {"rack": RACK} if kind == "steering_ratio" else {}
             add(kind, kind, left, other=right, **own)
@@ -269,6 +271,7 @@ def hardpoints_of(
     axes: Axes,
     mechanism_at: Callable[[Mapping[str, Vector]], Mechanism],
     shims: Mapping[str, Array],
+    levels: Mapping[str, Array],
 ) -> tuple[Hardpoint, ...]:
     """Return a hardpoint for each row that fills a role.
 
@@ -280,7 +283,8 @@ def hardpoints_of(
         at: positions by role [m], axes of the case.
         axes: of the table.
         mechanism_at: makes the mechanism from positions by role.
-        shims: derivatives of toe and camber by role and axes of the case.
+        shims: derivatives of toe, camber and caster by role and axes of the case.
+        levels: moves without bump steer, by role and axes of the case.
     """
     rows = list(dict.fromkeys(named.values()))
     by_table = np.zeros((len(rows), 3, 3 * len(rows)))
@@ -303,9 +307,11 @@ def hardpoints_of(
         roles = tuple(role for role, filled in named.items() if filled == name)
         own = {place: each[:, 3 * row : 3 * row + 3] for place, each in slopes.items()}
         moves = {place: each for place, each in own.items() if each.any()}
-        shim: Array | None = None
+        along, signs = zip(*axes, strict=True)
+        shim = level = None
         if turned := [shims[role] for role in roles if role in shims]:
-            along, signs = zip(*axes, strict=True)
             shim = np.sum(turned, axis=0)[:, along] * signs
-        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim))
+        if roles[0] in levels and len(roles) == 1:
+            level = levels[roles[0]][..., along] * signs
+        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim, level))
     return tuple(hardpoints)
