@@ -118,7 +118,7 @@ IMPORTS = {
     ),
     "live": (
         ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "
-        "harness report studies/variation studies/tolerance"
+        "harness report studies/variation studies/tolerance studies/diagnosis"
     ),
     "cli": (
         ". program program/llvm joints kinematics case "

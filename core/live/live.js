@@ -168,7 +168,6 @@ function remembered(key, text) {
     parts.sliders = sliders(one("#sliders"), opening.drivers, { moved, sweep, refuse: trouble });
     state.asked = performance.now();
     link.ask("solve", { type: "solve", points: [] });
-    reached(null);
   }
 
   // Ask for the reach of one driver after the other.
@@ -260,6 +259,7 @@ function remembered(key, text) {
     document.documentElement.dataset.ready = "";
     const count = Number(new URLSearchParams(location.search).get("measure"));
     if (count && parts.design) measureEdits(count);
+    if (parts.sliders && message.solved.some(Boolean)) reached(null);
   }
 
   // The words of the key samples.

@@ -11,11 +11,12 @@ import msgspec
 import numpy as np
 
 from ..case.case import HELD_BUT, SLOW, Case, size
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, SolveError, unknown
 from ..harness.compare import output_series
 from ..kinematics import NativeSolver, conditioning
 from ..mechanism.motions import Path as Way
 from ..mechanism.motions import Ramp, Slowed
+from ..studies.diagnosis import diagnose
 from ..trajectory import Array
 from .protocol import Answer, LiveDriver, Move, Opening, Pose, Reach, Reached, Solve
 from .table import TOL, drawn, drawn_frames, opening_of, sweep_axis
@@ -49,15 +50,24 @@ class LiveModel:
         return msgspec.structs.replace(opening, drivers=[*self.drivers.values()])
 
     def solve(self, asked: Solve) -> Answer:
-        """Return the motion over the sweep of the case.
-
-        Raises:
-            KincheckError: there is none.
+        """Return the motion over the sweep of the case; of a mechanism without one, its design
+        position and the reason, with the rows that are off.
         """
         case, begin = self.case, perf_counter()
-        found = self.solver.prepare(
-            case.mechanism, case.sweep.path, case.points, self.bodies, case.forces
-        )(TOL)
+        try:
+            found = self.solver.prepare(
+                case.mechanism, case.sweep.path, case.points, self.bodies, case.forces
+            )(TOL)
+        except SolveError as error:
+            reasons = diagnose(case, samples=1, tol=TOL).findings or [str(error)]
+            return Answer(
+                outputs={},
+                solved=[False] * len(self.axis.values),
+                drawing=drawn(case, self.axis, [], {}, {}),
+                frames=[],
+                message="; ".join(reasons),
+                milliseconds={},
+            )
         solved = perf_counter()
         values = {
             each.name: output_series(case, each, found).position.tolist()

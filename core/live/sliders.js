@@ -50,7 +50,7 @@ function sliders(box, drivers, { moved, refuse, sweep }) {
     };
     set(values[name]);
     const note = make("small", { className: "quiet" });
-    const travel = make("div", { className: "travel" });
+    const travel = make("div", { className: "travel", hidden: true });
     const row = make("div", { className: "slider" });
     const label = make("span", { textContent: name });
     row.append(label, slider, number, make("span", { textContent: unitName(driver) }), travel, note);
@@ -88,6 +88,7 @@ function sliders(box, drivers, { moved, refuse, sweep }) {
       const found = rows.find(({ driver }) => driver.name === name);
       const { driver, travel, note, place } = found;
       const [from, to] = [low, high].map((value) => (100 * place(value)) / TICKS);
+      travel.hidden = false;
       travel.style.setProperty("--from", `${from}%`);
       travel.style.setProperty("--to", `${to}%`);
       const text = [low, high].map((value) => shown(scaleOf(driver) * value, ".4g")).join(" to ");

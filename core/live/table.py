@@ -16,16 +16,18 @@ from numpy.typing import NDArray
 
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, PER_TRAVEL, Case, size, without_forces
-from ..case.closing import held_case
+from ..case.closing import held_case, moves_alone
 from ..case.io.reader_options import Supplied
 from ..case.models.files import read_hardpoints
 from ..case.models.hardpoints.read import case_of_hardpoints
 from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
+from ..case.models.saving import free_name, save_table
 from ..case.quantity import Output, Quantity
 from ..case.turns import counted
 from ..errors import KincheckError, unknown
 from ..harness.held_trajectory import SAME_POSE
 from ..harness.labels import output_label
+from ..harness.provenance import case_facts
 from ..harness.scene import scene
 from ..jet import Jet
 from ..kinematics import NativeSolver, PreparedDesigns, Variants, places, require_driven
@@ -57,7 +59,6 @@ from .protocol import (
     Spread,
     Vary,
 )
-from .saving import free_name, save_table
 
 TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
@@ -263,7 +264,7 @@ class LiveTable:
             self._held = {
                 alone: prepared(_in_parts(held_case(case, alone).sweep.path))
                 for alone in dict.fromkeys(map(_alone, case.outputs))
-                if alone and not _moves_alone(path, alone)
+                if alone and not moves_alone(path, alone)
             }
         return _structure(case), designs
 
@@ -371,12 +372,8 @@ def drawn(
 
 def sweep_axis(case: Case) -> Axis:
     """Return the axis of a case's sweep, as in reports."""
-    sweep, known = case.sweep, {each.name: each for each in case.mechanism.drivers}
-    driver = known.get(sweep.driver)
-    facts = {"name": sweep.driver, "type": sweep.driver} if driver is None else asdict(driver)
-    facts |= {} if driver is None else {"type": driver.type}
-    axis = driver_axis({"driver": facts}, [], [])
-    values = sweep.values.tolist()
+    values = case.sweep.values.tolist()
+    axis = driver_axis(case_facts(case), [], [])
     return replace(axis, values=values, kept=[*range(len(values))])
 
 
@@ -422,16 +419,6 @@ def _live_reference(case: Case) -> dict[str, LiveReference]:
 def _alone(output: Quantity) -> tuple[str, ...]:
     """Return the drivers by which an output is differentiated while the others rest."""
     return tuple(output.facts.get(HELD_BUT, ()))
-
-
-def _moves_alone(path: Way, drivers: Sequence[str]) -> bool:
-    """Return whether these drivers move at one rate along a path, and all others rest."""
-    rates = {name: motion.at(path.times)[1] for name, motion in path.motions.items()}
-    first = rates.get(drivers[0], 0.0)
-    names = {*rates, *drivers}
-    return all(
-        np.all(rates.get(name, 0.0) == (first if name in drivers else 0.0)) for name in names
-    )
 
 
 def _in_parts(path: Way) -> Way:

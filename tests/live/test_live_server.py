@@ -4,6 +4,7 @@ import base64
 import http.client
 import json
 import os
+import re
 import signal
 import stat
 import subprocess
@@ -407,6 +408,19 @@ def test_model_at_rest_has_the_reactions_of_run(tmp_path):
     rod = r + A(p) @ arm - np.array(ends["rack"])
     assert np.cross(force, rod) == pytest.approx([0.0] * 3, abs=1e-9 * np.abs(force).max())
     assert live.move(Move(drivers={})).reactions == {}
+
+
+def test_open_loop_is_named_with_its_gap(tmp_path):
+    case = load("rssr")
+    joints = [
+        replace(each, length=each.length + 9.0) if each.name == "rod" else each
+        for each in case.mechanism.joints
+    ]
+    wrong = replace(case, mechanism=replace(case.mechanism, joints=tuple(joints)))
+    found = LiveModel(tmp_path / "rssr", wrong).solve(Solve(points=[]))
+    assert not any(found.solved)
+    assert re.search(r"rows are off: rod: .* by \d", found.message)
+    assert found.drawing["bodies"]  # the design position
 
 
 def test_model_out_of_reach_shows_the_last_pose(tmp_path):
