@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import MOST_NAMED, CaseError, MechanismError, shortened
 from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
-from ..mechanism.motions import Motion, Waypoints
+from ..mechanism.motions import Motion, Path, Waypoints
 from ..trajectory import Array
 from .case import HELD_BUT, TIME, Case, Closure, Sweep, size
 
@@ -103,6 +103,16 @@ def held_case(case: Case, drivers: Sequence[str]) -> Case:
             tuple(times.tolist()), tuple(values.tolist()), rate if name in drivers else 0.0
         )
     return replace(case, sweep=Sweep(TIME, path.times, motions=motions))
+
+
+def moves_alone(path: Path, drivers: Sequence[str]) -> bool:
+    """Return whether these drivers move at one rate along a path, and all others rest."""
+    rates = {name: motion.at(path.times)[1] for name, motion in path.motions.items()}
+    first = rates.get(drivers[0], 0.0)
+    names = {*rates, *drivers}
+    return all(
+        np.all(rates.get(name, 0.0) == (first if name in drivers else 0.0)) for name in names
+    )
 
 
 def require_no_held(case: Case) -> None:

@@ -17,6 +17,7 @@ from .run_options import TOL, add_curve_options, curve_options, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.io.reader_options import Supplied
     from ..harness.record import Record, Results
     from ..live.server import Judge, Live
 
@@ -83,10 +84,7 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
     only. Ctrl-C ends it, with status 130; status 2 means that the file cannot be read or the port
     cannot be used.
     """
-    from ..case.models.files import is_table
-    from ..live.model import LiveModel
     from ..live.server import LiveServer
-    from ..live.table import LiveTable
 
     file, supplied = Path(options.file), import_options.supplied(options)
     curve = curve_options(options)
@@ -102,23 +100,17 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
             complain(notes)
         return case
 
-    def opened() -> Live:
-        named = options.file not in registry.cases() and file.is_file()
-        if named and is_table(file, supplied):
-            return LiveTable(file, supplied, referenced, options.vary)
-        if options.vary:
-            raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
-        return LiveModel(file, referenced(registry.find_case(options.file, supplied)))
+    def read() -> Live:
+        return opened(registry, options.file, supplied, referenced, options.vary)
 
     told = list[str]()
-
     wanted: int = options.measure or 0
     if wanted:
-        _measured(opened(), wanted)
+        _measured(read(), wanted)
         if options.no_browser:
             return Status.WITHIN
     server = LiveServer(
-        file, opened, registry.engines, judge_by(registry), port=options.port, once=options.once
+        file, read, registry.engines, judge_by(registry), port=options.port, once=options.once
     )
     try:
         address = server.address + f"&measure={wanted}" * bool(wanted)
@@ -131,6 +123,30 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
     if wanted:
         _print_times("browser", server.measured)
     return Status.WITHIN
+
+
+def opened(
+    registry: Registry,
+    name: str,
+    supplied: Supplied,
+    referenced: Callable[[Case], Case],
+    vary: Path | None,
+) -> Live:
+    """Return a table of hardpoints with its file of tolerances, or any other mechanism, opened.
+
+    Raises:
+        KincheckError: it cannot be read, or there are tolerances of no table.
+    """
+    from ..case.models.files import is_table
+    from ..live.model import LiveModel
+    from ..live.table import LiveTable
+
+    file = Path(name)
+    if name not in registry.cases() and file.is_file() and is_table(file, supplied):
+        return LiveTable(file, supplied, referenced, vary)
+    if vary:
+        raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
+    return LiveModel(file, referenced(registry.find_case(name, supplied)))
 
 
 def _print_times(name: str, times: Sequence[float]) -> None:
@@ -146,7 +162,7 @@ def _measured(live: Live, count: int) -> None:
     import statistics
     from time import perf_counter, process_time
 
-    from ..live.protocol import Answer, encode
+    from ..live.protocol import Solve, encode
     from ..live.table import LiveTable
 
     if not isinstance(live, LiveTable):
@@ -156,10 +172,8 @@ def _measured(live: Live, count: int) -> None:
     for k in range(count):
         moved = [(x, y + 1e-3 * size * (k % 11 - 5) / 5, z) for x, y, z in points]
         begin, worked = perf_counter(), process_time()
-        found = live.answer(k, moved)
+        found = live.solve(Solve(points=moved))
         sent = encode(found)
-        if not isinstance(found, Answer):
-            raise KincheckError(f"--measure: edit {k}: {found.message}")
         whole = {"answer": perf_counter() - begin, "processor": process_time() - worked}
         steps.setdefault("bytes", []).append(float(len(sent)))
         for name, each in (found.milliseconds | {k: 1e3 * v for k, v in whole.items()}).items():

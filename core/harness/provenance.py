@@ -96,7 +96,7 @@ def circumstances(
             "started": started.isoformat(timespec="seconds"),
             "tol": tol,
             "command": readable(command),
-            "cases": {case.name: _facts(case) for case in cases},
+            "cases": {case.name: case_facts(case) for case in cases},
         }
     )
 
@@ -199,7 +199,8 @@ def calibration() -> float:
     return float(np.median(times))
 
 
-def _facts(case: Case) -> dict[str, Any]:
+def case_facts(case: Case) -> dict[str, Any]:
+    """Return what pages say of a case: its source, driver, motions, signs and outputs."""
     sweep = case.sweep
     swept = (
         {"name": TIME, "type": TIME}

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         compliance,
         explain,
         free,
+        live,
         load,
         report,
         run,
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
 _BY_NAME = (
-    *("check_engine", "compare", "compliance", "explain", "free"),
+    *("check_engine", "compare", "compliance", "explain", "free", "live"),
     *("load", "report", "run", "sweep"),
 )
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "compliance",
     "explain",
     "free",
+    "live",
     "load",
     "primitives",
     "report",

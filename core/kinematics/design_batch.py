@@ -71,7 +71,7 @@ class Variants:
     messages: Mapping[int, str]
 
 
-def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
+def solve_variants(route: Route, geometry: Array, tol: float, *, alone: bool = True) -> Variants:
     """Solve all variants at all samples. Drivers are measured from the design position of each
     variant.
 
@@ -82,6 +82,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         route: of a model with varied places.
         geometry: numbers of the varied places in their order, shape (numbers, V).
         tol: as for `solve`.
+        alone: whether to solve variants alone that fail in parts of steps too, which takes a
+            hundred times as long; otherwise they end there.
     """
     _recycle()
     model = route.model
@@ -106,6 +108,9 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
                 "does not close at its design position; check the points, axes and lengths of this"
                 " variant"
             )
+            continue
+        if not alone:
+            messages[k] = "ends at the first step that fails in equal parts too"
             continue
         found = march(
             replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin),

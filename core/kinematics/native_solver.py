@@ -284,14 +284,14 @@ class PreparedDesigns:
         of_a_design = 8 * self.route.model.kept * len(self.route.path.times)
         return max(FEWEST, min(most, RECYCLED // of_a_design))
 
-    def solve(self, geometry: Array, tol: float) -> Variants:
+    def solve(self, geometry: Array, tol: float, *, alone: bool = True) -> Variants:
         """Solve designs at all samples.
 
         Args:
             geometry: numbers of the varied places in their order, shape (numbers, V).
-            tol: as for `solve`.
+            tol, alone: as for `solve_variants`.
         """
-        return solve_variants(self.route, geometry, tol)
+        return solve_variants(self.route, geometry, tol, alone=alone)
 
     def motion(self, found: Variants, point: str) -> Sequence[Array]:
         """Return position [m], velocity and acceleration of a point, as far as they were asked for,

@@ -3,7 +3,6 @@
     protocol    the messages between page and server, as JSON
     table       a table of hardpoints, whose numbers are inputs of one program
     model       a mechanism moved by its drivers
-    saving      new files with other numbers
     server      one page and its sockets on this machine, with token and checks of origin
 
 The page owns the design: each of its messages holds all numbers. The server only answers.

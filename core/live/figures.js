@@ -1,6 +1,20 @@
 "use strict";
 // Curves of the outputs over the sweep, with a ghost and limits, and their key numbers.
 
+const NOTHING = 1e-12; // round-off of lengths and angles [m, rad]
+
+// The ranges of the driver's values without a solution, from the last sample with one.
+function unreached(solved, driver) {
+  const ranges = [];
+  for (let k = 0; k < solved.length; k++) {
+    if (solved[k]) continue;
+    const from = Math.max(k - 1, 0);
+    while (k < solved.length && !solved[k]) k++;
+    ranges.push([driver[from], driver[Math.min(k, solved.length - 1)]]);
+  }
+  return ranges;
+}
+
 // The figures of a group of outputs.
 //   axis: of the sweep; state: `answer`, `ghost`, and by output `limits` and `reference`; `fresh`
 //   are the outputs of the last answer.
@@ -44,13 +58,22 @@ function figures(box, outputs, axis, state) {
     const ends = [low, high].filter(Number.isFinite);
     const inside = { ...whole, type: "rect", fillcolor: "rgba(0, 158, 115, 0.1)" };
     const band = { ...inside, [`${across}0`]: low, [`${across}1`]: high };
+    const lost = unreached(state.answer.solved, driver).map(([from, to]) => ({
+      type: "rect",
+      [`${along}0`]: from,
+      [`${along}1`]: to,
+      [`${across}0`]: 0,
+      [`${across}1`]: 1,
+      [`${across}ref`]: "paper",
+      fillcolor: "rgba(213, 94, 0, 0.16)",
+    }));
     const lines = ends.map((value) => ({
       ...whole,
       [`${across}0`]: value,
       [`${across}1`]: value,
       line: { color: "#009E73", width: 2, dash: "dot" },
     }));
-    return ends.length === 2 ? [band, ...lines] : lines;
+    return [...lost, ...(ends.length === 2 ? [band] : []), ...lines];
   }
   function start(output) {
     const figure = document.createElement("figure");
@@ -99,7 +122,8 @@ function figures(box, outputs, axis, state) {
 // Returns `show`.
 function keyNumbers(table, outputs, columns, state, changed) {
   const first = outputs.some(({ group }) => group === "outputs") ? "outputs" : "coordinates";
-  const main = outputs.filter(({ group }) => group === first);
+  const isPose = columns.length === 1;
+  const main = outputs.filter(({ group }) => group === first || isPose);
   const named = new Map(outputs.map((output) => [output.name, output]));
   const slope = ({ name }) => named.get(`${name}.per_travel`);
   const cell = (kind, text, className = "") =>
@@ -147,7 +171,8 @@ function keyNumbers(table, outputs, columns, state, changed) {
       columns.forEach(({ valueOf }, k) => {
         const value = valueOf(output.name);
         const known = typeof value === "number";
-        const scaled = known ? value * output.scale : NaN;
+        const exact = Math.abs(value) < NOTHING ? 0 : value;
+        const scaled = known ? exact * output.scale : NaN;
         cells[k].textContent = known ? shown(scaled, ".4g") : "–";
         cells[k].dataset.value = known ? String(value) : "";
         cells[k].classList.toggle("over", scaled < low || scaled > high);

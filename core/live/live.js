@@ -11,6 +11,16 @@ const DIRECTIONS = {
   down: [2, -1],
 };
 
+// A text of this tab, or a new one; a frame in another page may have no memory.
+function remembered(key, text) {
+  try {
+    if (text === undefined) return sessionStorage.getItem(key);
+    sessionStorage.setItem(key, text);
+  } catch {
+    return null;
+  }
+}
+
 (() => {
   const one = (selector) => document.querySelector(selector);
   const state = { answer: null, ghost: null, limits: new Map(), upwards: 0, latest: 0, times: [] };
@@ -91,7 +101,8 @@ const DIRECTIONS = {
       },
       file: (at) => places.map(([axis, sign]) => (sign * at[axis]) / size),
     };
-    const design = designOf(points, solve);
+    const across = places.findIndex(([axis]) => axis === 1);
+    const design = designOf(points, across, solve);
     const choose = (k) => {
       parts.planes.choose(k);
       parts.table.chosen(k);
@@ -100,10 +111,11 @@ const DIRECTIONS = {
     state.rows = () => design.rows();
     state.spots = (plane) => parts.planes.spots(plane);
     parts.planes = planes(one("#planes"), points, view, design, choose);
-    parts.table = pointTable(one("#points"), points, unit, design, { choose, refuse: trouble });
     one("#points caption").textContent =
       `${unit}; x, y, z are ${axes.replaceAll(",", ", ")}.` +
       " Arrow keys: 1, with Shift 10, with Alt 0.1.";
+    const refuse = (text) => link.tell({ type: "read", ...text });
+    parts.table = pointTable(one("#points"), points, unit, design, { choose, refuse });
     one("#name").value = opening.save;
     one("#ranked").replaceChildren(
       ...opening.outputs
@@ -137,20 +149,25 @@ const DIRECTIONS = {
   // The numbers before the page was loaded again, if the file is the same; undone by one step.
   const numbers = () => `kincheck ${opening.source} ${JSON.stringify(opening.points)}`;
   function kept() {
-    const rows = JSON.parse(sessionStorage.getItem(numbers()) || "null");
+    const rows = JSON.parse(remembered(numbers()) || "null");
     if (rows) parts.design.all(rows);
     return rows;
   }
 
   function openModel() {
     Object.assign(one("#scene").dataset, { forces: "", off: "names frames forces" });
-    parts.sliders = sliders(one("#sliders"), opening.drivers, (drivers, rests) => {
+    const moved = (drivers, rests) => {
       state.asked = performance.now();
       link.ask("move", { type: "move", drivers, measured: rests });
-    });
+    };
+    const sweep = () => {
+      const { drawing } = state.answer;
+      parts.scene.change(drawing, motionOf(drawing));
+      say(`${state.answer.solved.length} samples`);
+    };
+    parts.sliders = sliders(one("#sliders"), opening.drivers, { moved, sweep, refuse: trouble });
     state.asked = performance.now();
     link.ask("solve", { type: "solve", points: [] });
-    reached(null);
   }
 
   // Ask for the reach of one driver after the other.
@@ -168,7 +185,7 @@ const DIRECTIONS = {
     one("#verdicts tbody").replaceChildren();
     edited = true;
     parts.whole = false;
-    sessionStorage.setItem(numbers(), JSON.stringify(parts.design.rows()));
+    remembered(numbers(), JSON.stringify(parts.design.rows()));
     trouble("");
     parts.table.show();
     parts.planes.draw();
@@ -186,7 +203,8 @@ const DIRECTIONS = {
     state.answer = { ...message, outputs: { ...before, ...message.outputs } };
     state.ghost = state.ghost || state.answer;
     document.body.classList.remove("stale");
-    trouble(message.message);
+    // the reason is looked for when the gesture rests
+    trouble(parts.whole === false ? "" : message.message);
     if (parts.table) parts.table.mark("");
     if (!message.drawing.bodies.length) return;
     if (parts.first) start(message);
@@ -197,6 +215,7 @@ const DIRECTIONS = {
       if (parts.planes) parts.planes.change(message.drawing, motion);
     }
     parts.numbers.show();
+    markUnreached(message);
     const lost = message.solved.filter((each) => !each).length;
     const count = message.solved.length;
     say(lost ? `${count - lost} of ${count} samples reached` : `${count} samples`);
@@ -204,11 +223,19 @@ const DIRECTIONS = {
     clearTimeout(parts.settling);
     if (parts.design) parts.settling = setTimeout(settled, 250);
   }
+  // What the sweep does not reach, below the scene.
+  function markUnreached({ solved }) {
+    const { title, values, scale } = opening.axis;
+    const ends = unreached(solved, values.map((value) => value * scale));
+    const text = ends.map((range) => range.map((value) => shown(value, ".4g")).join(" to "));
+    one("#unreached").textContent = `${title} is not reached: ${text.join(", ")}`;
+    one("#unreached").hidden = !text.length;
+  }
   function settled() {
     if (link.isDue("solve")) return;
     parts.figures.draw(true);
     const late = opening.outputs.some(({ name }) => !state.fresh.has(name));
-    if (late && !parts.whole) {
+    if ((late || !state.answer.solved.every(Boolean)) && !parts.whole) {
       parts.whole = true;
       return ask(true);
     }
@@ -232,6 +259,7 @@ const DIRECTIONS = {
     document.documentElement.dataset.ready = "";
     const count = Number(new URLSearchParams(location.search).get("measure"));
     if (count && parts.design) measureEdits(count);
+    if (parts.sliders && message.solved.some(Boolean)) reached(null);
   }
 
   // The words of the key samples.
@@ -243,10 +271,11 @@ const DIRECTIONS = {
   function columns() {
     const sizes = opening.axis.values.map(Math.abs);
     const design = sizes.indexOf(Math.min(...sizes));
-    const at = (sample) => (name) => (state.answer.outputs[name] || [])[sample];
-    const ofPose = (name) => (state.pose ? state.pose.outputs[name] : at(design)(name));
+    const solved = (from) => Math.max(0, state.answer.solved[from](true));
+    const at = (find) => (name) => (state.answer.outputs[name] || [])[find()];
+    const ofPose = (name) => (state.pose ? state.pose[name] : at(() => design)(name));
     if (!parts.planes) return [{ word: "pose", valueOf: ofPose }];
-    const samples = [0, design, sizes.length - 1];
+    const samples = [() => solved("indexOf"), () => design, () => solved("lastIndexOf")];
     return words().map((word, k) => ({ word, valueOf: at(samples[k]) }));
   }
 
@@ -305,7 +334,8 @@ const DIRECTIONS = {
   function posed(message) {
     if (!parts.scene) return; // the sweep is still being solved
     const { drawing } = state.answer;
-    state.pose = message;
+    state.pose = { ...state.pose, ...message.outputs };
+    state.fresh = new Set(Object.keys(message.outputs));
     const bodies = drawing.bodies.map((body) => {
       const pose = message.bodies[body.name];
       return pose ? { ...body, r: [pose.slice(0, 3)], p: [pose.slice(3)] } : body;

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
+import msgspec
 import numpy as np
 
 from ..case.case import HELD_BUT, SLOW, Case, size
@@ -15,17 +16,10 @@ from ..harness.compare import output_series
 from ..kinematics import NativeSolver, conditioning
 from ..mechanism.motions import Path as Way
 from ..mechanism.motions import Ramp, Slowed
-from .protocol import VERSION, Answer, LiveDriver, Opening, Pose, Reached, Refused
-from .table import (
-    TOL,
-    as_values,
-    drawn,
-    drawn_frames,
-    live_axis,
-    live_outputs,
-    live_reference,
-    sweep_axis,
-)
+from ..studies.diagnosis import diagnose
+from ..trajectory import Array
+from .protocol import Answer, LiveDriver, Move, Opening, Pose, Reach, Reached, Solve
+from .table import TOL, drawn, drawn_frames, opening_of, sweep_axis
 
 WAY = 33
 """Samples on the way from the design to a pose; longer steps are divided by the solver."""
@@ -52,36 +46,31 @@ class LiveModel:
 
     def opening(self, engines: Sequence[str]) -> Opening:
         """Return the mechanism as it is."""
-        return Opening(
-            protocol=VERSION,
-            kind=self.kind,
-            file=self.file.name,
-            source=self.case.source,
-            unit=self.case.length_unit,
-            axes="",
-            points=[],
-            outputs=live_outputs(self.case),
-            axis=live_axis(self.axis),
-            drivers=[*self.drivers.values()],
-            engines=[*engines],
-            save="",
-            reference=live_reference(self.case),
-            limits={},
-            varied=False,
-        )
+        opening = opening_of(self.kind, self.file, self.case, self.axis, engines)
+        return msgspec.structs.replace(opening, drivers=[*self.drivers.values()])
 
-    def answer(self, number: int) -> Answer | Refused:
-        """Return the motion over the sweep of the case, or why there is none."""
+    def solve(self, asked: Solve) -> Answer:
+        """Return the motion over the sweep of the case; of a mechanism without one, its design
+        position and the reason, with the rows that are off.
+        """
         case, begin = self.case, perf_counter()
         try:
             found = self.solver.prepare(
                 case.mechanism, case.sweep.path, case.points, self.bodies, case.forces
             )(TOL)
         except SolveError as error:
-            return Refused(id=number, message=str(error), point="")
+            reasons = diagnose(case, samples=1, tol=TOL).findings or [str(error)]
+            return Answer(
+                outputs={},
+                solved=[False] * len(self.axis.values),
+                drawing=drawn(case, self.axis, [], {}, {}),
+                frames=[],
+                message="; ".join(reasons),
+                milliseconds={},
+            )
         solved = perf_counter()
         values = {
-            each.name: as_values(output_series(case, each, found).position)
+            each.name: output_series(case, each, found).position.tolist()
             for each in case.outputs
             if HELD_BUT not in each.facts
         }
@@ -91,7 +80,6 @@ class LiveModel:
             for name, motion in found.bodies.items()
         }
         return Answer(
-            id=number,
             outputs=values,
             solved=found.solved.tolist(),
             drawing=drawn(case, self.axis, frames, poses, values),
@@ -100,37 +88,43 @@ class LiveModel:
             milliseconds={"solve": 1e3 * (solved - begin), "rest": 1e3 * (perf_counter() - solved)},
         )
 
-    def pose(self, number: int, values: Mapping[str, float], *, measured: bool) -> Pose:
+    def move(self, asked: Move) -> Pose:
         """Return the pose at values of the drivers, straight from the design, or the last pose
         before a lock-up.
-
-        Args:
-            measured: whether reactions and the distance from a singular pose are wanted, which
-                takes longer.
 
         Raises:
             KincheckError: there is no such driver.
         """
-        begin = perf_counter()
-        changes = {name: value - self._known(name).design for name, value in values.items()}
-        way = self._way(changes, np.linspace(0.0, 1.0, WAY))
-        case = replace(self.case, sweep=replace(self.case.sweep, values=way.times))
-        found = self.solver.prepare(case.mechanism, way, case.points, self.bodies, ())(TOL)
+        begin, mechanism = perf_counter(), self.case.mechanism
+        changes = {name: value - self._known(name).design for name, value in asked.drivers.items()}
+        # forces are those at rest
+        way = self._way(changes, np.linspace(0.0, 1.0, WAY), SLOW if asked.measured else 1.0)
+        sweep = replace(self.case.sweep, values=way.times, rate=0.0 if asked.measured else 1.0)
+        case = replace(self.case, sweep=sweep)
+        loaded = mechanism.forces or any(body.mass for body in mechanism.moving)
+        joints = [each.name for each in mechanism.joints] if asked.measured and loaded else []
+        wanted = dict.fromkeys([*joints, *(case.forces if asked.measured else ())])
+        found = self.solver.prepare(mechanism, way, case.points, self.bodies, [*wanted])(TOL)
         reached = np.flatnonzero(found.solved)
         if not len(reached):
             raise KincheckError(f"{self.file.name}: {found.message}")
         last = int(reached[-1])
-        share = float(way.times[last])
+        share = last / (WAY - 1)
         solved = perf_counter()
         outputs = {
-            each.name: as_values(output_series(case, each, found).position[[last]])[0]
+            each.name: float(output_series(case, each, found).position[last])
             for each in case.outputs
-            if HELD_BUT not in each.facts and not each.forces
+            if HELD_BUT not in each.facts and (asked.measured or not each.forces)
         }
-        distance = self._distance(changes, share) if measured else None
-        reactions = self._reactions(changes, share) if measured else {}
+        reactions = dict[str, Array]()
+        if found.forces:
+            known = found.forces.joints
+            reactions = {
+                name: np.array([known[name].along(axis)[last] for axis in np.eye(3)])
+                for name in joints
+                if name in known
+            }
         return Pose(
-            id=number,
             drivers={
                 name: each.design + share * changes.get(name, 0.0)
                 for name, each in self.drivers.items()
@@ -141,19 +135,44 @@ class LiveModel:
                 for name, motion in found.bodies.items()
             },
             outputs=outputs,
-            distance=distance,
-            reactions=reactions,
+            distance=self._distance(changes, share) if asked.measured else None,
+            reactions={
+                name: np.nan_to_num(force).tolist()
+                for name, force in reactions.items()
+                if np.isfinite(force).any()
+            },
             message=found.message,
             milliseconds={"solve": 1e3 * (solved - begin), "rest": 1e3 * (perf_counter() - solved)},
         )
 
-    def _way(self, changes: Mapping[str, float], times: np.ndarray) -> Way:
-        """Return the path on which all drivers go to their values in a second."""
+    def reach(self, asked: Reach) -> Reached:
+        """Return the travel of a driver while the others rest.
+
+        Raises:
+            KincheckError: there is no such driver.
+        """
+        driver = self._known(asked.driver)
+        ends, messages = list[float](), list[str]()
+        for end in (driver.low, driver.high):
+            way = self._way({driver.name: end - driver.design}, np.linspace(0.0, 1.0, REACH))
+            found = self.solver.prepare(self.case.mechanism, way)(TOL)
+            share = float(way.times[found.solved].max(initial=0.0))
+            ends.append(driver.design + share * (end - driver.design))
+            messages.append("" if found.solved.all() else found.message)
+        return Reached(
+            driver=driver.name, low=ends[0], high=ends[1], messages=(messages[0], messages[1])
+        )
+
+    def _way(self, changes: Mapping[str, float], shares: Array, slow: float = 1.0) -> Way:
+        """Return the path on which all drivers go to their values in a second, or so many times
+        more slowly.
+        """
         names = [each.name for each in self.case.mechanism.drivers]
         design = {
             name: value for name in names if (value := self.case.mechanism.design_value(name))
         }
-        return Way({name: Ramp(changes.get(name, 0.0)) for name in names}, times, design)
+        motions = {name: Slowed(Ramp(changes.get(name, 0.0)), slow) for name in names}
+        return Way(motions, shares * slow, design)
 
     def _distance(self, changes: Mapping[str, float], share: float) -> float:
         """Return the smallest singular value of the rows at a place of a way, over the one at its
@@ -162,48 +181,6 @@ class LiveModel:
         way = self._way(changes, np.array([0.0, share]))
         poses = conditioning(self.case.mechanism, way, way.times, (), {}, 2, TOL).poses
         return poses[-1].smallest / poses[0].smallest
-
-    def _reactions(self, changes: Mapping[str, float], share: float) -> dict[str, list[float]]:
-        """Return the force of each joint at rest at a place of a way, of the global components that
-        rigid bodies determine; none without loads.
-        """
-        mechanism = self.case.mechanism
-        if not mechanism.forces and not any(body.mass for body in mechanism.moving):
-            return {}
-        way = self._way(changes, np.linspace(0.0, share, WAY))
-        slow = {name: Slowed(motion, SLOW) for name, motion in way.motions.items()}
-        joints = [joint.name for joint in mechanism.joints]
-        still = Way(slow, way.times * SLOW, way.design)
-        found = self.solver.prepare(mechanism, still, (), self.bodies, joints)(TOL).forces
-        if found is None:
-            return {}
-        forces = {
-            name: np.array([each.along(axis)[-1] for axis in np.eye(3)])
-            for name, each in found.joints.items()
-        }
-        return {
-            name: np.nan_to_num(each).tolist()
-            for name, each in forces.items()
-            if np.isfinite(each).any()
-        }
-
-    def reach(self, number: int, name: str) -> Reached:
-        """Return the travel of a driver while the others rest.
-
-        Raises:
-            KincheckError: there is no such driver.
-        """
-        driver = self._known(name)
-        ends, messages = list[float](), list[str]()
-        for end in (driver.low, driver.high):
-            way = self._way({name: end - driver.design}, np.linspace(0.0, 1.0, REACH))
-            found = self.solver.prepare(self.case.mechanism, way)(TOL)
-            share = float(way.times[found.solved].max(initial=0.0))
-            ends.append(driver.design + share * (end - driver.design))
-            messages.append("" if found.solved.all() else found.message)
-        return Reached(
-            id=number, driver=name, low=ends[0], high=ends[1], messages=(messages[0], messages[1])
-        )
 
     def _known(self, name: str) -> LiveDriver:
         if name not in self.drivers:

@@ -5,6 +5,7 @@ Lengths of points are in the unit and along the axes of the file; everything els
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
@@ -16,14 +17,16 @@ MOST_MESSAGES = 1_000
 """Most messages of a page in a second: a page asks again after an answer, and a hand makes 100."""
 MOST_POINTS = 1_000
 
-Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-1e100, le=1e100)]
+"""A number that can be squared; the reader judges its size."""
 Identifier: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Rows: TypeAlias = Annotated[
     list[tuple[Number, Number, Number]], msgspec.Meta(max_length=MOST_POINTS)
 ]
 """The points of a table in its order."""
 Name: TypeAlias = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
-Values: TypeAlias = list[float | None]
+Values: TypeAlias = Sequence[float | None]
+"""Numbers that are not known are NaN, which JSON has as null."""
 
 
 class _Message(
@@ -43,11 +46,20 @@ class Solve(_Message, frozen=True):
     """Solve a table with these points.
 
     Attributes:
-        whole: whether outputs that need another solution, which takes longer, are wanted.
+        whole: whether outputs that need another solution are wanted, and samples beyond a step
+            that has to be divided: both take longer.
     """
 
     points: Rows
     whole: bool = True
+
+
+class Read(_Message, frozen=True):
+    """Read a text typed for a coordinate that the page takes for no number."""
+
+    point: Name
+    axis: Literal["x", "y", "z"]
+    text: Annotated[str, msgspec.Meta(max_length=200)]
 
 
 class Rank(_Message, frozen=True):
@@ -110,7 +122,7 @@ class Measured(_Message, frozen=True):
     milliseconds: Annotated[list[Number], msgspec.Meta(min_length=1, max_length=10_000)]
 
 
-Asked: TypeAlias = Solve | Rank | Vary | Move | Reach | Check | Export | Save | Measured
+Asked: TypeAlias = Solve | Read | Rank | Vary | Move | Reach | Check | Export | Save | Measured
 
 
 class LivePoint(msgspec.Struct, frozen=True):
@@ -168,7 +180,7 @@ class LiveAxis(msgspec.Struct, frozen=True):
     up: int
 
 
-class Opening(_Message, frozen=True):
+class Opening(_Message, frozen=True, kw_only=True):
     """The file as it is: the first message to a page.
 
     Attributes:
@@ -180,21 +192,21 @@ class Opening(_Message, frozen=True):
         varied: whether there is a file of tolerances.
     """
 
-    protocol: int
+    protocol: int = VERSION
     kind: str
     file: str
     source: str
     unit: str
-    axes: str
-    points: list[LivePoint]
+    axes: str = ""
+    points: list[LivePoint] = []
     outputs: list[LiveOutput]
     axis: LiveAxis
-    drivers: list[LiveDriver]
+    drivers: list[LiveDriver] = []
     engines: list[str]
-    save: str
+    save: str = ""
     reference: dict[str, LiveReference]
-    limits: dict[str, tuple[float | None, float | None]]
-    varied: bool
+    limits: Mapping[str, tuple[float | None, float | None]] = {}
+    varied: bool = False
 
 
 class Answer(_Message, frozen=True):
@@ -208,7 +220,7 @@ class Answer(_Message, frozen=True):
         milliseconds: time of each step.
     """
 
-    outputs: dict[str, Values]
+    outputs: Mapping[str, Values]
     solved: list[bool]
     drawing: dict[str, Any]
     frames: list[int]
@@ -233,7 +245,7 @@ class Pose(_Message, frozen=True):
     drivers: dict[str, float]
     share: float
     bodies: dict[str, list[float]]
-    outputs: dict[str, float | None]
+    outputs: Mapping[str, float | None]
     distance: float | None
     reactions: dict[str, list[float]]
     message: str

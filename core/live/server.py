@@ -48,8 +48,10 @@ from .protocol import (
     Move,
     Rank,
     Reach,
+    Read,
+    Refused,
+    Rows,
     Save,
-    Saved,
     Solve,
     Told,
     Vary,
@@ -64,11 +66,12 @@ LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", re.IGNORECASE
 """Names of this machine; any port, for tunnels such as ssh -L."""
 MOST_PAGES = 16
 LIVE_SCRIPTS = ("link.js", "table.js", "planes.js", "figures.js", "sliders.js", "live.js")
+NOTEBOOKS = "http://127.0.0.1:* http://localhost:* vscode-webview:"
+"""Pages that may show this one in a frame, if it is for a notebook: those of this machine."""
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline';"
-        " connect-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none';"
-        " frame-ancestors 'none'"
+        " connect-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'"
     ),
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -95,6 +98,7 @@ class LiveServer:
         judge: solves by these engines.
         port: of this machine; 0 for a free one.
         once: whether to end when no page is open any more.
+        framed: whether notebooks of this machine may show the page.
 
     Attributes:
         address: with the token.
@@ -114,10 +118,15 @@ class LiveServer:
         *,
         port: int = 0,
         once: bool = False,
+        framed: bool = False,
     ) -> None:
         serving: Any = library("kincheck serve", "websockets.sync.server", "live")
-        self.file, self.open_file, self.built_in = file, open_file, not file.exists()
+        self.file, self.open_file, self.built_in = file, open_file, not file.is_file()
         self.engines, self.judge, self.once = engines, judge, once
+        self.points: Rows | None = None
+        frames = NOTEBOOKS if framed else "'none'"
+        policy = f"{HEADERS['Content-Security-Policy']}; frame-ancestors {frames}"
+        self.headers = {**HEADERS, "Content-Security-Policy": policy}
         self.lock, self.pages, self.ended = Lock(), 0, Event()
         self.measured = list[float]()
         self.live, self.digest = open_file(), self._sha256()
@@ -143,6 +152,18 @@ class LiveServer:
         self.port = self.listener.socket.getsockname()[1]
         self.address = f"http://{HOST}:{self.port}/?token={self.token}"
         Thread(target=self.listener.serve_forever, daemon=True).start()
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame, for a notebook on this machine."""
+        return f'<iframe src="{self.address}" style="width:100%;height:900px;border:0"></iframe>'
+
+    @property
+    def case(self) -> Case:
+        """The case with the numbers of the page that last had an answer; until then, the file."""
+        live = self.live
+        return (
+            live.edited(self.points) if self.points and isinstance(live, LiveTable) else live.case
+        )
 
     def close(self) -> None:
         """Stop listening. Open pages have a moment to close."""
@@ -175,16 +196,18 @@ class LiveServer:
     def _answer(self, connection: Any, request: Any) -> Any:
         """Return the response to a request; None for the socket, which goes on."""
         if why := self._refusal(request):
-            return _response(http.HTTPStatus.FORBIDDEN, f"kincheck: {why}\n", "text/plain")
+            return self._response(http.HTTPStatus.FORBIDDEN, f"kincheck: {why}\n", "text/plain")
         path = _parts(request)[0]
         if path == "/socket":
             if self.pages < MOST_PAGES:
                 return None
             busy = "kincheck: too many pages are open; close some\n"
-            return _response(http.HTTPStatus.SERVICE_UNAVAILABLE, busy, "text/plain")
+            return self._response(http.HTTPStatus.SERVICE_UNAVAILABLE, busy, "text/plain")
         if path not in (parts := page_files()):
-            return _response(http.HTTPStatus.NOT_FOUND, "kincheck: no such page\n", "text/plain")
-        return _response(http.HTTPStatus.OK, *parts[path])
+            return self._response(
+                http.HTTPStatus.NOT_FOUND, "kincheck: no such page\n", "text/plain"
+            )
+        return self._response(http.HTTPStatus.OK, *parts[path])
 
     def _refusal(self, request: Any) -> str:
         """Return why a request is refused; empty if it is not."""
@@ -203,6 +226,19 @@ class LiveServer:
         if path in ("/", "/socket") and not hmac.compare_digest(given, own):
             return "open the address that kincheck serve printed, with its token"
         return ""
+
+    def _response(self, status: http.HTTPStatus, text: str, media: str) -> Any:
+        """Return a response with the headers of all."""
+        headers: Any = library("kincheck serve", "websockets.datastructures", "live").Headers
+        response: Any = library("kincheck serve", "websockets.http11", "live").Response
+        body = text.encode()
+        given = {
+            **self.headers,
+            "Content-Type": f"{media}; charset=utf-8",
+            "Content-Length": str(len(body)),
+            "Connection": "close",
+        }
+        return response(status.value, status.phrase, headers(given), body)
 
     def _talk(self, socket: Any) -> None:
         """Answer one page until it closes."""
@@ -240,7 +276,7 @@ class Conversation:
             return
         threads = [
             Thread(target=self._work, args=(kinds, closed), daemon=True)
-            for kinds in ((Solve, Move, Save, Rank, Vary, Reach), (Check, Export))
+            for kinds in ((Solve, Move, Read, Save, Rank, Vary, Reach), (Check, Export))
         ]
         with suppress(closed):
             self.tell(self.live.opening(self.server.engines))
@@ -305,36 +341,28 @@ class Conversation:
         try:
             if isinstance(message, Check | Export):
                 self._judge(message)
-            else:
-                with self.server.lock:
-                    answer = self._found(message)
-                self.tell(answer)
+                return
+            answer: Callable[[Asked], Told] | None
+            answer = getattr(self.live, type(message).__name__.lower(), None)
+            if answer is None:
+                kind = type(message).__name__.lower()
+                raise KincheckError(f"a {self.live.kind} has no answer to {kind!r}")
+            with self.server.lock:
+                found = answer(message)
+                if isinstance(message, Solve):
+                    self.server.points = message.points
         except KincheckError as error:
-            self.tell(
-                self.live.refusal(message.id, error)
-                if isinstance(self.live, LiveTable) and isinstance(message, Solve)
-                else Invalid(id=message.id, message=str(error))
-            )
+            found = self._refused(message, str(error))
+        self.tell(msgspec.structs.replace(found, id=message.id))
 
-    def _found(self, message: Asked) -> Told:
-        live = self.live
-        match live, message:
-            case LiveTable(), Solve():
-                return live.answer(message.id, message.points, whole=message.whole)
-            case LiveTable(), Rank():
-                return live.ranking(message.id, message.points, message.output)
-            case LiveTable(), Vary():
-                return live.spread(message.id, message.points, message.output)
-            case LiveTable(), Save():
-                return Saved(id=message.id, name=live.save(message.points, message.name))
-            case LiveModel(), Solve():
-                return live.answer(message.id)
-            case LiveModel(), Move():
-                return live.pose(message.id, message.drivers, measured=message.measured)
-            case LiveModel(), Reach():
-                return live.reach(message.id, message.driver)
-            case _:
-                raise KincheckError(f"a {live.kind} has no answer to {type(message).__name__}")
+    def _refused(self, message: Asked, text: str) -> Invalid | Refused:
+        """Return a message about an error; of a design, with the row of the table in its text."""
+        if not isinstance(message, Solve):
+            return Invalid(message=text)
+        names = self.live.names if isinstance(self.live, LiveTable) else []
+        text = text.removeprefix(f"{self.live.file}: ")
+        named = (each for each in names if re.search(rf"\b{re.escape(each)}\b", text))
+        return Refused(message=text, point=next(named, ""))
 
     def _judge(self, message: Check | Export) -> None:
         """Tell the verdict of each engine as it ends, or hand out a file of the results."""
@@ -406,17 +434,3 @@ def page_files() -> dict[str, tuple[str, str]]:
         "/live.js": ("\n".join(scripts), "text/javascript"),
         "/live.css": (style, "text/css"),
     }
-
-
-def _response(status: http.HTTPStatus, text: str, media: str) -> Any:
-    """Return a response with the headers of all."""
-    headers: Any = library("kincheck serve", "websockets.datastructures", "live").Headers
-    response: Any = library("kincheck serve", "websockets.http11", "live").Response
-    body = text.encode()
-    given = {
-        **HEADERS,
-        "Content-Type": f"{media}; charset=utf-8",
-        "Content-Length": str(len(body)),
-        "Connection": "close",
-    }
-    return response(status.value, status.phrase, headers(given), body)

@@ -4,9 +4,10 @@
 const TICKS = 2000;
 
 // The sliders in a box.
-//   moved: called with the values of all drivers, and whether the gesture rests.
+//   moved: called with the values of all drivers, and whether the gesture rests; refuse: with the
+//   message about what is no number; sweep: called to show the sweep of the file.
 // Returns `show` (a pose) and `reach` (the travel of a driver).
-function sliders(box, drivers, moved) {
+function sliders(box, drivers, { moved, refuse, sweep }) {
   const values = Object.fromEntries(drivers.map(({ name, design }) => [name, design]));
   const degrees = 180 / Math.PI;
   const scaleOf = ({ unit }) => (unit === "rad" ? degrees : 1000);
@@ -35,7 +36,11 @@ function sliders(box, drivers, moved) {
     });
     number.addEventListener("change", () => {
       const value = typed(number.value) / scale;
-      if (!Number.isFinite(value)) return set(values[name]);
+      if (!Number.isFinite(value)) {
+        const unit = unitName(driver);
+        refuse(`${name}: found “${number.value}”, expected a number of ${unit}, without unit`);
+        return set(values[name]);
+      }
       slider.value = place(value);
       move(name, value);
     });
@@ -45,14 +50,18 @@ function sliders(box, drivers, moved) {
     };
     set(values[name]);
     const note = make("small", { className: "quiet" });
+    const travel = make("div", { className: "travel", hidden: true });
     const row = make("div", { className: "slider" });
     const label = make("span", { textContent: name });
-    row.append(label, slider, number, make("span", { textContent: unitName(driver) }), note);
-    return { driver, row, slider, set, note, place };
+    row.append(label, slider, number, make("span", { textContent: unitName(driver) }), travel, note);
+    return { driver, row, travel, set, note, place };
   });
-  const home = Object.assign(document.createElement("button"), { textContent: "design position" });
-  home.type = "button";
-  home.addEventListener("click", () => {
+  const button = (textContent, act) => {
+    const made = Object.assign(document.createElement("button"), { type: "button", textContent });
+    made.addEventListener("click", act);
+    return made;
+  };
+  const home = button("design position", () => {
     rows.forEach(({ driver, set }) => {
       values[driver.name] = driver.design;
       set(driver.design);
@@ -65,7 +74,7 @@ function sliders(box, drivers, moved) {
   const distance = Object.assign(document.createElement("span"), { className: "quiet" });
   const last = document.createElement("div");
   last.className = "row";
-  last.append(home, "distance from singular poses ", meter, distance);
+  last.append(home, button("sweep of the file", sweep), "distance from singular poses ", meter, distance);
   box.replaceChildren(...rows.map(({ row }) => row), last);
 
   return {
@@ -77,10 +86,11 @@ function sliders(box, drivers, moved) {
     },
     reach({ driver: name, low, high, messages }) {
       const found = rows.find(({ driver }) => driver.name === name);
-      const { driver, slider, note, place } = found;
+      const { driver, travel, note, place } = found;
       const [from, to] = [low, high].map((value) => (100 * place(value)) / TICKS);
-      slider.style.setProperty("--from", `${from}%`);
-      slider.style.setProperty("--to", `${to}%`);
+      travel.hidden = false;
+      travel.style.setProperty("--from", `${from}%`);
+      travel.style.setProperty("--to", `${to}%`);
       const text = [low, high].map((value) => shown(scaleOf(driver) * value, ".4g")).join(" to ");
       note.textContent = messages.some(Boolean)
         ? `reaches ${text} ${unitName(driver)} if the others rest`

@@ -9,14 +9,28 @@ function typed(text) {
   return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
 }
 
+// Of each point the one that mirrors it across the middle, or -1.
+//   across: the axis of the file from side to side.
+function mirrors(points, across) {
+  const size = Math.max(...points.flatMap(({ position }) => position.map(Math.abs)));
+  const isSame = (a, b) => Math.abs(a - b) < 1e-6 * size;
+  return points.map(({ position: here }) => {
+    if (isSame(here[across], 0)) return -1;
+    return points.findIndex(({ position }) =>
+      position.every((value, i) => isSame(value, i === across ? -here[i] : here[i])),
+    );
+  });
+}
+
 // The design: the numbers of all points, with undo and redo.
-//   changed: called after each change.
-function designOf(points, changed) {
+//   across: the axis of the file from side to side; changed: called after each change.
+function designOf(points, across, changed) {
   const copy = (rows) => rows.map((row) => row.slice());
   const start = points.map(({ position }) => position.slice());
   let rows = copy(start);
   let before = [];
   let after = [];
+  const others = mirrors(points, across);
   const same = (a, b) => a.every((row, k) => row.every((value, i) => value === b[k][i]));
 
   function go(from, to) {
@@ -28,6 +42,8 @@ function designOf(points, changed) {
   return {
     start,
     locked: [false, false, false], // whether x, y and z stay
+    hasSides: others.some((k) => k >= 0),
+    isSymmetric: true, // whether a point takes the one that mirrors it along
     rows: () => rows,
     can: () => [before.length > 0, after.length > 0],
     // Begin a gesture: everything up to the next one is undone together.
@@ -38,6 +54,8 @@ function designOf(points, changed) {
     },
     set(k, position) {
       rows[k] = position.map((value) => Math.round(value * FINE) / FINE);
+      const other = this.isSymmetric ? others[k] : -1;
+      if (other >= 0) rows[other] = rows[k].map((value, i) => (i === across ? -value : value));
       changed();
     },
     all(next) {
@@ -54,7 +72,8 @@ function designOf(points, changed) {
 }
 
 // The table of the points: typed numbers and arrow keys go to the design.
-//   choose: called with the point that has the focus; refuse: with what is no number.
+//   choose: called with the point that has the focus; refuse: with the point, axis and text of
+//   what is no number.
 // Returns `show` (the numbers), `mark` (the point that a message is about) and `chosen`.
 function pointTable(table, points, unit, design, { choose, refuse }) {
   const text = (value) => String(value);
@@ -75,7 +94,7 @@ function pointTable(table, points, unit, design, { choose, refuse }) {
   function take(input, k, i) {
     const value = typed(input.value);
     if (!Number.isFinite(value)) {
-      refuse(`${points[k].name} ${"xyz"[i]}: found “${input.value}”, expected a number`);
+      refuse({ point: points[k].name, axis: "xyz"[i], text: input.value });
       return show();
     }
     put(k, i, value);
@@ -109,6 +128,14 @@ function pointTable(table, points, unit, design, { choose, refuse }) {
     });
     head.append(" ", lock);
   });
+  if (design.hasSides) {
+    const label = document.createElement("label");
+    const both = Object.assign(document.createElement("input"), { type: "checkbox" });
+    both.checked = true;
+    both.addEventListener("change", () => (design.isSymmetric = both.checked));
+    label.append(both, " both sides: the mirrored point moves too");
+    table.querySelector("caption").append(label);
+  }
   const body = table.querySelector("tbody");
   const rows = points.map(({ name, roles }, k) => {
     const head = Object.assign(document.createElement("th"), { scope: "row", textContent: name });

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -16,15 +16,17 @@ from numpy.typing import NDArray
 
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, PER_TRAVEL, Case, size, without_forces
-from ..case.closing import held_case
+from ..case.closing import held_case, moves_alone
 from ..case.io.reader_options import Supplied
 from ..case.models.files import read_hardpoints
 from ..case.models.hardpoints.read import case_of_hardpoints
-from ..case.models.hardpoints.table import Hardpoint, axes_of, unit_of
+from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
+from ..case.models.saving import free_name, save_table
 from ..case.quantity import Output, Quantity
 from ..case.turns import counted
 from ..errors import KincheckError, unknown
 from ..harness.labels import output_label
+from ..harness.provenance import case_facts
 from ..harness.scene import scene
 from ..harness.trajectory_check import SAME_POSE
 from ..jet import Jet
@@ -34,27 +36,29 @@ from ..program.llvm.compiler import available
 from ..report.axis import DISPLAY, Axis, driver_axis
 from ..report.drawing import drawing
 from ..studies.tolerance.conformance import histogram
-from ..studies.variation.variation import Variation
 from ..studies.variation.variation_file import read_variation
 from ..trajectory import Array
 from ..unit_text import unit_text
 from .protocol import (
-    VERSION,
     Answer,
     Bins,
     Effect,
+    Invalid,
     LiveAxis,
     LiveOutput,
     LivePoint,
     LiveReference,
     Opening,
+    Rank,
     Ranking,
-    Refused,
+    Read,
     Rows,
+    Save,
+    Saved,
+    Solve,
     Spread,
-    Values,
+    Vary,
 )
-from .saving import free_name, save_table
 
 TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
@@ -62,6 +66,8 @@ FRAMES = 41
 """Most drawn samples: as many as a hand can tell apart on the slider."""
 VARIANTS = 512
 """Variants of a histogram: its bins hold some tens of them."""
+PARTS = 16
+"""Parts of a step on a path with velocities by some drivers alone: of eight, some fail."""
 MOVED = 2e-5
 """Half of the difference for derivatives [m]: its square times a third derivative is far below the
 three digits shown, and rounding of 1e-15 m over it too."""
@@ -90,7 +96,7 @@ class LiveTable:
         vary: Path | None = None,
     ) -> None:
         self.file, self.supplied = file, supplied
-        self.referenced, self.vary = referenced, vary
+        self.referenced, self.vary_file = referenced, vary
         self.table = read_hardpoints(file, supplied)
         self.names = [*self.table.points]
         self.case = referenced(case_of_hardpoints(self.table, supplied))
@@ -109,24 +115,17 @@ class LiveTable:
         roles = {each.name: each.roles for each in self.case.hardpoints}
         directions = ("forward", "left", "up"), ("rearward", "right", "down")
         axes = axes_of(self.table, self.supplied.axes)
-        return Opening(
-            protocol=VERSION,
-            kind=self.kind,
-            file=self.file.name,
-            source=self.case.source,
+        limits = self.variation.limits if self.variation else ()
+        return msgspec.structs.replace(
+            opening_of(self.kind, self.file, self.case, self.axis, engines),
             unit=unit_of(self.table, self.supplied.units).name,
             axes=",".join(directions[sign < 0][k] for k, sign in axes),
             points=[
                 LivePoint(name, each.position, roles.get(name, ()))
                 for name, each in self.table.points.items()
             ],
-            outputs=live_outputs(self.case),
-            axis=live_axis(self.axis),
-            drivers=[],
-            engines=[*engines],
             save=free_name(self.file),
-            reference=live_reference(self.case),
-            limits=live_limits(self.variation),
+            limits={each.output: (each.low, each.high) for each in limits},
             varied=self.variation is not None,
         )
 
@@ -146,122 +145,108 @@ class LiveTable:
         # those of the reference, if they were asked for
         return replace(case, sweep=replace(case.sweep, values=self.case.sweep.values))
 
-    def answer(self, number: int, points: Rows, *, whole: bool = True) -> Answer | Refused:
-        """Return the motion of an edited table, or why there is none; if it is not to be whole,
-        without the outputs that need another solution.
+    def solve(self, asked: Solve) -> Answer:
+        """Return the motion of an edited table; if it is not to be whole, without the outputs that
+        need another solution, and only up to a step that fails.
+
+        Raises:
+            KincheckError: the reader refuses the points.
         """
-        begin = perf_counter()
-        try:
-            case = self.edited(points)
-        except KincheckError as error:
-            return self.refusal(number, error)
-        read = perf_counter()
-        designs, geometry = self._prepared(case), _numbers(case)
-        found = designs.solve(geometry, TOL)
-        solved = perf_counter()
-        outputs = [each for each in case.outputs if whole or _alone(each) not in self._held]
+        times = [perf_counter()]
+        case = self.edited(asked.points)
+        times.append(perf_counter())
+        designs, geometry = self._prepared(case), _geometry(case)
+        found = designs.solve(geometry, TOL, alone=asked.whole)
+        times.append(perf_counter())
+        outputs = [each for each in case.outputs if asked.whole or _alone(each) not in self._held]
         values = {
-            name: as_values(each[:, 0])
+            name: each[:, 0].tolist()
             for name, each in self._outputs(case, designs, found, geometry, outputs).items()
         }
-        evaluated = perf_counter()
-        drawn, frames = self._drawing(case, designs, found)
-        steps = {
-            "read": read - begin,
-            "solve": solved - read,
-            "outputs": evaluated - solved,
-            "drawing": perf_counter() - evaluated,
+        times.append(perf_counter())
+        solved = found.solved[:, 0]
+        frames = drawn_frames(solved, key_samples(case, found.solved))
+        poses = {
+            body.name: designs.pose(found, body.name)[:, frames, 0].T
+            for body in case.mechanism.moving
         }
+        picture = drawn(case, self.axis, frames, poses, {})
+        times.append(perf_counter())
+        steps = zip(("read", "solve", "outputs", "drawing"), np.diff(times).tolist(), strict=True)
         return Answer(
-            id=number,
             outputs=values,
-            solved=found.solved[:, 0].tolist(),
-            drawing=drawn,
+            solved=solved.tolist(),
+            drawing=picture,
             frames=frames,
             message=found.messages.get(0, ""),
-            milliseconds={name: 1e3 * each for name, each in steps.items()},
+            milliseconds={name: 1e3 * each for name, each in steps},
         )
 
-    def refusal(self, number: int, error: KincheckError) -> Refused:
-        """Return a message of the reader, with the row of the table in its text."""
-        text = str(error).removeprefix(f"{self.file}: ")
-        named = (each for each in self.names if re.search(rf"\b{re.escape(each)}\b", text))
-        return Refused(id=number, message=text, point=next(named, ""))
+    def read(self, asked: Read) -> Invalid:
+        """Return what the reader says to a text typed for a coordinate.
 
-    def ranking(self, number: int, points: Rows, output: str) -> Ranking:
+        Raises:
+            KincheckError: the text is no number.
+        """
+        where = self.table.points[asked.point].where if asked.point in self.names else ""
+        value = number(self.file, f"{where}: {asked.point}: {asked.axis}", asked.text, ",")
+        return Invalid(message=f"found {asked.text!r}, expected {value!r} without signs between")
+
+    def rank(self, asked: Rank) -> Ranking:
         """Return the derivatives of an output by each number of the table, by differences.
 
         Raises:
             KincheckError: the reader refuses the points, or there is no such output.
         """
-        case = self.edited(points)
-        wanted = _output(case, output)
+        case = self.edited(asked.points)
         names = [each.name for each in case.hardpoints]
-        designs, steps = self._prepared(case), np.repeat(np.eye(3), 2, axis=0) * MOVED
-        steps[1::2] *= -1.0
-        count = 6 * len(names)
-        offsets = {name: np.zeros((count, 3)) for name in names}
-        for k, name in enumerate(names):
-            offsets[name][6 * k : 6 * k + 6] = steps
-        moved = case.geometry(offsets)
-        geometry = np.concatenate(
-            [
-                np.reshape(moved[place], (count, -1)).T
-                if place in moved
-                else np.repeat(np.array(value, dtype=float)[:, None], count, axis=1)
-                for place, value in places(case.mechanism).items()
-            ]
-        )
-        found = designs.solve(geometry, TOL)
-        values = self._outputs(case, designs, found, geometry, [wanted])[output]
-        samples = key_samples(self.case)
+        steps = np.kron(np.eye(3 * len(names)), [[MOVED], [-MOVED]])
+        offsets = dict(zip(names, np.split(steps, len(names), axis=1), strict=True))
+        moved = {
+            name: each.reshape(len(steps), -1).T for name, each in case.geometry(offsets).items()
+        }
+        found, values = self._of_variants(case, asked.output, _geometry(case, moved))
+        samples = key_samples(self.case, found.solved)
         slopes = ((values[:, ::2] - values[:, 1::2]) / (2 * MOVED))[samples]
         order: list[int] = np.argsort(
             -np.nan_to_num(np.abs(slopes)).max(axis=0), kind="stable"
         ).tolist()
-        effects = [Effect(names[k // 3], "xyz"[k % 3], as_values(slopes[:, k])) for k in order]
-        return Ranking(id=number, output=output, samples=samples, effects=effects)
+        effects = [Effect(names[k // 3], "xyz"[k % 3], slopes[:, k].tolist()) for k in order]
+        return Ranking(output=asked.output, samples=samples, effects=effects)
 
-    def spread(self, number: int, points: Rows, output: str) -> Spread:
+    def vary(self, asked: Vary) -> Spread:
         """Return histograms of an output over the variants of the file of tolerances.
 
         Raises:
             KincheckError: the reader or the file of tolerances refuses the points, or there is no
                 such output or file.
         """
-        if self.vary is None:
+        if self.vary_file is None:
             raise KincheckError("tolerances: there is no file of them; start kincheck with --vary")
-        case = self.edited(points)
-        wanted, variation = _output(case, output), read_variation(self.vary, case)
+        case = self.edited(asked.points)
+        variation = read_variation(self.vary_file, case)
         count = min(variation.count or VARIANTS, VARIANTS)
-        geometry = np.repeat(_numbers(case), count, axis=1)
-        varied, rows = variation.geometry(variation.offsets(0, 0, count)), _rows(case)
-        first = 0
-        for place, numbers in variation.places.items():
-            geometry[rows[place]] = varied[first : first + numbers]
-            first += numbers
-        designs = self._prepared(case)
-        found = designs.solve(geometry, TOL)
-        values = self._outputs(case, designs, found, geometry, [wanted])[output]
-        samples = key_samples(case)
+        varied = variation.geometry(variation.offsets(0, 0, count))
+        geometry = _geometry(case, _by_place(variation.places, varied))
+        found, values = self._of_variants(case, asked.output, geometry)
+        samples = key_samples(case, found.solved)
         bins = [histogram([values], sample) for sample in samples]
         return Spread(
-            id=number,
-            output=output,
+            output=asked.output,
             samples=samples,
             bins=[each and Bins(each.edges, each.counts) for each in bins],
             variants=count,
             failed=int((~found.solved.all(axis=0)).sum()),
         )
 
-    def save(self, points: Rows, name: str) -> str:
-        """Write the table with other numbers to a new file; return its name.
+    def save(self, asked: Save) -> Saved:
+        """Write the table with other numbers to a new file.
 
         Raises:
             KincheckError: as `save_table`, or the reader refuses the points.
         """
-        self.edited(points)
-        return save_table(self.table, self.supplied, points, name).name
+        self.edited(asked.points)
+        return Saved(name=save_table(self.table, self.supplied, asked.points, asked.name).name)
 
     def _prepare(self, case: Case) -> tuple[list[str], PreparedDesigns]:
         """Return the key of a program, and the program, compiled."""
@@ -271,15 +256,15 @@ class LiveTable:
         def prepared(path: Way) -> PreparedDesigns:
             wanted = [*places(case.mechanism)], without_forces(case).points
             designs = NativeSolver().prepare_designs(case.mechanism, path, *wanted, bodies=bodies)
-            designs.solve(_numbers(case), TOL)
+            designs.solve(_geometry(case), TOL)
             return designs
 
         with _at_once():  # otherwise an edit in between waits for the compiler
             designs = prepared(path)
             self._held = {
-                alone: prepared(held_case(case, alone).sweep.path)
+                alone: prepared(_in_parts(held_case(case, alone).sweep.path))
                 for alone in dict.fromkeys(map(_alone, case.outputs))
-                if alone and not _moves_alone(path, alone)
+                if alone and not moves_alone(path, alone)
             }
         return _structure(case), designs
 
@@ -288,6 +273,19 @@ class LiveTable:
         if self._structure != _structure(case):
             self._structure, self._designs = self._prepare(case)
         return self._designs
+
+    def _of_variants(self, case: Case, name: str, geometry: Array) -> tuple[Variants, Array]:
+        """Return V variants, and the values of an output over their samples, shape (n, V).
+
+        Raises:
+            KincheckError: there is no such output of motion.
+        """
+        known = {each.name: each for each in case.outputs if not each.forces}
+        if name not in known:
+            raise KincheckError(unknown("output", name, known))
+        designs = self._prepared(case)
+        found = designs.solve(geometry, TOL, alone=False)
+        return found, self._outputs(case, designs, found, geometry, [known[name]])[name]
 
     def _outputs(
         self,
@@ -298,35 +296,47 @@ class LiveTable:
         outputs: Sequence[Quantity],
     ) -> dict[str, Array]:
         """Return outputs over the samples of V variants, shape (n, V)."""
-        rows, names, values = _rows(case), without_forces(case).points, dict[str, Array]()
+        names, values = without_forces(case).points, dict[str, Array]()
+        sizes = {place: len(value) for place, value in places(case.mechanism).items()}
+        standing = _by_place(sizes, geometry)
         design = {
-            name: Vec3(*(Jet(a, np.zeros(()), np.zeros(())) for a in geometry[rows[place]]))
+            name: Vec3(*(Jet(a, np.zeros(()), np.zeros(())) for a in standing[place]))
             for name in names
-            if (place := f"points.{name}.position") in rows
+            if (place := f"points.{name}.position") in standing
         }
         computed = [(each, _alone(each)) for each in outputs if not each.forces]
         with np.errstate(all="ignore"):
             for alone in dict.fromkeys(by for _, by in computed):
                 # the same poses, with velocities by some drivers while the others rest
-                held = self._held[alone].solve(geometry, TOL) if alone in self._held else found
-                at = {name: _moving(designs.motion(held, name)) for name in names}
-                known = held.solved & _same_place(case, designs, found, held)
+                held, known = found, found.solved
+                if alone in self._held:
+                    fine = self._held[alone].solve(geometry, TOL)
+                    held = replace(fine, kept=fine.kept[:, ::PARTS], solved=fine.solved[::PARTS])
+                    known = held.solved & _same_place(case, designs, found, held)
+                at = {
+                    name: Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
+                    for name in names
+                    for motion in [designs.motion(held, name)]
+                }
                 for each in (each for each, by in computed if by == alone):
                     moved = {name: at[name] for name in each.points}
                     jet = counted(case.mechanism, case.sweep.path, each, moved, design)
                     values[each.name] = np.where(known, jet.x, np.nan)
         return values
 
-    def _drawing(
-        self, case: Case, designs: PreparedDesigns, found: Variants
-    ) -> tuple[dict[str, Any], list[int]]:
-        """Return the scene of reports at some of the solved samples, and these samples."""
-        frames = drawn_frames(found.solved[:, 0], key_samples(case))
-        poses = {
-            body.name: designs.pose(found, body.name)[:, frames, 0].T
-            for body in case.mechanism.moving
-        }
-        return drawn(case, self.axis, frames, poses, {}), frames
+
+def opening_of(kind: str, file: Path, case: Case, axis: Axis, engines: Sequence[str]) -> Opening:
+    """Return what the openings of all files tell."""
+    return Opening(
+        kind=kind,
+        file=file.name,
+        source=case.source,
+        unit=case.length_unit,
+        outputs=[*map(_live_output, case.outputs)],
+        axis=LiveAxis(axis.label, axis.values, axis.scale, axis.up),
+        engines=[*engines],
+        reference=_live_reference(case),
+    )
 
 
 def drawn_frames(solved: NDArray[np.bool_], always: Sequence[int] = ()) -> list[int]:
@@ -341,7 +351,7 @@ def drawn(
     axis: Axis,
     frames: list[int],
     poses: Mapping[str, Array],
-    values: Mapping[str, Values],
+    values: Mapping[str, Sequence[float | None]],
 ) -> dict[str, Any]:
     """Return the scene of reports.
 
@@ -362,46 +372,37 @@ def drawn(
 
 def sweep_axis(case: Case) -> Axis:
     """Return the axis of a case's sweep, as in reports."""
-    sweep, known = case.sweep, {each.name: each for each in case.mechanism.drivers}
-    driver = known.get(sweep.driver)
-    facts = {"name": sweep.driver, "type": sweep.driver} if driver is None else asdict(driver)
-    facts |= {} if driver is None else {"type": driver.type}
-    axis = driver_axis({"driver": facts}, [], [])
-    values = sweep.values.tolist()
+    values = case.sweep.values.tolist()
+    axis = driver_axis(case_facts(case), [], [])
     return replace(axis, values=values, kept=[*range(len(values))])
 
 
-def live_axis(axis: Axis) -> LiveAxis:
-    """Return the axis for the page."""
-    return LiveAxis(axis.label, axis.values, axis.scale, axis.up)
+def key_samples(case: Case, solved: NDArray[np.bool_]) -> list[int]:
+    """Return the first sample that most of V variants reach, the one nearest to design and the
+    last.
+
+    Args:
+        solved: shape (n, V).
+    """
+    known: list[int] = np.flatnonzero(solved.mean(axis=1) > 0.5).tolist() or [0]
+    return [known[0], int(np.abs(case.sweep.change).argmin()), known[-1]]
 
 
-def live_outputs(case: Case) -> list[LiveOutput]:
-    """Return the outputs of a case for the page, in display units."""
-    found = list[LiveOutput]()
-    for each in case.outputs:
-        shown, scale = DISPLAY.get(each.unit, (each.unit, 1.0))
-        group = "coordinates" if isinstance(each, Output) else "outputs"
-        group = "per travel" if each.name.endswith(PER_TRAVEL) else group
-        label = output_label(each.name)
-        found.append(LiveOutput(each.name, label, each.unit, unit_text(shown), scale, group))
-    return found
+def _live_output(output: Quantity) -> LiveOutput:
+    """Return an output for the page, in display units."""
+    shown, scale = DISPLAY.get(output.unit, (output.unit, 1.0))
+    group = "coordinates" if isinstance(output, Output) else "outputs"
+    return LiveOutput(
+        name=output.name,
+        label=output_label(output.name),
+        unit=output.unit,
+        shown_unit=unit_text(shown),
+        scale=scale,
+        group="per travel" if output.name.endswith(PER_TRAVEL) else group,
+    )
 
 
-def key_samples(case: Case) -> list[int]:
-    """Return the first sample, the one nearest to design and the last."""
-    return [0, int(np.abs(case.sweep.change).argmin()), len(case.sweep.values) - 1]
-
-
-def as_values(values: Array) -> Values:
-    """Return numbers for JSON: null for unknown ones."""
-    return [
-        each if known else None
-        for each, known in zip(values.tolist(), np.isfinite(values).tolist(), strict=True)
-    ]
-
-
-def live_reference(case: Case) -> dict[str, LiveReference]:
+def _live_reference(case: Case) -> dict[str, LiveReference]:
     """Return the reference of a case with the tolerances of a run."""
     found = dict[str, LiveReference]()
     for each in case.outputs:
@@ -411,29 +412,8 @@ def live_reference(case: Case) -> dict[str, LiveReference]:
             extent = float(np.ptp(known)) if len(known) else 0.0
             within = float(np.max((series.uncertainty or {}).get("position", 0.0)))
             tolerance = each.atol + each.rtol * extent + within
-            found[each.name] = LiveReference(as_values(series.position), tolerance)
+            found[each.name] = LiveReference(series.position.tolist(), tolerance)
     return found
-
-
-def live_limits(variation: Variation | None) -> dict[str, tuple[float | None, float | None]]:
-    """Return the limits of a file of tolerances, by output."""
-    found = dict[str, tuple[float | None, float | None]]()
-    for each in variation.limits if variation else ():
-        low, high = as_values(np.array([each.low, each.high]))
-        found[each.output] = low, high
-    return found
-
-
-def _output(case: Case, name: str) -> Quantity:
-    """Return an output of motion by its name.
-
-    Raises:
-        KincheckError: there is none.
-    """
-    known = {each.name: each for each in case.outputs if not each.forces}
-    if name not in known:
-        raise KincheckError(unknown("output", name, known))
-    return known[name]
 
 
 def _alone(output: Quantity) -> tuple[str, ...]:
@@ -441,18 +421,13 @@ def _alone(output: Quantity) -> tuple[str, ...]:
     return tuple(output.facts.get(HELD_BUT, ()))
 
 
-def _moves_alone(path: Way, drivers: Sequence[str]) -> bool:
-    """Return whether these drivers move at one rate along a path, and all others rest."""
-    rates = {name: motion.at(path.times)[1] for name, motion in path.motions.items()}
-    first = rates.get(drivers[0], 0.0)
-    names = {*rates, *drivers}
-    return all(
-        np.all(rates.get(name, 0.0) == (first if name in drivers else 0.0)) for name in names
-    )
-
-
-def _moving(motion: Sequence[Array]) -> Vec3:
-    return Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
+def _in_parts(path: Way) -> Way:
+    """Return a path with its steps in equal parts, which are followed whole: the velocities at its
+    samples do not point to the next ones.
+    """
+    samples = np.arange(len(path.times))
+    parts = np.arange(PARTS * (len(samples) - 1) + 1) / PARTS
+    return replace(path, times=np.interp(parts, samples, path.times))
 
 
 def _same_place(
@@ -474,19 +449,24 @@ def _at_once() -> AbstractContextManager[None]:
     return compiled_at_once()
 
 
-def _rows(case: Case) -> dict[str, slice]:
-    """Return the rows of each place among the numbers of the geometry."""
-    first, rows = 0, dict[str, slice]()
-    for place, value in places(case.mechanism).items():
-        rows[place] = slice(first, first := first + len(value))
-    return rows
+def _by_place(sizes: Mapping[str, int], geometry: Array) -> dict[str, Array]:
+    """Return the rows of the geometry by place."""
+    return dict(zip(sizes, np.split(geometry, np.cumsum([*sizes.values()])[:-1]), strict=True))
 
 
-def _numbers(case: Case) -> Array:
-    """Return the numbers of all places of the geometry, shape (numbers, 1)."""
-    return np.concatenate([np.array(v, dtype=float) for v in places(case.mechanism).values()])[
-        :, None
-    ]
+def _geometry(case: Case, moved: Mapping[str, Array] = MappingProxyType({})) -> Array:
+    """Return the numbers of all places of V variants, shape (numbers, V).
+
+    Args:
+        moved: places with other numbers, shape (numbers of the place, V).
+    """
+    variants = next(iter(moved.values()), np.zeros((1, 1))).shape[1]
+    return np.concatenate(
+        [
+            moved.get(place, np.repeat(np.array(value, dtype=float)[:, None], variants, axis=1))
+            for place, value in places(case.mechanism).items()
+        ]
+    )
 
 
 def _structure(case: Case) -> list[str]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.cli.main import registry
 from kincheck.core.cli.serve import judge_by
+from kincheck.core.live.protocol import live_schema
 from kincheck.core.live.server import LiveServer
 from kincheck.core.live.table import LiveTable
 from websockets.sync.client import ClientConnection, connect
@@ -50,8 +52,12 @@ def served(car: Path) -> Iterator[LiveServer]:
     server.close()
 
 
+SCHEMA = live_schema()
+ASKED, TOLD = (Draft202012Validator({"$ref": f"#/{way}", **SCHEMA}) for way in ("asked", "told"))
+
+
 class Page:
-    """A client that speaks the protocol."""
+    """A client that speaks the protocol, and checks both ways by its schema."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -59,12 +65,14 @@ class Page:
         self.points = [each["position"] for each in self.opening["points"]]
 
     def say(self, **message: Any) -> None:
+        ASKED.validate(message)
         self.socket.send(json.dumps(message))
 
     def told(self, kind: str) -> dict[str, Any]:
         """Return the next message of a kind."""
         while True:
             message = json.loads(self.socket.recv(timeout=120))
+            TOLD.validate(message)
             if message["type"] == kind:
                 return message
 
@@ -76,19 +84,17 @@ class Page:
         return rows
 
 
+def page_of(server: LiveServer) -> AbstractContextManager[ClientConnection]:
+    """Connect to a server as its page does."""
+    host = f"127.0.0.1:{server.port}"
+    address = f"ws://{host}/socket?token={server.token}"
+    return connect(address, origin=f"http://{host}", max_size=None)
+
+
 @pytest.fixture
 def open_page(served: LiveServer) -> Iterator[Callable[[], Page]]:
-    host = f"127.0.0.1:{served.port}"
     with ExitStack() as pages:
-        yield lambda: Page(
-            pages.enter_context(
-                connect(
-                    f"ws://{host}/socket?token={served.token}",
-                    origin=f"http://{host}",
-                    max_size=None,
-                )
-            )
-        )
+        yield lambda: Page(pages.enter_context(page_of(served)))
 
 
 @pytest.fixture

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
+from time import monotonic, sleep
 
+import kincheck
 import pytest
 from kincheck import load, run
 from kincheck.core.cli.main import registry
 from kincheck.core.cli.serve import judge_by
 from kincheck.core.live.model import LiveModel
 from kincheck.core.live.server import LiveServer
+from kincheck.core.live.table import LiveTable
 
 from ..support.browser import AXE, CHROMIUM, Browser
 from .conftest import CAR, TRAVEL
@@ -194,7 +199,7 @@ def test_typed_word_is_refused_and_the_number_stays(opened):
     opened.run("document.activeElement.select()")
     opened.write("54o")
     opened.key("Tab")
-    assert "expected a number" in text(opened, "#trouble")
+    opened.until("document.querySelector('#trouble').textContent.includes('coordinate')")
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
 
 
@@ -249,6 +254,74 @@ def test_page_measures_its_edits(served, browser):
     assert served.ended.wait(60)
     assert len(served.measured) == 3
     assert min(served.measured) > 0.0
+
+
+def test_point_of_both_sides_moves_its_mirror(browser, tmp_path):
+    head, _, rows = CAR.partition("name,x,y,z,meaning\n")
+    fields = [row.split(",") for row in rows.splitlines()]
+    sides = (("FL", 1.0), ("FR", -1.0))
+    both = [f"{s}_{n},{x},{k * float(y)},{z}" for s, k in sides for n, x, y, z, _ in fields]
+    file = tmp_path / "both sides.csv"
+    file.write_text(head + "name,x,y,z\n" + "\n".join(both), "utf-8")
+    server = kincheck.live(file, kincheck.Supplied(travel="0.03:5", corner="FL"))
+    browser.visit(server.address)
+    answered(browser)
+    field = "[aria-label='FL_uca_outer y [mm]']"
+    rows = f"return [2, {2 + len(fields)}].map((k) => kincheckLive.rows()[k])"
+    browser.click(field)
+    browser.key("ArrowUp")
+    assert browser.run(rows) == [[-15, 541, 312], [-15, -541, 312]]
+    browser.click("#points caption input")
+    browser.click(field)
+    browser.key("ArrowUp")
+    assert browser.run(rows) == [[-15, 542, 312], [-15, -541, 312]]
+    browser.key("z", ctrl=True)
+    browser.key("z", ctrl=True)
+    assert browser.run(rows) == [[-15, 540, 312], [-15, -540, 312]]
+    server.close()
+
+
+def test_unreached_travel_is_marked_in_curve_and_scene(browser, car):
+    server = kincheck.live(car, kincheck.Supplied(travel="0.06:21", axle="steer"))
+    browser.visit(server.address)
+    answered(browser)
+    assert "rack travel [mm] is not reached: −60 to −54, 54 to 60" in text(browser, "#unreached")
+    browser.until("document.querySelector('#trouble').textContent.includes('singular pose')")
+    marks = "#figures figure:first-child rect[fill^='rgba(213']"
+    assert browser.run(f"return document.querySelectorAll({marks!r}).length") == 2
+    server.close()
+
+
+@pytest.mark.parametrize("framed", [True, False])
+def test_page_stands_in_frames_of_notebooks_alone(browser, car, framed):
+    known = registry()
+    server = LiveServer(
+        car, lambda: LiveTable(car, TRAVEL), known.engines, judge_by(known), framed=framed
+    )
+    page = f"<!doctype html><link rel=icon href=data:>{server._repr_html_()}".encode()
+
+    class Notebook(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(page)
+
+        def log_message(self, *_):
+            pass
+
+    notebook = ThreadingHTTPServer(("127.0.0.1", 0), Notebook)
+    Thread(target=notebook.serve_forever, daemon=True).start()
+    browser("Page.navigate", url=f"http://localhost:{notebook.server_port}/")
+    end = monotonic() + (60 if framed else 2)
+    while monotonic() < end and server.points is None:
+        sleep(0.05)
+    assert (server.points is not None) == framed
+    if not framed:
+        assert "frame-ancestors" in browser.complaints()[0]
+        browser.events.clear()
+    notebook.shutdown()
+    notebook.server_close()
+    server.close()
 
 
 def test_scene_shows_the_roll_centre_of_the_outputs(opened):

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
 
-from ..case.io.reader_options import Supplied
-from ..case.models.files import read_hardpoints
-from ..case.models.hardpoints.table import HardpointTable, unit_of
-from ..errors import CaseError, KincheckError
+from ...errors import CaseError, KincheckError
+from ..io.reader_options import Supplied
+from .files import read_hardpoints
+from .hardpoints.table import HardpointTable, unit_of
 
 NAME = re.compile(r"[^\W_][\w .+-]{0,80}\.csv")
 """A plain name: no folder, no hidden file."""
