@@ -16,7 +16,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     parts: Any = import_module("pydrake.multibody.plant")
     tree: Any = import_module("pydrake.multibody.tree")
     shift: Any = import_module("pydrake.math").RigidTransform

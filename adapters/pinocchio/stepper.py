@@ -17,7 +17,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     pin: Any = import_module("pinocchio")
     m, at, origin = pin.Model(), {"ground": 0}, {"ground": np.zeros(3)}
     m.gravity.linear = np.array(model["gravity"])

@@ -108,6 +108,8 @@ def main(stepper: Callable[..., Any], version: Callable[[], str]) -> None:
     model, settings = (
         json.loads((folder / f"{name}.json").read_text("utf-8")) for name in ("model", "settings")
     )
+    if "file" in model:
+        model["file"] = str(folder / model["file"])
     table = np.loadtxt(folder / "truth.csv", delimiter=",", skiprows=1, ndmin=2)
     truth = table[:, 0], table[:, 2:].reshape(len(table), -1, 3), table[:, 1]
     found: dict[str, Any] = {"version": "", "message": "", "runs": []}

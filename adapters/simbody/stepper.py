@@ -16,7 +16,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     o: Any = import_module("opensim")
     made = o.Model()
     joints: list[Any] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Mapping
 from datetime import datetime
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
+from ..extras import ENVIRONMENTS
 from ..harness.resource_limits import TIMEOUT
 from .option_types import add_several, positive, whole
 from .registry import Registry, Status
@@ -73,6 +75,8 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
     from .destinations import Destinations
 
     assert registry.stepper_files is not None
+    if (folder := os.environ.get(ENVIRONMENTS)) and not Path(folder).is_dir():
+        raise KincheckError(f"{ENVIRONMENTS}: there is no folder {folder}; make it, or unset it")
     wanted, to = run.steppers(options.engine), Destinations.of(options)
     if unwritable := to.problems(["board.json", "index.html"]):
         raise KincheckError("\n".join(unwritable))
@@ -93,7 +97,7 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
         try:
             truth = truth_of(case)
             found = replace(found, truths=[*found.truths, truth.facts])
-            for row in run.rows_of(truth, wanted, files, earlier, **given):
+            for row in run.rows_of(truth, wanted, files, earlier, registry.apart, **given):
                 found = replace(found, rows=[*found.rows, row])
                 print(f"{row.case}: {row.name}: {row.state}", file=sys.stderr)
         except KincheckError as error:

@@ -43,7 +43,9 @@ def _doctor(options: argparse.Namespace, registry: Registry) -> int:
     from .installation import examine
 
     require_writable([("--json", options.json)])
-    found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
+    found = examine(
+        registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines, registry.apart
+    )
     with with_json(found, options.json):
         (_print_verdict if options.quiet else _print)(found, page(options.json))
     return Status.WITHIN if found.able else Status.FAILED

@@ -12,8 +12,10 @@ from pathlib import Path
 import kincheck
 import numpy as np
 import pytest
+from kincheck import adapters
 from kincheck.core.case.case import Free
 from kincheck.core.cli.main import main
+from kincheck.core.extras import python_of
 from kincheck.core.studies.board.results import Run
 from kincheck.core.studies.board.run import order_and_floor
 from kincheck.core.studies.board.truth import truth_of
@@ -213,6 +215,64 @@ def test_fault_of_an_engine_costs_only_its_rows(tmp_path, monkeypatch):
     for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
         assert row["state"] == FAKES[row["engine"]][0]
         assert row["message"]
+
+
+def own_python(folder, text):
+    program = folder / "environments" / "pybullet" / "bin" / "python"
+    program.parent.mkdir(parents=True)
+    program.write_text(f"#!/bin/sh\n{text}\n")
+    program.chmod(0o755)
+    return str(folder / "environments")
+
+
+def pybullet_row(tmp_path):
+    given = ["--case", str(short(tmp_path, 0.02, 3)), "--engine", "pybullet", "--steps", "2"]
+    assert main(["board", *given, "--out", str(tmp_path / "site")]) == 0
+    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"][0]
+
+
+def test_engine_runs_in_its_own_environment(tmp_path, monkeypatch):
+    monkeypatch.setenv("KINCHECK_ENVIRONMENTS", own_python(tmp_path, "echo own >&2\nexit 5"))
+    row = pybullet_row(tmp_path)
+    assert row["state"] == "crashed"
+    assert row["message"].endswith("status 5; own")
+
+
+def test_missing_environment_is_told_with_its_remedy(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path))
+    row = pybullet_row(tmp_path)
+    remedy = f"python -m venv {tmp_path}/pybullet && {tmp_path}/pybullet/bin/pip install"
+    assert row["state"] == "unavailable"
+    assert remedy in row["message"]
+    assert remedy in (tmp_path / "site" / "index.html").read_text("utf-8").replace("&amp;", "&")
+    monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path / "none"))
+    assert main(["board", "--out", str(tmp_path / "site")]) == 2
+    assert "KINCHECK_ENVIRONMENTS: there is no folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "mjx", "mujoco-warp"])
+def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
+    if python_of(engine) == sys.executable:
+        pytest.skip(f"KINCHECK_ENVIRONMENTS has no {engine}")
+    (*_, best) = measured(tmp_path, "--engine", engine, "--timeout", "600")
+    one = errors(rows["mujoco", "Euler", "best"])
+    # rounding to float32 shifts the phase
+    assert errors(best)[-1] == pytest.approx(one[-1], rel=0.06)
+
+
+def test_urdf_of_the_board_is_the_model(site):
+    pin = pytest.importorskip("pinocchio")
+    truth = truth_of(kincheck.load(FOUR_BAR))
+    files = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)
+    model, found = json.loads(files["model.json"]), pin.buildModelFromXML(files["model.urdf"])
+    data = found.createData()
+    for body in model["bodies"]:
+        k = found.getJointId(f"{body['name']} joint")
+        pin.forwardKinematics(found, data, pin.neutral(found))
+        inertia = found.inertias[k]
+        assert inertia.mass == body["mass"]
+        assert data.oMi[k].act(inertia.lever) == pytest.approx(body["center"], abs=1e-15)
+        assert inertia.inertia == pytest.approx(np.array(body["inertia"]), abs=1e-15)
 
 
 def test_missing_constraint_is_a_row_with_its_reason(tmp_path):

@@ -51,7 +51,7 @@ def report(board: Board) -> Report:
             f"kincheck {board.kincheck}",
             board.started,
             board.processor,
-            "float64 on the CPU",
+            "on the CPU",
             *(sorted({f"{row.engine} {row.version}" for row in board.rows if row.version})),
         ],
         [
@@ -149,6 +149,12 @@ def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
     return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
+def _missing(rows: Sequence[Row]) -> list[str]:
+    """Return why engines are not run, a sentence each."""
+    messages = {row.engine: row.message for row in rows if row.state == "unavailable"}
+    return [f"Not run: {engine}: {message}." for engine, message in messages.items()]
+
+
 def _settings(rows: Sequence[Row]) -> Section:
     named = {(row.engine, row.integrator, row.column): row for row in rows}
     return Section(
@@ -156,14 +162,14 @@ def _settings(rows: Sequence[Row]) -> Section:
         [
             "Default: nothing but integrator and step is set. Best: the best known settings, kept"
             " in settings.toml of the board; whoever knows better ones changes that file.",
-            "Not run here: PyBullet, MJX, MuJoCo Warp, Newton and Genesis, which need environments"
-            " of their own.",
+            *_missing(rows),
         ],
         NOTES,
         (
             "engine",
             "version",
             "integrator",
+            "precision",
             "settings",
             "loop over steps",
             "closed loops",
@@ -171,12 +177,13 @@ def _settings(rows: Sequence[Row]) -> Section:
             "by",
             "on",
         ),
-        9,
+        10,
         [
             [
                 row.engine,
                 row.version,
                 row.integrator,
+                row.precision,
                 row.column,
                 row.loop,
                 row.ties,

@@ -6,7 +6,6 @@ import json
 import math
 import os
 import subprocess
-import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ import numpy as np
 
 from ...case.io.escape import file_name
 from ...errors import KincheckError, UnsupportedError, unknown
-from ...extras import THREADS
+from ...extras import THREADS, how_to_add, python_of
 from ...harness.record import to_json
 from .results import Row, Run, State
 from .truth import Truth
@@ -48,6 +47,7 @@ class Stepper:
     ties: str
     order: int | None = None
     accuracies: Sequence[float] = ()
+    precision: str = "float64"
     best: Mapping[str, Any] | None = None
     by: str = ""
     date: Any = ""
@@ -87,6 +87,7 @@ def rows_of(
     wanted: Sequence[Stepper],
     files: Files,
     earlier: Mapping[str, Row],
+    apart: Mapping[str, str],
     *,
     out: Path,
     steps: int,
@@ -96,6 +97,7 @@ def rows_of(
 
     Args:
         earlier: rows of an earlier board in this folder, by their keys.
+        apart: requirements of engines in environments of their own.
         steps: least number of the longest steps in the whole motion.
         timeout: of all runs of a row [s].
     """
@@ -113,6 +115,7 @@ def rows_of(
                 on=str(stepper.date) if settings else "",
                 loop=stepper.loop,
                 ties=stepper.ties,
+                precision=stepper.precision,
                 state="unsupported",
             )
             try:
@@ -135,7 +138,7 @@ def rows_of(
             }
             _write(out / folder, texts)
             row = msgspec.structs.replace(row, folder=str(folder))
-            done = measured(row, out / folder, timeout).dated(earlier)
+            done = measured(row, out / folder, apart, timeout).dated(earlier)
             _write(out / folder, {"row.json": to_json(done).decode()})
             yield done
 
@@ -151,7 +154,7 @@ def _write(folder: Path, texts: Mapping[str, str]) -> None:
         ) from None
 
 
-def measured(row: Row, place: Path, timeout: float) -> Row:
+def measured(row: Row, place: Path, apart: Mapping[str, str], timeout: float) -> Row:
     """Run the reproducer in a folder, and return the row with its runs."""
     state: State | None = None
     message, result = "", place / "result.json"
@@ -159,7 +162,7 @@ def measured(row: Row, place: Path, timeout: float) -> Row:
     environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "run.py"],
+            [python_of(row.engine), "-P", "run.py"],
             cwd=place,
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -181,6 +184,8 @@ def measured(row: Row, place: Path, timeout: float) -> Row:
     if state is None and (said := found.get("message", "")):
         kind, _, message = said.partition(": ")
         state = "unavailable" if kind == "unavailable" else "unsupported"
+        if state == "unavailable" and row.engine in apart:
+            message = f"{message}; {how_to_add(row.engine, apart[row.engine])}"
     if state is None:
         state, message = _state(runs)
     return msgspec.structs.replace(
