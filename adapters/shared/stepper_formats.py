@@ -26,6 +26,9 @@ def mjcf(model: Plain) -> str:
     ET.SubElement(root, "compiler", angle="radian")
     ET.SubElement(root, "option", gravity=_numbers(model["gravity"]))
     elements = {"ground": ET.SubElement(root, "worldbody")}
+    if any("ground" in tie["bodies"] for tie in model["ties"]):
+        # Genesis has no connect with the world
+        ET.SubElement(elements["ground"], "body", name="anchor")
     for body in model["bodies"]:
         element = ET.SubElement(elements[body["parent"]], "body", name=body["name"])
         elements[body["name"]] = element
@@ -51,7 +54,7 @@ def mjcf(model: Plain) -> str:
             tendon(f"tie {k}", tie)
             ET.SubElement(equalities, "tendon", tendon1=f"tie {k}")
             continue
-        one, two = ("world" if name == "ground" else name for name in tie["bodies"])
+        one, two = ("anchor" if name == "ground" else name for name in tie["bodies"])
         anchor = _numbers(tie["points"][0])
         ET.SubElement(equalities, "connect", body1=one, body2=two, anchor=anchor)
     for k, each in enumerate(model["springs"]):

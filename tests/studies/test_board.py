@@ -16,9 +16,10 @@ from kincheck import adapters
 from kincheck.core.case.case import Free
 from kincheck.core.cli.main import main
 from kincheck.core.extras import python_of
-from kincheck.core.studies.board.results import Run
-from kincheck.core.studies.board.run import order_and_floor
+from kincheck.core.studies.board.results import Row, Run
+from kincheck.core.studies.board.run import better, order_and_floor
 from kincheck.core.studies.board.truth import truth_of
+from msgspec.structs import replace as replace_row
 
 DATA = Path(__file__).parents[1] / "data"
 FOUR_BAR = DATA / "free_four_bar.toml"
@@ -184,6 +185,18 @@ def test_truth_of_a_turned_body_follows_its_points():
     assert np.ptp(force) > 1.0
     lost = np.diff(truth.energy)  # into the damper
     assert (lost < 0.0).all()
+
+
+def test_best_is_best_by_error():
+    given = {"case": "a", "engine": "b", "integrator": "c", "group": "d", "loop": "", "ties": ""}
+    default = Row(**given, column="default", state="measured", runs=[Run(error=3e-4)])
+    row = replace_row(default, column="best", settings={"mu": 0.1})
+    worse, nearer = (replace_row(row, runs=[Run(error=each)]) for each in (4e-4, 2e-4))
+    found = better(default, worse)
+    assert (found.column, found.settings, found.runs) == ("best", {}, default.runs)
+    assert found.message == "the defaults are nearer here than mu 0.1, with error 0.0004 m"
+    assert better(default, nearer) is nearer
+    assert better(replace_row(default, runs=[]), worse) is worse
 
 
 def test_order_and_floor_of_halved_steps():

@@ -26,6 +26,8 @@ SETTINGS = Path(__file__).with_name("settings.toml")
 HALVINGS = 3
 # A halved step that lowers the error by less than this part of a digit of order has met a floor.
 FLOOR = 0.5
+# Errors within a hundredth of each other are alike: solvers end at their own tolerances.
+ALIKE = 0.99
 
 Files = Callable[[str, Truth], Mapping[str, str]]
 """Function from engine and truth to the files of a reproducer: model.json and run.py."""
@@ -102,6 +104,7 @@ def rows_of(
         timeout: of all runs of a row [s].
     """
     for stepper in wanted:
+        default: Row | None = None
         for column, settings in stepper.columns.items():
             row = Row(
                 case=truth.case.name,
@@ -140,7 +143,18 @@ def rows_of(
             row = msgspec.structs.replace(row, folder=str(folder))
             done = measured(row, out / folder, apart, timeout).dated(earlier)
             _write(out / folder, {"row.json": to_json(done).decode()})
-            yield done
+            default = default or done
+            yield better(default, done)
+
+
+def better(default: Row, best: Row) -> Row:
+    """Return the row of the best known settings, or the default's if its error is smaller."""
+    errors = [row.measured[-1].error or 0.0 for row in (default, best) if row.measured]
+    if len(errors) < 2 or errors[0] >= ALIKE * errors[1]:
+        return best
+    values = ", ".join(f"{name} {value}" for name, value in best.settings.items())
+    message = f"the defaults are nearer here than {values}, with error {errors[1]:.3g} m"
+    return msgspec.structs.replace(default, column="best", message=message, since=best.since)
 
 
 def _write(folder: Path, texts: Mapping[str, str]) -> None:
