@@ -129,19 +129,39 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
-def test_board_keeps_the_date_of_an_unchanged_row(tmp_path):
+def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
     given = ["--engine", "mujoco", "--case", str(short(tmp_path, 0.02, 3)), "--steps", "2"]
     file = tmp_path / "site" / "board.json"
     assert main(["board", *given, "--out", str(file.parent)]) == 0
+    page = file.parent / "index.html"
+    assert "History" not in page.read_text("utf-8")
     found = json.loads(file.read_text("utf-8"))
-    first, second, *_ = found["rows"]
-    first["since"], second["since"], second["version"] = "2025-01-01", "2025-01-01", "3.9"
-    file.write_text(json.dumps(found), "utf-8")
+    first, second, third, *_ = found["rows"]
+    for row in (first, second, third):
+        row["since"] = "2025-01-01"
+    second["version"] = "3.9"
+    third["runs"][-1]["error"] *= 0.5
+    wrong = third["runs"][-1]["error"]
+    old = tmp_path / "the old one.json"
+    old.write_text(json.dumps(found), "utf-8")
+    assert main(["board", *given, "--out", str(file.parent), "--against", str(old)]) == 1
+    assert "mujoco implicitfast, default: measured, worse" in capsys.readouterr().err
+    one, two, three, *_ = json.loads(file.read_text("utf-8"))["rows"]
+    assert one["since"] == "2025-01-01" < two["since"] == three["since"]
+    assert not one["past"]
+    assert [each["version"] for each in two["past"]] == ["3.9"]
+    (before,) = three["past"]
+    assert (before["since"], before["until"]) == ("2025-01-01", three["since"])
+    assert before["error"] == wrong
+    assert "History" in page.read_text("utf-8")
+    # the same again, and a board with other steps
     assert main(["board", *given, "--out", str(file.parent)]) == 0
-    dates = [row["since"] for row in json.loads(file.read_text("utf-8"))["rows"]]
-    assert dates[0] == "2025-01-01" < dates[1]
+    assert len(json.loads(file.read_text("utf-8"))["rows"][2]["past"]) == 1
+    more = [*given[:-1], "4", "--out", str(file.parent), "--against", str(old)]
+    assert main(["board", *more]) == 0
     file.write_text("{}", "utf-8")
     assert main(["board", *given, "--out", str(file.parent)]) == 2
+    assert main(["board", *given, "--out", str(file.parent), "--against", "none.json"]) == 2
 
 
 def test_reproducer_runs_alone_and_repeats_the_row(site, rows):

@@ -56,9 +56,27 @@ def report(board: Board) -> Report:
         ],
         [
             *(_section(truth, rows) for truth in board.truths if (rows := _rows(board, truth))),
+            *_history(board.rows),
             _settings(board.rows),
         ],
     )
+
+
+def _history(rows: Sequence[Row]) -> list[Section]:
+    """Return the section on rows that changed, if any did."""
+    cells, changed = list[list[str]](), [row for row in rows if row.past]
+    for row in changed:
+        ends = [(each.until, each) for each in row.past]
+        for until, each in [*ends, ("now", row)]:
+            error = number(each.error) if each.error is not None else each.state
+            settings = ", ".join(f"{name} {value}" for name, value in each.settings.items())
+            cells.append([row.case, row.name, each.since, until, each.version, settings, error])
+    verdict = [
+        "Rows whose version, settings, outcome or error changed since the first board of this"
+        " history: errors by more than a tenth, and by more than round-off."
+    ]
+    heads = ("case", "row", "since", "until", "version", "settings", "error [m]")
+    return [Section("History", verdict, [], heads, 6, cells)] if changed else []
 
 
 def _rows(board: Board, truth: TruthFacts) -> list[Row]:
@@ -97,10 +115,8 @@ def _alike(rows: Sequence[Row]) -> list[str]:
     found = list[str]()
     for group, each in groupby(rows, key=lambda row: row.group):
         best = _best(each)
-        errors = [row.measured[-1].error or 0.0 for row in best if row.measured]
-        if len({row.engine for row in best if row.measured}) > 1 and max(errors) < 1.1 * min(
-            errors
-        ):
+        errors = [row.error for row in best if row.error]
+        if len({row.engine for row in best if row.error}) > 1 and max(errors) < 1.1 * min(errors):
             found.append(
                 f"{group}: {len(errors)} steppers share their error to"
                 f" {100 * (max(errors) / min(errors) - 1):.1g} %: it is the integrator's, not the"

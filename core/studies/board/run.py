@@ -17,7 +17,7 @@ import numpy as np
 
 from ...case.io.escape import file_name
 from ...errors import KincheckError, UnsupportedError, unknown
-from ...extras import THREADS, how_to_add, python_of
+from ...extras import THREADS, how_to_add, how_to_install, python_of
 from ...harness.record import to_json
 from .results import Row, Run, State
 from .truth import Truth
@@ -141,20 +141,20 @@ def rows_of(
             }
             _write(out / folder, texts)
             row = msgspec.structs.replace(row, folder=str(folder))
-            done = measured(row, out / folder, apart, timeout).dated(earlier)
-            _write(out / folder, {"row.json": to_json(done).decode()})
+            done = measured(row, out / folder, apart, timeout)
             default = default or done
-            yield better(default, done)
+            done = better(default, done).dated(earlier)
+            _write(out / folder, {"row.json": to_json(done).decode()})
+            yield done
 
 
 def better(default: Row, best: Row) -> Row:
     """Return the row of the best known settings, or the default's if its error is smaller."""
-    errors = [row.measured[-1].error or 0.0 for row in (default, best) if row.measured]
-    if len(errors) < 2 or errors[0] >= ALIKE * errors[1]:
+    if not default.error or not best.error or default.error >= ALIKE * best.error:
         return best
     values = ", ".join(f"{name} {value}" for name, value in best.settings.items())
-    message = f"the defaults are nearer here than {values}, with error {errors[1]:.3g} m"
-    return msgspec.structs.replace(default, column="best", message=message, since=best.since)
+    message = f"the defaults are nearer here than {values}, with error {best.error:.3g} m"
+    return msgspec.structs.replace(default, column="best", message=message)
 
 
 def _write(folder: Path, texts: Mapping[str, str]) -> None:
@@ -198,8 +198,10 @@ def measured(row: Row, place: Path, apart: Mapping[str, str], timeout: float) ->
     if state is None and (said := found.get("message", "")):
         kind, _, message = said.partition(": ")
         state = "unavailable" if kind == "unavailable" else "unsupported"
-        if state == "unavailable" and row.engine in apart:
-            message = f"{message}; {how_to_add(row.engine, apart[row.engine])}"
+        if state == "unavailable":
+            wanted = apart.get(row.engine)
+            remedy = how_to_add(row.engine, wanted) if wanted else how_to_install(row.engine)
+            message = f"{message}; {remedy}"
     if state is None:
         state, message = _state(runs)
     return msgspec.structs.replace(
