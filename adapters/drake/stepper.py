@@ -116,4 +116,17 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             found[name] = pose.translation() - arm, R, w, twist.translational() - np.cross(w, arm)
         return found
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        port, found = plant.get_reaction_forces_output_port(), dict[str, Any]()
+        if not sample:  # forces are those of a step
+            return found
+        every, ends = port.Eval(simulator.get_context()), iter(moves)
+        for body in model["bodies"]:
+            for _ in body["moves"]:
+                last = next(ends)
+            frame = last.frame_on_child().CalcPoseInWorld(simulator.get_context())
+            force = frame.rotation() @ every[int(last.index())].translational()
+            found[body["joint"]] = force if body["second"] else -force
+        return found
+
+    return advance, states, reactions

@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-from ..shared.stepper_mjcf import body_states, loaded
+from ..shared.stepper_mjcf import body_states, loaded, tie_forces
 
 
 def version() -> str:
@@ -19,6 +19,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     # otherwise a diverged motion would start again from the design
     m.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     seen = mujoco.MjData(m)
+    seen.xfrc_applied[:] = d.xfrc_applied
 
     def advance(sample: int) -> None:
         mujoco.mj_step(m, d, effort["steps"])
@@ -27,4 +28,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         seen.qpos[:], seen.qvel[:] = d.qpos, d.qvel
         return body_states(m, seen, model)
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        return tie_forces(m, seen, model)
+
+    return advance, states, reactions

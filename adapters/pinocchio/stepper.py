@@ -113,4 +113,12 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     def states(sample: int) -> Any:
         return read(q, v)
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        rate(q, v)
+        found: Any = {}
+        for tie, model_of, each in zip(model["ties"], ties, data, strict=True):
+            R = d.oMi[model_of.joint1_id].rotation
+            found[tie["joint"]] = found.get(tie["joint"], 0.0) - R @ each.contact_force.linear
+        return found
+
+    return advance, states, reactions

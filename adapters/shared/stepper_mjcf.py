@@ -39,3 +39,16 @@ def body_states(m: Any, seen: Any, model: Any) -> Any:
         R = np.array(seen.xmat[k]).reshape(3, 3)
         found[body["name"]] = np.array(seen.xpos[k]), R, twist[:3].copy(), twist[3:].copy()
     return found
+
+
+def tie_forces(m: Any, seen: Any, model: Any) -> Any:
+    """Return the forces of joints that close loops, first body on second, at the data's state."""
+    import_module("mujoco").mj_forward(m, seen)
+    found: Any = {}
+    for k, tie in enumerate(model["ties"]):
+        force = seen.efc_force[: seen.ne][seen.efc_id[: seen.ne] == k]
+        if tie["length"]:
+            P, Q = (seen.site(f"tie {k}.{end}").xpos for end in range(2))
+            force = -force * (Q - P) / np.linalg.norm(Q - P)
+        found[tie["joint"]] = found.get(tie["joint"], 0.0) - force
+    return found

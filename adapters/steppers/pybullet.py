@@ -56,16 +56,16 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     for name, link in links.items():
         q = pb.getLinkState(robot, link, computeForwardKinematics=1)[1]
         turn[name] = np.array(pb.getMatrixFromQuaternion(q)).reshape(3, 3)
+    made = list[Any]()
     for tie in model["ties"]:
         ends = list[Any]()
         for name, point in zip(tie["bodies"], tie["points"], strict=True):
             arm = np.array(point) - center.get(name, np.zeros(3))
             ends.append((links.get(name, -1), (turn[name].T @ arm).tolist()))
         (one, first), (two, second) = ends
-        made = pb.createConstraint(
-            robot, one, robot, two, pb.JOINT_POINT2POINT, [0, 0, 0], first, second
-        )
-        pb.changeConstraint(made, maxForce=1e9)
+        ends = robot, one, robot, two, pb.JOINT_POINT2POINT, [0, 0, 0], first, second
+        made.append(pb.createConstraint(*ends))
+        pb.changeConstraint(made[-1], maxForce=1e9)
 
     def states(sample: int) -> Any:
         found: Any = {}
@@ -88,4 +88,11 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
                     pb.applyExternalTorque(robot, link, torque, pb.WORLD_FRAME)
             pb.stepSimulation()
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        found: Any = {}  # of the last step
+        for tie, each in zip(model["ties"], made, strict=True):
+            force = np.array(pb.getConstraintState(each))
+            found[tie["joint"]] = found.get(tie["joint"], 0.0) + force
+        return found if sample else {}
+
+    return advance, states, reactions

@@ -119,6 +119,26 @@ def test_energy_and_gap_follow_the_error(rows):
     assert 0.1 * last["error"] < last["energy"] < 1e3 * last["error"]
 
 
+def test_joint_forces_of_engines_are_the_truths(rows):
+    def last(*key):
+        return rows[key]["runs"][-1]["reaction"]
+
+    # forces of up to 100 N, of which MuJoCo's impedance of 0.9999 leaves a ten-thousandth out
+    assert last("pinocchio", "RK4", "best") < 1e-6
+    assert last("exudyn", "TrapezoidalIndex2", "best") < 1e-3
+    assert last("mujoco", "RK4", "best") < 2e-2
+    assert last("mujoco", "RK4", "default") > 0.1
+
+
+def test_undetermined_joint_forces_are_left_open():
+    truth = truth_of(replace(kincheck.load("bricard"), free=Free(0.01, 2)))
+    assert np.isfinite(truth.reactions).all()
+    assert np.abs(truth.reactions[..., 3:]).max() > 0.1
+    head, *values = truth.tables([], 1)["reactions.csv"].splitlines()
+    assert len(values) == 1
+    assert head.count(",") == 6 * len(truth.case.mechanism.joints) - 1
+
+
 def test_site_has_every_row_and_its_reproducer(site, rows):
     page = (site / "index.html").read_text("utf-8")
     for row in rows.values():

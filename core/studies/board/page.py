@@ -23,6 +23,7 @@ COLUMNS = (
     "error [m]",
     "gap [m]",
     "energy [J]",
+    "reaction [N]",
     "cost [s/s]",
     "order",
     "floor [m]",
@@ -33,6 +34,9 @@ NOTES = (
     "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
     " Gap: largest opening of a loop. Energy: of motion, weight and springs, minus the truth's at"
     " the same time; what loads and dampers take is in both.",
+    "Reaction: largest error of the force in a joint, without directions that redundant rows leave"
+    " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Drake,"
+    " Simbody), or of all joints but rods (Exudyn).",
     "Errors and costs are of the shortest step. Cost: wall time for a simulated second, in one"
     " run and process. The machine also does other things: costs within a factor of two are"
     " alike. Where the loop over the steps is in Python, its time is in the cost.",
@@ -139,7 +143,9 @@ def _cells(row: Row) -> list[str]:
         row.column,
         f"{row.state}: {row.message}" if row.message else row.state,
         number(last.step) if last.step else "own" if last.accuracy else "–",
-        *(number(each) for each in (last.error, last.gap, last.energy, last.cost)),
+        *(number(each) for each in (last.error, last.gap, last.energy)),
+        "not given" if row.measured and last.reaction is None else number(last.reaction),
+        number(last.cost),
         "–" if row.order is None else f"{row.order:.2f}",
         number(row.floor),
         row.since,

@@ -38,6 +38,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         error: largest distance of a point from the truth over the samples [m].
         gap: largest opening of a loop at the samples [m].
         energy: largest difference of the energy of motion, weight and springs from the truth's [J].
+        reaction: largest error of the given joint forces, in determined directions [N].
         cost: wall time for a simulated second [s/s].
         message: why there are no numbers, or empty.
     """
@@ -48,12 +49,13 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     error: float | None = None
     gap: float | None = None
     energy: float | None = None
+    reaction: float | None = None
     cost: float | None = None
     message: str = ""
 
 
 class Past(msgspec.Struct, frozen=True, kw_only=True):
-    """What a row was on earlier boards.
+    """Figures of a row on earlier boards.
 
     Attributes:
         since, until: dates of the first board with it, and of the first without.
@@ -76,13 +78,13 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
         group: of the integrator.
         design_order: order of the method for smooth motions; None if steps are controlled.
         by, on: who gave the settings, and when; empty for defaults.
-        loop: where the loop over the steps runs: the engine or Python.
+        loop: runs the loop over the steps: the engine or Python.
         ties: form of the closed loops.
         order: by least squares over the runs above the floor; None with fewer than two.
         floor: error that smaller steps do not lower [m]; None if none is reached.
         folder: of the reproducer, below the board; empty without one.
         since: date of the first board of a history with this version, settings, state and error.
-        past: what it was before, the oldest first.
+        past: its earlier figures, the oldest first.
     """
 
     schema: str = SCHEMA

@@ -39,6 +39,7 @@ class Stepper:
 
     Attributes:
         accuracies: efforts of an engine that controls its steps; empty for fixed steps.
+        samples: number of compared ones; None for all.
         best: settings; None if no better ones than the defaults are known.
     """
 
@@ -50,6 +51,7 @@ class Stepper:
     order: int | None = None
     accuracies: Sequence[float] = ()
     precision: str = "float64"
+    samples: int | None = None
     best: Mapping[str, Any] | None = None
     by: str = ""
     date: Any = ""
@@ -137,12 +139,15 @@ def rows_of(
             texts = {
                 **texts,
                 "settings.json": json.dumps(given, indent=1) + "\n",
-                "truth.csv": truth.table(points),
+                **truth.tables(points, stepper.samples or len(truth.times)),
             }
             _write(out / folder, texts)
             row = msgspec.structs.replace(row, folder=str(folder))
             done = measured(row, out / folder, apart, timeout)
             default = default or done
+            if stepper.samples and done.measured:
+                end = truth.times[: stepper.samples][-1]
+                done = msgspec.structs.replace(done, message=f"the first {end:.3g} s alone")
             done = better(default, done).dated(earlier)
             _write(out / folder, {"row.json": to_json(done).decode()})
             yield done
