@@ -1,5 +1,6 @@
 """Drake as a stepper of free motion: a discrete MultibodyPlant with its SAP solver, and a ball
-constraint for each tie. A ball joint is a floating joint with such a constraint.
+constraint for each tie; for a tree also a continuous one. A ball joint is a floating joint with
+such a constraint.
 """
 
 from importlib import import_module
@@ -21,9 +22,12 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     tree: Any = import_module("pydrake.multibody.tree")
     shift: Any = import_module("pydrake.math").RigidTransform
     simulation: Any = import_module("pydrake.systems.analysis")
-    plant = parts.MultibodyPlant(effort["step"])
-    solver = getattr(parts.DiscreteContactApproximation, f"k{settings['integrator']}")
-    plant.set_discrete_contact_approximation(solver)
+    plant = parts.MultibodyPlant(effort.get("step", 0.0))
+    if "step" in effort:
+        solver = getattr(parts.DiscreteContactApproximation, f"k{settings['integrator']}")
+        plant.set_discrete_contact_approximation(solver)
+    elif model["ties"] or "ball" in {m["kind"] for body in model["bodies"] for m in body["moves"]}:
+        raise NotImplementedError("a continuous plant has no constraints for loops and balls")
     plant.mutable_gravity_field().set_gravity_vector(np.array(model["gravity"]))
     bodies = {"ground": plant.world_body()}
     origin, moves = {"ground": np.zeros(3)}, list[Any]()
@@ -100,6 +104,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     ]
     plant.get_applied_spatial_force_input_port().FixValue(context, value(external))
     simulator = simulation.Simulator(plant, context)
+    if "accuracy" in effort:
+        simulation.ResetIntegratorFromFlags(simulator, settings["integrator"], times[1] - times[0])
+        simulator.get_mutable_integrator().set_target_accuracy(effort["accuracy"])
     simulator.Initialize()
 
     def advance(sample: int) -> None:
@@ -118,7 +125,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
 
     def reactions(sample: int) -> Any:
         port, found = plant.get_reaction_forces_output_port(), dict[str, Any]()
-        if not sample:  # forces are those of a step
+        if not sample and "step" in effort:  # forces are those of a step
             return found
         every, ends = port.Eval(simulator.get_context()), iter(moves)
         for body in model["bodies"]:

@@ -86,6 +86,21 @@ def test_semi_implicit_engines_share_their_error(engine, rows, tmp_path):
     assert errors(best)[-2:] == pytest.approx(one[-2:], rel=0.05)
 
 
+def test_drake_without_loops_is_also_continuous(tmp_path):
+    pytest.importorskip("pydrake.multibody.plant", exc_type=ImportError)
+    text = short(tmp_path, 0.1, 3).read_text("utf-8")
+    case = tmp_path / "chain.toml"
+    case.write_text(re.sub(r"\[joints\.D\]\n(.+\n)*", "", text).replace('"free_', '"chain_'))
+    found = {
+        (row["case"], row["integrator"]): row
+        for row in measured(tmp_path, "--engine", "drake", "--case", str(case))
+    }
+    chain = found["chain_four_bar", "runge_kutta3"]
+    assert errors(chain)[-1] < 1e-9
+    assert chain["runs"][-1]["reaction"] < 1e-6
+    assert "no constraints" in found["free_four_bar", "runge_kutta3"]["message"]
+
+
 def test_error_of_simbody_follows_its_accuracy(tmp_path):
     pytest.importorskip("opensim", exc_type=ImportError)
     strut = tmp_path / "strut.toml"
