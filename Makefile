@@ -1,12 +1,13 @@
 # Two commands:  make run   the McPherson strut in every engine, compared and reported
 #                make test  style, types and tests
+# make board builds the short board of time steppers into board/.
 # make docs builds the documentation into site/.
 # Plain Python with venv is enough; uv is used when it is there.
 PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test nightly docs lock sizes house mutants fuzz clean
+.PHONY: run test board nightly docs lock sizes house mutants fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -16,6 +17,10 @@ test: .venv/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest --numprocesses auto --dist worksteal
+
+# Three closed loops in four engines: half a minute. An engine that is not installed is named.
+board: .venv/ready
+	$(BIN)/kincheck board --case bricard bennett planar_slider_crank --engine mujoco pinocchio exudyn drake --steps 200 --out board
 
 # The dear tests, which the nightly workflow runs, and new examples for those that draw them.
 nightly: .venv/ready
@@ -88,4 +93,4 @@ fuzz: .venv/ready
 	for reader in adams casefile hardpoints mjcf recording reference results sdf urdf; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
 
 clean:
-	rm -rf .venv build report site .mutants *.egg-info
+	rm -rf .venv build report board site .mutants *.egg-info

@@ -4,6 +4,7 @@ adapter is imported at its first use.
 
 import importlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -64,13 +65,37 @@ def converter(name: str) -> Any:
     return importlib.import_module(f".{CONVERTERS[name]}", __name__).saved
 
 
-STEPPERS = ("mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody")
-"""Steppers of free motion, by engine; the module NAME.stepper is a script without kincheck."""
+_MUJOCO = "shared/stepper_mjcf.py"
+STEPPERS = {
+    "mujoco": ("mjcf", _MUJOCO, "mujoco/stepper.py"),
+    "pinocchio": ("", "pinocchio/stepper.py"),
+    "exudyn": ("", "exudyn/stepper.py"),
+    "drake": ("", "drake/stepper.py"),
+    "dart": ("", "dart/stepper.py"),
+    "simbody": ("", "simbody/stepper.py"),
+    "pybullet": ("urdf", "steppers/pybullet.py"),
+    "mjx": ("mjcf", _MUJOCO, "steppers/mjx.py"),
+    "mujoco-warp": ("mjcf", _MUJOCO, "steppers/warp.py"),
+    "newton": ("mjcf", "steppers/newton.py"),
+    "genesis": ("mjcf", _MUJOCO, "steppers/genesis.py"),
+}
+"""Steppers of free motion, by engine: format of the model that they read, and the parts of a script
+without kincheck. Where no format is named, the script builds the model.
+"""
+
+APART = {
+    "pybullet": "pybullet",
+    "mjx": "mujoco-mjx",
+    "mujoco-warp": "mujoco-warp",
+    "newton": "newton mujoco-warp",
+    "genesis": "genesis-world torch",
+}
+"""Steppers with an environment of their own, by engine: the requirements there."""
 
 
 def stepper_files(name: str, mechanism: Any, twists: Any) -> dict[str, str]:
-    """Return the files of a stepper's reproducer, by name: model.json and run.py, which needs numpy
-    and the engine alone.
+    """Return the files of a stepper's reproducer, by name: model.json, the engine's own model file
+    if it reads one, and run.py, which needs numpy and the engine alone.
 
     Args:
         twists: see `shared.stepper_model`.
@@ -79,10 +104,20 @@ def stepper_files(name: str, mechanism: Any, twists: Any) -> dict[str, str]:
         UnsupportedError: steppers lack a part of the mechanism.
     """
     stepper_model = importlib.import_module(".shared.stepper_model", __name__).stepper_model
-    folder = Path(__file__).resolve().parent
-    parts = [folder / name / "stepper.py", folder / "shared" / "stepper_loop.py"]
-    text = "\n\n".join(part.read_text("utf-8").rstrip() for part in parts)
+    formats = importlib.import_module(".shared.stepper_formats", __name__).WRITERS
+    kind, *parts = STEPPERS[name]
+    model, folder = stepper_model(mechanism, twists), Path(__file__).resolve().parent
+    files = dict[str, str]()
+    if kind:
+        file, write = formats[kind]
+        model["file"], files[file] = file, write(model)
+    texts = [(folder / part).read_text("utf-8") for part in (*parts, "shared/stepper_loop.py")]
+    # the parts are one file: they need not import each other
+    text = "\n\n".join(
+        re.sub(r"^from \.\S* import .*\n", "", each, flags=re.M).rstrip() for each in texts
+    )
     return {
-        "model.json": json.dumps(stepper_model(mechanism, twists), indent=1) + "\n",
+        **files,
+        "model.json": json.dumps(model, indent=1) + "\n",
         "run.py": f"{text}\n\n\nmain(stepper, version)\n",
     }

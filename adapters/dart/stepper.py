@@ -14,7 +14,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     dart: Any = import_module("dartpy")
     parts, skeleton = dart.dynamics, dart.dynamics.Skeleton("mechanism")
     nodes: dict[str, Any] = {"ground": None}

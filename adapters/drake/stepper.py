@@ -1,5 +1,6 @@
 """Drake as a stepper of free motion: a discrete MultibodyPlant with its SAP solver, and a ball
-constraint for each tie. A ball joint is a floating joint with such a constraint.
+constraint for each tie; for a tree also a continuous one. A ball joint is a floating joint with
+such a constraint.
 """
 
 from importlib import import_module
@@ -16,14 +17,17 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     parts: Any = import_module("pydrake.multibody.plant")
     tree: Any = import_module("pydrake.multibody.tree")
     shift: Any = import_module("pydrake.math").RigidTransform
     simulation: Any = import_module("pydrake.systems.analysis")
-    plant = parts.MultibodyPlant(effort["step"])
-    solver = getattr(parts.DiscreteContactApproximation, f"k{settings['integrator']}")
-    plant.set_discrete_contact_approximation(solver)
+    plant = parts.MultibodyPlant(effort.get("step", 0.0))
+    if "step" in effort:
+        solver = getattr(parts.DiscreteContactApproximation, f"k{settings['integrator']}")
+        plant.set_discrete_contact_approximation(solver)
+    elif model["ties"] or "ball" in {m["kind"] for body in model["bodies"] for m in body["moves"]}:
+        raise NotImplementedError("a continuous plant has no constraints for loops and balls")
     plant.mutable_gravity_field().set_gravity_vector(np.array(model["gravity"]))
     bodies = {"ground": plant.world_body()}
     origin, moves = {"ground": np.zeros(3)}, list[Any]()
@@ -100,6 +104,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     ]
     plant.get_applied_spatial_force_input_port().FixValue(context, value(external))
     simulator = simulation.Simulator(plant, context)
+    if "accuracy" in effort:
+        simulation.ResetIntegratorFromFlags(simulator, settings["integrator"], times[1] - times[0])
+        simulator.get_mutable_integrator().set_target_accuracy(effort["accuracy"])
     simulator.Initialize()
 
     def advance(sample: int) -> None:
@@ -116,4 +123,17 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             found[name] = pose.translation() - arm, R, w, twist.translational() - np.cross(w, arm)
         return found
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        port, found = plant.get_reaction_forces_output_port(), dict[str, Any]()
+        if not sample and "step" in effort:  # forces are those of a step
+            return found
+        every, ends = port.Eval(simulator.get_context()), iter(moves)
+        for body in model["bodies"]:
+            for _ in body["moves"]:
+                last = next(ends)
+            frame = last.frame_on_child().CalcPoseInWorld(simulator.get_context())
+            force = frame.rotation() @ every[int(last.index())].translational()
+            found[body["joint"]] = force if body["second"] else -force
+        return found
+
+    return advance, states, reactions

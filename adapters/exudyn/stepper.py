@@ -14,7 +14,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     exu: Any = import_module("exudyn")
     items: Any = import_module("exudyn.itemInterface")
     exu.config.printToConsole = False
@@ -42,6 +42,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     def ends(each: Any) -> list[Any]:
         return [marker(*end) for end in zip(each["bodies"], each["points"], strict=True)]
 
+    connectors: dict[str, Any] = {}
     for joint in model["joints"]:
         if joint["type"] == "distance":
             P, Q = map(np.array, joint["points"])
@@ -59,7 +60,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             rotationMarker0=A,
             rotationMarker1=A,
         )
-        system.AddObject(made)
+        connectors[joint["name"]] = system.AddObject(made)
     for each in model["springs"]:
         made = items.SpringDamper(
             markerNumbers=ends(each),
@@ -76,7 +77,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         exu.OutputVariableType,
         ("Position", "RotationMatrix", "AngularVelocity", "Velocity"),
     )
-    sensors = {
+    sensors: dict[Any, Any] = {
         (name, what): system.AddSensor(
             items.SensorBody(
                 bodyNumber=number[name],
@@ -88,6 +89,18 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         for name in center
         if name != "ground"
         for what in wanted
+    }
+    sensors |= {
+        joint["name"]: system.AddSensor(
+            items.SensorObject(
+                objectNumber=connectors[joint["name"]],
+                outputVariableType=kinds.ForceLocal,
+                storeInternal=True,
+                writeToFile=False,
+            )
+        )
+        for joint in model["joints"]
+        if joint["rows"]
     }
     system.Assemble()
     asked = exu.SimulationSettings()
@@ -126,4 +139,16 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             found[name] = x - R @ c, R, w, v - np.cross(w, R @ c)
         return found
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        found: Any = {}
+        for joint in model["joints"] if sample else ():
+            if not joint["rows"]:
+                continue
+            rows = tables[joint["name"]]
+            near = int(np.abs(rows[:, 0] - times[sample]).argmin())
+            first = joint["bodies"][0]
+            R = np.eye(3) if first == "ground" else states(sample)[first][1]
+            found[joint["name"]] = -R @ np.array(joint["frame"]).T @ rows[near, 1:]
+        return found
+
+    return advance, states, reactions

@@ -17,7 +17,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     pin: Any = import_module("pinocchio")
     m, at, origin = pin.Model(), {"ground": 0}, {"ground": np.zeros(3)}
     m.gravity.linear = np.array(model["gravity"])
@@ -113,4 +113,12 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     def states(sample: int) -> Any:
         return read(q, v)
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        rate(q, v)
+        found: Any = {}
+        for tie, model_of, each in zip(model["ties"], ties, data, strict=True):
+            R = d.oMi[model_of.joint1_id].rotation
+            found[tie["joint"]] = found.get(tie["joint"], 0.0) - R @ each.contact_force.linear
+        return found
+
+    return advance, states, reactions

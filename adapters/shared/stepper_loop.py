@@ -73,11 +73,21 @@ def gap(model: Any, states: Mapping[str, State]) -> float:
     return found
 
 
+def reaction(model: Any, forces: Mapping[str, Any], truth: Any) -> float:
+    """Return the largest error of joint forces, first body on second, where rows determine them."""
+    found = 0.0
+    for each, (*force, x, y, z) in zip(model["joints"], truth, strict=True):
+        if each["name"] in forces and np.isfinite(x):
+            off, open_way = forces[each["name"]] - np.array(force), np.array([x, y, z])
+            found = max(found, float(np.linalg.norm(off - open_way * (off @ open_way))))
+    return found
+
+
 def run(stepper: Any, model: Any, settings: Any, effort: Any, truth: Any) -> dict[str, Any]:
     """Return the largest errors of a run, and its time by simulated second."""
-    times, points, energies = truth
-    advance, states = stepper(model, settings, effort, times, loads)
-    largest, spent, message, k = np.zeros(3), 0.0, "", 0
+    times, points, energies, reactions = truth
+    advance, states, *given = stepper(model, settings, effort, times, loads)
+    largest, spent, message, k = np.zeros(4), 0.0, "", 0
     for k in range(len(times)):
         begin = time.perf_counter()
         if k:
@@ -90,14 +100,18 @@ def run(stepper: Any, model: Any, settings: Any, effort: Any, truth: Any) -> dic
                 np.linalg.norm(np.array(at) - points[k], axis=1).max(),
                 gap(model, found),
                 abs(energy(model, found) - energies[k]),
+                reaction(model, given[0](k) if given else {}, reactions[k]),
             ]
         )
         if not np.isfinite(errors).all():
             message = f"not finite at {times[k]:.6g} s"
             break
         largest = np.maximum(largest, errors)
-    names, done = ("error", "gap", "energy"), float(times[k] - times[0])
-    measured = [None] * 3 if message else largest.tolist()
+    names, done = ("error", "gap", "energy", "reaction"), float(times[k] - times[0])
+    measured: list[Any] = [None] * 4 if message else largest.tolist()
+    # no joint has a determined force, or the engine gives none
+    if not given or not np.isfinite(reactions).any():
+        measured[3] = None
     cost = spent / done if done else None
     return {**effort, **dict(zip(names, measured, strict=True)), "cost": cost, "message": message}
 
@@ -108,8 +122,15 @@ def main(stepper: Callable[..., Any], version: Callable[[], str]) -> None:
     model, settings = (
         json.loads((folder / f"{name}.json").read_text("utf-8")) for name in ("model", "settings")
     )
-    table = np.loadtxt(folder / "truth.csv", delimiter=",", skiprows=1, ndmin=2)
-    truth = table[:, 0], table[:, 2:].reshape(len(table), -1, 3), table[:, 1]
+    if "file" in model:
+        model["file"] = str(folder / model["file"])
+    table, forces = (
+        np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1, ndmin=2)
+        for name in ("truth", "reactions")
+    )
+    count = len(table)
+    places, forces = table[:, 2:].reshape(count, -1, 3), forces.reshape(count, -1, 6)
+    truth = table[:, 0], places, table[:, 1], forces
     found: dict[str, Any] = {"version": "", "message": "", "runs": []}
     try:
         found["version"] = version()

@@ -105,7 +105,7 @@ def stepper_model(mechanism: Mechanism, twists: Mapping[str, Array]) -> Plain:
         "name": mechanism.name,
         "gravity": [*mechanism.gravity],
         "bodies": [
-            _body(mechanism, name, carriers[name].parent, moves[name], twists)
+            _body(mechanism, name, carriers[name], moves[name], twists)
             for name in _depth_first({name: each.parent for name, each in carriers.items()})
         ],
         "ties": ties,
@@ -248,17 +248,20 @@ def _depth_first(parents: Mapping[str, str]) -> list[str]:
 def _body(
     mechanism: Mechanism,
     name: str,
-    parent: str,
+    branch: Any,
     moves: list[Link],
     twists: Mapping[str, Array],
 ) -> Plain:
-    body, relative = mechanism.body(name), twists[name] - twists.get(parent, np.zeros(6))
+    body, parent = mechanism.body(name), branch.parent
+    relative = twists[name] - twists.get(parent, np.zeros(6))
     assert body.inertia is not None
     columns = _columns(moves)
     rates = np.linalg.lstsq(columns, relative)[0] if columns.size else np.zeros(0)
     return {
         "name": name,
         "parent": parent,
+        "joint": branch.joint.name,
+        "second": branch.joint.j == name,
         "moves": [
             {"kind": each.move, "axis": [*each.axis], "point": [*each.point]} for each in moves
         ],

@@ -16,7 +16,7 @@ def version() -> str:
 
 
 def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
-    """Return the functions that advance to a sample and read the bodies' states there."""
+    """Return functions to advance to a sample, and to read the bodies' states there."""
     o: Any = import_module("opensim")
     made = o.Model()
     joints: list[Any] = []
@@ -120,4 +120,12 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             found[name] = pose.p().to_numpy() - arm, R, w, v - np.cross(w, arm)
         return found
 
-    return advance, states
+    def reactions(sample: int) -> Any:
+        made.realizeAcceleration(state)
+        found: Any = {}
+        for joint, body in zip(joints, model["bodies"], strict=True):
+            force = joint.calcReactionOnChildExpressedInGround(state).get(1).to_numpy()
+            found[body["joint"]] = force if body["second"] else -force
+        return found
+
+    return advance, states, reactions

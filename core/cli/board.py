@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Mapping
 from datetime import datetime
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
+from ..extras import ENVIRONMENTS
 from ..harness.resource_limits import TIMEOUT
 from .option_types import add_several, positive, whole
 from .registry import Registry, Status
@@ -38,6 +40,12 @@ def add(commands: Any) -> None:
         help="folder for the site: index.html, board.json, and a folder for each row",
     )
     board.add_argument(
+        "--against",
+        type=Path,
+        metavar="FILE",
+        help="board.json to continue; exit status 1 if a row is worse; default: that in DIR",
+    )
+    board.add_argument(
         "--steps",
         type=whole(1),
         default=STEPS,
@@ -58,8 +66,10 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
     the truth of kincheck free: error, gap, energy, cost, and order by halved steps.
 
     Each row of the site is a folder with what repeats it without kincheck: the model, a script and
-    the truth. An engine that is missing, lacks a joint, diverges or crashes is a row too. Exit
-    status: 0 the site is written; 2 the tool could not do all of its work.
+    the truth. An engine that is missing, lacks a joint, diverges or crashes is a row too.
+
+    Exit status: 0 the site is written; 1 a row is worse than in --against; 2 the tool could not do
+    all of its work.
     """
     from msgspec.structs import replace
 
@@ -73,6 +83,8 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
     from .destinations import Destinations
 
     assert registry.stepper_files is not None
+    if (folder := os.environ.get(ENVIRONMENTS)) and not Path(folder).is_dir():
+        raise KincheckError(f"{ENVIRONMENTS}: there is no folder {folder}; make it, or unset it")
     wanted, to = run.steppers(options.engine), Destinations.of(options)
     if unwritable := to.problems(["board.json", "index.html"]):
         raise KincheckError("\n".join(unwritable))
@@ -87,15 +99,24 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
     def files(engine: str, truth: Truth) -> Mapping[str, str]:
         return make(engine, truth.case.mechanism, truth.twists)
 
-    found, earlier = Board.begun(datetime.now().astimezone()), earlier_rows(file)
+    if options.against and not options.against.exists():
+        raise KincheckError(f"--against: there is no file {options.against}; give a board.json")
+    earlier = earlier_rows(options.against or file)
+    found, worse = Board.begun(datetime.now().astimezone()), False
     given = {name: getattr(options, name) for name in ("out", "steps", "timeout")}
     for case in cases:
         try:
             truth = truth_of(case)
             found = replace(found, truths=[*found.truths, truth.facts])
-            for row in run.rows_of(truth, wanted, files, earlier, **given):
+            for row in run.rows_of(truth, wanted, files, earlier, registry.apart, **given):
                 found = replace(found, rows=[*found.rows, row])
-                print(f"{row.case}: {row.name}: {row.state}", file=sys.stderr)
+                before = earlier.get(row.key)
+                grown = options.against and before and row.worse_than(before)
+                worse = worse or bool(grown)
+                print(
+                    f"{row.case}: {row.name}: {row.state}{', worse' if grown else ''}",
+                    file=sys.stderr,
+                )
         except KincheckError as error:
             problems.append(str(error))
         # after each case, so that an interrupt loses only the last one
@@ -106,4 +127,4 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
         print_report(report(found), sys.stdout)
     if problems:
         raise KincheckError("\n".join(dict.fromkeys(problems)))
-    return Status.WITHIN
+    return Status.DEVIATES if worse else Status.WITHIN

@@ -41,7 +41,9 @@ class Doctor(Command):
         from .installation import examine
 
         require_writable([("--json", self.json)])
-        found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
+        found = examine(
+            registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines, registry.apart
+        )
         with with_json(found, self.json):
             (_print_verdict if self.quiet else _print)(found, page(self.json))
         return Status.WITHIN if found.able else Status.FAILED

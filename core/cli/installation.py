@@ -11,11 +11,12 @@ import sys
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 
 import msgspec
 
 from ..case.case import Case
-from ..extras import how_to_install
+from ..extras import how_to_add, how_to_install, python_of
 from ..harness.engine import PATIENCE, Engine
 from ..harness.provenance import circumstances
 from ..harness.record import Outcome, Record
@@ -47,6 +48,9 @@ MODULES = {
     "drake": "pydrake.multibody.plant",
     "dartpy": "dartpy",
     "opensim": "opensim",
+    "mujoco-mjx": "mujoco.mjx",
+    "mujoco-warp": "mujoco_warp",
+    "genesis-world": "genesis",
 }
 LIBRARIES = "of Debian: libgomp1 for Pinocchio, libgl1 and libx11-6 for Exudyn"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -118,8 +122,14 @@ class Examination(msgspec.Struct, frozen=True):
         )
 
 
-def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
-    """Examine the installation, with the named engines, and solve a case with the native engine."""
+def examine(
+    case: Case, native: Engine, tol: float, engines: Collection[str], apart: Mapping[str, str]
+) -> Examination:
+    """Examine the installation, with the named engines, and solve a case with the native engine.
+
+    Args:
+        apart: requirements of steppers that have environments of their own, by engine.
+    """
     problem = _cache_problem()
     about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
     machine = Machine(
@@ -138,17 +148,20 @@ def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) ->
         problem,
     )
     return Examination(
-        SCHEMA, about["kincheck"], parts(engines), machine, _check(case, native, tol)
+        SCHEMA, about["kincheck"], parts(engines, apart), machine, _check(case, native, tol)
     )
 
 
-def parts(engines: Collection[str]) -> list[Part]:
-    """Return required and optional parts from kincheck's own metadata, and a browser.
+def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
+    """Return required and optional parts from kincheck's own metadata, steppers in environments of
+    their own, and a browser.
 
     Args:
         engines: names of engines; the extra of an engine's simulator has the same name.
+        apart: see `examine`.
     """
     purposes, modules = PURPOSES | dict.fromkeys(engines, "engine"), dict(MODULES)
+    pythons = dict[str, str]()
     found: list[Part] = []
     for requirement in importlib.metadata.requires("kincheck") or []:
         extra = re.search(r"""extra == ['"]([\w-]+)['"]""", requirement)
@@ -174,28 +187,47 @@ def parts(engines: Collection[str]) -> list[Part]:
                     remedy if problem else "",
                 )
             )
+    for engine, requirements in apart.items():
+        name, python = requirements.split()[0], python_of(engine)
+        version, pythons[name] = _version(name, python), python
+        problem = "not installed" if version is None else ""
+        remedy = how_to_add(engine, requirements) if problem else ""
+        found.append(Part(name, version, "board of steppers", False, problem, remedy))
     browser = next((path for path in map(shutil.which, BROWSERS) if path), None)
     missing = ("", "") if browser else ("not installed", "apt install chromium")
     return [
-        *_imported(found, modules),
+        *_imported(found, modules, pythons),
         Part("chromium", browser, "tests of the report", False, *missing),
     ]
 
 
-def _version(name: str) -> str | None:
+def _version(name: str, python: str = sys.executable) -> str | None:
+    """Return the version of a distribution beside a Python."""
     try:
-        return importlib.metadata.version(name)
+        if python == sys.executable:
+            return importlib.metadata.version(name)
+        folder = Path(python).parents[1]
+        places = *folder.glob("lib/python*/site-packages"), folder / "Lib" / "site-packages"
+        every = importlib.metadata.distributions(name=name, path=[*map(str, places)])
+        return next((each.version for each in every), None)
     except importlib.metadata.PackageNotFoundError:
         return None
 
 
-def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
+def _imported(
+    found: Sequence[Part], modules: Mapping[str, str], pythons: Mapping[str, str]
+) -> list[Part]:
     """Return the parts with the problems of importing their modules. Each import runs in its own
     process, because a broken library can end it.
     """
     running = {
         part.name: subprocess.Popen(
-            [sys.executable, "-P", "-c", f"import {modules.get(part.name, part.name)}"],
+            [
+                pythons.get(part.name, sys.executable),
+                "-P",
+                "-c",
+                f"import {modules.get(part.name, part.name)}",
+            ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -144,7 +144,7 @@ def registry() -> Registry:
         tuple(adapters.SIMULATIONS),
         tuple(adapters.CONVERTERS),
         adapters.converter,
-        adapters.STEPPERS,
+        adapters.APART,
         adapters.stepper_files,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from fnmatch import fnmatchcase
 from glob import glob
@@ -51,7 +51,7 @@ class Registry:
         simulations: names of the engines in simulate mode.
         converters: names of the simulators that save models.
         converter: returns the function of such a name, from a file to the text of another.
-        steppers: names of the engines that step free motion.
+        apart: requirements of the steppers that have environments of their own.
         stepper_files: returns the files of a stepper's reproducer, of an engine, a mechanism and
             its twists at the start.
     """
@@ -66,7 +66,7 @@ class Registry:
     simulations: Sequence[str] = ()
     converters: Sequence[str] = ()
     converter: Callable[[str], Callable[[Path], str]] | None = None
-    steppers: Sequence[str] = ()
+    apart: Mapping[str, str] = field(default_factory=dict[str, str])
     stepper_files: Callable[..., Mapping[str, str]] | None = None
 
     def case_of(self, options: Any, *, driven: bool = True) -> Case:

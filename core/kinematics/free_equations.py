@@ -208,12 +208,18 @@ class FreeEquations:
         """Return a solution x of rows x = right, and a basis of all others beside it, shape
         (unknowns,) and (unknowns, freedoms).
         """
-        if not self.count:
+        if not self.rank:
             return np.zeros(self.unknowns), np.diag(self.scale)
-        q, r, order = self._linear.qr((rows * self.scale).T, pivoting=True, check_finite=False)
-        chosen, upper = order[: self.rank], r[: self.rank, : self.rank]
-        x = self._linear.solve_triangular(upper, right[chosen], trans="T", check_finite=False)
-        return self.scale * (q[:, : self.rank] @ x), self.scale[:, None] * q[:, self.rank :]
+        # LAPACK itself, with room for its blocks of up to 64 columns: scipy's wrappers take as long
+        # as the factors
+        lapack, rank, n = self._linear.lapack, self.rank, self.unknowns
+        room = 64 * (n + self.count)
+        factors, order, tau, *_ = lapack.dgeqp3((rows * self.scale).T, lwork=room)
+        x, _ = lapack.dtrtrs(factors[:rank, :rank], right[order[:rank] - 1], trans=1)
+        square = np.zeros((n, n), order="F")
+        square[:, : self.count] = factors[:, :n]
+        q, *_ = lapack.dorgqr(square, tau, lwork=room, overwrite_a=1)
+        return self.scale * (q[:, :rank] @ x), self.scale[:, None] * q[:, rank:]
 
     def start(self, v: Array) -> Array:
         """Return the state at the design position, closed, at rates of the unknowns.

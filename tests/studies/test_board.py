@@ -12,11 +12,14 @@ from pathlib import Path
 import kincheck
 import numpy as np
 import pytest
+from kincheck import adapters
 from kincheck.core.case.case import Free
 from kincheck.core.cli.main import main
-from kincheck.core.studies.board.results import Run
-from kincheck.core.studies.board.run import order_and_floor
+from kincheck.core.extras import python_of
+from kincheck.core.studies.board.results import Row, Run
+from kincheck.core.studies.board.run import better, order_and_floor
 from kincheck.core.studies.board.truth import truth_of
+from msgspec.structs import replace as replace_row
 
 DATA = Path(__file__).parents[1] / "data"
 FOUR_BAR = DATA / "free_four_bar.toml"
@@ -83,6 +86,21 @@ def test_semi_implicit_engines_share_their_error(engine, rows, tmp_path):
     assert errors(best)[-2:] == pytest.approx(one[-2:], rel=0.05)
 
 
+def test_drake_without_loops_is_also_continuous(tmp_path):
+    pytest.importorskip("pydrake.multibody.plant", exc_type=ImportError)
+    text = short(tmp_path, 0.1, 3).read_text("utf-8")
+    case = tmp_path / "chain.toml"
+    case.write_text(re.sub(r"\[joints\.D\]\n(.+\n)*", "", text).replace('"free_', '"chain_'))
+    found = {
+        (row["case"], row["integrator"]): row
+        for row in measured(tmp_path, "--engine", "drake", "--case", str(case))
+    }
+    chain = found["chain_four_bar", "runge_kutta3"]
+    assert errors(chain)[-1] < 1e-9
+    assert chain["runs"][-1]["reaction"] < 1e-6
+    assert "no constraints" in found["free_four_bar", "runge_kutta3"]["message"]
+
+
 def test_error_of_simbody_follows_its_accuracy(tmp_path):
     pytest.importorskip("opensim", exc_type=ImportError)
     strut = tmp_path / "strut.toml"
@@ -116,6 +134,26 @@ def test_energy_and_gap_follow_the_error(rows):
     assert 0.1 * last["error"] < last["energy"] < 1e3 * last["error"]
 
 
+def test_joint_forces_of_engines_are_the_truths(rows):
+    def last(*key):
+        return rows[key]["runs"][-1]["reaction"]
+
+    # forces of up to 100 N, of which MuJoCo's impedance of 0.9999 leaves a ten-thousandth out
+    assert last("pinocchio", "RK4", "best") < 1e-6
+    assert last("exudyn", "TrapezoidalIndex2", "best") < 1e-3
+    assert last("mujoco", "RK4", "best") < 2e-2
+    assert last("mujoco", "RK4", "default") > 0.1
+
+
+def test_undetermined_joint_forces_are_left_open():
+    truth = truth_of(replace(kincheck.load("bricard"), free=Free(0.01, 2)))
+    assert np.isfinite(truth.reactions).all()
+    assert np.abs(truth.reactions[..., 3:]).max() > 0.1
+    head, *values = truth.tables([], 1)["reactions.csv"].splitlines()
+    assert len(values) == 1
+    assert head.count(",") == 6 * len(truth.case.mechanism.joints) - 1
+
+
 def test_site_has_every_row_and_its_reproducer(site, rows):
     page = (site / "index.html").read_text("utf-8")
     for row in rows.values():
@@ -126,19 +164,39 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
-def test_board_keeps_the_date_of_an_unchanged_row(tmp_path):
+def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
     given = ["--engine", "mujoco", "--case", str(short(tmp_path, 0.02, 3)), "--steps", "2"]
     file = tmp_path / "site" / "board.json"
     assert main(["board", *given, "--out", str(file.parent)]) == 0
+    page = file.parent / "index.html"
+    assert "History" not in page.read_text("utf-8")
     found = json.loads(file.read_text("utf-8"))
-    first, second, *_ = found["rows"]
-    first["since"], second["since"], second["version"] = "2025-01-01", "2025-01-01", "3.9"
-    file.write_text(json.dumps(found), "utf-8")
+    first, second, third, *_ = found["rows"]
+    for row in (first, second, third):
+        row["since"] = "2025-01-01"
+    second["version"] = "3.9"
+    third["runs"][-1]["error"] *= 0.5
+    wrong = third["runs"][-1]["error"]
+    old = tmp_path / "the old one.json"
+    old.write_text(json.dumps(found), "utf-8")
+    assert main(["board", *given, "--out", str(file.parent), "--against", str(old)]) == 1
+    assert "mujoco implicitfast, default: measured, worse" in capsys.readouterr().err
+    one, two, three, *_ = json.loads(file.read_text("utf-8"))["rows"]
+    assert one["since"] == "2025-01-01" < two["since"] == three["since"]
+    assert not one["past"]
+    assert [each["version"] for each in two["past"]] == ["3.9"]
+    (before,) = three["past"]
+    assert (before["since"], before["until"]) == ("2025-01-01", three["since"])
+    assert before["error"] == wrong
+    assert "History" in page.read_text("utf-8")
+    # the same again, and a board with other steps
     assert main(["board", *given, "--out", str(file.parent)]) == 0
-    dates = [row["since"] for row in json.loads(file.read_text("utf-8"))["rows"]]
-    assert dates[0] == "2025-01-01" < dates[1]
+    assert len(json.loads(file.read_text("utf-8"))["rows"][2]["past"]) == 1
+    more = [*given[:-1], "4", "--out", str(file.parent), "--against", str(old)]
+    assert main(["board", *more]) == 0
     file.write_text("{}", "utf-8")
     assert main(["board", *given, "--out", str(file.parent)]) == 2
+    assert main(["board", *given, "--out", str(file.parent), "--against", "none.json"]) == 2
 
 
 def test_reproducer_runs_alone_and_repeats_the_row(site, rows):
@@ -184,6 +242,18 @@ def test_truth_of_a_turned_body_follows_its_points():
     assert (lost < 0.0).all()
 
 
+def test_best_is_best_by_error():
+    given = {"case": "a", "engine": "b", "integrator": "c", "group": "d", "loop": "", "ties": ""}
+    default = Row(**given, column="default", state="measured", runs=[Run(error=3e-4)])
+    row = replace_row(default, column="best", settings={"mu": 0.1})
+    worse, nearer = (replace_row(row, runs=[Run(error=each)]) for each in (4e-4, 2e-4))
+    found = better(default, worse)
+    assert (found.column, found.settings, found.runs) == ("best", {}, default.runs)
+    assert found.message == "the defaults are nearer here than mu 0.1, with error 0.0004 m"
+    assert better(default, nearer) is nearer
+    assert better(replace_row(default, runs=[]), worse) is worse
+
+
 def test_order_and_floor_of_halved_steps():
     def runs(*found):
         return [Run(step=0.5**k, error=error) for k, error in enumerate(found)]
@@ -213,6 +283,64 @@ def test_fault_of_an_engine_costs_only_its_rows(tmp_path, monkeypatch):
     for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
         assert row["state"] == FAKES[row["engine"]][0]
         assert row["message"]
+
+
+def own_python(folder, text):
+    program = folder / "environments" / "pybullet" / "bin" / "python"
+    program.parent.mkdir(parents=True)
+    program.write_text(f"#!/bin/sh\n{text}\n")
+    program.chmod(0o755)
+    return str(folder / "environments")
+
+
+def pybullet_row(tmp_path):
+    given = ["--case", str(short(tmp_path, 0.02, 3)), "--engine", "pybullet", "--steps", "2"]
+    assert main(["board", *given, "--out", str(tmp_path / "site")]) == 0
+    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"][0]
+
+
+def test_engine_runs_in_its_own_environment(tmp_path, monkeypatch):
+    monkeypatch.setenv("KINCHECK_ENVIRONMENTS", own_python(tmp_path, "echo own >&2\nexit 5"))
+    row = pybullet_row(tmp_path)
+    assert row["state"] == "crashed"
+    assert row["message"].endswith("status 5; own")
+
+
+def test_missing_environment_is_told_with_its_remedy(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path))
+    row = pybullet_row(tmp_path)
+    remedy = f"python -m venv {tmp_path}/pybullet && {tmp_path}/pybullet/bin/pip install"
+    assert row["state"] == "unavailable"
+    assert remedy in row["message"]
+    assert remedy in (tmp_path / "site" / "index.html").read_text("utf-8").replace("&amp;", "&")
+    monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path / "none"))
+    assert main(["board", "--out", str(tmp_path / "site")]) == 2
+    assert "KINCHECK_ENVIRONMENTS: there is no folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "mjx", "mujoco-warp"])
+def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
+    if python_of(engine) == sys.executable:
+        pytest.skip(f"KINCHECK_ENVIRONMENTS has no {engine}")
+    (*_, best) = measured(tmp_path, "--engine", engine, "--timeout", "600")
+    one = errors(rows["mujoco", "Euler", "best"])
+    # rounding to float32 shifts the phase
+    assert errors(best)[-1] == pytest.approx(one[-1], rel=0.06)
+
+
+def test_urdf_of_the_board_is_the_model(site):
+    pin = pytest.importorskip("pinocchio")
+    truth = truth_of(kincheck.load(FOUR_BAR))
+    files = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)
+    model, found = json.loads(files["model.json"]), pin.buildModelFromXML(files["model.urdf"])
+    data = found.createData()
+    for body in model["bodies"]:
+        k = found.getJointId(f"{body['name']} joint")
+        pin.forwardKinematics(found, data, pin.neutral(found))
+        inertia = found.inertias[k]
+        assert inertia.mass == body["mass"]
+        assert data.oMi[k].act(inertia.lever) == pytest.approx(body["center"], abs=1e-15)
+        assert inertia.inertia == pytest.approx(np.array(body["inertia"]), abs=1e-15)
 
 
 def test_missing_constraint_is_a_row_with_its_reason(tmp_path):

@@ -22,6 +22,7 @@ COLUMNS = (
     "error [m]",
     "gap [m]",
     "energy [J]",
+    "reaction [N]",
     "cost [s/s]",
     "order",
     "floor [m]",
@@ -32,6 +33,9 @@ NOTES = (
     "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
     " Gap: largest opening of a loop. Energy: of motion, weight and springs, minus the truth's at"
     " the same time; what loads and dampers take is in both.",
+    "Reaction: largest error of the force in a joint, without directions that redundant rows leave"
+    " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Drake,"
+    " Simbody), or of all joints but rods (Exudyn).",
     "Errors and costs are of the shortest step. Cost: wall time for a simulated second, in one"
     " run and process. The machine also does other things: costs within a factor of two are"
     " alike. Where the loop over the steps is in Python, its time is in the cost.",
@@ -50,14 +54,32 @@ def report(board: Board) -> Report:
             f"kincheck {board.kincheck}",
             board.started,
             board.processor,
-            "float64 on the CPU",
+            "on the CPU",
             *(sorted({f"{row.engine} {row.version}" for row in board.rows if row.version})),
         ],
         [
             *(_section(truth, rows) for truth in board.truths if (rows := _rows(board, truth))),
+            *_history(board.rows),
             _settings(board.rows),
         ],
     )
+
+
+def _history(rows: Sequence[Row]) -> list[Section]:
+    """Return the section on rows that changed, if any did."""
+    cells, changed = list[list[str]](), [row for row in rows if row.past]
+    for row in changed:
+        ends = [(each.until, each) for each in row.past]
+        for until, each in [*ends, ("now", row)]:
+            error = number(each.error) if each.error is not None else each.state
+            settings = ", ".join(f"{name} {value}" for name, value in each.settings.items())
+            cells.append([row.case, row.name, each.since, until, each.version, settings, error])
+    verdict = [
+        "Rows whose version, settings, outcome or error changed since the first board of this"
+        " history: errors by more than a tenth, and by more than round-off."
+    ]
+    heads = ("case", "row", "since", "until", "version", "settings", "error [m]")
+    return [Section("History", verdict, [], heads, 6, cells)] if changed else []
 
 
 def _rows(board: Board, truth: TruthFacts) -> list[Row]:
@@ -96,10 +118,8 @@ def _alike(rows: Sequence[Row]) -> list[str]:
     found = list[str]()
     for group, each in groupby(rows, key=lambda row: row.group):
         best = _best(each)
-        errors = [row.measured[-1].error or 0.0 for row in best if row.measured]
-        if len({row.engine for row in best if row.measured}) > 1 and max(errors) < 1.1 * min(
-            errors
-        ):
+        errors = [row.error for row in best if row.error]
+        if len({row.engine for row in best if row.error}) > 1 and max(errors) < 1.1 * min(errors):
             found.append(
                 f"{group}: {len(errors)} steppers share their error to"
                 f" {100 * (max(errors) / min(errors) - 1):.1g} %: it is the integrator's, not the"
@@ -122,7 +142,9 @@ def _cells(row: Row) -> list[str]:
         row.column,
         f"{row.state}: {row.message}" if row.message else row.state,
         number(last.step) if last.step else "own" if last.accuracy else "–",
-        *(number(each) for each in (last.error, last.gap, last.energy, last.cost)),
+        *(number(each) for each in (last.error, last.gap, last.energy)),
+        "not given" if row.measured and last.reaction is None else number(last.reaction),
+        number(last.cost),
         "–" if row.order is None else f"{row.order:.2f}",
         number(row.floor),
         row.since,
@@ -148,6 +170,12 @@ def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
     return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
+def _missing(rows: Sequence[Row]) -> list[str]:
+    """Return why engines are not run, a sentence each."""
+    messages = {row.engine: row.message for row in rows if row.state == "unavailable"}
+    return [f"Not run: {engine}: {message}." for engine, message in messages.items()]
+
+
 def _settings(rows: Sequence[Row]) -> Section:
     named = {(row.engine, row.integrator, row.column): row for row in rows}
     return Section(
@@ -155,14 +183,14 @@ def _settings(rows: Sequence[Row]) -> Section:
         [
             "Default: nothing but integrator and step is set. Best: the best known settings, kept"
             " in settings.toml of the board; whoever knows better ones changes that file.",
-            "Not run here: PyBullet, MJX, MuJoCo Warp, Newton and Genesis, which need environments"
-            " of their own.",
+            *_missing(rows),
         ],
         NOTES,
         (
             "engine",
             "version",
             "integrator",
+            "precision",
             "settings",
             "loop over steps",
             "closed loops",
@@ -170,12 +198,13 @@ def _settings(rows: Sequence[Row]) -> Section:
             "by",
             "on",
         ),
-        9,
+        10,
         [
             [
                 row.engine,
                 row.version,
                 row.integrator,
+                row.precision,
                 row.column,
                 row.loop,
                 row.ties,

@@ -16,6 +16,9 @@ from ...harness.provenance import processor
 from ...version import VERSION
 
 SCHEMA = "kincheck-board/1"
+# An engine repeats its digits. Another processor's rounding moves errors down at round-off, and
+# those of float32 by some percent.
+RELATIVE, ROUNDING = 0.1, 1e-11  # [-], [m]
 
 State: TypeAlias = Literal[
     "measured", "diverged", "failed", "unsupported", "unavailable", "timeout", "crashed"
@@ -35,6 +38,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         error: largest distance of a point from the truth over the samples [m].
         gap: largest opening of a loop at the samples [m].
         energy: largest difference of the energy of motion, weight and springs from the truth's [J].
+        reaction: largest error of the given joint forces, in determined directions [N].
         cost: wall time for a simulated second [s/s].
         message: why there are no numbers, or empty.
     """
@@ -45,8 +49,25 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     error: float | None = None
     gap: float | None = None
     energy: float | None = None
+    reaction: float | None = None
     cost: float | None = None
     message: str = ""
+
+
+class Past(msgspec.Struct, frozen=True, kw_only=True):
+    """Figures of a row on earlier boards.
+
+    Attributes:
+        since, until: dates of the first board with it, and of the first without.
+        error: of the shortest step [m]; None without one.
+    """
+
+    since: str
+    until: str
+    version: str
+    settings: dict[str, Any]
+    state: State
+    error: float | None
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True):
@@ -57,12 +78,13 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
         group: of the integrator.
         design_order: order of the method for smooth motions; None if steps are controlled.
         by, on: who gave the settings, and when; empty for defaults.
-        loop: where the loop over the steps runs: the engine or Python.
+        loop: runs the loop over the steps: the engine or Python.
         ties: form of the closed loops.
         order: by least squares over the runs above the floor; None with fewer than two.
         floor: error that smaller steps do not lower [m]; None if none is reached.
         folder: of the reproducer, below the board; empty without one.
-        since: date of the first board in the same folder with this version and these settings.
+        since: date of the first board of a history with this version, settings, state and error.
+        past: its earlier figures, the oldest first.
     """
 
     schema: str = SCHEMA
@@ -87,6 +109,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
     floor: float | None = None
     folder: str = ""
     since: str = ""
+    past: list[Past] = []
 
     @property
     def name(self) -> str:
@@ -99,18 +122,57 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
         return f"{self.case}: {self.name}"
 
     def dated(self, earlier: Mapping[str, Row]) -> Row:
-        """Return the row with today's date, or an earlier one's if version and settings are the
-        same.
+        """Return the row with its history, which continues an earlier row with the same steps."""
+        before, today = earlier.get(self.key), date.today().isoformat()
+        if before is None or not self.compares_with(before):
+            return replace(self, since=today)
+        same = (before.version, before.settings, before.state) == (
+            self.version,
+            self.settings,
+            self.state,
+        )
+        if same and not _changed(before.error, self.error):
+            return replace(self, since=before.since, past=before.past)
+        old = Past(
+            since=before.since,
+            until=today,
+            version=before.version,
+            settings=before.settings,
+            state=before.state,
+            error=before.error,
+        )
+        return replace(self, since=today, past=[*before.past, old])
+
+    def compares_with(self, before: Row) -> bool:
+        """Return whether both are of the same steps; a row without runs compares with any."""
+        ends = [[(run.step, run.accuracy) for run in row.runs[-1:]] for row in (self, before)]
+        return ends[0] == ends[1] or [] in ends
+
+    def worse_than(self, before: Row) -> bool:
+        """Return whether the error has grown at the same steps, or there is none any more. An
+        engine that is not installed is not worse.
         """
-        before, since = earlier.get(self.key), date.today().isoformat()
-        if before and (before.version, before.settings) == (self.version, self.settings):
-            since = before.since
-        return replace(self, since=since)
+        if not self.compares_with(before):
+            return False
+        if self.error is None or before.error is None:
+            return before.error is not None and self.state != "unavailable"
+        return self.error > before.error and _changed(before.error, self.error)
+
+    @property
+    def error(self) -> float | None:
+        """Error of the shortest step [m]."""
+        return self.measured[-1].error if self.measured else None
 
     @property
     def measured(self) -> list[Run]:
         """The runs with numbers."""
         return [run for run in self.runs if run.error is not None]
+
+
+def _changed(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one is not other
+    return abs(other - one) > max(RELATIVE * one, ROUNDING)
 
 
 class TruthFacts(msgspec.Struct, frozen=True, kw_only=True):
@@ -167,6 +229,7 @@ def earlier_rows(file: Path) -> dict[str, Row]:
     Raises:
         KincheckError: the file is no board.
     """
+    file = file / "board.json" if file.is_dir() else file
     if not file.is_file():
         return {}
     try:

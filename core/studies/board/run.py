@@ -6,7 +6,6 @@ import json
 import math
 import os
 import subprocess
-import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ import numpy as np
 
 from ...case.io.escape import file_name
 from ...errors import KincheckError, UnsupportedError, unknown
-from ...extras import THREADS
+from ...extras import THREADS, how_to_add, how_to_install, python_of
 from ...harness.record import to_json
 from .results import Row, Run, State
 from .truth import Truth
@@ -27,6 +26,8 @@ SETTINGS = Path(__file__).with_name("settings.toml")
 HALVINGS = 3
 # A halved step that lowers the error by less than this part of a digit of order has met a floor.
 FLOOR = 0.5
+# Errors within a hundredth of each other are alike: solvers end at their own tolerances.
+ALIKE = 0.99
 
 Files = Callable[[str, Truth], Mapping[str, str]]
 """Function from engine and truth to the files of a reproducer: model.json and run.py."""
@@ -38,6 +39,7 @@ class Stepper:
 
     Attributes:
         accuracies: efforts of an engine that controls its steps; empty for fixed steps.
+        samples: number of compared ones; None for all.
         best: settings; None if no better ones than the defaults are known.
     """
 
@@ -48,6 +50,8 @@ class Stepper:
     ties: str
     order: int | None = None
     accuracies: Sequence[float] = ()
+    precision: str = "float64"
+    samples: int | None = None
     best: Mapping[str, Any] | None = None
     by: str = ""
     date: Any = ""
@@ -87,6 +91,7 @@ def rows_of(
     wanted: Sequence[Stepper],
     files: Files,
     earlier: Mapping[str, Row],
+    apart: Mapping[str, str],
     *,
     out: Path,
     steps: int,
@@ -96,10 +101,12 @@ def rows_of(
 
     Args:
         earlier: rows of an earlier board in this folder, by their keys.
+        apart: requirements of engines in environments of their own.
         steps: least number of the longest steps in the whole motion.
         timeout: of all runs of a row [s].
     """
     for stepper in wanted:
+        default: Row | None = None
         for column, settings in stepper.columns.items():
             row = Row(
                 case=truth.case.name,
@@ -113,6 +120,7 @@ def rows_of(
                 on=str(stepper.date) if settings else "",
                 loop=stepper.loop,
                 ties=stepper.ties,
+                precision=stepper.precision,
                 state="unsupported",
             )
             try:
@@ -131,13 +139,27 @@ def rows_of(
             texts = {
                 **texts,
                 "settings.json": json.dumps(given, indent=1) + "\n",
-                "truth.csv": truth.table(points),
+                **truth.tables(points, stepper.samples or len(truth.times)),
             }
             _write(out / folder, texts)
             row = msgspec.structs.replace(row, folder=str(folder))
-            done = measured(row, out / folder, timeout).dated(earlier)
+            done = measured(row, out / folder, apart, timeout)
+            default = default or done
+            if stepper.samples and done.measured:
+                end = truth.times[: stepper.samples][-1]
+                done = msgspec.structs.replace(done, message=f"the first {end:.3g} s alone")
+            done = better(default, done).dated(earlier)
             _write(out / folder, {"row.json": to_json(done).decode()})
             yield done
+
+
+def better(default: Row, best: Row) -> Row:
+    """Return the row of the best known settings, or the default's if its error is smaller."""
+    if not default.error or not best.error or default.error >= ALIKE * best.error:
+        return best
+    values = ", ".join(f"{name} {value}" for name, value in best.settings.items())
+    message = f"the defaults are nearer here than {values}, with error {best.error:.3g} m"
+    return msgspec.structs.replace(default, column="best", message=message)
 
 
 def _write(folder: Path, texts: Mapping[str, str]) -> None:
@@ -151,7 +173,7 @@ def _write(folder: Path, texts: Mapping[str, str]) -> None:
         ) from None
 
 
-def measured(row: Row, place: Path, timeout: float) -> Row:
+def measured(row: Row, place: Path, apart: Mapping[str, str], timeout: float) -> Row:
     """Run the reproducer in a folder, and return the row with its runs."""
     state: State | None = None
     message, result = "", place / "result.json"
@@ -159,7 +181,7 @@ def measured(row: Row, place: Path, timeout: float) -> Row:
     environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "run.py"],
+            [python_of(row.engine), "-P", "run.py"],
             cwd=place,
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -181,6 +203,10 @@ def measured(row: Row, place: Path, timeout: float) -> Row:
     if state is None and (said := found.get("message", "")):
         kind, _, message = said.partition(": ")
         state = "unavailable" if kind == "unavailable" else "unsupported"
+        if state == "unavailable":
+            wanted = apart.get(row.engine)
+            remedy = how_to_add(row.engine, wanted) if wanted else how_to_install(row.engine)
+            message = f"{message}; {remedy}"
     if state is None:
         state, message = _state(runs)
     return msgspec.structs.replace(

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...case.case import TIME, Case
 from ...errors import KincheckError
+from ...forces import Reaction
 from ...kinematics import free_motion
 from ...mechanism.body import inertia_matrix
 from ...mechanism.loads import SpringDamper
@@ -48,12 +49,15 @@ class Truth:
     Attributes:
         frames: by moving body.
         energy: of motion, weight and springs [J], shape (n,).
+        reactions: of the joints: force of the first body on the second [N], and the direction left
+            open by redundant rows, zero without one; shape (n, joints, 6). NaN if more are open.
     """
 
     case: Case
     times: Array
     frames: Mapping[str, Frames]
     energy: Array
+    reactions: Array
     facts: TruthFacts
 
     @property
@@ -61,13 +65,19 @@ class Truth:
         """Angular velocities and velocities of the origin at the start, by body, shape (6,)."""
         return {name: np.concatenate([at.w[0], at.v[0]]) for name, at in self.frames.items()}
 
-    def table(self, points: Sequence[Mapping[str, Any]]) -> str:
-        """Return time, energy and the positions of points as CSV, SI units."""
+    def tables(self, points: Sequence[Mapping[str, Any]], samples: int) -> dict[str, str]:
+        """Return the first samples as CSV by file, SI units: time, energy and the positions of
+        points; reactions.
+        """
         heads = [TIME, "energy", *(f"{each['name']}.{axis}" for each in points for axis in "xyz")]
         places = [self.frames[each["body"]].at(each["position"])[0] for each in points]
         rows = np.hstack([self.times[:, None], self.energy[:, None], *places])
-        quoted = ",".join(f'"{name}"' for name in heads)
-        return "\n".join([quoted, *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n"
+        parts = [*(f"force {axis}" for axis in "xyz"), *(f"open {axis}" for axis in "xyz")]
+        joints = [f"{joint.name} {part}" for joint in self.case.mechanism.joints for part in parts]
+        return {
+            "truth.csv": _csv(heads, rows[:samples]),
+            "reactions.csv": _csv(joints, self.reactions.reshape(len(rows), -1)[:samples]),
+        }
 
 
 def truth_of(case: Case) -> Truth:
@@ -109,7 +119,27 @@ def truth_of(case: Case) -> Truth:
         seconds=perf_counter() - begin,
         message=found.message,
     )
-    return Truth(case, found.times, frames, _energy(mechanism, frames), facts)
+    forces = found.forces([joint.name for joint in mechanism.joints]).joints
+    reactions = [_determined(forces[joint.name], found.samples) for joint in mechanism.joints]
+    energy = _energy(mechanism, frames)
+    return Truth(case, found.times, frames, energy, np.stack(reactions, axis=1), facts)
+
+
+def _determined(reaction: Reaction, samples: Any) -> Array:
+    """Return the force at samples, and its open direction; see `Truth.reactions`."""
+    u, sizes, _ = np.linalg.svd(np.pad(reaction.free[samples, :3], ((0, 0), (0, 0), (0, 1))))
+    count = (sizes > np.broadcast_to(reaction.known, reaction.force.shape[:1])[samples, None]).sum(
+        1
+    )
+    found = np.hstack([reaction.force[samples], u[:, :, 0]])
+    found[count == 0, 3:] = 0.0
+    found[count > 1] = np.nan
+    return found
+
+
+def _csv(heads: Sequence[str], rows: Array) -> str:
+    quoted = ",".join(f'"{name}"' for name in heads)
+    return "\n".join([quoted, *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n"
 
 
 def _rotations(p: Array) -> Array:
