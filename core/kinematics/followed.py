@@ -28,7 +28,6 @@ from ..trajectory import Array, Trajectory
 from .compiled.request import Request
 from .compiled.routes import start_of
 from .forces.reactions import Follow
-from .formulation.constraints import size_of
 
 Prepare: TypeAlias = Callable[[Mechanism, Request, Path], Callable[[float], Trajectory]]
 """Makes a mechanism ready to be solved along a path, to a tolerance."""
@@ -147,7 +146,7 @@ def _way(mechanism: Mechanism, path: Path, times: Array) -> Array:
     if len(times) < 2 or not path.motions:
         return np.zeros(max(len(times) - 1, 0))
     turning = [mechanism.driver(name).turns for name in path.motions]
-    scale = np.where(turning, 1.0, 0.5 * size_of(mechanism))
+    scale = np.where(turning, 1.0, 0.5 * mechanism.size)
     share = np.linspace(0.0, 1.0, AMONG + 1)
     between = times[:-1, None] + np.diff(times)[:, None] * share
     values = path.values(between.ravel()).reshape(len(scale), *between.shape)

@@ -107,13 +107,7 @@ class _Inclusion:
 
     def whole(self, around: Element) -> Element:
         """Return an element with included models in place of <include>, at any depth."""
-        if not any(each.tag == "include" for each in around.below()):
-            return around
-        found = [
-            self._model(each) if each.tag == "include" else self.whole(each)
-            for each in around.children
-        ]
-        return replace(around, children=found)
+        return around.rebuilt(lambda each: (self._model(each) if each.tag == "include" else each,))
 
     def _model(self, element: Element) -> Element:
         element.require_known(("merge",), "SDF")
