@@ -30,6 +30,7 @@ from .mjcf_language import (
 )
 from .mjcf_mass import STAND_INS, mass_of
 from .place import ORIGIN, Place, coordinates, unit_quaternion
+from .robot_elements import Unread
 from .tree import (
     MOST_MOVING,
     UNKNOWNS,
@@ -134,6 +135,7 @@ class _Reader:
         )
         tendons = [each for section in root.only("tendon") for each in section.children]
         self.coupling = set[str]()
+        self.plugins = [(each, "") for part in root.only("extension") for each in part.children]
         self.tendons = {each.attributes.get("name", ""): each for each in tendons}
 
     def read(self) -> Tree:
@@ -147,6 +149,9 @@ class _Reader:
             )
             self._inside(world)
         tree.require_moving(root)
+        unread = Unread({name: name for name in tree.places}, {}, (), "an <equality>")
+        for plugin, link in self.plugins:
+            unread.require_apart(plugin, link)
         for section in root.only(*_LEFT_OUT):
             for element in section.children:
                 tree.count(f"{section.tag}: {element.tag}")
@@ -186,6 +191,8 @@ class _Reader:
                     pass
                 case _:
                     self.tree.count(f"{element.tag}s")
+                    if element.tag == "plugin":
+                        self.plugins.append((element, link))
 
     def _body(
         self, element: Element, around: Place, outer: str, childclass: str

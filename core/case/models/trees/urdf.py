@@ -267,6 +267,8 @@ class _Robot:
             case "fixed":
                 freedoms = []
             case "screw":
+                if element.child(PITCH) is None:
+                    raise element.fault(f"<{PITCH}>: missing, expected metres in a turn; add it")
                 freedoms = screw(graph, name, element.value(PITCH, 1)[0], axis(), element)
             case "universal":  # of Drake: about x of the parent, then y of the child
                 axes = enumerate((X, Y), 1)
@@ -373,6 +375,7 @@ class _Robot:
 
 def _mass(element: Element) -> Mass | None:
     """Return the mass of an <inertial>; None if it cannot be read, for motion does not need it."""
+    element.require_known((), "URDF")
     element.require_children(("mass", "inertia", "origin"), closed=True)
     for child in element.children:
         child.require_known({"mass": ("value",), "inertia": ENTRIES}.get(child.tag, POSE), "URDF")
