@@ -39,6 +39,8 @@ NEAR, PARTS = 0.5, (0.25, 0.05, 0.01)
 DOUBT = 0.5 * math.pi
 # More samples than these would take long, and such a sweep has passed no turn unseen.
 MOST = 200_000
+# Poses of bodies that are kept at once, of some hundred bytes each.
+MOST_POSES = 500_000
 # Places between two samples where the drivers' way is measured.
 AMONG = 8
 TOL = 1e-9
@@ -130,8 +132,20 @@ def _followed(
 
 
 def _motion(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
-    request = Request(tuple(path.motions), (), what.bodies(mechanism), 1)
-    return prepare(mechanism, request, path)(TOL)
+    """Return the motion of all bodies, which others ask for next, or if it is long of its own."""
+    bodies = tuple(body.name for body in mechanism.moving)
+    if len(bodies) * len(path.times) > MOST_POSES:
+        bodies = what.bodies(mechanism)
+    return (_recent_motion if path.is_builtin else _solved)(prepare, mechanism, path, bodies)
+
+
+def _solved(
+    prepare: Prepare, mechanism: Mechanism, path: Path, bodies: tuple[str, ...]
+) -> Trajectory:
+    return prepare(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
+
+
+_recent_motion = keep_last(2)(_solved)
 
 
 def _sorted(path: Path, start: float) -> Array:

@@ -268,7 +268,11 @@ NOT_INCLUDED = {
     "far away": ("../../../etc/x.sdf", "", "expected a model in the folder"),
     "itself": ("model.sdf", "", "with 0 models, expected <sdf> with one"),
     "merged": ("model://bars", '</include><include merge="true">', "merge: is not read"),
-    "by no frame of it": ("model://bars", "<placement_frame>z</placement_frame>", "the frame 'two::z'"),
+    "by no frame of it": (
+        "model://bars",
+        "<placement_frame>z</placement_frame>",
+        "the frame 'two::z'",
+    ),
 }
 
 

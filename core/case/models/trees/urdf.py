@@ -145,9 +145,15 @@ class _Robot:
         add_ties(graph, ((each, self._named, framed) for each in root.children))
         self.beside.add(graph)
         self._require_apart(frames)
-        for each in root.only("transmission"):
-            names = (joint.attributes.get("name", "") for joint in each.only("joint"))
-            graph.tree.actuated.update(name for name in names if name in self.joints)
+        commanded = [
+            joint
+            for control in root.only("ros2_control")
+            for joint in control.only("joint")
+            if any(joint.only("command_interface"))
+        ]
+        driven = [joint for each in root.only("transmission") for joint in each.only("joint")]
+        names = {joint.attributes.get("name", "") for joint in (*driven, *commanded)}
+        graph.tree.actuated |= names & self.joints.keys()
 
     def _links(self) -> None:
         root, graph = self.root, self.graph
