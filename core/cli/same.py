@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
-from ..extras import THREADS
 from .option_types import add_json
 from .registry import Registry, Status
 
@@ -37,7 +35,7 @@ def add(commands: Any) -> None:
         help="compare files: the same mechanism, what is lost, or how it differs",
         description=_same.__doc__,
     )
-    same.set_defaults(do=_same)
+    same.set_defaults(do=_same, one_thread=True)
     same.add_argument(
         "files",
         nargs="+",
@@ -79,8 +77,6 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 the same motion, whether something is lost or not, 1 it differs, 2 not judged or
     not read.
     """
-    for name in THREADS:  # many small matrices: threads would wait for each other
-        os.environ.setdefault(name, "1")
     from ..case.io.atomic_files import require_writable
     from ..case.models.files import require_used
     from ..report.terminal import page, with_json

@@ -97,7 +97,9 @@ def read_urdf(file: Path, root: Element) -> Tree:
     """
     robot = _Robot(file, root)
     robot.read()
-    return robot.graph.hang()
+    tree = robot.graph.hang()
+    robot.beside.place(tree)
+    return tree
 
 
 class _Robot:
