@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..caches import keep_last
 from ..errors import CaseError, unknown
 from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
@@ -309,12 +311,12 @@ class Case:
                 found[place] = found.get(place, np.array(values[place])) + moved @ slopes.T
         return found
 
-    @property
+    @cached_property
     def points(self) -> tuple[str, ...]:
         """Names of the points that outputs read; no other motion is needed."""
         return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
 
-    @property
+    @cached_property
     def forces(self) -> tuple[str, ...]:
         """Names of the joints, drivers and force elements whose forces outputs read."""
         return tuple(dict.fromkeys(name for output in self.outputs for name in output.forces))
@@ -325,6 +327,7 @@ class Case:
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))
 
 
+@keep_last(8)
 def size(case: Case) -> float:
     """Return the largest extent along a global axis of joints and compared points at design, or the
     largest displacement of a driver [m].
@@ -350,6 +353,7 @@ def turning(case: Case) -> NDArray[np.bool_]:
     )
 
 
+@keep_last(8)
 def pace(case: Case) -> float:
     """Return the pace of the mechanism [1/s]: the largest rate of a driver over a radian,
     or over the mechanism's size; see `harness.compare`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ..case.io.escape import file_name
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, unknown
-from ..extras import THREADS
 from ..options import (
     ONE_CASE,
     argument,
@@ -185,6 +183,7 @@ class Same(Command):
     """
 
     about: ClassVar[str] = "compare files: the same mechanism, what is lost, or how it differs"
+    one_thread: ClassVar[bool] = True
     files: tuple[str, ...] = argument(
         "models and case files of any formats, or names of built-in cases; the first is"
         " compared with each of the others",
@@ -214,8 +213,6 @@ class Same(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        for name in THREADS:  # many small matrices: threads would wait for each other
-            os.environ.setdefault(name, "1")
         from ..case.io.atomic_files import require_writable
         from ..case.models.files import require_used
         from ..report.terminal import page, with_json

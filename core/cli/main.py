@@ -16,6 +16,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, TextIO
 
 from ..errors import KincheckError
+from ..extras import THREADS
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..version import VERSION
 from . import COMMANDS
@@ -58,6 +59,9 @@ def _done(argv: list[str]) -> int:
     except SystemExit as end:  # argparse has printed why
         return int(end.code or 0)
     try:
+        if getattr(options, "one_thread", False):  # before numpy is loaded
+            for name in THREADS:
+                os.environ.setdefault(name, "1")
         if getattr(options, "joint_type", ()):
             from .joint_loading import load_joint
 

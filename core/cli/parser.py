@@ -106,12 +106,14 @@ class Command:
     Attributes:
         about: what it does, in the list of commands.
         epilog: end of the help.
+        one_thread: whether its matrices are so small that threads of libraries wait for each other.
         below: commands below this one, by name, with the heading of their list.
         command: the command line.
     """
 
     about: ClassVar[str]
     epilog: ClassVar[str | None] = None
+    one_thread: ClassVar[bool] = False
     below: ClassVar[Mapping[str, type[Command]]] = {}
     command: str = field(default="", init=False)
 
@@ -129,7 +131,7 @@ def add_command(commands: Any, name: str, cls: type[Command], given: Collection[
     parser: Parser = commands.add_parser(
         name, help=cls.about, description=cls.__doc__, epilog=cls.epilog
     )
-    parser.set_defaults(do=partial(_run, cls))
+    parser.set_defaults(do=partial(_run, cls), one_thread=cls.one_thread)
     known = add_options(parser, cls, given)
     if cls.below:
         below = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")

@@ -28,7 +28,6 @@ from ..trajectory import Array, Trajectory
 from .compiled.request import Request
 from .compiled.routes import start_of
 from .forces.reactions import Follow
-from .formulation.constraints import size_of
 
 Prepare: TypeAlias = Callable[[Mechanism, Request, Path], Callable[[float], Trajectory]]
 """Makes a mechanism ready to be solved along a path, to a tolerance."""
@@ -40,6 +39,8 @@ NEAR, PARTS = 0.5, (0.25, 0.05, 0.01)
 DOUBT = 0.5 * math.pi
 # More samples than these would take long, and such a sweep has passed no turn unseen.
 MOST = 200_000
+# Poses of bodies that are kept at once, of some hundred bytes each.
+MOST_POSES = 500_000
 # Places between two samples where the drivers' way is measured.
 AMONG = 8
 TOL = 1e-9
@@ -131,8 +132,20 @@ def _followed(
 
 
 def _motion(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
-    request = Request(tuple(path.motions), (), what.bodies(mechanism), 1)
-    return prepare(mechanism, request, path)(TOL)
+    """Return the motion of all bodies, which others ask for next, or if it is long of its own."""
+    bodies = tuple(body.name for body in mechanism.moving)
+    if len(bodies) * len(path.times) > MOST_POSES:
+        bodies = what.bodies(mechanism)
+    return (_recent_motion if path.is_builtin else _solved)(prepare, mechanism, path, bodies)
+
+
+def _solved(
+    prepare: Prepare, mechanism: Mechanism, path: Path, bodies: tuple[str, ...]
+) -> Trajectory:
+    return prepare(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
+
+
+_recent_motion = keep_last(2)(_solved)
 
 
 def _sorted(path: Path, start: float) -> Array:
@@ -147,7 +160,7 @@ def _way(mechanism: Mechanism, path: Path, times: Array) -> Array:
     if len(times) < 2 or not path.motions:
         return np.zeros(max(len(times) - 1, 0))
     turning = [mechanism.driver(name).turns for name in path.motions]
-    scale = np.where(turning, 1.0, 0.5 * size_of(mechanism))
+    scale = np.where(turning, 1.0, 0.5 * mechanism.size)
     share = np.linspace(0.0, 1.0, AMONG + 1)
     between = times[:-1, None] + np.diff(times)[:, None] * share
     values = path.values(between.ravel()).reshape(len(scale), *between.shape)

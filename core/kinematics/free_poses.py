@@ -18,7 +18,7 @@ from ..mechanism.mechanism import Mechanism
 from ..primitives.base import Pose
 from ..trajectory import Array
 from .formulation.cartesian import COLUMNS, Cartesian
-from .formulation.constraints import frames, size_of
+from .formulation.constraints import frames
 from .formulation.formulation import Configuration
 from .formulation.state_vectors import displaced, state_of
 
@@ -69,7 +69,7 @@ class FreePoses:
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = replace(mechanism, drivers=(), forces=())
         self.frame = frames(self.mechanism)
-        self.size, self.unit = size_of(self.mechanism), self.frame.unit
+        self.size, self.unit = self.mechanism.size, self.frame.unit
         self.formulation = Cartesian.of(self.mechanism, self.frame)
 
     def walk(self, walks: int, steps: int, seed: int, outside: Callable[[Poses], Array]) -> Walked:

@@ -439,14 +439,26 @@ class Mechanism:
         return found
 
     @cached_property
+    def _places(self) -> Sequence[Vector]:
+        return [place for joint in self.joints for place in joint.points_on()]
+
+    @cached_property
     def extent(self) -> float:
         """Largest extent along a global axis of the points of joints, and of those that are no
         markers [m].
         """
-        places = [place for joint in self.joints for place in joint.points_on()]
-        places += [p.position for p in self.points if not p.name.startswith(MARKER)]
-        ends = zip(*places, strict=True)
-        return max((max(each) - min(each) for each in ends), default=0.0)
+        points = (p.position for p in self.points if not p.name.startswith(MARKER))
+        return extent([*self._places, *points])
+
+    @cached_property
+    def size(self) -> float:
+        """Extent of the joints' points [m], or of all points if the joints' have none.
+
+        A single pivot has joints without extent. A metre instead would be the unit of a mechanism
+        of micrometres, whose residuals and singular values would be too small to detect.
+        """
+        points = [point.position for point in self.points]
+        return extent(self._places) or extent([*self._places, *points]) or 1.0
 
     @cached_property
     def _named(self) -> Mapping[str, Mapping[str, Any]]:
@@ -462,10 +474,15 @@ class Mechanism:
         named["joints"] |= {each.joint.name: each.joint for each in self.reduced}
         return named
 
-    @property
+    @cached_property
     def moving(self) -> tuple[Body, ...]:
         """The bodies not fixed, in order."""
         return tuple(body for body in self.bodies if not body.fixed)
+
+
+def extent(points: Sequence[Sequence[float]]) -> float:
+    """Return the largest extent of points along a global axis [m]; zero without points."""
+    return max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
 
 
 def coordinates(mechanism: Mechanism) -> dict[str, Driver]:

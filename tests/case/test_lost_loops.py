@@ -149,6 +149,17 @@ JOINING = {
         '<child link="t"/></drake:joint>',
         "found 'curvilinear', expected one of ball, planar, screw, universal",
     ),
+    "a gear": (
+        '<drake:gearbox ratio="2"><drake:joint1>drive</drake:joint1><drake:joint2>pivot'
+        "</drake:joint2></drake:gearbox>",
+        COUPLED,
+    ),
+    "names with their models": ('<x:weld from="gate::strut" to="/follower"/>', TWO),
+    "a screw without pitch": (
+        '<link name="t"/><drake:joint name="q" type="screw"><parent link="strut"/>'
+        '<child link="t"/></drake:joint>',
+        "<drake:screw_thread_pitch>: missing",
+    ),
     "a joint that moves the base": (
         '<gazebo><joint name="w" type="revolute"><parent>world</parent><child>base</child><axis/>'
         "</joint></gazebo>",
@@ -355,7 +366,8 @@ MISTYPED = {
     "joint": ("<parent>", "<offset>1</offset><parent>", "unknown in <joint>"),
     "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
     "mimic": ("<parent>", '<drake:mimc joint="x"/><parent>', "did you mean 'mimic'?"),
-    "model": ('name="gate"', 'name="gate" placement_frame="x"', "'placement_frame'"),
+    "model": ('name="gate"', 'name="gate" placement_fram="x"', "did you mean 'placement_frame'?"),
+    "parent": ("<parent>", '<parent also="strut">', "the attribute 'also'"),
     "mass": (
         "<pose>",
         "<inertial><mas>1</mas></inertial><pose>",
@@ -477,6 +489,12 @@ def test_all_attributes_of_mujoco_are_accepted(tmp_path: Path):
             whole = f"<worldbody><body>{whole}</body></worldbody>"
         require_known_attributes(parse_xml(tmp_path / "m.xml", f"<mujoco>{whole}</mujoco>"))
     assert len(found["mujoco/body/geom"]) > 30
+
+
+def test_a_plugin_of_mjcf_between_bodies_is_refused(tmp_path: Path):
+    plugin = '<plugin plugin="p"><config key="i" value="a"/><config key="j" value="b"/></plugin>'
+    with pytest.raises(CaseError, match="names the links 'a' and 'b', which it may join"):
+        read(tmp_path, IN_MJCF.format(f"<extension>{plugin}</extension>"), "model.xml")
 
 
 @pytest.mark.parametrize("kind", ["flex", "flexvert", "flexstrain", "distance"])

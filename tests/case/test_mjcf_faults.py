@@ -96,7 +96,7 @@ FAULTS = {
         ('<joint name="right_coupler_joint" class="coupler"/>', "<freejoint/>"),
         ["<freejoint>", "worldbody"],
     ),
-    "joint in a frame": ((BASE, "<frame><joint/></frame>" + BASE), ["<frame>", "holds a joint"]),
+    "joint in a frame": ((BASE, "<frame><joint/></frame>" + BASE), ["<joint>", "is in no body"]),
     "unknown body": (
         (FIRST, FIRST.replace("right_follower", "right_folower")),
         ["body1", "'right_folower'", "'right_follower'"],

@@ -31,6 +31,19 @@ def test_motors_move_through_their_limits(tmp_path):
     assert any("shoulder, elbow move through their limits" in note for note in case.assembly)
 
 
+def test_joints_commanded_by_ros2_control_have_motors(tmp_path):
+    file = arm(tmp_path, "elbow")
+    commanded = '<joint name="shoulder"><command_interface name="position"/></joint>'
+    file.write_text(
+        file.read_text().replace(
+            "</robot>",
+            f"<ros2_control>{commanded}"
+            '<joint name="elbow"><state_interface name="position"/></joint></ros2_control></robot>',
+        )
+    )
+    assert [*load(file).sweep.path.motions] == ["shoulder", "elbow"]
+
+
 @pytest.mark.parametrize(("motors", "upper"), [(("shoulder",), "1"), (("shoulder", "elbow"), "-1")])
 def test_too_few_motors_or_limits_ask(motors, upper, tmp_path):
     with pytest.raises(CaseError, match="nothing said of what drives it"):

@@ -6,11 +6,12 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from kincheck.core.algebra import Vec3
 from kincheck.core.case.io import table
 from kincheck.core.case.io.foreign import MOST_MEMBERS
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
-from kincheck.core.case.models.files import load
+from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.hardpoints.rows import MOST_LINES
 from kincheck.core.case.models.trees.element import DEEPEST, MOST_ELEMENTS, parse_xml
 from kincheck.core.case.models.trees.tree import MOST_TIES
@@ -171,6 +172,20 @@ def test_long_chain_of_fixed_links_is_read(tmp_path: Path):
     file.write_text(f"{base}{chain}</robot>")
     case = load(file, Supplied(drive=("j:0:1",)))
     assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
+
+
+def test_bodies_in_bodies_are_read_however_deep(tmp_path: Path):
+    """Deeper than Python recurses."""
+    deep = '<body pos="1 0 0"><frame><joint axis="0 0 1"/>'
+    file = tmp_path / "deep.xml"
+    file.write_text(
+        f"<mujoco><include file='more.xml'/><worldbody>{deep * 1200}<site name='tip'/>"
+        f"{'</frame></body>' * 1200}</worldbody></mujoco>"
+    )
+    (tmp_path / "more.xml").write_text("<mujocoinclude><option/></mujocoinclude>")
+    tree = read_tree(file, ["option"])
+    assert len(tree.moves) == 1200
+    assert tree.sites["tip"][1].at == Vec3(1200.0, 0.0, 0.0)
 
 
 def test_many_linkages_of_few_digits_are_read(tmp_path: Path):

@@ -159,7 +159,7 @@ FAULTS = {
     "five numbers": ("4 0 0 0 0.3 0", "4 0 0 0 0.3", "expected 6 numbers; correct the text"),
     "no axis": ("<axis><xyz>0 1 0</xyz></axis>", "", "<axis>: missing, expected an axis; add it"),
     "zero axis": ("<xyz>0 1 0</xyz>", "<xyz>0 0 0</xyz>", "found zero, expected the direction"),
-    "unknown type": ('type="continuous"', 'type="gearbox"', "found 'gearbox', expected one of"),
+    "unknown type": ('type="continuous"', 'type="planar"', "found 'planar', expected one of"),
     "old screw": ('type="continuous"', 'type="screw"', "<screw_thread_pitch>: missing"),
     "mistyped": (
         "<parent>",
@@ -192,6 +192,45 @@ def test_a_document_without_a_mechanism_is_told(text: str, tmp_path: Path):
 
 
 CONFIG = "<model><sdf version='1.4'>old.sdf</sdf><sdf version='1.9'>four bar.sdf</sdf></model>"
+GEARS = """<sdf version="1.9"><model name="gears"><link name="frame"/>
+<link name="sun"/><link name="wheel"><pose>1 0 0 0 0 0</pose></link>
+<joint name="s" type="revolute"><parent>frame</parent><child>sun</child>
+<axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="w" type="revolute"><parent>wheel</parent><child>frame</child>
+<axis><xyz>0 0 SIGN</xyz></axis></joint>
+<joint name="fixed" type="fixed"><parent>world</parent><child>frame</child></joint>
+<joint name="gear" type="gearbox"><parent>sun</parent><child>wheel</child>
+<axis><xyz>0 0 1</xyz></axis><axis2><xyz>AXIS</xyz></axis2><gearbox_ratio>3</gearbox_ratio>
+<gearbox_reference_body>frame</gearbox_reference_body></joint></model></sdf>"""
+
+
+@pytest.mark.parametrize(("axis", "turns"), [("0 0 1", -3.0), ("0 0 -1", 3.0)])
+@pytest.mark.parametrize("sign", ["1", "-1"])
+def test_a_gearbox_couples_turns_about_its_reference(axis, turns, sign, tmp_path: Path):
+    """SDF: the child turns by minus the ratio times the turn of the parent, each about its axis."""
+    text = GEARS.replace("SIGN", sign).replace("AXIS", axis)
+    found = solution(load(model(tmp_path, text), Supplied(drive=("s:0:0.5:3",))))
+    half = 0.5 * turns * np.array([0.0, 0.25, 0.5])
+    assert np.allclose(found.bodies["wheel"].p[:, 3] / found.bodies["wheel"].p[:, 0], np.tan(half))
+
+
+def test_a_gearbox_without_hinges_is_refused(tmp_path: Path):
+    text = GEARS.replace("SIGN", "1").replace("AXIS", "1 0 0")
+    with pytest.raises(CaseError, match="<axis2>: there is no hinge between 'wheel' and 'frame'"):
+        read_tree(model(tmp_path, text))
+
+
+def test_a_model_is_placed_by_its_frame(tmp_path: Path):
+    """As Drake 1.51 places the links, to its printed digits."""
+    text = (
+        '<sdf version="1.9"><model name="m" placement_frame="v"><pose>0 0 1 0 0 0.3</pose>'
+        '<link name="u"/><link name="v"><pose>1 2 5 0.3 0 0</pose></link></model></sdf>'
+    )
+    places = read_tree(model(tmp_path, text)).places
+    assert [*places["u"].at] == pytest.approx([0.04596695, -3.53246201, -3.18564203], abs=1e-8)
+    assert [*places["v"].at] == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
+
+
 INCLUDED = {
     "folder with its description": "model://bars",
     "folder of that name alone": "../other",
@@ -228,7 +267,12 @@ NOT_INCLUDED = {
     "web": ("https://fuel.gazebosim.org/x", "", "expected a model in the folder"),
     "far away": ("../../../etc/x.sdf", "", "expected a model in the folder"),
     "itself": ("model.sdf", "", "with 0 models, expected <sdf> with one"),
-    "merged": ("model://bars", "<placement_frame>a</placement_frame>", "which are not read"),
+    "merged": ("model://bars", '</include><include merge="true">', "merge: is not read"),
+    "by no frame of it": (
+        "model://bars",
+        "<placement_frame>z</placement_frame>",
+        "the frame 'two::z'",
+    ),
 }
 
 

@@ -12,12 +12,15 @@ from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Cylindrical, Revolute, Spherical, Translational, Universal
 from kincheck.core.kinematics import (
     NativeSolver,
+    followed,
     followed_angle,
     follower,
     forces_of,
     in_doubt,
     near_design,
 )
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.one_design import prepare as prepare_one
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
@@ -129,3 +132,17 @@ def test_rates_without_bound_towards_a_fold_are_no_turns():
     first = math.atan2(0.8, 0.6)
     wanted = beside + np.arccos(np.clip(cosine, -1, 1)) - first
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-4)
+
+
+def test_angles_of_a_path_are_followed_at_once():
+    asked: list[int] = []
+
+    def prepare(mechanism: Mechanism, request: Request, path: Path):
+        asked.append(len(request.bodies))
+        return prepare_one(mechanism, request, path)
+
+    path = Path({"turn": Ramp(7.0)}, np.array([1.0]))
+    first, second = (followed.followed_angle(prepare, shafts(), path, joint) for joint in "ab")
+    assert asked == [2]
+    assert first == pytest.approx([7.0])
+    assert second == pytest.approx(driven([7.0]))

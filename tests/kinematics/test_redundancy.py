@@ -4,7 +4,7 @@ are good for the whole sweep.
 
 import numpy as np
 import pytest
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve, trace
+from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, solve, trace
 from kincheck.core.algebra import ZERO, Quat, vec
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
@@ -13,7 +13,7 @@ from kincheck.core.kinematics.formulation.constraints import constraints, frames
 from kincheck.core.kinematics.formulation.formulation import Condition
 from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
-from kincheck.core.kinematics.structure.redundancy import independent_rows
+from kincheck.core.kinematics.structure.redundancy import independent_rows, reduce_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
 from kincheck.core.studies.stress.families.linkages import any_plane, beside, crank_rocker, four_bar
@@ -156,3 +156,31 @@ def test_where_both_rods_are_at_their_dead_points_there_is_one():
     assert [
         event.kind for event in trace(locomotive(np.pi), "turn", length=3.5, longest=0.1).events
     ][:1] == ["branch point"]
+
+
+def test_branches_beside_a_loop_do_not_count():
+    """A four-bar with a tilted hinge, among a thousand wheels that follow its crank."""
+    tilted = (1e-6, 0.0, 1.0)
+    joints = [
+        Revolute("crank", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("pin", "a", "b", (0.0, 1.0, 0.0), tilted),
+        Revolute("end", "b", "c", (3.0, 2.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("rocker", "c", "ground", (3.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ]
+    bars = Mechanism("bars", [Body(name) for name in "abc"], joints)
+    wheels = [f"wheel{k}" for k in range(1100)]
+    axles = [
+        Revolute(x, "ground", x, (float(k), 5.0, 0.0), (0.3, 0.0, 0.9))
+        for k, x in enumerate(wheels)
+    ]
+    whole = Mechanism(
+        "building",
+        [*bars.bodies, *map(Body, wheels)],
+        [*joints, *axles],
+        couplers=[Gear(f"gear {x}", ("crank", x), 2.0) for x in wheels],
+    )
+    reduced = reduce_rows(bars, 1e-5).mechanism.reduced
+    assert reduced
+    assert [str(each.joint) for each in reduce_rows(whole, 1e-5).mechanism.reduced] == [
+        str(each.joint) for each in reduced
+    ]

@@ -70,6 +70,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         "line 2: found a key nested more than 16 deep",
     ),
     "deep elements": ("a.xml", filled("<a>"), "nested more than 200 deep"),
+    "deep bodies": ("a.xml", model(filled("<body>")), "nested more than 5000 deep"),
     # many
     "a million bodies": (
         "a.json",

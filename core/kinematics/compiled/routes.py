@@ -21,7 +21,6 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import NODES, Side, groups_behind, place_of
 from ...trajectory import Array, Trajectory
-from ..formulation.constraints import size_of
 from .compiled_model import CLOSED, RECENT, Model, is_builtin, recent_model
 from .request import Request
 
@@ -121,7 +120,7 @@ def _scales(mechanism: Mechanism, path: Path, values: Array) -> Array:
     mechanism's size, or the largest number in the values.
     """
     size, given = (
-        size_of(mechanism),
+        mechanism.size,
         np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1, initial=0.0),
     )
     own = [1.0 if mechanism.driver(name).turns else size for name in path.motions]
@@ -165,7 +164,7 @@ def solve_from_start(
             notes.append(f"no sample can be reached by way of {start.name} ({found.message})")
             found, taken = second, other
     elif other is not None and start.ambiguous and compare:
-        notes += _differ(start, other, found, solve(other), size_of(mechanism))
+        notes += _differ(start, other, found, solve(other), mechanism.size)
     notes = [
         *found.details.get("notes", ()),
         *notes,

@@ -6,6 +6,7 @@ style. dpi is in global axes, or in body axes if the row style is; the poses are
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -105,21 +106,25 @@ class Cartesian:
             found.append(Condition(rows, remote, steady))
         return found
 
-    @property
+    @cached_property
     def _from_ground(self) -> Mapping[str, int]:
         """Joints and drivers between every body and the ground or a prescribed body.
 
         Unconnected bodies are missing.
         """
-        pairs = [(c.i, c.j) for c in self.constraints if isinstance(c, Constraint)]
-        far = {name: 0 for pair in pairs for name in pair if name not in self.columns}
-        while reached := {
-            b: far[a] + 1
-            for i, j in pairs
-            for a, b in ((i, j), (j, i))
-            if a in far and b not in far
-        }:
-            far |= reached
+        near: dict[str, list[str]] = {}
+        for c in self.constraints:
+            if isinstance(c, Constraint):
+                near.setdefault(c.i, []).append(c.j)
+                near.setdefault(c.j, []).append(c.i)
+        far = {name: 0 for name in near if name not in self.columns}
+        waiting = deque(far)
+        while waiting:
+            a = waiting.popleft()
+            for b in near[a]:
+                if b not in far:
+                    far[b] = far[a] + 1
+                    waiting.append(b)
         return far
 
     @cached_property

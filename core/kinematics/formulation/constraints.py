@@ -19,7 +19,7 @@ from ...algebra import ZERO, Vec3, vec
 from ...errors import SolveError
 from ...joints import Attachment, AxialJoint, Joint
 from ...joints.base import unit
-from ...mechanism.mechanism import GROUND, Mechanism
+from ...mechanism.mechanism import GROUND, Mechanism, extent
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...mechanism.tree import spanning_tree
 from ...primitives.base import Drive
@@ -61,7 +61,7 @@ def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
     The origin of a body is at the joint by which the spanning tree reaches it.
     """
     if length_unit is None:
-        length_unit = unit_near(size_of(mechanism))
+        length_unit = unit_near(mechanism.size)
     origins = dict.fromkeys((GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO)
     touching: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
@@ -95,25 +95,6 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
         {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()},
         whole.moving,
     )
-
-
-def size_of(mechanism: Mechanism) -> float:
-    """Return the extent of the joints' points [m], or of all points if the joints' have none.
-
-    A single pivot has joints without extent. A metre instead would be the unit of a mechanism of
-    micrometres, whose residuals and singular values would be too small to detect.
-    """
-    joints = [point for joint in mechanism.joints for point in joint.points_on()]
-    for places in (joints, joints + [point.position for point in mechanism.points]):
-        size = extent(places)
-        if size > 0.0:
-            return size
-    return 1.0
-
-
-def extent(points: Sequence[Sequence[float]]) -> float:
-    """Return the largest extent of points along a global axis [m]; zero without points."""
-    return max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
 
 
 def unit_near(length: float) -> float:

@@ -19,10 +19,10 @@ from ...algebra import ZERO, vec
 from ...errors import SolveError
 from ...failures import FailureKind
 from ...joints import Joint, Kind
-from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector, extent
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Frames, extent, unit_near
+from ..formulation.constraints import Frames, unit_near
 from ..formulation.formulation import Formulation
 from ..formulation.parameters import places
 from ..formulation.state_vectors import jacobian

@@ -37,7 +37,7 @@ from ...mechanism.tree import spanning_tree
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Frames, frames
+from ..formulation.constraints import Frames, frames, unit_near
 from ..formulation.formulation import Condition, Formulation
 from ..formulation.state_vectors import displaced, jacobian
 
@@ -274,8 +274,8 @@ def reduce_rows(
     Args:
         carrying: joints with all their rows, as long as others can close the loops.
     """
-    bare = replace(mechanism, drivers=())
-    frame = frames(bare)
+    core = _without_branches(mechanism)
+    frame = frames(core, unit_near(mechanism.size))
     keeping = {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
     keeping |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     keeping |= {each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)}
@@ -283,7 +283,7 @@ def reduce_rows(
     held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}
     if not any(held.values()):  # no loop, or none whose rows can be left out
         return Reduction(mechanism, frame.unit, ADDED_UP * tolerance)
-    formulation = Cartesian.of(bare, frame)
+    formulation = Cartesian.of(core, frame)
     matrix, named = jacobian(formulation), dict[str, list[int]]()
     for k, (owner, _) in enumerate(formulation.owners):
         named.setdefault(owner, []).append(k)
@@ -326,6 +326,42 @@ def reduce_rows(
         frame.unit,
         ADDED_UP * tolerance,
     )
+
+
+def _without_branches(mechanism: Mechanism) -> Mechanism:
+    """Return the joints of loops, with the bodies coupled to them: the rows of a body at the end
+    of a branch, and of the coupler of its motion, say nothing of other bodies.
+    """
+    joints = {joint.name: joint for joint in mechanism.joints}
+    couplers = {coupler.name: coupler for coupler in mechanism.couplers}
+    on: dict[str, set[str]] = {body.name: set() for body in mechanism.moving}
+    of_joint: dict[str, set[str]] = {name: set() for name in joints}
+    for joint in mechanism.joints:
+        for body in {*joint.bodies} & on.keys():
+            on[body].add(joint.name)
+    for coupler in mechanism.couplers:
+        for name in coupler.joints:
+            of_joint[name].add(coupler.name)
+    waiting = [*on]
+    while waiting:
+        body = waiting.pop()
+        if len(on.get(body, ())) != 1:
+            continue
+        (name,) = on[body]
+        moving = {each: couplers[each] for each in of_joint[name]}
+        if len(moving) > 1 or any(x.curve and x.joints[0] != name for x in moving.values()):
+            continue  # the slope of a curve may vanish
+        del on[body]
+        for other in joints.pop(name).bodies:
+            on.get(other, set()).discard(name)
+            waiting.append(other)
+        for each in moving:
+            for other in couplers.pop(each).joints:
+                of_joint[other].discard(each)
+                if other in joints:
+                    waiting += joints[other].bodies
+    bodies = [body for body in mechanism.bodies if body.fixed or body.name in on]
+    return Mechanism(mechanism.name, bodies, [*joints.values()], couplers=[*couplers.values()])
 
 
 def largest_residual(

@@ -39,6 +39,8 @@ CLOSED = 1e-12
 ADDED_UP = 10.0
 # Rows are of size one: a smaller singular value is round-off of a redundant row.
 ROUND_OFF = 1e-9
+# Rows are of size one: one gives an unknown if it has a part of it far above round-off.
+CLEAR = 0.1
 # Tolerances that the digits of a file leave, relative to the size: six digits, and all.
 COARSEST, FINEST = 1e-5, 1e-12
 MOST_SHOWN = 12
@@ -296,10 +298,44 @@ class Closing:
 
     def null(self, rows: Array) -> Array:
         """Return an orthonormal basis of the motions left by rows, shape (freedoms, n)."""
-        if len(rows) > rows.shape[1]:  # no matrix of rows by rows, of which a file may have many
-            rows = np.linalg.qr(rows).R
-        _, sizes, right = np.linalg.svd(rows, full_matrices=True)
-        return right[int((sizes > self.weak).sum()) :]
+        lonely = _lonely(rows)
+        given = {*lonely.values()}
+        rest = [k for k in range(rows.shape[1]) if k not in given]
+        others = np.delete(rows, [*lonely], axis=0)[:, rest]
+        if len(others) > len(rest):  # no matrix of rows by rows, of which a file may have many
+            others = np.linalg.qr(others).R
+        _, sizes, right = np.linalg.svd(others, full_matrices=True)
+        found = np.zeros((rows.shape[1], len(rest) - int((sizes > self.weak).sum())))
+        found[rest] = right[len(rest) - found.shape[1] :].T
+        for row, column in reversed([*lonely.items()]):
+            used = np.flatnonzero(rows[row])
+            found[column] = -(rows[row, used] @ found[used]) / rows[row, column]
+        return np.linalg.qr(found).Q.T if lonely else found.T
+
+
+def _lonely(rows: Array) -> Mapping[int, int]:
+    """Return rows that give an unknown, by its column, which no other row but earlier ones has.
+
+    They are independent of all others, as couplings of many joints with one are: what is left of a
+    large model is small.
+    """
+    columns = [np.flatnonzero(row).tolist() for row in rows]
+    owners: list[set[int]] = [set() for _ in range(rows.shape[1])]
+    for row, used in enumerate(columns):
+        for column in used:
+            owners[column].add(row)
+    found = dict[int, int]()
+    waiting = [column for column, each in enumerate(owners) if len(each) == 1]
+    while waiting:
+        column = waiting.pop()
+        for row in tuple(owners[column]):
+            if abs(rows[row, column]) >= CLEAR:
+                found[row] = column
+                for other in columns[row]:
+                    owners[other].discard(row)
+                    if len(owners[other]) == 1:
+                        waiting.append(other)
+    return found
 
 
 def _gap(tie: Tie, pose: Pose) -> float:

@@ -23,16 +23,16 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from ....algebra import Vec3, X, Y, Z, cross, vec
+from ....algebra import Vec3, X, Y, Z, cross, quat, vec
 from ....errors import CaseError, remedy
 from ....joints.base import triad
 from ....joints.polynomial import HIGHEST
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name
+from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
 from .element import Element
 from .graph import Freedom, Graph, Joint, Loop
-from .place import Place, unit_vector
-from .tree import Closure, Coupling, Kind, Move
+from .place import ORIGIN, Place, unit_quaternion, unit_vector
+from .tree import Closure, Coupling, Kind, Move, Tree
 
 CONSTRAINTS = ".constraints.json"
 YAML = (".yaml", ".yml")
@@ -74,10 +74,19 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     coefficients: Annotated[list[float], msgspec.Meta(max_length=HIGHEST + 1)] = []
 
 
+class BodyFrame(msgspec.Struct, frozen=True):
+    """The frame of a body in its link."""
+
+    link: str
+    origin: Vector
+    euler_parameters: tuple[float, float, float, float]
+
+
 class ConstraintsFile(msgspec.Struct, frozen=True):
     """NAME.constraints.json; its other keys are for people."""
 
     constraints: list[Condition]
+    bodies: dict[str, BodyFrame] = {}
 
 
 class PairsFile(msgspec.Struct, frozen=True):
@@ -118,6 +127,32 @@ class Beside:
             _add_constraints(*self.constraints, graph)
         if self.pairs is not None:
             _add_pairs(*self.pairs, graph)
+
+    def place(self, tree: Tree) -> None:
+        """Give links the frames of the bodies they are written of, whose joints and numbers a URDF
+        has in other axes.
+
+        Raises:
+            CaseError: a frame has no turn.
+        """
+        if self.constraints is None:
+            return
+        file, found = self.constraints
+        for name, each in found.bodies.items():
+            if each.link != name or name not in tree.places:
+                continue
+            if not all(map(usable, (*each.origin, *each.euler_parameters))) or not any(
+                each.euler_parameters
+            ):
+                raise fault(file, f"bodies: {name}", "has no frame; export the case anew")
+            turn = unit_quaternion(quat(each.euler_parameters))
+            frame = Place(vec(each.origin), turn)
+            tree.places[name] = tree.places[name].then(frame)
+            if name in tree.moving:
+                tree.moving[name] = tree.moving[name].then(frame)
+                back = ORIGIN.seen_from(frame)
+                masses = tree.masses.get(name, ())
+                tree.masses |= {name: [mass.seen_in(back) for mass in masses]} if masses else {}
 
 
 def read_beside(file: Path, root: Element) -> Beside:

@@ -98,9 +98,10 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
         own = read_driving(tree, replace(supplied, drive=motor_ranges(tree)))
         if own.driven and len(own.driven) == Freedom(model, axes).dof:
             driving = own
+            names = shortened([*own.driven], MOST_NAMED)
             note = (
-                f"nothing is said of what drives it: {', '.join(own.driven)} move through their"
-                " limits, as the file has motors there; other motions by --drive"
+                f"nothing is said of what drives it: {names} move through their limits, as the file"
+                " has motors there; other motions by --drive"
             )
             model = replace(model, notes=(*model.notes, note))
     chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)

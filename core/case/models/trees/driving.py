@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....algebra import quat, vec
-from ....errors import CaseError, remedy, with_article
+from ....errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ....trajectory import Array
 from ...io.document import decimal, fault, interval, measure, shown, unknown_name, usable
 from ...io.reader_options import Supplied
@@ -399,7 +399,7 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
 
 
 def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:
-    """Return the complete list of moves to hold, by their kinds."""
+    """Return the moves to hold, by their kinds."""
     counts = [(move, freedom.count(move.name)) for move in candidates]
     loose = [move for move, count in counts if count == UNKNOWNS[move.kind]]
     kinds = {
@@ -408,8 +408,10 @@ def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:
         "free bodies": [move.inner for move in loose if move.kind == "free"],
     }
     if loose:
-        return "".join(f"; {what}: {', '.join(names)}" for what, names in kinds.items() if names)
-    partly = ", ".join(move.name for move, count in counts if count)
+        return "".join(
+            f"; {what}: {shortened(names, MOST_NAMED)}" for what, names in kinds.items() if names
+        )
+    partly = shortened([move.name for move, count in counts if count], MOST_NAMED)
     return (
         f"; only in part free, so that they cannot be held: {partly}"
         if partly

@@ -11,7 +11,7 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
@@ -19,8 +19,9 @@ from xml.parsers import expat
 from ....errors import CaseError, remedy, similar
 from ...io.document import decimal, fault, shown, unknown_name, usable
 
-# Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
-DEEPEST = 200
+# Elements are some ten deep; but bodies of MJCF are in the bodies that carry them.
+DEEPEST, DEEPEST_BODY = 200, 5_000
+_CARRYING = ("body", "frame")
 # Each takes some microseconds and a kilobyte.
 MOST_ELEMENTS = 200_000
 # Two words are alike if a typing error makes one of the other.
@@ -100,23 +101,45 @@ class Element:
 
     def below(self) -> Iterator[Element]:
         """Yield all elements in it, at any depth, in order."""
-        for child in self.children:
-            yield child
-            yield from child.below()
+        waiting = self.children[::-1]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += element.children[::-1]
+
+    def rebuilt(self, change: Callable[[Element], Iterable[Element]]) -> Element:
+        """Return the element with all below it changed, at any depth, innermost ones first.
+
+        Args:
+            change: returns what takes the place of an element.
+        """
+        open_: list[tuple[Element, Iterator[Element], list[Element]]]
+        open_ = [(self, iter(self.children), [])]
+        while True:
+            element, inside, changed = open_[-1]
+            if (child := next(inside, None)) is not None:
+                open_.append((child, iter(child.children), []))
+                continue
+            open_.pop()
+            whole = element if changed == element.children else replace(element, children=changed)
+            if not open_:
+                return whole
+            open_[-1][2].extend(change(whole))
 
     def pruned(self, names: Collection[str], found: list[tuple[str, Element]]) -> Element:
         """Return the element without those in it of a tag, a name or TAG/NAME; add the names that
         are used, with their elements.
         """
-        kept: list[Element] = []
-        for child in self.children:
-            own = child.attributes.get("name", "")
-            called = next((x for x in (child.tag, own, f"{child.tag}/{own}") if x in names), None)
-            if called is None:
-                kept.append(child.pruned(names, found))
-            else:
-                found.append((called, child))
-        return replace(self, children=kept)
+
+        def kept(element: Element) -> Sequence[Element]:
+            own = element.attributes.get("name", "")
+            called = (element.tag, own, f"{element.tag}/{own}")
+            if name := next((each for each in called if each in names), ""):
+                found.append((name, element))
+                return ()
+            return (element,)
+
+        return self.rebuilt(kept) if names else self
 
     def require_known(
         self, known: Sequence[str], format_name: str = "MJCF", *, closed: bool = True
@@ -273,19 +296,21 @@ def parse_xml(file: Path, text: str) -> Element:
     parser = expat.ParserCreate("utf-8")
     roots: list[Element] = []
     open_: list[Element] = []
-    count = 0
+    count, bodies = 0, 0
 
     def start(tag: str, attributes: Mapping[str, str]) -> None:
         element = Element(file, tag, attributes, parser.CurrentLineNumber)
-        nonlocal count
+        nonlocal count, bodies
         count += 1
         if count > MOST_ELEMENTS:
             raise element.too_many()
-        if len(open_) >= DEEPEST:
-            raise element.fault(
-                f"nested more than {DEEPEST} deep, expected the tree of a mechanism; correct the"
-                " file"
-            )
+        bodies += tag in _CARRYING
+        for depth, deepest in ((len(open_) - bodies, DEEPEST), (bodies, DEEPEST_BODY)):
+            if depth >= deepest:
+                raise element.fault(
+                    f"nested more than {deepest} deep, expected the tree of a mechanism; correct"
+                    " the file"
+                )
         for name in (tag, *attributes.values()):
             if not name.isprintable():
                 raise element.fault(
@@ -306,8 +331,12 @@ def parse_xml(file: Path, text: str) -> Element:
             " remove it",
         )
 
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda _: open_.pop()
+    def end(tag: str) -> None:
+        nonlocal bodies
+        bodies -= tag in _CARRYING
+        open_.pop()
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = text_in
     parser.StartDoctypeDeclHandler = refuse
     try:

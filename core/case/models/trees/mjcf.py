@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import cast
+from typing import TypeAlias, cast
 
 from ....algebra import X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
@@ -30,6 +30,7 @@ from .mjcf_language import (
 )
 from .mjcf_mass import STAND_INS, mass_of
 from .place import ORIGIN, Place, coordinates, unit_quaternion
+from .robot_elements import Unread
 from .tree import (
     MOST_MOVING,
     UNKNOWNS,
@@ -56,6 +57,8 @@ OTHERS = {
 }
 """Other documents in XML, and the remedy, by their root."""
 _EQUALITIES = ("connect", "weld", "joint", "tendon")
+_Part: TypeAlias = tuple[Element, Place, str]
+"""An element, the place of the frame it is given in, and its default class."""
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
 
 
@@ -132,6 +135,7 @@ class _Reader:
         )
         tendons = [each for section in root.only("tendon") for each in section.children]
         self.coupling = set[str]()
+        self.plugins = [(each, "") for part in root.only("extension") for each in part.children]
         self.tendons = {each.attributes.get("name", ""): each for each in tendons}
 
     def read(self) -> Tree:
@@ -143,8 +147,11 @@ class _Reader:
             tree.names.update(
                 each.attributes["name"] for each in bodies if "name" in each.attributes
             )
-            self._inside(world, ORIGIN, WORLD, MAIN)
+            self._inside(world)
         tree.require_moving(root)
+        unread = Unread({name: name for name in tree.places}, {}, (), "an <equality>")
+        for plugin, link in self.plugins:
+            unread.require_apart(plugin, link)
         for section in root.only(*_LEFT_OUT):
             for element in section.children:
                 tree.count(f"{section.tag}: {element.tag}")
@@ -162,31 +169,35 @@ class _Reader:
             tree.gravity = self._gravity()
         return tree
 
-    def _inside(self, around: Element, place: Place, link: str, childclass: str) -> None:
-        """Read what is in a body, or in a frame of it, at a place."""
-        for element in around.children:
-            _require_written_out(element)
-            if element.tag not in IN_BODY:
-                raise element.fault(f"unknown in a body; {remedy(element.tag, IN_BODY)}")
+    def _inside(self, world: Element) -> None:
+        """Read the bodies of a world and what is in them, depth first."""
+        waiting = [(WORLD, self._in_frames(world, ORIGIN, MAIN))]
+        while waiting:
+            link, inside = waiting[-1]
+            if (found := next(inside, None)) is None:
+                waiting.pop()
+                continue
+            element, place, childclass = found
             match element.tag:
                 case "body":
-                    self._body(element, place, link, _class(element, childclass))
-                case "frame":
-                    if around.tag == "worldbody" and any(element.only("joint", "freejoint")):
-                        raise element.fault("holds a joint, expected joints in bodies; remove it")
-                    inner = place.then(self.compiler.place(element))
-                    self._inside(element, inner, link, _class(element, childclass))
+                    waiting.append(self._body(element, place, link, _class(element, childclass)))
                 case "site":
                     site = self.classes.complete(element, "site", childclass)
                     if (name := site.attributes.get("name")) is not None:
-                        at = place.then(self.compiler.place(site))
-                        self.tree.mark(site, name, link, at)
+                        self.tree.mark(site, name, link, place.then(self.compiler.place(site)))
+                case "joint" | "freejoint" if link == WORLD:
+                    raise element.fault("is in no body, expected joints in bodies; remove it")
                 case "joint" | "freejoint" | "inertial":
                     pass
                 case _:
                     self.tree.count(f"{element.tag}s")
+                    if element.tag == "plugin":
+                        self.plugins.append((element, link))
 
-    def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
+    def _body(
+        self, element: Element, around: Place, outer: str, childclass: str
+    ) -> tuple[str, Iterator[_Part]]:
+        """Hang a body; return its name and content."""
         tree = self.tree
         if (name := element.attributes.get("name")) is None:
             name = tree.names.new(f"body{len(tree.places)}")
@@ -200,7 +211,7 @@ class _Reader:
             if element.number("gravcomp", 0.0) != 0.0:
                 tree.count("gravity compensation of bodies")
             self._weigh(element, name, childclass)
-        self._inside(element, place, name, childclass)
+        return name, self._in_frames(element, place, childclass)
 
     def _weigh(self, element: Element, name: str, childclass: str) -> None:
         """Read the mass of a body, which motion does not need: what makes no sense is left out."""
@@ -213,16 +224,19 @@ class _Reader:
         except CaseError:
             self.tree.weigh(name, None)
 
-    def _in_frames(
-        self, around: Element, place: Place, childclass: str
-    ) -> Iterator[tuple[Element, Place, str]]:
+    def _in_frames(self, around: Element, place: Place, childclass: str) -> Iterator[_Part]:
         """Yield what is in a body or its frames, with the place and the class of the frame."""
-        for element in around.children:
-            if element.tag == "frame":
-                inner = place.then(self.compiler.place(element))
-                yield from self._in_frames(element, inner, _class(element, childclass))
-            else:
-                yield element, place, childclass
+        waiting = [(each, place, childclass) for each in reversed(around.children)]
+        while waiting:
+            element, at, within = waiting.pop()
+            _require_written_out(element)
+            if element.tag not in IN_BODY:
+                raise element.fault(f"unknown in a body; {remedy(element.tag, IN_BODY)}")
+            if element.tag != "frame":
+                yield element, at, within
+                continue
+            inner, own = at.then(self.compiler.place(element)), _class(element, within)
+            waiting += [(each, inner, own) for each in reversed(element.children)]
 
     def _moves(self, body: Element, name: str, place: Place, childclass: str) -> Iterator[Move]:
         """Yield the joints of a body."""

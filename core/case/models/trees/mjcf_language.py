@@ -15,7 +15,7 @@ from pathlib import Path
 from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
-from .element import DEEPEST, MOST_ELEMENTS, Element, file_near, parse_xml, words
+from .element import MOST_ELEMENTS, Element, file_near, parse_xml, words
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion, unit_vector
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")
@@ -110,19 +110,15 @@ def require_known_attributes(root: Element) -> None:
     Raises:
         CaseError: there is one.
     """
-    for section in root.only(*_READ, "keyframe"):
-        if section.tag != "compiler":  # read before
-            _require_known(section, root.tag)
-
-
-def _require_known(element: Element, around: str) -> None:
-    inner = f"{around} {element.tag}"
-    key = inner if inner in _ALL else element.tag
-    if key in _ALL:
-        element.require_known(_ALL[key], closed=key in KNOWN)
-    if element.tag not in MAKE_BODIES:
-        for child in element.children:
-            _require_known(child, element.tag)
+    waiting = [(root.tag, each) for each in root.only(*_READ, "keyframe")]
+    while waiting:
+        around, element = waiting.pop()
+        inner = f"{around} {element.tag}"
+        key = inner if inner in _ALL else element.tag
+        if key in _ALL:
+            element.require_known(_ALL[key], closed=key in KNOWN)
+        if element.tag not in MAKE_BODIES:
+            waiting += [(element.tag, child) for child in reversed(element.children)]
 
 
 MAIN = "main"
@@ -140,21 +136,20 @@ class Classes:
         self._attributes: dict[str, dict[str, dict[str, str]]] = {MAIN: {}}
         for top in root.only("default"):
             top.choice("class", (MAIN,), MAIN)
-            self._read(top, MAIN, self._attributes[MAIN])
-
-    def _read(
-        self, element: Element, name: str, inherited: Mapping[str, Mapping[str, str]]
-    ) -> None:
-        own = {kind: dict(values) for kind, values in inherited.items()}
-        for child in element.only(*_IN_CLASSES):
-            own[child.tag] = _over(own.get(child.tag, {}), child.attributes)
-        self._attributes[name] = own
-        for child in element.only("default"):
-            below = child.attributes.get("class", "")
-            if not below or below in self._attributes:
-                problem = "missing" if not below else f"found {shown(below)} again"
-                raise child.fault(f"class: {problem}, expected a name of its own; name the class")
-            self._read(child, below, own)
+            waiting = [(top, MAIN, MAIN)]
+            while waiting:
+                element, name, around = waiting.pop()
+                if element is not top and (not name or name in self._attributes):
+                    problem = f"found {shown(name)} again" if name else "missing"
+                    raise element.fault(
+                        f"class: {problem}, expected a name of its own; name the class"
+                    )
+                own = {kind: dict(values) for kind, values in self._attributes[around].items()}
+                for child in element.only(*_IN_CLASSES):
+                    own[child.tag] = _over(own.get(child.tag, {}), child.attributes)
+                self._attributes[name] = own
+                inner = [*element.only("default")][::-1]
+                waiting += [(each, each.attributes.get("class", ""), name) for each in inner]
 
     def complete(self, element: Element, kind: str, childclass: str = MAIN) -> Element:
         """Return the element with the attributes of its class, or of the class of the body around
@@ -338,29 +333,21 @@ class _Expansion:
     bytes: int = 0
     elements: int = 0
 
-    def children(self, around: Element, depth: int = 0) -> list[Element]:
-        """Return the elements in one, expanded at any depth."""
-        if depth > DEEPEST:
-            raise around.fault(
-                f"nested more than {DEEPEST} deep with its includes, expected the tree of a"
-                " mechanism; correct the file"
-            )
-        found: list[Element] = []
-        for child in around.children:
-            match child.tag:
-                case "include":
-                    found += self.children(self._include(child), depth + 1)
-                case "replicate" if self.compiler is not None:
-                    inside = self.children(child, depth + 1)
-                    found += self._copies(child, inside, self.compiler)
-                case _ if child.children:
-                    found.append(replace(child, children=self.children(child, depth + 1)))
-                case _:
-                    found.append(child)
-            self.elements += 1
-            if self.elements > MOST_ELEMENTS:
-                raise child.too_many()
-        return found
+    def expanded(self, around: Element) -> Element:
+        """Return an element with all in it expanded, at any depth."""
+        return around.rebuilt(self._expand)
+
+    def _expand(self, element: Element) -> Iterator[Element]:
+        """Yield what an element stands for, whose content is expanded."""
+        self.elements += 1
+        if self.elements > MOST_ELEMENTS:
+            raise element.too_many()
+        if element.tag == "include":
+            yield from self.expanded(self._include(element)).children
+        elif element.tag == "replicate" and self.compiler is not None:
+            yield from self._copies(element, element.children, self.compiler)
+        else:
+            yield element
 
     def _include(self, element: Element) -> Element:
         element.require_known(("file",))
@@ -421,10 +408,15 @@ def _text(values: Iterable[float]) -> str:
 
 
 def _with_suffix(element: Element, suffix: str) -> Element:
-    own = element.attributes
-    name = {"name": own["name"] + suffix} if own.get("name") else {}
-    children = [_with_suffix(each, suffix) for each in element.children]
-    return replace(element, attributes={**own, **name}, children=children)
+    def named(each: Element) -> Element:
+        own = each.attributes
+        return (
+            replace(each, attributes={**own, "name": own["name"] + suffix})
+            if own.get("name")
+            else each
+        )
+
+    return named(element.rebuilt(lambda each: (named(each),)))
 
 
 def expand(file: Path, root: Element) -> Element:
@@ -434,6 +426,5 @@ def expand(file: Path, root: Element) -> Element:
         CaseError: a file is missing, elsewhere or taken twice, a replicate or a setting of the
             compiler makes no sense, or there is too much of either.
     """
-    whole = replace(root, children=_Expansion(file.resolve()).children(root))
-    copies = _Expansion(file.resolve(), read_compiler(whole))
-    return replace(whole, children=copies.children(whole))
+    whole = _Expansion(file.resolve()).expanded(root)
+    return _Expansion(file.resolve(), read_compiler(whole)).expanded(whole)

@@ -57,8 +57,10 @@ _PUBLISHERS = words("p3d imu camera laser gps publisher odometry ft_sensor")
 # Elements whose attribute `name` is their own.
 _NAMED = words("plugin param controller hardware system joint link frame")
 _CLOSING = words("loop equality constraint closure")
+_COUPLING = words("mimic gear coupl")
 _OF_LINK = words("link body parent child frame member")
-_SEPARATOR = re.compile(r"[\s,;]+")
+_SEPARATOR = re.compile(r"[\s,;|]+")
+_PATH = re.compile(r"::|^/")
 
 LinkOf: TypeAlias = Callable[[Element, str], str]
 """Name of the link that an element names."""
@@ -311,7 +313,7 @@ class Unread:
         if len(joints) < 2 or any(joints <= {*pair} for pair in self.followers):
             return joints
         why = ""
-        if any(map(_says_mimic, (element, *element.children))):
+        if any(map(_says_coupled, (element, *element.children))):
             why = "couples the joints"
         elif _bare(element.tag) == "transmission":
             free = joints - {follower for follower, _ in self.followers}
@@ -365,12 +367,12 @@ def _apart(element: Element) -> bool:
     )
 
 
-def _says_mimic(element: Element) -> bool:
+def _says_coupled(element: Element) -> bool:
     tag = _bare(element.tag)
     said = [tag, *element.attributes]
     if tag in ("plugin", "param"):
         said += element.attributes.values()
-    return any("mimic" in text.lower() for text in said)
+    return any(word in text.lower() for text in said for word in _COUPLING)
 
 
 def _words(element: Element) -> Iterator[tuple[str, str]]:
@@ -386,8 +388,10 @@ def _words(element: Element) -> Iterator[tuple[str, str]]:
 
 
 def _split(text: str) -> Iterator[str]:
-    """Yield a text, and the words in it."""
-    yield from dict.fromkeys((text.strip(), *_SEPARATOR.split(text)))
+    """Yield a text, the words in it, and the last parts of those that are paths of names."""
+    found = dict.fromkeys((text.strip(), *_SEPARATOR.split(text)))
+    yield from found
+    yield from (_PATH.split(word)[-1] for word in found if _PATH.search(word))
 
 
 def _is_number(word: str) -> bool:

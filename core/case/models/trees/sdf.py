@@ -7,6 +7,7 @@ pose in its child, and a frame's pose in its `attached_to`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -35,10 +36,21 @@ from .robot_elements import (
     mimic,
     screw,
 )
-from .sdf_frames import FLAGS, MODEL, TRUE, Frames, endings, flag_of, pose_of, text_of, within
+from .sdf_frames import (
+    FLAGS,
+    MODEL,
+    PLACED,
+    TRUE,
+    Frames,
+    endings,
+    flag_of,
+    pose_of,
+    text_of,
+    within,
+)
 from .tree import WORLD, Coupling, Mass, Move, Tree
 
-TYPES = words("revolute continuous prismatic fixed ball universal revolute2 screw")
+TYPES = words("revolute continuous prismatic fixed ball universal revolute2 screw gearbox")
 TWO_AXES = ("universal", "revolute2")
 IN_MODEL = words(
     "link joint frame model pose static include plugin gripper self_collide "
@@ -53,6 +65,9 @@ IN_JOINT = (
     *words("parent child pose axis axis2 physics sensor thread_pitch"),
     *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body", "frame", MIMIC),
 )
+BARE = words("parent child screw_thread_pitch gearbox_ratio gearbox_reference_body")
+"""Those without attributes."""
+GEARBOX = "gearbox"
 IN_AXIS = words("xyz limit dynamics mimic use_parent_model_frame initial_position")
 IN_INERTIAL = words("mass density pose inertia frame auto_inertia_params fluid_added_mass")
 IN_ROOT = words("model world light actor")
@@ -70,9 +85,10 @@ _COUNTED = words("visual collision sensor light plugin")
 MOST_FRAMES = 6_000
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
-_PLACED = "placement_frame"
 MOST_INCLUDES, _SUFFIXES = 100, (".sdf", ".world", ".config")
 _WRITE_OUT = "write the whole model out: gz sdf -p FILE > flat.sdf"
+# Cosine between an axis and that of a hinge it means, which few digits leave.
+ALONG = 1.0 - 1e-6
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link unless given, of 1 kg [kg m^2]."""
 # Axes were in the model's frame before this version.
@@ -107,19 +123,13 @@ class _Inclusion:
 
     def whole(self, around: Element) -> Element:
         """Return an element with included models in place of <include>, at any depth."""
-        if not any(each.tag == "include" for each in around.below()):
-            return around
-        found = [
-            self._model(each) if each.tag == "include" else self.whole(each)
-            for each in around.children
-        ]
-        return replace(around, children=found)
+        return around.rebuilt(lambda each: (self._model(each) if each.tag == "include" else each,))
 
     def _model(self, element: Element) -> Element:
         element.require_known(("merge",), "SDF")
-        if element.choice("merge", FLAGS, "false") in TRUE or any(element.only(_PLACED)):
-            raise element.fault(f"has merge or <{_PLACED}>, which are not read; {_WRITE_OUT}")
-        element.require_children(("uri", "name", "pose", "static", "plugin"), closed=True)
+        if element.choice("merge", FLAGS, "false") in TRUE:
+            raise element.fault(f"merge: is not read; {_WRITE_OUT}")
+        element.require_children(("uri", "name", "pose", "static", "plugin", PLACED), closed=True)
         self.count += 1
         if self.count > MOST_INCLUDES:
             raise element.fault(f"found more than {MOST_INCLUDES} includes, or a ring of them")
@@ -143,8 +153,9 @@ class _Inclusion:
         given = {each.tag for each in own if each.tag != "plugin"}
         children = [*own, *(each for each in model.children if each.tag not in given)]
         attributes = dict(model.attributes)
-        if name := element.child("name"):
-            attributes["name"] = name.text
+        for tag in ("name", PLACED):
+            if element.child(tag) is not None:
+                attributes[tag] = text_of(element, tag)
         return replace(model, attributes=attributes, children=children)
 
     def _file(self, element: Element, uri: str) -> Path:
@@ -320,9 +331,12 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
     while world in graph.places:
         world += "'"
     joints: list[Joint] = []
+    gears: list[tuple[_Joint, tuple[str, str]]] = []
     for full, framed in frames.joints.items():
         element = framed.element
         element.require_children(IN_JOINT, closed=True)
+        for each in element.only(*BARE):
+            each.require_known((), "SDF")
         ends: list[str] = []
         for tag in ("parent", "child"):
             link = frames.link(element, within(framed.scope, text_of(element, tag)))
@@ -334,10 +348,17 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
             raise element.fault(
                 f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
             )
+        links = ends[0], ends[1]
         if {*ends} <= graph.fixed:
             graph.tree.count("joints of what stands still")
+            continue
+        joint = _Joint(graph, frames, full, version)
+        if joint.kind == GEARBOX:
+            gears.append((joint, links))
         else:
-            joints.append(_Joint(graph, frames, full, version).read((ends[0], ends[1])))
+            joints.append(joint.read(links))
+    for gear, links in gears:
+        graph.couplings.append(gear.gearbox(links, [*graph.joints, *joints]))
     return joints
 
 
@@ -365,6 +386,35 @@ class _Joint:
             mimics.append(self._drake_mimic(moves, element))
         self.graph.couplings += mimics
         return joint
+
+    def gearbox(self, links: tuple[str, str], joints: Sequence[Joint]) -> Coupling:
+        """Return the coupling of the turns of two links about a third.
+
+        The child turns by minus the ratio times the turn of the parent, each about its own axis
+        (SDF 1.4 and later).
+        """
+        element, named = self.element, text_of(self.element, "gearbox_reference_body")
+        reference = self.frames.link(element, within(self.framed.scope, named))
+        around = self.frames.short(reference) if reference else WORLD
+        ratio = _number(element, "gearbox_ratio", 1.0)
+        second = "axis2" if element.child("axis2") is not None else "axis"
+        weights: dict[str, float] = {}
+        for tag, link, weight in (("axis", links[0], ratio), (second, links[1], 1.0)):
+            for joint in joints:
+                ends = [around if end in self.graph.fixed else end for end in joint.links]
+                if {*ends} == {around, link} and [move.kind for move in joint.moves] == ["hinge"]:
+                    (move,) = joint.moves
+                    along = move.axis @ self._axis(tag)
+                    if abs(along) > ALONG:
+                        sense = along if ends[1] == link else -along
+                        weights[move.name] = weight * math.copysign(1.0, sense)
+                        break
+            else:
+                raise element.fault(
+                    f"<{tag}>: there is no hinge between {link!r} and {named!r} along it, expected"
+                    " one, whose turn the gearbox couples; correct the axis, or write <mimic>"
+                )
+        return Coupling(self.name, weights, {}, (0.0,), element)
 
     def _freedoms(self) -> list[Freedom]:
         element = self.element
@@ -396,6 +446,7 @@ class _Joint:
         axis.require_known((), "SDF")
         axis.require_children(IN_AXIS, closed=True)
         for limit in axis.only("limit"):
+            limit.require_known((), "SDF")
             limit.require_children(IN_LIMIT, closed=True)
         numbers: Sequence[float] = (0.0, 0.0, 1.0)
         given, place = "", self.place
@@ -414,6 +465,7 @@ class _Joint:
             if self.kind == "screw":  # of the turn or of the shift
                 self.graph.tree.count("dynamics of screw joints")
                 return
+            dynamics.require_known((), "SDF")
             dynamics.require_children((*LAW, *FRICTION), closed=True)
             add_spring(self.graph, move.name, {each.tag: each.text for each in dynamics.children})
 

@@ -13,7 +13,7 @@ from .element import DEEPEST, Element
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .tree import WORLD
 
-MODEL = "__model__"
+MODEL, PLACED = "__model__", "placement_frame"
 SCOPE = "::"
 
 
@@ -57,10 +57,12 @@ class Frames:
             full = self._add(element, scope, scope)
             self.links[full] = self.found[full]
         for element in around.only("model"):
-            element.require_known(("name", "canonical_link"), "SDF")
+            element.require_known(("name", "canonical_link", PLACED), "SDF")
             full = self._add(element, scope, scope)
             self.models[full] = self.found[full]
-            if flag_of(element.child("static")):
+            if (static := element.child("static")) is not None:
+                static.require_known((), "SDF")
+            if flag_of(static):
                 self.static.add(full)
             self.read(element, full, depth + 1)
         for element in around.only("joint"):
@@ -147,9 +149,26 @@ class Frames:
                 )
             name = self.known(self.found[name].element, self._base(name))
         for name in reversed(chain):
-            base = self._places[self._base(name)]
-            self._places[name] = base.then(pose_of(self.found[name].element.child("pose")))
+            self._places[name] = self._places[self._base(name)].then(self._pose(name))
         return self._places[full]
+
+    def _pose(self, full: str) -> Place:
+        """Return the place of a frame in its base; a model may give that of a frame in it."""
+        element = self.found[full].element
+        pose, name, inside = pose_of(element.child("pose")), full, ORIGIN
+        if placed := element.attributes.get(PLACED, "") if full in self.models else "":
+            name = self.known(element, within(full, placed))
+        for _ in self.found:
+            if name == full:
+                return pose.then(ORIGIN.seen_from(inside))
+            inside = self._pose(name).then(inside)
+            name = self.known(element, self._base(name))
+            if not name:
+                break
+        raise element.fault(
+            f"{PLACED}: found {shown(placed)}, which is given outside the model, expected a frame"
+            " given in it; correct it"
+        )
 
     def _base(self, full: str) -> str:
         """Return the base of the pose of a frame."""

@@ -97,7 +97,9 @@ def read_urdf(file: Path, root: Element) -> Tree:
     """
     robot = _Robot(file, root)
     robot.read()
-    return robot.graph.hang()
+    tree = robot.graph.hang()
+    robot.beside.place(tree)
+    return tree
 
 
 class _Robot:
@@ -145,9 +147,15 @@ class _Robot:
         add_ties(graph, ((each, self._named, framed) for each in root.children))
         self.beside.add(graph)
         self._require_apart(frames)
-        for each in root.only("transmission"):
-            names = (joint.attributes.get("name", "") for joint in each.only("joint"))
-            graph.tree.actuated.update(name for name in names if name in self.joints)
+        commanded = [
+            joint
+            for control in root.only("ros2_control")
+            for joint in control.only("joint")
+            if any(joint.only("command_interface"))
+        ]
+        driven = [joint for each in root.only("transmission") for joint in each.only("joint")]
+        names = {joint.attributes.get("name", "") for joint in (*driven, *commanded)}
+        graph.tree.actuated |= names & self.joints.keys()
 
     def _links(self) -> None:
         root, graph = self.root, self.graph
@@ -267,6 +275,8 @@ class _Robot:
             case "fixed":
                 freedoms = []
             case "screw":
+                if element.child(PITCH) is None:
+                    raise element.fault(f"<{PITCH}>: missing, expected metres in a turn; add it")
                 freedoms = screw(graph, name, element.value(PITCH, 1)[0], axis(), element)
             case "universal":  # of Drake: about x of the parent, then y of the child
                 axes = enumerate((X, Y), 1)
@@ -373,6 +383,7 @@ class _Robot:
 
 def _mass(element: Element) -> Mass | None:
     """Return the mass of an <inertial>; None if it cannot be read, for motion does not need it."""
+    element.require_known((), "URDF")
     element.require_children(("mass", "inertia", "origin"), closed=True)
     for child in element.children:
         child.require_known({"mass": ("value",), "inertia": ENTRIES}.get(child.tag, POSE), "URDF")
