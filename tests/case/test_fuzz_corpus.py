@@ -4,6 +4,7 @@ and all that failed once.
 The fuzzers themselves run by hand: see tests/fuzz/__main__.py.
 """
 
+import importlib.util
 import random
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,7 @@ from ..fuzz import (
     results,
     sdf,
     urdf,
+    usd,
 )
 
 READERS = {
@@ -34,6 +36,7 @@ READERS = {
     "results": results,
     "sdf": sdf,
     "urdf": urdf,
+    **({"usd": usd} if importlib.util.find_spec("pxr") else {}),
 }
 # Inputs of a random choice of changes, the same in every run; the fuzzers try millions.
 CHANGES = 20

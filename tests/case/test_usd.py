@@ -595,3 +595,59 @@ def product(p, q):
 
 def turned(q, x):
     return product(product(q, np.array([0.0, *x])), q * [1, -1, -1, -1])[1:]
+
+
+TURN = "quatd xformOp:orient = ({}, 0, {}, 0)"
+
+
+def turned_by(degrees):
+    half = math.radians(degrees) / 2
+    return TURN.format(math.cos(half), math.sin(half))
+
+
+def test_coordinates_at_the_start_are_those_of_transforms(write):
+    """In centimetres; the second joint counts the world on its body, and the third follows."""
+    follow = ["rel newton:mimicJoint = </r/A>", "float newton:mimicCoef1 = 3"]
+    file = write(
+        body("a", (0, 0, 100), ops=turned_by(30)),
+        body("b", (0, 0, 200), ops=turned_by(-40)),
+        body("c", (0, 7, 300), ops=turned_by(90)),
+        joint("Revolute", "A", "", "a", (0, 0, 100)),
+        joint("Revolute", "B", "b", "", None, (0, 0, 200)),
+        joint("Revolute", "C", "", "c", (0, 0, 300), None, *follow, apis="NewtonMimicAPI"),
+        units="metersPerUnit = 0.01",
+    )
+    tree = tree_of(file)
+    found = [tree.moves[name].value for name in "ABC"]
+    assert np.degrees(found) == pytest.approx([30, 40, 90], abs=1e-12)
+    places = np.array([[*tree.places[name].at] for name in "abc"])
+    assert places == pytest.approx(np.array([[0, 0, 1], [0, 0, 2], [0, 0, 3]]), abs=EXACT)
+    (tie,) = tree.ties
+    assert tie.coefficients[0] == pytest.approx(0.0, abs=EXACT)
+    assert any("c by 0.07 m and" in note and "a by" not in note for note in tree.notes)
+
+
+def test_rod_is_measured_where_joints_place_its_bodies(write):
+    rod = joint("Distance", "rod", "a", "b", (0, 0, 1), None, axis=None)
+    lengths = "float physics:minDistance = 1\nfloat physics:maxDistance = 1\n}"
+    file = write(
+        body("a", (9, 9, 9)),
+        body("b", (0, 0, 2)),
+        joint("Revolute", "A", "", "a"),
+        rod.removesuffix("}") + lengths,
+    )
+    (tie,) = tree_of(file).ties
+    assert [*tie.places[0].at] == [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        ("metresPerUnit = 1", "did you mean 'metersPerUnit'"),
+        ('metersPerUnit = "cm"', "Failed to parse value"),
+        ("metersPerUnit = 0", "expected positive numbers"),
+    ],
+)
+def test_units_that_make_no_sense_are_refused(write, units, message):
+    with pytest.raises(CaseError, match=message):
+        tree_of(write(*ARM, units=units))

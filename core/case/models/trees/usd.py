@@ -20,11 +20,12 @@ from ....algebra import cross, quat, vec
 from ....errors import shortened
 from ....mechanism.mechanism import Vector
 from .element import Element, words
-from .graph import Graph, Joint, Loop
+from .framed import FramedJoint, Freedom, join
+from .graph import Graph
 from .place import ORIGIN, Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
 from .robot_elements import mimic
 from .tree import WORLD, Closure, Kind, Move, Tree
-from .usd_joints import AXES, GENERIC, ROD, TYPES, Freedom, JointOfStage, freedoms_of
+from .usd_joints import AXES, GENERIC, ROD, TYPES, Axis, axes_of
 from .usd_mass import COLLIDER, masses_of
 from .usd_stage import UNITS
 
@@ -79,9 +80,10 @@ class _Reader:
         self.prims = {each.attributes["path"]: each for each in root.below()}
         bodies = [path for path, each in self.prims.items() if _is_body(each)]
         self.names = _short(bodies)
-        self.joints: dict[str, JointOfStage] = {}
+        self.joints: dict[str, FramedJoint] = {}
+        self.axes: dict[str, Sequence[Axis]] = {}
+        self.rods: list[tuple[str, Element, tuple[str, str], tuple[Place, Place], float]] = []
         self.moves: dict[str, list[Move]] = {}
-        self.frames: dict[str, Place] = {}
 
     def read(self) -> Tree:
         """Return the tree."""
@@ -215,12 +217,17 @@ class _Reader:
         if element.tag == ROD:
             self._add_rod(name, element, links, (f, g))
             return
-        freedoms = freedoms_of(element)
-        if sum(3 if each.kind == "ball" else 1 for each in freedoms) == 6:
+        axes = axes_of(element)
+        if sum(3 if each.kind == "ball" else 1 for each in axes) == 6:
             graph.tree.count("joints that hold nothing")
             return
         closes = element.flag("physics:excludeFromArticulation", default=False)
-        self.joints[name] = JointOfStage(name, element, links, (f, g), freedoms, closes)
+        freedoms = [
+            Freedom(f"{name}{each.end}", each.kind, each.axis, self._limited(element, each))
+            for each in axes
+        ]
+        self.joints[name] = FramedJoint(name, element, links, (f, g), freedoms, closes)
+        self.axes[name] = axes
 
     def _end(self, element: Element, side: int) -> tuple[str, Place]:
         """Return the body of a joint, empty for the world, and the joint's frame in it [m]."""
@@ -255,12 +262,7 @@ class _Reader:
         if least < 0.0 and most < 0.0:
             self.graph.tree.count("joints that hold nothing")
         elif least == most:
-            first, second = (
-                self.graph.places[link].then(frame)
-                for link, frame in zip(links, frames, strict=True)
-            )
-            places = Place(first.at), Place(second.at)
-            self.graph.rods.append(Closure(name, links, places, element, "distance", most))
+            self.rods.append((name, element, links, frames, most))
         else:
             raise element.fault(
                 "physics:minDistance, physics:maxDistance: found a range, which acts at its ends"
@@ -269,59 +271,23 @@ class _Reader:
             )
 
     def _hang(self) -> None:
-        """Place the bodies along a tree of joints, and add all joints to the graph."""
-        graph, joints = self.graph, self.joints
-        own = dict(graph.places)
-        graph.joints = [
-            Joint(each.name, each.links, (), each.element)
-            for each in joints.values()
-            if not each.closes
-        ]
-        spanning, loops = graph.spanning_tree()
-        for each in spanning:
-            joint = joints[each.name]
-            (a, b), (f, g) = joint.links, joint.frames
-            first, second = (own[link].then(frame) for link, frame in ((a, f), (b, g)))
-            motion, _ = joint.motion(second.seen_from(first))
-            if each.links == joint.links:
-                placed = graph.places[a].then(f).then(motion)
-                graph.places[b] = placed.then(ORIGIN.seen_from(g))
-            else:
-                placed = graph.places[b].then(g).then(ORIGIN.seen_from(motion))
-                graph.places[a] = placed.then(ORIGIN.seen_from(f))
+        """Place the bodies, and add joints and rods to the graph."""
+        graph, own = self.graph, dict(self.graph.places)
+        self.moves = join(graph, self.joints.values())
         self._tell_moved(own)
-        graph.joints = [self._joined(joints[each.name])[0] for each in spanning]
-        closing = [each.joint.name for each in loops]
-        closing += [each.name for each in joints.values() if each.closes]
-        graph.loops = [Loop(*self._joined(joints[name])) for name in closing]
-
-    def _joined(self, joint: JointOfStage) -> tuple[Joint, tuple[Place, Place]]:
-        """Return a joint of the graph, and its frames: the first one behind its moves."""
-        first, second = (
-            self.graph.places[link].then(frame)
-            for link, frame in zip(joint.links, joint.frames, strict=True)
-        )
-        motion, values = joint.motion(second.seen_from(first))
-        moves = [
-            Move(
-                f"{joint.name}{each.end}",
-                each.kind,
-                second.at,
-                first.direction(each.axis),
-                self._limited(joint.element, each),
-                value,
-            )
-            for each, value in zip(joint.freedoms, values, strict=True)
-        ]
-        self.moves[joint.name] = moves
-        whole = Joint(joint.name, joint.links, moves, joint.element)
-        return whole, (first.then(motion), second)
+        for name, element, links, frames, length in self.rods:
+            places = [
+                Place(graph.places[link].point(frame.at))
+                for link, frame in zip(links, frames, strict=True)
+            ]
+            rod = Closure(name, links, (places[0], places[1]), element, "distance", length)
+            graph.rods.append(rod)
 
     def _unit(self, kind: Kind) -> float:
         """Return the unit of a coordinate [rad or m]."""
         return math.radians(1.0) if kind == "hinge" else self.metre
 
-    def _limited(self, element: Element, freedom: Freedom) -> Element:
+    def _limited(self, element: Element, freedom: Axis) -> Element:
         """Return the element of a move with its limits and motor, as <limit> of URDF has them."""
         if freedom.kind == "ball":
             return element
@@ -357,19 +323,19 @@ class _Reader:
                 tie = mimic(move.name, lead.name, offset, factor, joint.element)
                 self.graph.couplings.append(tie)
                 followers.add(move.name)
-        for joint, move, freedom in self._freedoms():
+        for joint, move, axis in self._axes():
             said = joint.element.attributes
-            gains = [said.get(f"drive:{freedom.key}:physics:{each}") for each in GAINS]
-            if f"{DRIVE}:{freedom.key}" in said["apis"].split() and gains != ["0.0", "0.0"]:
+            gains = [said.get(f"drive:{axis.key}:physics:{each}") for each in GAINS]
+            if f"{DRIVE}:{axis.key}" in said["apis"].split() and gains != ["0.0", "0.0"]:
                 self.graph.tree.actuated.add(move.name)
         self.graph.tree.actuated -= followers
 
-    def _freedoms(self) -> Iterator[tuple[JointOfStage, Move, Freedom]]:
+    def _axes(self) -> Iterator[tuple[FramedJoint, Move, Axis]]:
         for joint in self.joints.values():
-            for move, freedom in zip(self.moves[joint.name], joint.freedoms, strict=True):
-                yield joint, move, freedom
+            for move, axis in zip(self.moves[joint.name], self.axes[joint.name], strict=True):
+                yield joint, move, axis
 
-    def _mimics(self, joint: JointOfStage) -> Iterator[tuple[Move, float, float]]:
+    def _mimics(self, joint: FramedJoint) -> Iterator[tuple[Move, float, float]]:
         """Yield the leader of a joint, its offset [rad or m] and its factor."""
         element = joint.element
         said, apis = element.attributes, element.attributes["apis"].split()
@@ -402,7 +368,7 @@ class _Reader:
                 factor = element.number("newton:mimicCoef1", 1.0) * unit / other
                 yield lead, element.number("newton:mimicCoef0", 0.0) * unit, factor
 
-    def _lead(self, joint: JointOfStage, key: str) -> tuple[Move, float, float]:
+    def _lead(self, joint: FramedJoint, key: str) -> tuple[Move, float, float]:
         """Return the leader of a joint, and the units of both coordinates."""
         element = joint.element
         found = element.attributes.get(key, "").split()
@@ -443,8 +409,8 @@ class _Reader:
             ("target", "drive", "targetPosition"),
             ("state", "state", "position"),
         ):
-            for joint, move, freedom in self._freedoms():
-                own = key.format(start, freedom.key, end)
+            for joint, move, axis in self._axes():
+                own = key.format(start, axis.key, end)
                 if move.is_axial and own in joint.element.attributes:
                     value = joint.element.number(own) * self._unit(move.kind)
                     tree.starts.setdefault(name, []).append(f"{move.name}={value!r}")

@@ -5,14 +5,12 @@ Conventions: UsdPhysics of OpenUSD. An axis of a joint is one of its frame in th
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import cast
 
-from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z
+from ....algebra import Vec3, X, Y, Z
 from .element import Element
-from .place import Place, unit_quaternion
 from .tree import Kind
 
 AXES = {"X": X, "Y": Y, "Z": Z}
@@ -27,10 +25,11 @@ GENERIC, ROD = "PhysicsJoint", "PhysicsDistanceJoint"
 
 
 @dataclass(frozen=True)
-class Freedom:
-    """A move of a joint: the end of its name, and its axis in the joint's frame.
+class Axis:
+    """A move that a joint leaves, along or about an axis of its frame.
 
     Attributes:
+        end: of its name, which begins with the joint's.
         bounds: keys of its limits.
         key: of its drive and its state, as names of schemas end.
     """
@@ -42,47 +41,8 @@ class Freedom:
     key: str
 
 
-@dataclass(frozen=True)
-class JointOfStage:
-    """A joint of the stage.
-
-    Attributes:
-        frames: in its links [m].
-        closes: it is excluded from articulations.
-    """
-
-    name: str
-    element: Element
-    links: tuple[str, str]
-    frames: tuple[Place, Place]
-    freedoms: Sequence[Freedom]
-    closes: bool
-
-    def motion(self, relative: Place) -> tuple[Place, list[float]]:
-        """Return the nearest motion of the second frame in the first one by the joint's moves, and
-        their coordinates [m or rad].
-        """
-        at, turn, values = 0.0 * relative.at, IDENTITY, list[float]()
-        for each in self.freedoms:
-            value = 0.0
-            if each.kind == "slide":
-                value = each.axis @ relative.at
-                at += value * each.axis
-            elif each.kind == "hinge":
-                along = each.axis @ relative.turn.e
-                length = math.hypot(relative.turn.e0, along)
-                if length > 0.0:
-                    turn = unit_quaternion(Quat(relative.turn.e0, along * each.axis))
-                    sign = math.copysign(1.0, relative.turn.e0)
-                    value = 2.0 * math.atan2(sign * along, sign * relative.turn.e0)
-            else:
-                turn = relative.turn
-            values.append(value)
-        return Place(at, turn), values
-
-
-def freedoms_of(element: Element) -> list[Freedom]:
-    """Return the freedoms of a joint.
+def axes_of(element: Element) -> list[Axis]:
+    """Return the moves that a joint leaves.
 
     Raises:
         CaseError: no joint leaves them, or limits make no sense.
@@ -90,21 +50,21 @@ def freedoms_of(element: Element) -> list[Freedom]:
     return _generic(element) if element.tag == GENERIC else _single(element)
 
 
-def _single(element: Element) -> list[Freedom]:
-    """Return the freedom of a joint of one kind."""
+def _single(element: Element) -> list[Axis]:
+    """Return the move of a joint of one kind."""
     kind = TYPES[element.tag]
     if kind is None:
         return []
     letter = element.choice("physics:axis", (*AXES,), "X")
     key = {"hinge": "angular", "slide": "linear"}.get(kind, "")
     bounds = "physics:lowerLimit", "physics:upperLimit"
-    return [Freedom("", kind, AXES[letter], bounds, key)]
+    return [Axis("", kind, AXES[letter], bounds, key)]
 
 
-def _generic(element: Element) -> list[Freedom]:
-    """Return the freedoms of a joint whose limits lock axes."""
+def _generic(element: Element) -> list[Axis]:
+    """Return the moves of a joint whose limits lock axes."""
     apis = element.attributes["apis"].split()
-    free: dict[str, Freedom] = {}
+    free: dict[str, Axis] = {}
     for prefix, kind in (("trans", "slide"), ("rot", "hinge")):
         for letter, axis in AXES.items():
             key = f"{prefix}{letter}"
@@ -122,7 +82,7 @@ def _generic(element: Element) -> list[Freedom]:
                         f"{low}: found {least:g} for both limits, which lock the joint out of its"
                         " frames, expected low above high for a lock; move the frame"
                     )
-            free[key] = Freedom(f".{key}", cast("Kind", kind), axis, (low, high), key)
+            free[key] = Axis(f".{key}", cast("Kind", kind), axis, (low, high), key)
     if "PhysicsLimitAPI:distance" in apis:
         raise element.fault(
             "limits a distance, which acts at its ends alone; write a"
@@ -136,5 +96,5 @@ def _generic(element: Element) -> list[Freedom]:
             " joints: PhysX one of constant velocity, Newton a universal one; write it as two"
             " PhysicsRevoluteJoint with a body between them"
         )
-    found += [Freedom(".rot", "ball", X, ("", ""), "")] if len(turns) == 3 else turns
+    found += [Axis(".rot", "ball", X, ("", ""), "")] if len(turns) == 3 else turns
     return [replace(found[0], end="")] if len(found) == 1 else found

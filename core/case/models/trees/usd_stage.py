@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import CaseError, shortened
+from ....errors import CaseError, remedy, shortened, similar
 from ....extras import library
 from ...io.document import fault, shown
 from .element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
@@ -51,6 +51,7 @@ def root_of_usd(file: Path) -> Element:
         stage = pxr.Usd.Stage.Open(str(file.resolve()))
         if errors := [str(each) for each in stage.GetCompositionErrors()]:
             raise fault(file, "", f"cannot be composed: {shortened(errors, MOST_NAMED)}; {FLATTEN}")
+        _require_units(file, stage)
         units = (
             _written(pxr.UsdGeom.GetStageMetersPerUnit(stage)),
             _written(pxr.UsdPhysics.GetStageKilogramsPerUnit(stage)),
@@ -61,19 +62,34 @@ def root_of_usd(file: Path) -> Element:
         root = Element(file, USD, attributes, 1, words="the stage")
         prims = _Prims(file, pxr)
         root.children.extend(prims.inside(stage.GetPseudoRoot(), 1))
-    except pxr.Tf.ErrorException as error:
-        raise _unreadable(file, str(error)) from None
+    except (pxr.Tf.ErrorException, UnicodeDecodeError) as error:
+        raise _unreadable(file, error) from None
     finally:
         quiet.TakeUncoalescedDiagnostics()
     return root
 
 
-def _unreadable(file: Path, error: str) -> CaseError:
-    """Return the error of a file, from the first reason that the library gives."""
-    reason = " ".join((_REASON.findall(error) or [error])[0].split())
+def _unreadable(file: Path, error: Exception) -> CaseError:
+    """Return the error of a file, with the first reason of the library."""
+    try:
+        text = str(error)
+    except UnicodeDecodeError as inside:  # bytes of the file, quoted by the library
+        text = str(inside)
+    reason = " ".join((_REASON.findall(text) or [text])[0].split())
     line = _LINE.fullmatch(reason)
     key, what = (f"line {line[1]}", line[2]) if line else ("", reason)
     return fault(file, key, f"not valid USD: {what}; correct the file")
+
+
+def _require_units(file: Path, stage: Any) -> None:
+    """Refuse units that are misspelt or of another kind, in whose place others would be taken."""
+    for key in stage.GetPseudoRoot().GetAllAuthoredMetadata():
+        if key not in UNITS and similar(key, UNITS):
+            raise fault(file, "", f"found {shown(key)} of the stage; {remedy(key, UNITS)}")
+    for key in UNITS[:2]:
+        value = stage.GetMetadata(key)
+        if value is not None and not isinstance(value, int | float):
+            raise fault(file, key, f"found {shown(value)}, expected a number; correct it")
 
 
 def _require_near(file: Path, pxr: Any) -> None:
