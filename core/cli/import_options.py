@@ -146,7 +146,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
     )
     model = command.add_argument_group(
         "models",
-        "Models (MJCF, URDF, SDF, USD), which do not state drivers, and datasets of Adams (.adm).",
+        "Models (MJCF, URDF, SDF, USD, OpenSim), which do not state drivers, and datasets of Adams"
+        " (.adm).",
     )
     model.add_argument(
         "--drive",

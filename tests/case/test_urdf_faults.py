@@ -127,7 +127,6 @@ def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
     ("text", "advice"),
     [
         ("<mujocoinclude/>", "give the file that includes it"),
-        ("<OpenSimDocument/>", "give MJCF or a case file"),
         ("<launch/>", "give the URDF"),
         (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
     ],

@@ -351,8 +351,8 @@ _PLACES = words(
     "pos axis anchor relpose fromto xyz rpy quat axisangle xyaxes zaxis euler "
     "physics:localPos0 physics:localPos1 physics:localRot0 physics:localRot1"
 )
-# Elements of SDF, whose texts are places.
-_TEXTS = ("pose", "xyz")
+# Elements of SDF and OpenSim, whose texts are places.
+_TEXTS = words("pose xyz translation orientation location_body_1 location_body_2")
 _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")
 
 

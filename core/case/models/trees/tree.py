@@ -1,4 +1,4 @@
-"""The tree of links of a model: the content of a MJCF, URDF, SDF or USD file, and all that
+"""The tree of links of a model: the content of a model in any format, and all that
 its case is made of.
 
 A link without a move of its own is part of the link around it. A link with several moves hangs on a

@@ -22,9 +22,9 @@ from ....mechanism.mechanism import Vector
 from .element import Element, words
 from .framed import FramedJoint, Freedom, join
 from .graph import Graph
-from .place import ORIGIN, Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
+from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
 from .robot_elements import mimic
-from .tree import WORLD, Closure, Kind, Move, Tree
+from .tree import Closure, Kind, Move, Tree
 from .usd_joints import AXES, GENERIC, ROD, TYPES, Axis, axes_of
 from .usd_mass import COLLIDER, masses_of
 from .usd_stage import UNITS
@@ -200,13 +200,7 @@ class _Reader:
                 f"joins {first or 'the world'!r} with itself, expected two bodies; correct"
                 " physics:body0 or physics:body1"
             )
-        world = WORLD
-        while world in self.names.values():
-            world += "'"
-        if not (first and second) and world not in graph.places:
-            graph.places[world], graph.elements[world] = ORIGIN, self.root
-            graph.fixed.add(world)
-        links = first or world, second or world
+        links = first or graph.add_world(), second or graph.add_world()
         if {*links} <= graph.fixed:
             graph.tree.count("joints of what stands still")
             return
@@ -399,7 +393,7 @@ class _Reader:
             x, y, z = scene.numbers("physics:gravityDirection", 3, default=down)
             down = x, y, z
         if not any(down):
-            down = coordinates(-AXES[self.root.attributes["upAxis"]])
+            down = coordinates(-AXES[self.root.choice("upAxis", (*AXES,), "Y")])
         return coordinates(size / math.hypot(*down) * vec(down))
 
     def _keyframes(self) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,9 +25,9 @@ UNITS = ("metersPerUnit", "kilogramsPerUnit", "upAxis")
 # Shapes make files long; scenes of whole plants have some hundred megabytes.
 LARGEST_LAYER, MOST_LAYERS = 500_000_000, 1_000
 MOST_NAMED = 3
-_SINGLE, _WHOLE = words("half float"), words("int uint int64 uint64 uchar")
+_SINGLE, _TEXTS = words("half float"), words("token string")
+_SCALARS = (*_SINGLE, *_TEXTS, *words("double bool int uint int64 uint64 uchar"))
 _VECTORS = re.compile(r"(vector|point|normal|float|double|half)3[hfd]?|quat[hfd]")
-_TEXTS = words("token string")
 # Their places are those of the prims; looks and shapes are of no use.
 _LEFT_OUT = words("xformOp xformOpOrder primvars inputs outputs ui info")
 _REASON = re.compile(r" : '(.*?)'\s*(?:\n|$)", re.DOTALL)
@@ -161,7 +161,11 @@ class _Prims:
                 raise element.fault(f"nested more than {DEEPEST} deep; correct the file")
             if prim.HasAuthoredMetadata("clips"):
                 raise element.fault(f"takes values from clips of other files; {FLATTEN}")
-            attributes = {"name": prim.GetName(), "path": path, **dict(self._properties(prim))}
+            attributes = {
+                "name": prim.GetName(),
+                "path": path,
+                **dict(self._properties(element, prim)),
+            }
             attributes["apis"] = " ".join(prim.GetPrimTypeInfo().GetAppliedAPISchemas())
             matrix = np.array(self.places.GetLocalToWorldTransform(prim), dtype=np.float64)
             attributes["matrix"] = " ".join(map(repr, matrix.ravel().tolist()))
@@ -173,7 +177,7 @@ class _Prims:
             element.children.extend(self.inside(prim, depth + 1))
             yield element
 
-    def _properties(self, prim: Any) -> Iterator[tuple[str, str]]:
+    def _properties(self, element: Element, prim: Any) -> Iterator[tuple[str, str]]:
         """Yield names and texts of properties; of relationships the paths of their targets."""
         for each in prim.GetAuthoredProperties():
             name = str(each.GetName())
@@ -181,34 +185,33 @@ class _Prims:
                 continue
             if isinstance(each, self.relationship):
                 yield name, " ".join(str(path) for path in each.GetTargets())
-            elif (text := self._text(each)) is not None:
-                yield name, text
+                continue
+            kind = str(each.GetTypeName())
+            if kind not in _SCALARS and not _VECTORS.fullmatch(kind):
+                continue
+            value = each.Get(self.time)
+            if value is None:  # blocked
+                continue
+            try:
+                text = _text(kind, value)
+            except (TypeError, ValueError, AttributeError):  # of another type than it says
+                problem = f"{name}: found {shown(str(value))}, expected {kind}"
+                raise element.fault(f"{problem}; correct it") from None
+            yield name, text
 
-    def _text(self, attribute: Any) -> str | None:
-        """Return the text of a value; None of others than numbers, words and vectors of three."""
-        kind = str(attribute.GetTypeName())
-        scalar = kind in (*_SINGLE, *_WHOLE, *_TEXTS, "double", "bool")
-        if not (scalar or _VECTORS.fullmatch(kind)):
-            return None
-        value = attribute.Get(self.time)
-        if value is None:  # blocked
-            return None
-        if kind in _TEXTS:
-            return str(value)
-        if kind == "bool":
-            return str(value).lower()
-        if scalar:
-            return _written(value, single=kind in _SINGLE)
-        numbers = [*value] if kind[:4] != "quat" else [value.GetReal(), *value.GetImaginary()]
-        single = not (kind.endswith("d") or kind.startswith("double"))
-        return " ".join(_written(number, single=single) for number in numbers)
+
+def _text(kind: str, value: Any) -> str:
+    """Return the text of a value of a type."""
+    if kind in _TEXTS:
+        return str(value)
+    if kind == "bool":
+        return str(value).lower()
+    if kind in _SCALARS:
+        return _written(value, single=kind in _SINGLE)
+    numbers = [*value] if kind[:4] != "quat" else [value.GetReal(), *value.GetImaginary()]
+    single = not (kind.endswith("d") or kind.startswith("double"))
+    return " ".join(_written(number, single=single) for number in numbers)
 
 
 def _written(number: float, *, single: bool = False) -> str:
     return str(np.float32(number)) if single else repr(float(number))
-
-
-def places_of(element: Element) -> Sequence[Sequence[float]]:
-    """Return the rows of the matrix of a prim: three axes and the origin, global."""
-    numbers = element.numbers("matrix", 16)
-    return [numbers[k : k + 3] for k in (0, 4, 8, 12)]
