@@ -153,7 +153,9 @@ class _Reader:
         for marker in self._all("Marker"):
             link, place = self._frame(marker, "socket_parent_frame")
             at = place.then(Place(_vector(marker, "location")))
-            graph.frames[marker.required("name")] = link, graph.places[link].then(at)
+            name = marker.required("name")
+            name += ".marker" * (name in graph.places)
+            graph.frames[name] = link, graph.places[link].then(at)
         x, y, z = _numbers(self.model, "gravity", 3, GRAVITY)
         tree.gravity = x, y, z
         for section in self.model.children:

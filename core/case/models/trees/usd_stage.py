@@ -17,7 +17,7 @@ import numpy as np
 
 from ....errors import CaseError, remedy, shortened, similar
 from ....extras import library
-from ...io.document import fault, shown
+from ...io.document import fault, require_file, shown
 from .element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
 
 FLATTEN = "write all into one file: usdcat --flatten FILE -o flat.usda"
@@ -103,20 +103,14 @@ def _require_near(file: Path, pxr: Any) -> None:
     waiting, known = [str(file.resolve())], set[str]()
     while waiting:
         path = waiting.pop()
-        package = path.partition("[")[0]
+        package = _package(path, pxr)
         if path in known:
             continue
         known.add(path)
         if len(known) > MOST_LAYERS:
             raise refuse("", f"found more than {MOST_LAYERS} layers, expected fewer")
-        try:
-            size = Path(package).stat().st_size
-        except OSError as error:
-            raise fault(
-                file, "", f"cannot be read ({error.strerror}); check path and rights"
-            ) from None
-        if size > LARGEST_LAYER:
-            raise refuse(package, f"is larger than {LARGEST_LAYER} bytes, expected less")
+        own = file if package == str(file.resolve()) else Path(package)
+        require_file(own, LARGEST_LAYER, "take out shapes")
         layer = pxr.Sdf.Layer.FindOrOpen(path)
         if layer is None:
             part = "" if path == str(file.resolve()) else shown(path)
@@ -124,7 +118,7 @@ def _require_near(file: Path, pxr: Any) -> None:
         for asset in filter(None, layer.GetCompositionAssetDependencies()):  # none: this layer
             wanted = pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, asset)
             found = resolver.Resolve(wanted).GetPathString()
-            outer = found.partition("[")[0]
+            outer = _package(found, pxr)
             near = bool(outer) and file_near(
                 folder, os.path.relpath(Path(outer).resolve(), folder), suffixes
             )
@@ -133,6 +127,12 @@ def _require_near(file: Path, pxr: Any) -> None:
                 missing = "which is elsewhere" if outer else "and there is none"
                 raise refuse(f"found the reference {shown(asset)},", f"{problem}, {missing}")
             waiting.append(found)
+
+
+def _package(path: str, pxr: Any) -> str:
+    """Return the file of a layer: the package around it, if it is in one."""
+    inside = pxr.Ar.IsPackageRelativePath(path)
+    return pxr.Ar.SplitPackageRelativePathOuter(path)[0] if inside else path
 
 
 class _Prims:
