@@ -518,9 +518,11 @@ def test_files_from_elsewhere_are_refused(write, tmp_path, asset, problem):
         tree_of(file)
 
 
-@pytest.mark.parametrize(
-    "data", [b"", b"hello", b"PXR-USDC", b"PK\x03\x04", bytes(99)], ids=range(5)
-)
+INVALID = b'#usda 1.0\ndef "\xff\xff"'
+OTHER = [b"", b"hello", b"PXR-USDC", b"PK\x03\x04", bytes(99), INVALID]
+
+
+@pytest.mark.parametrize("data", OTHER, ids=range(len(OTHER)))
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usdz", ".usd"])
 def test_other_data_is_no_stage(tmp_path, suffix, data):
     file = tmp_path / f"m{suffix}"

@@ -10,6 +10,7 @@ and z of the body, one after the other.
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
+from ....errors import KincheckError
 from ....extras import library
 from ...io.case_file import LARGEST_FILE
 from ...io.document import fault, read_text, shown
@@ -32,8 +34,8 @@ from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .robot_elements import HALFWAY, direction, mass_in
 from .tree import BushingLaw, Closure, Coupling, Kind, Move, Spring, Strut, Tree
 
-NEWEST, OLDEST = "40000", 40_000
-"""Version of documents that are read."""
+VERSION_4 = 40_000
+"""Oldest version of documents that are read as they are."""
 CHAINS: Mapping[str, Sequence[tuple[Kind, Vec3, int]]] = {
     "PinJoint": [("hinge", Z, 0)],
     "SliderJoint": [("slide", X, 0)],
@@ -78,13 +80,20 @@ def whole_osim(file: Path, root: Element) -> Element:
     """Return a document in the form of version 4.
 
     Raises:
-        CaseError: OpenSim cannot read an older document.
-        KincheckError: OpenSim is needed and not installed.
+        CaseError: OpenSim cannot read an older document, or is not installed.
     """
-    version = root.attributes.get("Version", "0")
-    if version.isdecimal() and int(version) >= OLDEST:
+    version = root.attributes.get("Version", "")
+    if re.fullmatch(r"[4-9]\d{4}", version):
         return root
-    opensim = library(f"{file}: version {version} of OpenSim's documents", "opensim", "simbody")
+    if not re.fullmatch(r"[1-9]\d{4}", version):
+        raise root.fault(
+            f"Version: found {shown(version)}, expected {VERSION_4} or more; correct it"
+        )
+    try:
+        opensim = library("an older one", "opensim", "simbody")
+    except KincheckError as error:
+        problem = f"Version: found {version}, expected {VERSION_4} or more; save it by OpenSim 4"
+        raise root.fault(f"{problem}, or install that: {error}") from None
     opensim.Logger.setLevelString("Off")
     with tempfile.TemporaryDirectory() as folder:
         newer = Path(folder) / "newer.osim"
