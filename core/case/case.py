@@ -37,8 +37,11 @@ class Hardpoint:
         axes: axis among these, and its sign, along each of x, y and z of the table.
         moves: derivatives of the numbers of each following place, see `kinematics.places`, by x, y
             and z of the table [m/m], shape (numbers, 3). They are constant.
-        shim: derivatives of toe and camber at design by x, y and z of the table [rad/m], shape
-            (2, 3), if the joint is moved and the links keep their lengths; None for no such joint.
+        shim: derivatives of toe, camber and, with a steering axis of two points, caster at design
+            by x, y and z of the table [rad/m], shape (2 or 3, 3), if the joint is moved and the
+            links keep their lengths; None for no such joint.
+        level: how far the row, moved along x, y or z of the table alone, leaves no bump steer at
+            design, to first order [m], shape (3,); None for rows that are not an end of a tie rod.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Hardpoint:
     axes: Sequence[tuple[int, float]]
     moves: Mapping[str, Array]
     shim: Array | None = None
+    level: Array | None = None
 
 
 SLOW = 2.0**60

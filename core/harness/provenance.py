@@ -218,7 +218,11 @@ def _facts(case: Case) -> dict[str, Any]:
         "signs": case.signs,
         "notes": notes(case),
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
-        **({"units": {"length": case.length_unit, "angle": "deg"}} if case.hardpoints else {}),
+        **(
+            {"units": {"length": case.length_unit, "angle": case.angle_unit}}
+            if case.hardpoints
+            else {}
+        ),
     }
 
 

@@ -18,7 +18,7 @@ from ..harness.record import Deviation, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Finding, Kind, Loose, Regressions, Step, changes, same_machine
-from .queries import NIGHTS, NOTHING, Entry, History, calibration, read, same
+from .queries import IDLE, NIGHTS, NOTHING, Entry, History, calibration, read, same
 from .run_selection import Subject
 from .steps import (
     ENOUGH,
@@ -89,6 +89,7 @@ def regressions(
         pairs=len(records),
         failing=[record.pair for record in records if record.outcome.bad],
         unjudged=[record.pair for record in records if record.outcome is Outcome.UNJUDGED],
+        unable=sum(record.outcome in IDLE for record in records),
         unread=[*why],
         passed_by=[*subject.passed_by],
         time_limit=limit,

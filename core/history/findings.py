@@ -198,6 +198,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         pairs: number of records of the run.
         failing: case, engine and mode of all pairs that failed or broke, new or not.
         unjudged: case, engine and mode of all solved pairs without a comparison, new or not.
+        unable: number of pairs whose engine is not there or cannot do the case.
         unread: requested cases that cannot be read; their pairs are findings, as lost.
         passed_by: numbers of later runs of something else, which are not judged.
         steps: first the standing ones, then the repaired ones (`Step.repaired`).
@@ -212,6 +213,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     pairs: int
     failing: list[tuple[str, str, str]]
     unjudged: list[tuple[str, str, str]] = []
+    unable: int = 0
     unread: list[str] = []
     passed_by: list[int] = []
     time_limit: float

@@ -75,7 +75,7 @@ class Designs:
 
 def designs_of(results: Results, cases: Sequence[Case]) -> Designs:
     """Return the designs of a run that have any value."""
-    units = {"length": cases[0].length_unit, "angle": "deg"}
+    units = {"length": cases[0].length_unit, "angle": cases[0].angle_unit}
     every = {name: each | {"units": units} for name, each in results.run["cases"].items()}
     results = msgspec.structs.replace(results, run=results.run | {"cases": every})
     facts, other = every[cases[0].name], _defined_otherwise(every)

@@ -63,7 +63,7 @@ class Row:
 def headline(found: Regressions) -> str:
     """Return the report in one sentence."""
     if found.against is None:
-        judged = found.pairs - len(found.unjudged)
+        judged = found.pairs - len(found.unjudged) - found.unable
         failing = (
             f"{len(found.failing)} of {judged} not right"
             if found.failing
@@ -72,6 +72,7 @@ def headline(found: Regressions) -> str:
         # without a run to compare with there are no other regressions
         never = _counted(found, Kind.LOST)
         rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
+        rest += [f"{found.unable} unavailable or unsupported"] if found.unable else []
         rest += [f"{never} not run"] if never else []
         absent = _counted(found, Kind.ABSENT)
         rest += [f"{absent} {Kind.ABSENT}"] if absent else []

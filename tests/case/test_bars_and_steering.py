@@ -102,8 +102,10 @@ def test_anti_roll_bar_on_every_template(tmp_path, template):
     assert np.isfinite(found["bar_twist"]).all()
 
 
-def test_rocker_and_heave_spring_ratios(tmp_path):
-    at = {**TEMPLATES["pushrod_lower_arm"].sample, "heave_spring": (0.01, 0.24, 0.49)}
+def test_rocker_and_spring_ratios_across_axle(tmp_path):
+    springs = {"heave_spring": (0.01, 0.24, 0.49)}
+    springs |= {"roll_spring": (0.02, 0.24, 0.49), "roll_spring_right": (0.03, 0.27, 0.35)}
+    at = {**TEMPLATES["pushrod_lower_arm"].sample, **springs}
     rocker = [at[name] for name in ("rocker_pivot", "rocker_axis", "pushrod_inner")]
     heave = car(tmp_path, "pushrod_lower_arm", at, travel="0.03:3", axle="heave")
 
@@ -112,17 +114,27 @@ def test_rocker_and_heave_spring_ratios(tmp_path):
         place, _ = arm_rate(carrier, at, "lca", "pushrod_outer")
         return turned(*rocker, at["pushrod_outer"], place)
 
+    def end(role, travel):
+        """Place on the left rocker: its axis is along x."""
+        x, y, z = np.subtract(at[role], at["rocker_pivot"])
+        c, s = np.cos(angle(travel)), np.sin(angle(travel))
+        return np.add(at["rocker_pivot"], (x, y * c - z * s, y * s + z * c))
+
     def width(travel):
-        """Distance of both ends: the axis is along x."""
-        y, z = np.subtract(at["heave_spring"], at["rocker_pivot"])[1:]
-        t = angle(travel)
-        return 2.0 * (at["rocker_pivot"][1] + y * np.cos(t) - z * np.sin(t))
+        return 2.0 * end("heave_spring", travel)[1]
+
+    def diagonal(left, right):
+        x, y, z = end("roll_spring_right", right)
+        return np.linalg.norm(end("roll_spring", left) - (x, -y, z))
 
     found = answered(heave)
     for k, travel in enumerate(heave.sweep.values):
         assert found["left_rocker_twist"][k] == pytest.approx(angle(travel), abs=CLOSE)
         slope = -(width(travel + STEP) - width(travel - STEP)) / (2 * STEP)
         assert found["heave_spring_ratio"][k] == pytest.approx(slope, abs=1e-5)
+        near = [diagonal(travel + way * STEP, travel) for way in (1, -1)]
+        slope = -(near[0] - near[1]) / (2 * STEP)
+        assert found["roll_spring_ratio"][k] == pytest.approx(slope, abs=1e-5)
     roll = answered(car(tmp_path, "pushrod_lower_arm", at, travel="0.03:3", axle="roll"))
     assert roll["heave_spring_ratio"][1] == pytest.approx(found["heave_spring_ratio"][1], abs=1e-9)
 

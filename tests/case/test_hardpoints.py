@@ -363,9 +363,15 @@ TABLE_FAULTS = {
     "no axes": ((), Supplied(WISHBONE, "mm"), ["where x, y and z point", "--axes forward,left,up"]),
     "no template": (
         (),
+        Supplied(None, "mm", "adams", ask_names=True),
+        ["--template", "mcpherson, double_wishbone, ", "five_link, three_link"],
+    ),
+    "no template, and names that fit none": (
+        ("uca_outer", "my_point"),
         Supplied(None, "mm", "adams"),
         ["--template", "mcpherson, double_wishbone, ", "five_link, three_link"],
     ),
+    "neither unit nor axes": ((), Supplied(WISHBONE), ["--units mm or m", "--axes forward,left"]),
     "misspelt template": (
         (),
         Supplied("duoble_wishbone", "mm", "adams"),
@@ -479,6 +485,20 @@ def test_empty_tables(tmp_path, text, fragment):
     file = tmp_path / "car.csv"
     file.write_text(text)
     complains(file, WHOLE, fragment)
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_templates_follow_from_the_names(tmp_path, name, capsys):
+    rows = [f"{role},{x},{y},{z}" for role, (x, y, z) in TEMPLATES[name].sample.items()]
+    file = tmp_path / "car.csv"
+    file.write_text("\n".join(["# units: m", "# axes: forward,left,up", "name,x,y,z", *rows]))
+    if name.startswith("pushrod"):
+        three = "pushrod_lower_arm or pushrod_upper_arm or pushrod_knuckle"
+        complains(file, Supplied(), f"add --template {three}")
+        return
+    said = [note for note in load(file, Supplied()).assembly if "--template" in note]
+    wanted = name.removeprefix("reduced_")
+    assert said == [f"template {wanted}, by the names of its points: --template states it"]
 
 
 def test_the_template_must_not_contradict_the_file():

@@ -295,6 +295,16 @@ def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
     assert from_json(to_json(results)).records[0].evidence == record.evidence
 
 
+@pytest.mark.parametrize(("reach", "beyond"), [(1.0, ""), (1.1, "2 rows"), (2.0, "19 rows")])
+def test_rows_beyond_the_sweep_are_counted(tmp_path, reach, beyond):
+    rows = np.linspace(-reach, reach, 41) + 1e-3
+    grid = judged(case_of(tmp_path, curve(rows))).evidence.grid
+    if beyond:
+        assert f"; {beyond} beyond the sweep not compared: widen it, or take" in grid
+    else:
+        assert "beyond" not in grid
+
+
 @pytest.mark.parametrize("sweep", [EVEN, AT])
 @pytest.mark.parametrize("noise", [0.0, 0.004])
 @pytest.mark.parametrize("first", [0, 20])

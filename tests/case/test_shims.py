@@ -9,7 +9,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 
-from ..support.rods_of_templates import RODS
+from ..support.rods_of_templates import RODS, solved
 
 STEP = 1e-5
 """Half a difference [m]: its square, and round-off over it, are below the tolerance."""
@@ -26,9 +26,9 @@ def turn(r):
     return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
 
 
-def toe_and_camber(name, role, shift, spin):
-    """Toe and camber with the joint of a role shifted: inner ends on the chassis, outer ones on the
-    carrier.
+def angles_of(name, role, shift, spin):
+    """Toe, camber and caster with the joint of a role shifted: inner ends on the chassis, outer
+    ones on the carrier.
     """
     at = {each: np.array(place) for each, place in TEMPLATES[name].sample.items()}
     outer = {end for _, end in RODS.get(name, ())}
@@ -68,21 +68,37 @@ def toe_and_camber(name, role, shift, spin):
         )
         pose = pose - np.linalg.lstsq(jacobian.T, misfit(pose), rcond=None)[0]
     s = turn(pose[3:]) @ spin
-    return np.array([np.arctan2(s[0], s[1]), -np.arcsin(s[2])])
+    angles = [np.arctan2(s[0], s[1]), -np.arcsin(s[2])]
+    kingpin = TEMPLATES[name].kingpin or ((),)
+    if isinstance(kingpin[0], str):
+        moved = {
+            k: center + pose[:3] + turn(pose[3:]) @ (p - center) for k, p in on_carrier.items()
+        }
+        low, high = ((moved if end in outer else on_body)[end] for end in kingpin)
+        angles += [np.arctan2(low[0] - high[0], high[2] - low[2])]
+    return np.array(angles)
+
+
+def write_table(folder, name, toe, camber, moved):
+    """Write the sample table of a template, x rearward and y right; return the wheel's axis."""
+    spin = np.array(
+        [math.sin(toe) * math.cos(camber), math.cos(toe) * math.cos(camber), -math.sin(camber)]
+    )
+    sample = dict(TEMPLATES[name].sample)
+    sample["wheel_axis"] = tuple((np.array(sample["wheel_center"]) + 0.2 * spin).tolist())
+    for role, shift in moved.items():
+        sample[role] = tuple((np.array(sample[role]) + shift).tolist())
+    lines = ["# units: m", "# axes: rearward,right,up", f"# template: {name}", "name,x,y,z"]
+    lines += [f"{role},{-x!r},{-y!r},{z!r}" for role, (x, y, z) in sample.items()]
+    (folder / "car.csv").write_text("\n".join(lines) + "\n")
+    return spin
 
 
 @pytest.mark.parametrize("name", [*RODS])
 @pytest.mark.parametrize("angles", [(0.0, 0.0), (0.3, -2.0)])
 def test_shims_of_every_template(tmp_path, name, angles):
     toe, camber = map(math.radians, angles)
-    spin = np.array(
-        [math.sin(toe) * math.cos(camber), math.cos(toe) * math.cos(camber), -math.sin(camber)]
-    )
-    sample = dict(TEMPLATES[name].sample)
-    sample["wheel_axis"] = tuple((np.array(sample["wheel_center"]) + 0.2 * spin).tolist())
-    lines = ["# units: m", "# axes: rearward,right,up", f"# template: {name}", "name,x,y,z"]
-    lines += [f"{role},{-x!r},{-y!r},{z!r}" for role, (x, y, z) in sample.items()]
-    (tmp_path / "car.csv").write_text("\n".join(lines) + "\n")
+    spin = write_table(tmp_path, name, toe, camber, {})
     found = {each.roles[0]: each.shim for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
     checked = [role for role, shim in found.items() if shim is not None]
     ends = {end for rod in RODS[name] for end in rod}
@@ -90,8 +106,25 @@ def test_shims_of_every_template(tmp_path, name, angles):
     for role in checked:
         for k, sign in enumerate((-1.0, -1.0, 1.0)):
             shift = STEP * sign * np.eye(3)[k]
-            up, down = (toe_and_camber(name, role, way * shift, spin) for way in (1, -1))
+            up, down = (angles_of(name, role, way * shift, spin) for way in (1, -1))
             assert found[role][:, k] == pytest.approx((up - down) / (2 * STEP), abs=1e-6), (role, k)
+
+
+@pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) > 2])
+def test_tie_rod_moves_leave_no_bump_steer(tmp_path, name):
+    def bump_steer(moved):
+        write_table(tmp_path, name, 0.01, -0.03, moved)
+        return solved(load(tmp_path / "car.csv", Supplied(travel="0.01:3")))["toe.per_travel"][1]
+
+    write_table(tmp_path, name, 0.01, -0.03, {})
+    ends = {each.roles[0]: each for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
+    found = {role: each.level for role, each in ends.items() if each.level is not None}
+    assert found.keys() == {*RODS[name][-1]}
+    for role, level in found.items():
+        for k, sign in enumerate((-1.0, -1.0, 1.0)):
+            up, down = (bump_steer({role: way * STEP * np.eye(3)[k]}) for way in (1, -1))
+            slope = sign * (up - down) / (2.0 * STEP)
+            assert level[k] * slope == pytest.approx(-bump_steer({}), rel=1e-6), (role, k)
 
 
 def test_explain_prints_shims_in_degrees(tmp_path, capsys):
@@ -100,6 +133,9 @@ def test_explain_prints_shims_in_degrees(tmp_path, capsys):
     assert main(["explain", str(tmp_path / "car.csv"), "--samples", "2"]) == 0
     printed = capsys.readouterr().out
     assert "shims of 1 mm at design" in printed
+    ends = {each.name: each.level for each in load(tmp_path / "car.csv").hardpoints}
+    for name in ("tierod_inner", "tierod_outer"):
+        assert f"first order: {name} z {1e3 * ends[name][2]:+.3g} mm in the table" in printed
     (row,) = [line for line in printed.splitlines() if line.startswith("uca_outer  ")]
     degrees = math.degrees(1e-3 * load(tmp_path / "car.csv").hardpoints[2].shim[1][1])
     assert f"{degrees:+.4f}" in row.split()

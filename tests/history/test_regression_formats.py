@@ -85,6 +85,13 @@ def test_regression_markdown_escapes_and_folds(path):
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")
 
 
+def test_pairs_that_no_engine_can_solve_are_not_right(path):
+    first, *others = records()
+    gone = [msgspec.structs.replace(each, outcome=Outcome.UNAVAILABLE) for each in others]
+    keep(path, [first, *gone])
+    assert f": all 1 right, {len(others)} unavailable or unsupported;" in headline(reported(path))
+
+
 def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
     nights(path, 6)
     keep(path, changed(records(), **worse(20.0), message="<script> | *x*")[:-1])

@@ -182,6 +182,22 @@ def test_limits_take_a_unit(limit, low, high):
     assert [found.low, found.high] == pytest.approx(ends, rel=1e-15)
 
 
+def test_limits_of_a_table_are_in_degrees(tmp_path, capsys):
+    main(["templates", "mcpherson"])
+    car, out = tmp_path / "car.csv", tmp_path / "out"
+    car.write_text(capsys.readouterr().out)
+    rows = {"ball": {"at": "lca_outer", "sigma": 1.0}}
+    varied = vary_file(tmp_path, rows, units={"length": "mm"})
+    said = ["--limit", "toe:-1.5:3", "--output", "toe", "--samples", "20", "--out", str(out)]
+    assert main(["sweep", str(car), "--vary", str(varied), *said]) == 0
+    (limit, _) = json.loads((out / "sweep.json").read_text())["limits"]
+    assert [limit["low"], limit["high"]] == pytest.approx(np.radians([-1.5, 3.0]), rel=1e-15)
+    with (out / "limits.csv").open() as lines:
+        row = next(csv.DictReader(lines))
+    assert row["unit"] == "deg"
+    assert [float(row["low"]), float(row["high"])] == pytest.approx([-1.5, 3.0])
+
+
 @pytest.mark.parametrize("limit", ["toe:-2:2mm", "toe:-2deg:2rad", "toe:-2:2dgr", "toe:deg:deg"])
 def test_limits_of_another_unit_are_refused(limit):
     with pytest.raises(

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import number_of
 from ...trajectory import QUANTITIES, Array
 from ..case import Case, Origin, Quantity, Series, Truth
 from ..curves import FEWEST, Printed, bounded, even, interpolated, matched, multiples, slopes
@@ -325,6 +326,12 @@ class Grid:
         rows, samples = len(self._x), len(self._at)
         if self._index is None:
             where = f"interpolated at {int(self._within.sum())} of {samples} samples"
+            # the first row beyond an end is needed there; those behind it say nothing
+            ends = self._x < self._at.min(), self._x > self._at.max()
+            beyond = sum(max(int(each.sum()) - 1, 0) for each in ends)
+            if beyond:
+                where += f"; {number_of(beyond, 'row')} beyond the sweep not compared: widen it, or"
+                where += " take the samples of the reference (--at-reference)"
             return f"{rows} rows on a grid of their own, {where}"
         there = int((self._index >= 0).sum())
         return "" if there == samples else f"rows for {there} of {samples} samples"

@@ -71,8 +71,11 @@ class Diagnosis(msgspec.Struct, frozen=True):
         notes: remarks on the joints' geometry.
         freeing: joints of which any one, taken out alone, frees the blocked drivers.
         binding: numbers of the geometry not to be changed alone: redundant rows contradict then.
-        shims: derivatives of toe and camber at design by x, y and z of each joint of a table that
-            is moved while the links keep their lengths and the wheel its height [rad/m], by row.
+        shims: derivatives of toe, camber and caster at design by x, y and z of each joint of a
+            table that is moved while the links keep their lengths and the wheel its height [rad/m],
+            by row.
+        level: by how much each end of a tie rod, moved along x, y or z of the table alone, leaves
+            no bump steer at design, to first order [m], by row; null where it has no effect.
         moves: places of the case that follow each hardpoint, direction or length, by its name.
         signs: sign conventions of the outputs; empty without.
         not_derived: outputs of more than the pose, without budget and sensitivities.
@@ -101,6 +104,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     sensitivities: list[Sensitivity]
     binding: list[str]
     shims: dict[str, list[list[float]]]
+    level: dict[str, list[float | None]]
     moves: dict[str, list[str]]
     signs: str
     not_derived: list[str]
@@ -185,6 +189,11 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         sensitivities=sensitivities(case, swept, design, variables) if swept and derived else [],
         binding=binding(swept, variables) if swept and derived else [],
         shims={each.name: each.shim.tolist() for each in case.hardpoints if each.shim is not None},
+        level={
+            each.name: [float(x) if np.isfinite(x) else None for x in each.level]
+            for each in case.hardpoints
+            if each.level is not None
+        },
         moves={each.name: each.places for each in variables},
         signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],

@@ -216,12 +216,18 @@ def _signs(found: Diagnosis) -> Iterator[Text]:
 
 def _shims(found: Diagnosis) -> Iterator[Text | Table]:
     yield _head("shims of 1 mm at design: links keep their lengths, the wheel keeps its height")
-    heads = [f">{output} {axis}" for output in ("toe", "camber") for axis in "xyz"]
+    angles = ("toe", "camber", "caster")[: len(next(iter(found.shims.values())))]
+    heads = [f">{output} {axis}" for output in angles for axis in "xyz"]
     table = columns("joint moved along", *heads, "")
     for name, rows in found.shims.items():
         numbers = [1e-3 * math.degrees(each) for row in rows for each in row]
         table.add_row(name, *(f"{0.0 + round(each, 4):+.4f}" for each in numbers), "deg")
     yield table
+    for name, (*_, up) in found.level.items():
+        if up is not None:
+            yield Text(
+                f"no bump steer at design, to first order: {name} z {1e3 * up:+.3g} mm in the table"
+            )
 
 
 def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:

@@ -33,7 +33,10 @@ from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
 AXLE = ("track", "roll_angle", "axle_roll_center_height", "axle_roll_center_offset")
 RADII = (0.02, 3.0)
-"""Radii of wheels [m], from model cars to haulage trucks."""
+WHEELBASES, HEIGHTS, TURNS = (0.1, 20.0), (0.005, 6.0), (1e-3, 1.0)
+"""Radii of wheels, wheelbases, heights of the centre of gravity and rack travels per turn [m], from
+model cars to haulage trucks.
+"""
 
 
 def vehicle_of(
@@ -71,14 +74,9 @@ def vehicle_of(
             f"found {radius}, and the point {named[WHEEL_CONTACT]}, expected one of them;"
             " leave out --wheel-radius",
         )
-    size = math.dist(center, contact) if contact else _length(file, "wheel-radius", radius)
-    if size is not None and not RADII[0] <= size <= RADII[1]:
-        raise fault(
-            file,
-            named[WHEEL_CONTACT] if contact else "--wheel-radius",
-            f"found a wheel's radius of {size:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
-            " correct it",
-        )
+    size = math.dist(center, contact) if contact else _length(file, "wheel-radius", radius, RADII)
+    if contact is not None:
+        _require_within(file, named[WHEEL_CONTACT], size, RADII)
     position = supplied.position
     if position is not None and position not in list(Axle):
         raise unknown_name(file, "--position", position, [*Axle], "an axle")
@@ -94,16 +92,16 @@ def vehicle_of(
         wheel_radius=size,
         wheel_contact=WHEEL_CONTACT if contact else None,
         axle=None if position is None else Axle(position),
-        wheelbase=_length(file, "wheelbase", supplied.wheelbase),
-        cg_height=_length(file, "cg-height", supplied.cg_height),
-        rack_per_turn=_length(file, "rack-per-turn", supplied.rack_per_turn),
+        wheelbase=_length(file, "wheelbase", supplied.wheelbase, WHEELBASES),
+        cg_height=_length(file, "cg-height", supplied.cg_height, HEIGHTS),
+        rack_per_turn=_length(file, "rack-per-turn", supplied.rack_per_turn, TURNS),
         brake_share=_share(file, "brake-share", supplied.brake_share),
         drive_share=_share(file, "drive-share", supplied.drive_share),
         kingpin=template.kingpin or None,
     )
 
 
-def _length(file: Path, option: str, text: str | None) -> float | None:
+def _length(file: Path, option: str, text: str | None, range_: tuple[float, float]) -> float | None:
     """Return the length stated by an option [m]."""
     if text is None:
         return None
@@ -115,9 +113,21 @@ def _length(file: Path, option: str, text: str | None) -> float | None:
             f"--{option}",
             f"found {shown(text)}, expected a length; say --{option} 0.3 or 300mm",
         ) from None
-    if not 0.0 < found < float("inf"):
-        raise fault(file, f"--{option}", f"found {found:.6g} m, expected a length; correct it")
+    _require_within(file, f"--{option}", found, range_)
     return found
+
+
+def _require_within(
+    file: Path, where: str, size: float | None, range_: tuple[float, float]
+) -> None:
+    least, most = range_
+    if size is not None and not least <= size <= most:
+        raise fault(
+            file,
+            where,
+            f"found {size:.6g} m, expected a length of {least:g} to {most:g} m; correct it, or say"
+            f" its unit: {size:.6g}mm",
+        )
 
 
 def _share(file: Path, option: str, text: str | None) -> float | None:
@@ -196,10 +206,12 @@ def with_suspension_outputs(
         watched += [prefix + role for role in template.watched]
     if motion is not None:
         left, right = vehicles.values()
-        for name, role in template.across.items():
-            if role in at:
-                between = tuple(f"{side}_{role}" for side in Side)
-                add(name, "motion_ratio", left, between=between)
+        for name, ends in template.across.items():
+            if at.keys() >= {*ends}:
+                between = tuple(f"{side}_{role}" for side, role in zip(Side, ends, strict=True))
+                # heave does not move an unlike pair of ends: one wheel travels, the other is held
+                alone = left if len({*ends}) == 1 else replace(left, travel=left.travel[:1])
+                add(name, "motion_ratio", alone, between=between)
         for kind in _defined_of_axle(vehicle, motion, steered=steered):
             own = {"rack": RACK} if kind == "steering_ratio" else {}
             add(kind, kind, left, other=right, **own)
@@ -269,6 +281,7 @@ def hardpoints_of(
     axes: Axes,
     mechanism_at: Callable[[Mapping[str, Vector]], Mechanism],
     shims: Mapping[str, Array],
+    levels: Mapping[str, Array],
 ) -> tuple[Hardpoint, ...]:
     """Return a hardpoint for each row that fills a role.
 
@@ -280,7 +293,8 @@ def hardpoints_of(
         at: positions by role [m], axes of the case.
         axes: of the table.
         mechanism_at: makes the mechanism from positions by role.
-        shims: derivatives of toe and camber by role and axes of the case.
+        shims: derivatives of toe, camber and caster by role and axes of the case.
+        levels: moves without bump steer, by role and axes of the case.
     """
     rows = list(dict.fromkeys(named.values()))
     by_table = np.zeros((len(rows), 3, 3 * len(rows)))
@@ -303,9 +317,11 @@ def hardpoints_of(
         roles = tuple(role for role, filled in named.items() if filled == name)
         own = {place: each[:, 3 * row : 3 * row + 3] for place, each in slopes.items()}
         moves = {place: each for place, each in own.items() if each.any()}
-        shim: Array | None = None
+        along, signs = zip(*axes, strict=True)
+        shim = level = None
         if turned := [shims[role] for role in roles if role in shims]:
-            along, signs = zip(*axes, strict=True)
             shim = np.sum(turned, axis=0)[:, along] * signs
-        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim))
+        if roles[0] in levels and len(roles) == 1:
+            level = levels[roles[0]][..., along] * signs
+        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim, level))
     return tuple(hardpoints)

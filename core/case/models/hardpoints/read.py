@@ -28,8 +28,8 @@ from ...units import plain
 from .axle import AxleMotion, mechanism_of, read_travels, sides_of
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
 from .rubber import of_chrono, with_file, with_rubber
-from .shims import shims
-from .table import Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
+from .shims import level, shims
+from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
     TEMPLATE_NAMES,
     TEMPLATES,
@@ -86,10 +86,18 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
             f"found {len(table.points)} points, expected a suspension's, {MOST_POINTS} at most;"
             " take out the others",
         )
-    template = _template(table, supplied.template)
+    if not (table.unit or supplied.units or table.axes or supplied.axes):
+        raise fault(
+            file,
+            "",
+            "says neither its unit nor where x, y and z point, expected both from you; add --units"
+            f" mm or m, and --axes {AXES_IN_USE}",
+        )
     unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     table = _of_corner(table, supplied.corner)
+    template, of_names = _template(table, supplied)
     named, told = _filled(table, template, supplied)
+    told = [*of_names, *told]
     points = placed(table, unit, axes)
     at = {role: points[name] for role, name in named.items()}
     size = max(math.dist(a, b) for a in at.values() for b in at.values())
@@ -127,13 +135,15 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         source += f"; not computed: {', '.join(lacking)}"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = replace(case, length_unit=unit.name, assembly=(*told, *of_side))
+    case = replace(case, length_unit=unit.name, angle_unit="deg", assembly=(*told, *of_side))
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    turned = shims(template, at, vehicle.static_toe, vehicle.static_camber)
+    turned, levels = (
+        each(template, at, vehicle.static_toe, vehicle.static_camber) for each in (shims, level)
+    )
     hardpoints = hardpoints_of(
-        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned
+        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, levels
     )
     case, sides = replace(case, hardpoints=hardpoints), sides_of(supplied.axle, side)
     rubber, left_out = of_chrono(table, template, named)
@@ -148,10 +158,10 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
     """Return the outputs of optional data that are not there, each with what to add."""
     axle = supplied.axle is not None
-    across = {name: (role,) for name, role in template.across.items()} if axle else {}
-    wanted = {**template.springs, **template.twists, **across}
+    across = template.across.items() if axle else ()
+    wanted = dict([*template.springs.items(), *template.twists.items(), *across])
     found = [
-        f"{name} (add {', '.join(role for role in roles if role not in at)})"
+        f"{name} (add {', '.join(role for role in dict.fromkeys(roles) if role not in at)})"
         for name, roles in wanted.items()
         if not {*roles} <= at.keys()
     ]
@@ -224,20 +234,27 @@ def _of_corner(table: HardpointTable, said: str | None) -> HardpointTable:
     return replace(table, points=kept, left_out=left_out, side=side, corner=wanted)
 
 
-def _template(table: HardpointTable, said: str | None) -> Template:
-    known = TEMPLATE_NAMES
+def _template(table: HardpointTable, supplied: Supplied) -> tuple[Template, list[str]]:
+    """Return the template that the user or the file states, or else the one whose roles the points
+    fill by their names, with a note.
+    """
+    known, said = TEMPLATE_NAMES, supplied.template
     if said is not None and compact(said) not in known:
         raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
     names = ", ".join(TEMPLATES)
     if table.template is None:
-        if said is None:
-            raise fault(
-                table.file,
-                "",
-                "does not say what suspension it is of, expected it from you; add --template, one"
-                f" of {names}",
-            )
-        return known[compact(said)]
+        if said is not None:
+            return known[compact(said)], []
+        guessed = [each for each in TEMPLATES.values() if each.guessed and not supplied.ask_names]
+        fitting = [each for each in guessed if _fills(table, each)]
+        roles = max((len(each.roles) for each in fitting), default=0)
+        largest = [each for each in fitting if len(each.roles) == roles]
+        if len(largest) != 1:
+            problem = "does not say what suspension it is of, expected it from you; add --template"
+            names = " or ".join(each.name for each in largest) or f"one of {names}"
+            raise fault(table.file, "", f"{problem} {names}")
+        (found,) = largest
+        return found, [f"template {found.name}, by the names of its points: --template states it"]
     if compact(table.template) not in known:
         problem = (
             f"found {shown(table.template)}, expected one of those that there is a template for;"
@@ -251,7 +268,7 @@ def _template(table: HardpointTable, said: str | None) -> Template:
             " out --template"
         )
         raise fault(table.file, "--template", problem)
-    return written
+    return written, []
 
 
 def _filled(
@@ -262,15 +279,7 @@ def _filled(
     """
     own = supplied.names
     new = own is not None and not own.exists()
-    by_compact_name: dict[str, list[str]] = {}
-    by_side_name: dict[str, list[str]] = {}
-    sides = [side for _, side in map(side_of, table.points)]
-    wheel = table.side or ("right" if "left" not in sides else "left")
-    for name in table.points:
-        by_compact_name.setdefault(compact(name), []).append(name)
-        plain, side = side_of(name)
-        if side == wheel:
-            by_side_name.setdefault(compact(plain), []).append(name)
+    named = _points_by_role(table)
     filled: dict[str, str] = {}
     if own is not None and not new:
         filled |= _read_own_names(
@@ -279,9 +288,7 @@ def _filled(
     for role in (*template.roles, *template.optional):
         if role.name in filled:
             continue
-        names = dict.fromkeys(role.names)
-        found = [name for each in names for name in by_compact_name.get(each, ())]
-        found = found or [name for each in names for name in by_side_name.get(each, ())]
+        found = named(role)
         if len(found) > 1:
             places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
             raise fault(
@@ -322,6 +329,33 @@ def _filled(
         "",
         f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or {advice}",
     )
+
+
+def _points_by_role(table: HardpointTable) -> Callable[[Role], list[str]]:
+    """Return what gives the points with a name of a role, or else with one and their side."""
+    by_compact_name: dict[str, list[str]] = {}
+    by_side_name: dict[str, list[str]] = {}
+    sides = [side for _, side in map(side_of, table.points)]
+    wheel = table.side or ("right" if "left" not in sides else "left")
+    for name in table.points:
+        by_compact_name.setdefault(compact(name), []).append(name)
+        plain, side = side_of(name)
+        if side == wheel:
+            by_side_name.setdefault(compact(plain), []).append(name)
+
+    def points(role: Role) -> list[str]:
+        names = dict.fromkeys(role.names)
+        found = [name for each in names for name in by_compact_name.get(each, ())]
+        return found or [name for each in names for name in by_side_name.get(each, ())]
+
+    return points
+
+
+def _fills(table: HardpointTable, template: Template) -> bool:
+    """Return whether each role of a template has one point of its own by name."""
+    named = _points_by_role(table)
+    found = [named(role) for role in template.roles]
+    return all(len(each) == 1 for each in found) and len({each[0] for each in found}) == len(found)
 
 
 def _nearest(role: Role, unused: Mapping[str, str]) -> str:

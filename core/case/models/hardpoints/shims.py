@@ -1,20 +1,24 @@
-"""Shims: toe and camber when a joint is moved and the links keep their lengths.
+"""Shims: toe, camber and caster when a joint is moved and the links keep their lengths; and the
+places of the tie rod that leave no bump steer.
 
 A row of a table that moves makes other links; a shim under a joint moves the wheel instead. The
 wheel carrier has six velocities, of the wheel's centre and of rotation. Its links leave one, the
 height, which is held:  n . (v + w x r) = n . u,  n being the direction that a joint holds, r its
 place from the wheel's centre, and u the velocity by the shim.
+
+A tie rod l from a to b holds  l . (v + w x r_b) = 0  while the wheel moves up. An end that moves
+in the table turns l, and with it the velocities at design, which the same six rows give.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
-from .templates import KNUCKLE, WHEEL_AXIS, WHEEL_CENTER, Template
+from .templates import KNUCKLE, TIEROD_INNER, WHEEL_AXIS, WHEEL_CENTER, Template
 
 Held = tuple[str, Array, Mapping[str, float]]
 """Role of a place of the carrier, the direction held there, and roles whose shims move it."""
@@ -24,34 +28,97 @@ _AXES = np.eye(3)
 def shims(
     template: Template, at: Mapping[str, Vector], toe: float, camber: float
 ) -> dict[str, Array]:
-    """Return the derivatives of toe and camber [rad/m] by the position of each joint, by role and
-    then by x, y and z, shape (2, 3); nothing for a carrier that is held otherwise.
+    """Return the derivatives of toe, camber and, where two points make the steering axis, caster
+    [rad/m] by the position of each joint, by role and then by x, y and z, shape (2 or 3, 3);
+    nothing for a carrier that is held otherwise.
 
     Args:
         at: positions by role of a left wheel [m].
         toe, camber: at design, if no point states the wheel's axis [rad].
     """
     places = {role: np.array(place) for role, place in at.items()}
-    held: list[Held] = [*_held(template, places), (WHEEL_CENTER, _AXES[2], {})]
+    held = _held(template, places)
     if len(held) != 6:
         return {}
-    spin = np.array([np.sin(toe), np.cos(toe), -np.tan(camber)])
-    if WHEEL_AXIS in places:
-        spin = places[WHEEL_AXIS] - places[WHEEL_CENTER]
-    x, y, z = spin / np.linalg.norm(spin)
-    arms = [places[role] - places[WHEEL_CENTER] for role, _, _ in held]
-    rows = [np.r_[n, np.cross(r, n)] for (_, n, _), r in zip(held, arms, strict=True)]
+    x, y, z = _spin(places, toe, camber)
     moved = dict.fromkeys(role for *_, movers in held for role in movers)
     found: dict[str, Array] = {}
     for role in moved:
         right = np.array([movers.get(role, 0.0) * n for _, n, movers in held])
-        turns = np.linalg.solve(np.array(rows), right)[3:]  # by x, y and z of the joint
+        solved = np.asarray(np.linalg.solve(_rows(held, places), right), float)
+        v, turns = solved.reshape(2, 3, 3)  # by x, y and z of the joint
         dx, dy, dz = np.cross(turns.T, (x, y, z)).T
-        found[role] = np.array([(y * dx - x * dy) / (x * x + y * y), -dz / np.hypot(x, y)])
+        angles = [(y * dx - x * dy) / (x * x + y * y), -dz / np.hypot(x, y)]
+        if ends := [end for end in template.kingpin or () if isinstance(end, str)]:
+            low, high = (_moved(end, role, held, places, v, turns) for end in ends)
+            x_of, _, z_of = places[ends[1]] - places[ends[0]]
+            turned = x_of * (high - low)[2] - z_of * (high - low)[0]
+            angles += [turned / (x_of * x_of + z_of * z_of)]
+        found[role] = np.array(angles)
     return found
 
 
-def _held(template: Template, at: Mapping[str, Array]) -> Iterator[Held]:
+def level(
+    template: Template, at: Mapping[str, Vector], toe: float, camber: float
+) -> dict[str, Array]:
+    """Return by how much each end of the tie rod, moved alone in the table along x, y or z, leaves
+    no bump steer at design, to first order [m], shape (3,), by role; infinite where it has no
+    effect, and nothing for a carrier that is held otherwise.
+
+    Args: see `shims`.
+    """
+    places = {role: np.array(place) for role, place in at.items()}
+    held = _held(template, places)
+    rods = [k for k, (*_, movers) in enumerate(held) if TIEROD_INNER in movers]
+    if len(held) != 6 or not rods:
+        return {}
+    rod, outer = rods[0], held[rods[0]][0]
+    spin, along = _spin(places, toe, camber), places[outer] - places[TIEROD_INNER]
+    moving = np.linalg.solve(_rows(held, places), np.eye(6)[:, [5, rod]])
+    dx, dy, _ = np.cross(moving[3:].T, spin).T
+    by_travel, by_rod = (spin[1] * dx - spin[0] * dy) / (spin[0] ** 2 + spin[1] ** 2)
+    v, w = moving[:3, 0], moving[3:, 0]
+    end = v + np.cross(w, places[outer] - places[WHEEL_CENTER])
+    wanted = -by_travel * np.linalg.norm(along) / by_rod
+    with np.errstate(divide="ignore"):
+        return {TIEROD_INNER: wanted / end, outer: -wanted / (end + np.cross(along, w))}
+
+
+def _spin(places: Mapping[str, Array], toe: float, camber: float) -> Array:
+    """Return the direction of the wheel's axis at design."""
+    spin = np.array([np.sin(toe), np.cos(toe), -np.tan(camber)])
+    if WHEEL_AXIS in places:
+        spin = places[WHEEL_AXIS] - places[WHEEL_CENTER]
+    return spin / np.linalg.norm(spin)
+
+
+def _rows(held: Sequence[Held], places: Mapping[str, Array]) -> Array:
+    arms = [places[role] - places[WHEEL_CENTER] for role, _, _ in held]
+    return np.array([np.r_[n, np.cross(r, n)] for (_, n, _), r in zip(held, arms, strict=True)])
+
+
+def _moved(
+    end: str,
+    shimmed: str,
+    held: Sequence[Held],
+    places: Mapping[str, Array],
+    v: Array,
+    turns: Array,
+) -> Array:
+    """Return the velocity of an end of the steering axis by x, y and z of the shimmed joint."""
+    sign = next(movers.get(end, 0.0) for role, _, movers in held if role == end)
+    own = _AXES * (end == shimmed)
+    if sign > 0.0:  # on the chassis
+        return own
+    return v + np.cross(turns.T, places[end] - places[WHEEL_CENTER]).T + own
+
+
+def _held(template: Template, at: Mapping[str, Array]) -> list[Held]:
+    """Return what holds the carrier; the height of the wheel's centre comes last."""
+    return [*_joints(template, at), (WHEEL_CENTER, _AXES[2], {})]
+
+
+def _joints(template: Template, at: Mapping[str, Array]) -> Iterator[Held]:
     joints = template.joint_rows.values()
     balls = {i: role for kind, i, j, role, *_ in joints if (kind, j) == ("spherical", KNUCKLE)}
     struts = {j: roles for kind, i, j, *roles in joints if (kind, i) == ("translational", KNUCKLE)}

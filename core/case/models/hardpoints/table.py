@@ -27,6 +27,10 @@ _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "up": (2, 1.0),
     "down": (2, -1.0),
 }
+AXES_IN_USE = (
+    "forward,left,up (ISO 8855), rearward,right,up (Adams/Car), forward,right,down (SAE J670), or"
+    " what else they are"
+)
 _NAMED_AXES: Mapping[str, str] = {
     "iso": "forward,left,up",
     "sae": "forward,right,down",
@@ -230,9 +234,7 @@ def axes_of(table: HardpointTable, said: str | None) -> Axes:
         raise fault(
             table.file,
             "",
-            "does not say where x, y and z point, expected it from you; add --axes forward,left,up"
-            " (ISO 8855), rearward,right,up (Adams/Car), forward,right,down (SAE J670), or what"
-            " else they are",
+            f"does not say where x, y and z point, expected it from you; add --axes {AXES_IN_USE}",
         )
     places = None if table.axes is None else _places(table.file, "axes", table.axes)
     if said is None:

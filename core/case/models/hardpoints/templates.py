@@ -122,12 +122,13 @@ class Template:
     sample: Mapping[str, Vector]
     springs: Mapping[str, tuple[str, str]]
     twists: Mapping[str, tuple[str, ...]]
-    across: Mapping[str, str]
+    across: Mapping[str, tuple[str, str]]
     bodies: Mapping[str, str]
     above: Sequence[tuple[str, str]]
     ahead: Sequence[tuple[str, str]]
     kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None
     steered: str
+    guessed: bool
 
     def joints(self, at: Mapping[str, Vector]) -> list[Joint]:
         """Return the joints for the places of the roles; they name the bodies."""
@@ -156,7 +157,7 @@ class Template:
             ),
         ]
         twists = [roles[:3] for roles in self.twists.values() if at.keys() >= {*roles}]
-        several = (*self.springs.values(), *twists, *zip(self.across.values()))
+        several = (*self.springs.values(), *twists, *self.across.values())
         read += [role for roles in several if all(map(at.get, roles)) for role in roles]
         read += [role for role in (WHEEL_CONTACT, WHEEL_AXIS) if role in at]
         return [
@@ -274,12 +275,13 @@ def _read_templates() -> dict[str, Template]:
             sample={role: place for role, place in keys["sample"].items() if role in known},
             springs=keys["springs"],
             twists={name: tuple(roles) for name, roles in keys["twists"].items()},
-            across=keys["across"],
+            across={name: tuple(ends) for name, ends in keys["across"].items()},
             bodies={**common["bodies"], **keys.get("bodies", {})},
             above=keys.get("above", ()),
             ahead=keys.get("ahead", ()),
             kingpin=kingpin or None,
             steered=keys.get("steered", ""),
+            guessed=own.get("guessed", True),
         )
     return templates
 
