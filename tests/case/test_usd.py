@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.trees.driving import read_start
 from kincheck.core.case.models.undriven import undriven_file
 from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.studies.same import compare
@@ -165,8 +166,12 @@ def test_generic_joint_leaves_what_it_does_not_lock(write, lock):
 
 ARM = (body("a"), body("b"), joint("Revolute", "j", "", "a"))
 """A body on a hinge, and a free one."""
+ENDS = "rel physics:body0 = </r/a>", "rel physics:body1 = </r/b>"
 REFUSED = {
-    "two turns": (joint("", "k", "a", "b", *[(0, 0, 0)] * 2, *locked("transX rotX")), "two turns"),
+    "limit without schema": (
+        prim("PhysicsJoint", "k", lines=[*ENDS, "float limit:rotX:physics:low = 5"]),
+        "limit:rotX: found without the schema PhysicsLimitAPI:rotX",
+    ),
     "lock beside zero": (
         joint(
             "",
@@ -217,7 +222,7 @@ REFUSED = {
         joint(
             "Revolute", "k", "a", "b", *[(0, 0, 0)] * 2, "bool physics:exludeFromArticulation = 1"
         ),
-        "did you mean 'physics:excludeFromArticulation'",
+        "did you mean 'excludeFromArticulation'",
     ),
     "axis": (joint("Revolute", "k", "a", "b", axis="W"), "expected one of X, Y, Z"),
     "zero turn": (
@@ -653,3 +658,55 @@ def test_rod_is_measured_where_joints_place_its_bodies(write):
 def test_units_that_make_no_sense_are_refused(write, units, message):
     with pytest.raises(CaseError, match=message):
         tree_of(write(*ARM, units=units))
+
+
+def placed(tree, start, name):
+    place = read_start(tree, start).pose.as_tree().places[name]
+    e0, *e = place.turn
+    return [*place.at, *e, e0]
+
+
+def test_chain_and_universal_joint_are_as_in_newton(write):
+    """Poses of Newton 1.8 by its own reader, at equal coordinates, in single precision."""
+    turn = "quatf physics:localRot{} = (0.9238795, {})"
+    ends = turn.format(0, "0.3826834, 0, 0"), turn.format(1, "0, 0, 0.3826834")
+    limits = [
+        f"float limit:{axis}:physics:{end} = {sign}{size}"
+        for axis, size in (("transY", 9), ("rotY", 170), ("rotZ", 170))
+        for end, sign in (("low", "-"), ("high", ""))
+    ]
+    file = write(
+        *(body("a"), body("b"), joint("Revolute", "A", "", "a")),
+        joint(
+            "",
+            "U",
+            "a",
+            "b",
+            (0.5, 0, 0),
+            (0, 0.25, 0),
+            *ends,
+            *limits,
+            *locked("transX transZ rotX"),
+        ),
+    )
+    tree = tree_of(file)
+    start = "A=0.3 U.transY=0.2 U.rotY=-0.7 U.rotZ=0.4".split()
+    expected = [0.389729, 0.020423, -0.188806, 0.364771, -0.115834, -0.353477, 0.853568]
+    assert placed(tree, start, "b") == pytest.approx(expected, abs=1e-6)
+    assert any("rotY and then rotZ, a universal joint as in Newton" in x for x in tree.notes)
+    scaled = body("a", (0.1, 0.2, 0.3), ops="double3 xformOp:scale = (2, 2, 2)")
+    slide = joint("Prismatic", "B", "a", "b", (0.5, 0, 0), (0, 0.25, 0), *ends, axis="Z")
+    last = joint(
+        "Revolute",
+        "C",
+        "b",
+        "c",
+        (0, 0, 1),
+        None,
+        "quatf physics:localRot1 = (0.9238795, 0, 0.3826834, 0)",
+        axis="X",
+    )
+    first = joint("Revolute", "A", "", "a", (0.1, 0.2, 0.3))
+    tree = tree_of(write(scaled, body("b"), body("c"), first, slide, last))
+    expected = [1.100272, -0.773528, 0.747934, -0.111818, 0.029388, -0.261765, 0.958182]
+    assert placed(tree, ["A=0.3", "B=0.2", "C=-0.7"], "c") == pytest.approx(expected, abs=1e-6)

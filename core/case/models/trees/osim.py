@@ -141,7 +141,7 @@ class _Reader:
         """Return the tree."""
         graph, tree = self.graph, self.graph.tree
         units = self.model.child("length_units")
-        if units is not None and units.text not in ("", "meters"):
+        if units is not None and units.text not in ("", "m", "meters"):
             raise units.fault(f"found {shown(units.text)}, expected meters; convert the model")
         for element in self._all("Body"):
             self._add_body(element)

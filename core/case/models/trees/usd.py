@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ....algebra import cross, quat, vec
-from ....errors import shortened
+from ....errors import remedy, shortened, similar
 from ....mechanism.mechanism import Vector
 from .element import Element, words
 from .framed import FramedJoint, Freedom, join
@@ -40,8 +40,9 @@ IN_JOINT = (
     *words("coneAngle0Limit coneAngle1Limit minDistance maxDistance"),
 )
 IN_BODY = words(
-    "rigidBodyEnabled kinematicEnabled simulationOwner startsAsleep velocity angularVelocity mass"
-    " density centerOfMass diagonalInertia principalAxes collisionEnabled filteredPairs"
+    "rigidBodyEnabled kinematicEnabled simulationOwner startsAsleep velocity angularVelocity"
+    " linearVelocity mass density centerOfMass diagonalInertia principalAxes collisionEnabled"
+    " filteredPairs"
 )
 # These name bodies that they do not join.
 _APART = words(
@@ -52,6 +53,8 @@ EARTH = 9.81
 """Gravity of a scene unless given [m/s^2]."""
 # Axes of a frame in single precision are square to each other within this; more is a shear.
 SQUARE = 1e-5
+# Two names are alike if a letter or two tell them apart.
+CLOSE = 0.86
 MOST_NAMED = 8
 
 
@@ -118,8 +121,7 @@ class _Reader:
 
     def _add_body(self, name: str, element: Element) -> None:
         graph, (place, _) = self.graph, self._frame(element)
-        known = [f"physics:{each}" for each in IN_BODY]
-        _require_spelt(element, known)
+        _require_spelt(element, IN_BODY)
         graph.places[name], graph.elements[name] = place, element
         if element.flag("physics:kinematicEnabled", default=False):
             graph.fixed.add(name)
@@ -190,7 +192,7 @@ class _Reader:
 
     def _add_joint(self, element: Element) -> None:
         graph = self.graph
-        _require_spelt(element, [f"physics:{each}" for each in IN_JOINT])
+        _require_spelt(element, IN_JOINT)
         if not element.flag("physics:jointEnabled", default=True):
             graph.tree.notes.append(f"{element} is switched off and joins nothing (jointEnabled)")
             return
@@ -213,8 +215,20 @@ class _Reader:
             return
         axes = axes_of(element)
         if sum(3 if each.kind == "ball" else 1 for each in axes) == 6:
-            graph.tree.count("joints that hold nothing")
+            graph.tree.notes.append(f"{element} holds nothing: none of its axes is locked")
             return
+        apis = element.attributes["apis"]
+        open_ = [f"{x.key}" for x in axes if x.key and f"LimitAPI:{x.key}" not in apis]
+        if element.tag == GENERIC and open_:
+            graph.tree.notes.append(
+                f"{element} leaves {', '.join(open_)} free, which have no PhysicsLimitAPI; Newton"
+                " locks them"
+            )
+        if len(turns := [each.key for each in axes if each.kind == "hinge"]) == 2:
+            graph.tree.notes.append(
+                f"{element} turns about {' and then '.join(turns)}, a universal joint as in Newton;"
+                " in PhysX no axis comes first, which is another joint for large turns"
+            )
         closes = element.flag("physics:excludeFromArticulation", default=False)
         freedoms = [
             Freedom(f"{name}{each.end}", each.kind, each.axis, self._limited(element, each))
@@ -254,7 +268,7 @@ class _Reader:
             element.number(f"physics:{each}Distance", -1.0) * self.metre for each in ("min", "max")
         )
         if least < 0.0 and most < 0.0:
-            self.graph.tree.count("joints that hold nothing")
+            self.graph.tree.notes.append(f"{element} holds nothing: it has no distance")
         elif least == most:
             self.rods.append((name, element, links, frames, most))
         else:
@@ -449,6 +463,8 @@ def _short(paths: Sequence[str]) -> dict[str, str]:
 
 
 def _require_spelt(element: Element, known: Sequence[str]) -> None:
-    """Refuse misspelt properties of UsdPhysics."""
-    own = {key: text for key, text in element.attributes.items() if key.startswith("physics:")}
-    replace(element, attributes=own).require_known(known, "USD", closed=False)
+    """Refuse misspelt properties of UsdPhysics, which has many of similar names."""
+    for key in element.attributes:
+        name = key.removeprefix("physics:")
+        if name != key and name not in known and similar(name, known, CLOSE):
+            raise element.fault(f"found the property {key!r}; {remedy(name, known)}")

@@ -70,6 +70,11 @@ def _generic(element: Element) -> list[Axis]:
             key = f"{prefix}{letter}"
             low, high = (f"limit:{key}:physics:{end}" for end in ("low", "high"))
             limited = f"PhysicsLimitAPI:{key}" in apis
+            if not limited and (low in element.attributes or high in element.attributes):
+                raise element.fault(
+                    f"limit:{key}: found without the schema PhysicsLimitAPI:{key}, so that programs"
+                    " do not read it alike; apply the schema, or remove the limit"
+                )
             bounds = [element.attributes.get(each, "inf") for each in (low, high)]
             if limited and "inf" not in bounds and "-inf" not in bounds:
                 least, most = element.number(low), element.number(high)
@@ -90,11 +95,5 @@ def _generic(element: Element) -> list[Axis]:
         )
     turns = [each for each in free.values() if each.kind == "hinge"]
     found = [each for each in free.values() if each.kind == "slide"]
-    if len(turns) == 2:
-        raise element.fault(
-            f"leaves two turns, {turns[0].key} and {turns[1].key}, of which programs make two"
-            " joints: PhysX one of constant velocity, Newton a universal one; write it as two"
-            " PhysicsRevoluteJoint with a body between them"
-        )
     found += [Axis(".rot", "ball", X, ("", ""), "")] if len(turns) == 3 else turns
     return [replace(found[0], end="")] if len(found) == 1 else found
