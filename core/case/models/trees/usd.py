@@ -22,6 +22,7 @@ from ....mechanism.mechanism import Vector
 from .element import Element, words
 from .framed import FramedJoint, Freedom, join
 from .graph import Graph
+from .limits import INFINITE
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
 from .robot_elements import mimic
 from .tree import Closure, Kind, Move, Tree
@@ -206,8 +207,9 @@ class _Reader:
         if {*links} <= graph.fixed:
             graph.tree.count("joints of what stands still")
             return
-        for each in ("breakForce", "breakTorque"):
-            if element.attributes.get(f"physics:{each}", "inf") != "inf":
+        for key in ("physics:breakForce", "physics:breakTorque"):
+            given = element.attributes.get(key, "inf") != "inf"
+            if given and element.number(key) < INFINITE:
                 graph.tree.count("forces at which joints break")
         name = self.joint_names[element.attributes["path"]]
         if element.tag == ROD:
