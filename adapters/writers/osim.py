@@ -167,8 +167,7 @@ class _Model:
         element = ET.SubElement(bodies, "Body", name=_name(body.name))
         add_text(element, "mass", numbers([text.mass_of(body)]))
         add_text(element, "mass_center", numbers(local(body, text.center_of(body))))
-        xx, yy, zz, xy, yz, xz = text.six(text.own_inertia(body))
-        add_text(element, "inertia", numbers([xx, yy, zz, xy, xz, yz]))
+        add_text(element, "inertia", numbers(text.six(text.own_inertia(body))))
 
     def add_joint(self, joints: ET.Element, joint: Hung) -> None:
         """Add a joint between a frame of the parent and a frame of the child, which coincide at

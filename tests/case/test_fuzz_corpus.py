@@ -4,6 +4,7 @@ and all that failed once.
 The fuzzers themselves run by hand: see tests/fuzz/__main__.py.
 """
 
+import importlib.util
 import random
 from functools import cache
 from pathlib import Path
@@ -17,11 +18,13 @@ from ..fuzz import (
     hardpoints,
     keeping,
     mjcf,
+    osim,
     recording,
     reference,
     results,
     sdf,
     urdf,
+    usd,
 )
 
 READERS = {
@@ -29,11 +32,13 @@ READERS = {
     "casefile": casefile,
     "hardpoints": hardpoints,
     "mjcf": mjcf,
+    "osim": osim,
     "recording": recording,
     "reference": reference,
     "results": results,
     "sdf": sdf,
     "urdf": urdf,
+    **({"usd": usd} if importlib.util.find_spec("pxr") else {}),
 }
 # Inputs of a random choice of changes, the same in every run; the fuzzers try millions.
 CHANGES = 20

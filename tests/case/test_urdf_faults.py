@@ -116,7 +116,7 @@ def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Pat
     assert str(caught.value).startswith(str(file.with_suffix(".yaml")))
 
 
-@pytest.mark.parametrize("name", ["robot.xacro", "robot.usd", "part.STL", "r.constraints.json"])
+@pytest.mark.parametrize("name", ["robot.xacro", "robot.mo", "part.STL", "r.constraints.json"])
 def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
     (tmp_path / name).write_bytes(b"\x00\xff")
     with pytest.raises(CaseError, match=r"found a \.[\w.]+ file, which .*; "):
@@ -127,7 +127,6 @@ def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
     ("text", "advice"),
     [
         ("<mujocoinclude/>", "give the file that includes it"),
-        ("<OpenSimDocument/>", "give MJCF or a case file"),
         ("<launch/>", "give the URDF"),
         (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
     ],

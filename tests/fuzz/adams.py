@@ -2,7 +2,6 @@
 the title.
 """
 
-import random
 import re
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from kincheck.core.case.models.adams.dataset import ARGUMENTS, KNOWN
 from kincheck.core.case.models.files import load
 
 from .fuzzing import changing, read_or_refused, written
-from .trees import changed_lines
+from .trees import changed_text
 
 LONGEST = 6000
 DATA = Path(__file__).parent.parent / "data"
@@ -104,15 +103,4 @@ def seeds() -> list[bytes]:
     return [LINKAGE, COUPLED, COUPLER, LOOSE, public.replace(b"ADAMS", b"recorded", 1)]
 
 
-def _exchanged(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
-    """A word, number or sign replaced."""
-    parts = re.split(rb"(\W)", data)
-    parts[rng.randrange(len(parts))] = rng.choice((*words, "0", "-1", "1E-9", "1E30", "")).encode()
-    return b"".join(parts)
-
-
-def _changed(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
-    return (_exchanged if rng.random() < 0.7 else changed_lines)(data, rng, words)
-
-
-mutate = changing(_changed, words=WORDS)
+mutate = changing(changed_text, words=WORDS)

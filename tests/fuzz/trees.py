@@ -236,3 +236,12 @@ def changed_lines(data: bytes, rng: random.Random, words: tuple[str, ...]) -> by
             cells[rng.randrange(len(cells))] = rng.choice((*words, *TEXTS, *map(repr, NUMBERS)))
             lines[k] = "".join(cells)
     return "\n".join(lines).encode("latin-1", errors="replace")
+
+
+def changed_text(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
+    """A text with a word, number or sign replaced, or lines moved."""
+    if rng.random() < 0.3:
+        return changed_lines(data, rng, words)
+    parts = re.split(rb"(\W)", data)
+    parts[rng.randrange(len(parts))] = rng.choice((*words, "0", "-1", "1E-9", "1E30", "")).encode()
+    return b"".join(parts)

@@ -137,7 +137,7 @@ def wedges():
     "name",
     ["four_bar", "five_bar", "hooke_joint_cross", "mcpherson_arm", "strut_swapped", "wedges"],
 )
-@pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf"])
+@pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf", "osim"])
 def test_written_case_is_the_same_mechanism(name, form, tmp_path):
     own = {"strut_swapped": lambda: CASES[name], "wedges": wedges}
     given = own.get(name, lambda: cases.load(name))()

@@ -168,19 +168,30 @@ def read_bytes(file: Path, limit: int, why_limit: str) -> bytes:
     Raises:
         CaseError: the file is missing, not regular, not readable, or too large.
     """
+    require_file(file, limit, why_limit)
     try:
-        if not file.exists():
-            raise fault(file, "", "no such file; check the path")
-        if not file.is_file():
-            what = "a folder, not a regular file" if file.is_dir() else "not a regular file"
-            raise fault(file, "", f"{what}; give the path of a file")
         with file.open("rb") as stream:
             data = stream.read(limit + 1)
     except OSError as error:
         raise fault(file, "", f"cannot be read ({error.strerror}); check path and rights") from None
-    if len(data) > limit:
+    if len(data) > limit:  # it has grown
         raise fault(file, "", f"larger than {limit} bytes, expected less; {why_limit}")
     return data
+
+
+def require_file(file: Path, limit: int, why_limit: str) -> None:
+    """Refuse what is no regular file of at most `limit` bytes."""
+    try:
+        size = file.stat().st_size if file.exists() else None
+    except OSError as error:
+        raise fault(file, "", f"cannot be read ({error.strerror}); check path and rights") from None
+    if size is None:
+        raise fault(file, "", "no such file; check the path")
+    if not file.is_file():
+        what = "a folder, not a regular file" if file.is_dir() else "not a regular file"
+        raise fault(file, "", f"{what}; give the path of a file")
+    if size > limit:
+        raise fault(file, "", f"larger than {limit} bytes, expected less; {why_limit}")
 
 
 def read_text(file: Path, limit: int, why_limit: str, *, of_spreadsheet: bool = False) -> str:

@@ -23,7 +23,8 @@ CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
 TREES = (".yaml", ".yml", ".py")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
-MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
+STAGES = (".usd", ".usda", ".usdc", ".usdz")
+MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world", ".osim", *STAGES)
 DATASETS = (".adm",)
 SUFFIXES = (
     *(*CASE_FILES, ".ini", ".pm", *TABLES, *TREES, *WORKBOOKS),
@@ -48,15 +49,10 @@ UNREAD = {
     " table, name,x,y,z, with --units m --axes left,up,rearward",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     ".mjb": "is compiled; give the MJCF that it is made of",
-    ".osim": "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case",
     ".cmd": "is a script of Adams/View; export the dataset of Adams Solver, .adm",
     ".acf": "holds commands of Adams Solver; give the dataset that it names, .adm",
     **dict.fromkeys(
         (
-            ".usd",
-            ".usda",
-            ".usdc",
-            ".usdz",
             ".mo",
             ".slx",
             ".sldasm",
@@ -141,7 +137,7 @@ def is_table(file: Path, supplied: Supplied = NOTHING) -> bool:
 
 
 def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
-    """Return the links of a model in XML: MJCF, URDF or SDF, whatever the file is called.
+    """Return the links of a model: USD by its suffix; MJCF, URDF, SDF and OpenSim by their content.
 
     Args:
         without: elements to leave out, by tag, name or TAG/NAME; the tree has those it found.
@@ -158,6 +154,13 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
             from .trees.sdf import whole_sdf
 
             root = whole_sdf(file, root)
+        case "OpenSimDocument":
+            from .trees.osim import read_osim as read
+            from .trees.osim import whole_osim
+
+            root = whole_osim(file, root)
+        case "usd":
+            from .trees.usd import read_usd as read
         case _:
             from .trees.mjcf import read_mjcf as read
             from .trees.mjcf import whole_mjcf
@@ -186,11 +189,16 @@ def require_used(file: Path, without: Collection[str], used: Collection[str]) ->
 
 
 def root_of(file: Path) -> Element:
-    """Return the root element of a model in XML.
+    """Return the root element of a model in XML, or the stage of USD as an element.
 
     Raises:
-        CaseError: it is no XML.
+        CaseError: it is neither.
+        KincheckError: usd-core is not installed.
     """
+    if file.suffix.lower() in STAGES:
+        from .trees.usd_stage import root_of_usd
+
+        return root_of_usd(file)
     from .trees.element import parse_xml
 
     return parse_xml(file, _text(file))

@@ -19,6 +19,8 @@ from .trees.limits import NO_LIMIT, Limit, limit_of
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12
 _ANGLE = re.compile(r"[-+]?\d*\.\d{2,}")
+# Elements of SDF and USD that have it.
+_SCENES = ("world", "PhysicsScene")
 # A name's ends that programs add to those of links.
 _ENDS = ("_link", "-link", " link", "link_")
 
@@ -121,7 +123,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         10.0**-digits if digits else 0.0,
         max(map(_angle_error, root.below()), default=0.0),
         is_model=True,
-        says_gravity=tree.dialect == "mujoco" or any(root.only("world")),
+        says_gravity=tree.dialect == "mujoco" or any(each.tag in _SCENES for each in root.below()),
         notes=[f"{file.name}: {note}" for note in tree.notes],
         without=tree.without,
     )

@@ -49,6 +49,8 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
     """
     file, values = tree.file, dict(Pose.of(tree).value_of)
     given: list[str] = []
+    text = ", ".join(said) if said else tree.zero
+    said = [own for each in said for own in tree.starts.get(each.removeprefix(KEYFRAME), [each])]
     keyframes = [each for each in said if each.startswith(KEYFRAME)]
     if len(keyframes) > 1:
         raise fault(file, "--start", f"found {len(keyframes)} keyframes, expected one; name one")
@@ -57,7 +59,7 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
     for each in said:
         if each in keyframes:
             continue
-        name, sign, text = each.rpartition("=")
+        name, sign, value = each.rpartition("=")
         if not sign:
             form = f"{KEYFRAME}NAME or JOINT=VALUE [rad or m, as qpos]"
             raise fault(file, "--start", f"found {shown(each)}, expected {form}; say the value")
@@ -65,9 +67,8 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
             raise unknown_name(file, "--start", name, tree.moves, "a joint")
         if name in given:
             raise fault(file, "--start", f"found {shown(name)} twice; give one value")
-        values[name] = _value(tree, tree.moves[name], text.split(","))
+        values[name] = _value(tree, tree.moves[name], value.split(","))
         given.append(name)
-    text = ", ".join(said) if said else tree.zero
     return Start(Pose(tree, [*values.values()]), tuple(given), text, tree.closes and not given)
 
 
@@ -77,7 +78,7 @@ def _keyframe(tree: Tree, name: str) -> dict[str, Value]:
             tree.file,
             "--start",
             f"found {shown(KEYFRAME + name)}, expected a keyframe of the model, by name or by"
-            f" number from 0; {remedy(name, tree.keyframes)}",
+            f" number from 0; {remedy(name, [*tree.keyframes, *tree.starts])}",
         )
     element, numbers = tree.keyframes[name]
     if numbers is None:

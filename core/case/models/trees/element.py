@@ -26,6 +26,8 @@ _CARRYING = ("body", "frame")
 MOST_ELEMENTS = 200_000
 # Two words are alike if a typing error makes one of the other.
 ALIKE = 0.75
+USD = "usd"
+"""Tag of the root of a stage of USD, whose numbers are in single precision."""
 EXTENDED = ("robot", "link", "model", "world")
 """Elements in which programs put their own ones."""
 
@@ -372,9 +374,14 @@ def _without_declaration(text: str) -> str:
 
 # What prints numbers writes six digits and more; fewer are a designer's own numbers.
 _FEWEST = 6
-_PLACES = words("pos axis anchor relpose fromto xyz rpy quat axisangle xyaxes zaxis euler")
-# Elements of SDF, whose texts are places.
-_TEXTS = ("pose", "xyz")
+# Digits of numbers in single precision.
+_SINGLE = 7
+_PLACES = words(
+    "pos axis anchor relpose fromto xyz rpy quat axisangle xyaxes zaxis euler "
+    "physics:localPos0 physics:localPos1 physics:localRot0 physics:localRot1"
+)
+# Elements of SDF and OpenSim, whose texts are places.
+_TEXTS = words("pose xyz translation orientation location_body_1 location_body_2")
 _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")
 
 
@@ -396,4 +403,5 @@ def printed_digits(root: Element) -> int:
         for found in map(_NUMBER.fullmatch, " ".join(texts).split()):
             if found and (count := len(found[1].replace(".", "").rstrip("0"))) >= _FEWEST:
                 counts.append(count)
-    return int(statistics.median(counts)) if counts else 0
+    digits = int(statistics.median(counts)) if counts else 0
+    return min(digits, _SINGLE) if root.tag == USD else digits

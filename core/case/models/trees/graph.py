@@ -109,6 +109,15 @@ class Graph:
         pairs = [(*each.driven, *each.driving) for each in self.couplings if each.driving]
         return [(follower, leader) for follower, leader in pairs]
 
+    def add_world(self) -> str:
+        """Return the name of the world as a link, and add it."""
+        name = WORLD
+        while self.elements.get(name, self.root) is not self.root:
+            name += "'"
+        self.places[name], self.elements[name] = ORIGIN, self.root
+        self.fixed.add(name)
+        return name
+
     def hang(self) -> Tree:
         """Hang all links, and tie them; return the tree.
 

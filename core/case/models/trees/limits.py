@@ -48,7 +48,7 @@ def limit_of(tree: Tree, move: Move) -> Limit:
         return NO_LIMIT
     if tree.dialect == "mujoco":
         return _of_mjcf(tree, move)
-    if tree.dialect == "robot" and (found := element.child("limit")) is not None:
+    if tree.dialect != "sdf" and (found := element.child("limit")) is not None:
         said = found.attributes
         zero = element.attributes.get("type") != "continuous"
         bounds = [

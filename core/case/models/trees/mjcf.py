@@ -48,9 +48,6 @@ from .tree import (
 _LEFT_OUT = words("contact actuator sensor keyframe custom extension deformable asset")
 OTHERS = {
     "mujocoinclude": "is a part of a model; give the file that includes it",
-    "OpenSimDocument": (
-        "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case file"
-    ),
     "COLLADA": "holds shapes, which say nothing of joints; give the model that names it",
     "launch": "starts programs of ROS; give the URDF that it names",
     "model": "describes a package of Gazebo; give the SDF beside it",

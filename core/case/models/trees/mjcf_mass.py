@@ -82,7 +82,7 @@ def _geom(element: Element, compiler: Compiler) -> Mass | None:
         raise element.fault("is a mesh, expected a simple shape; give <inertial>")
     if element.attributes.get("shellinertia") == "true":
         raise element.fault("shellinertia: is a shell, expected a solid; give <inertial>")
-    volume, moments = _solid(kind, _sizes(element, kind))
+    volume, moments = solid(kind, _sizes(element, kind))
     mass = density * volume if math.isnan(mass) else mass
     if not (mass > 0.0 and volume > 0.0 and usable(mass)):
         raise element.fault("has a mass or size that is not positive or huge; correct it")
@@ -114,7 +114,7 @@ def _sizes(element: Element, kind: str) -> Sequence[float]:
     return sizes[: SHAPES[kind]]
 
 
-def _solid(kind: str, sizes: Sequence[float]) -> tuple[float, Sequence[float]]:
+def solid(kind: str, sizes: Sequence[float]) -> tuple[float, Sequence[float]]:
     """Return the volume [m^3] and the principal moments over the mass [m^2] of a solid."""
     a, b, c = (*sizes, 0.0, 0.0)[:3]
     match kind:

@@ -1,4 +1,4 @@
-"""The tree of links of a model: the content of a MJCF, URDF or SDF file, and all that
+"""The tree of links of a model: the content of a model in any format, and all that
 its case is made of.
 
 A link without a move of its own is part of the link around it. A link with several moves hangs on a
@@ -243,6 +243,7 @@ class Tree:
         springs: by move; others are of no move of the tree.
         actuated: moves with a motor.
         keyframes: by name.
+        starts: keyframes of some moves alone, as --start takes their values.
         left_out: numbers of parts without a meaning for kinematics, by name.
         notes: of its reader, beside every verdict.
         without: names by which the user leaves out elements.
@@ -269,6 +270,7 @@ class Tree:
     springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
     struts: list[Strut] = field(default_factory=list[Strut])
     actuated: set[str] = field(default_factory=set[str])
+    starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
     notes: list[str] = field(default_factory=list[str])

@@ -1,0 +1,574 @@
+"""OpenSim: models in its XML since version 4; older ones are brought up to date by its own library.
+
+Coordinates are those of OpenSim, by their names. The pose of the file is that of their default
+values. Custom joints turn and slide by lines of their coordinates; other axes may follow by lines
+and polynomials.
+
+Conventions: OpenSim 4.6. Angles of frames and of ball, gimbal and free joints are turns about x, y
+and z of the body, one after the other.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import reduce
+from pathlib import Path
+from posixpath import join as joined
+from posixpath import normpath
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
+from ....errors import KincheckError
+from ....extras import library
+from ...io.case_file import LARGEST_FILE
+from ...io.document import fault, read_text, shown
+from .element import Element, parse_xml, words
+from .framed import FramedJoint, Freedom, join
+from .graph import Graph, Joint, Loop
+from .place import ORIGIN, Place, turn_about, unit_quaternion
+from .robot_elements import HALFWAY, direction, mass_in
+from .tree import BushingLaw, Closure, Coupling, Kind, Move, Spring, Strut, Tree
+
+VERSION_4 = 40_000
+"""Oldest version of documents that are read as they are."""
+CHAINS: Mapping[str, Sequence[tuple[Kind, Vec3, int]]] = {
+    "PinJoint": [("hinge", Z, 0)],
+    "SliderJoint": [("slide", X, 0)],
+    "UniversalJoint": [("hinge", X, 0), ("hinge", Y, 1)],
+    "GimbalJoint": [("hinge", X, 0), ("hinge", Y, 1), ("hinge", Z, 2)],
+    "BallJoint": [("hinge", X, 0), ("hinge", Y, 1), ("hinge", Z, 2)],
+    "PlanarJoint": [("slide", X, 1), ("slide", Y, 2), ("hinge", Z, 0)],
+    "FreeJoint": [
+        *(("slide", axis, k) for k, axis in enumerate((X, Y, Z), 3)),
+        *(("hinge", axis, k) for k, axis in enumerate((X, Y, Z))),
+    ],
+    "WeldJoint": [],
+}
+"""Moves of joints, slides first, with the number of their coordinates in the file."""
+CUSTOM, SPACE = "CustomJoint", "SpatialTransform"
+AXES = words("translation1 translation2 translation3 rotation1 rotation2 rotation3")
+CONSTRAINTS = words(
+    "PointConstraint WeldConstraint ConstantDistanceConstraint CoordinateCouplerConstraint"
+)
+FUNCTIONS = words("Constant LinearFunction PolynomialFunction MultiplierFunction")
+IN_JOINT = words(
+    "socket_parent_frame socket_child_frame coordinates frames components SpatialTransform reverse"
+)
+IN_COORDINATE = words(
+    "motion_type default_value default_speed_value range clamped locked prescribed_function"
+    " prescribed is_free_to_satisfy_constraints"
+)
+IN_FRAME = words("socket_parent translation orientation components FrameGeometry attached_geometry")
+IN_CONSTRAINT = (
+    *words("isEnforced socket_body_1 socket_body_2 location_body_1 location_body_2"),
+    *words("constant_distance socket_frame1 socket_frame2 frames components scale_factor"),
+    *words("coupled_coordinates_function independent_coordinate_names dependent_coordinate_name"),
+)
+_INSIDE = ("objects", "components", "frames", "coordinates", "Model")
+_TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
+GRAVITY = (0.0, -9.80665, 0.0)
+"""Gravity unless given [m/s^2]."""
+DEEPEST_FRAME = 50
+
+
+def whole_osim(file: Path, root: Element) -> Element:
+    """Return a document in the form of version 4.
+
+    Raises:
+        CaseError: OpenSim cannot read an older document, or is not installed.
+    """
+    version = root.attributes.get("Version", "")
+    if re.fullmatch(r"[4-9]\d{4}", version):
+        return root
+    if not re.fullmatch(r"[1-9]\d{4}", version):
+        raise root.fault(
+            f"Version: found {shown(version)}, expected {VERSION_4} or more; correct it"
+        )
+    try:
+        opensim = library("an older one", "opensim", "simbody")
+    except KincheckError as error:
+        problem = f"Version: found {version}, expected {VERSION_4} or more; save it by OpenSim 4"
+        raise root.fault(f"{problem}, or install that: {error}") from None
+    opensim.Logger.setLevelString("Off")
+    with tempfile.TemporaryDirectory() as folder:
+        newer = Path(folder) / "newer.osim"
+        try:
+            opensim.Model(str(file)).printToXML(str(newer))
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())
+            raise fault(file, "", f"OpenSim cannot read it: {reason}; correct the model") from None
+        return parse_xml(file, read_text(newer, 2 * LARGEST_FILE, "take out what does not move"))
+
+
+def read_osim(file: Path, root: Element) -> Tree:
+    """Return the tree of a whole document, in its default pose.
+
+    Raises:
+        CaseError: an unknown joint, function or constraint, an unknown frame or coordinate.
+    """
+    return _Reader(file, root).read()
+
+
+class _Reader:
+    """A model during its reading.
+
+    Attributes:
+        paths: elements with names, by their paths in the model.
+        owners: paths of elements, by identity.
+        coordinates: moves by name of the coordinate.
+    """
+
+    def __init__(self, file: Path, root: Element) -> None:
+        models = [*root.only("Model", "ModelComponentSet")]
+        if len(models) != 1 or models[0].tag != "Model":
+            raise root.fault("found no single <Model>, expected one; give a model of OpenSim")
+        self.model = models[0]
+        name = self.model.attributes.get("name", file.stem)
+        self.graph = Graph.of(root, f"OpenSim model {name!r} of {file.name}")
+        self.graph.tree.zero = "its default pose"
+        self.paths: dict[str, Element] = {}
+        self.owners: dict[int, str] = {}
+        self.ties: list[Coupling] = []
+        self.values: dict[str, float] = {}
+        self._name(self.model, "")
+
+    def read(self) -> Tree:
+        """Return the tree."""
+        graph, tree = self.graph, self.graph.tree
+        units = self.model.child("length_units")
+        if units is not None and units.text not in ("", "m", "meters"):
+            raise units.fault(f"found {shown(units.text)}, expected meters; convert the model")
+        for element in self._all("Body"):
+            self._add_body(element)
+        every = [each for each in self.paths.values() if each.tag.endswith("Joint")]
+        coupled = {
+            name
+            for each in self._all("CoordinateCouplerConstraint")
+            for key in ("independent_coordinate_names", "dependent_coordinate_name")
+            for name in _text(each, key).split()
+        }
+        joints = [found for each in every if (found := self._joint(each, coupled))]
+        join(graph, joints)
+        for each in self.paths.values():
+            if each.tag.endswith("Constraint"):
+                self._constrain(each)
+        graph.couplings += self.ties
+        self._forces()
+        for marker in self._all("Marker"):
+            link, place = self._frame(marker, "socket_parent_frame")
+            at = place.then(Place(_vector(marker, "location")))
+            name = marker.required("name")
+            name += ".marker" * (name in graph.places)
+            graph.frames[name] = link, graph.places[link].then(at)
+        x, y, z = _numbers(self.model, "gravity", 3, GRAVITY)
+        tree.gravity = x, y, z
+        for section in self.model.children:
+            if section.tag.endswith("Set") and section.tag not in _TIED:
+                for each in section.only("objects"):
+                    for other in each.children:
+                        tree.count(other.tag)
+        return graph.hang()
+
+    def _name(self, around: Element, path: str) -> None:
+        """Give the elements in another one their paths."""
+        for child in around.children:
+            if child.tag in _INSIDE:
+                self._name(child, path)
+            elif "name" in child.attributes or child.tag.endswith("Set"):
+                own = f"{path}/{child.attributes.get('name', child.tag.lower())}"
+                if own in self.paths and child.tag.endswith(("Joint", "Constraint", "Body")):
+                    raise child.repeated_name(own, "the components")
+                self.paths.setdefault(own, child)
+                self.owners[id(child)] = own
+                self._name(child, own)
+
+    def _all(self, tag: str) -> Iterator[Element]:
+        return (each for each in self.paths.values() if each.tag == tag)
+
+    def _add_body(self, element: Element) -> None:
+        graph, name = self.graph, element.required("name")
+        if name in graph.places:
+            raise element.repeated_name(name, "the bodies")
+        graph.places[name], graph.elements[name] = ORIGIN, element
+        xx, yy, zz, xy, xz, yz = _numbers(element, "inertia", 6, (0.0,) * 6)
+        (mass,) = _numbers(element, "mass", 1, (0.0,))
+        if mass != 0.0:
+            place = Place(_vector(element, "mass_center"))
+            graph.masses[name] = mass_in(place, mass, (xx, yy, zz, xy, xz, yz))
+
+    def _frame(self, element: Element, key: str, depth: int = 0) -> tuple[str, Place]:
+        """Return the link of a frame that a socket names, and its place in the link.
+
+        Raises:
+            CaseError: there is none, or frames hang on each other in a ring.
+        """
+        text, owner = _text(element, key), self.owners[id(element)]
+        tried = [normpath(joined(each, text)) for each in (owner, owner.rpartition("/")[0] or "/")]
+        tried += [f"/bodyset/{text}", f"/{text}"]
+        found = next((path for path in tried if path in self.paths), "")
+        frame = self.paths.get(found)
+        if frame is None or not text or frame.tag not in ("Ground", "Body", "PhysicalOffsetFrame"):
+            known = [path for path, each in self.paths.items() if each.tag == "Body"]
+            raise element.unknown_name(key, text, ["/ground", *known], "a frame of the model")
+        if frame.tag == "Body":
+            return frame.required("name"), ORIGIN
+        if frame.tag == "Ground":
+            return self.graph.add_world(), ORIGIN
+        if depth > DEEPEST_FRAME:
+            raise frame.fault("hangs on itself by a ring of frames; correct socket_parent")
+        frame.require_children(IN_FRAME)
+        link, place = self._frame(frame, "socket_parent", depth + 1)
+        angles = _numbers(frame, "orientation", 3, (0.0,) * 3)
+        return link, place.then(Place(_vector(frame, "translation"), _turn(angles)))
+
+    def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
+        """Return a joint; None of one that leaves its link free."""
+        graph, name = self.graph, element.required("name")
+        if element.tag not in (*CHAINS, CUSTOM):
+            raise element.unknown_name("type", element.tag, (*CHAINS, CUSTOM), "a joint")
+        element.require_children(IN_JOINT)
+        (a, f), (b, g) = (
+            self._frame(element, f"socket_{each}_frame") for each in ("parent", "child")
+        )
+        if a == b:
+            raise element.fault(f"joins {a!r} with itself, expected two bodies; correct a socket")
+        freedoms = (
+            self._custom(element, name)
+            if element.tag == CUSTOM
+            else self._chain(element, name, coupled)
+        )
+        found = FramedJoint(name, element, (a, b), (f, g), freedoms)
+        if element.tag == "FreeJoint" and a in graph.fixed and freedoms[-1].kind == "ball":
+            motion, _ = found.motion(ORIGIN)
+            graph.places[b] = f.then(motion).then(ORIGIN.seen_from(g))
+            return None
+        return found
+
+    def _coordinates(self, element: Element, name: str, count: int) -> list[Element]:
+        """Return the coordinates of a joint, with those that have their default name."""
+        given = [
+            each for around in element.only("coordinates") for each in around.only("Coordinate")
+        ]
+        for each in given:
+            each.require_children(IN_COORDINATE)
+            if _flag(each, "prescribed"):
+                self.graph.tree.count("prescribed motions of coordinates")
+        for k in range(len(given), count):
+            named = {"name": f"{name}_coord_{k}"}
+            given.append(Element(element.file, "Coordinate", named, element.line))
+        if element.tag != CUSTOM and len(given) > count:
+            raise element.fault(f"found {len(given)} coordinates, expected {count}; correct it")
+        return given
+
+    def _chain(self, element: Element, name: str, coupled: set[str]) -> list[Freedom]:
+        chain = CHAINS[element.tag]
+        coordinates = self._coordinates(element, name, len(chain))
+        whole = element.tag in ("BallJoint", "FreeJoint") and not any(
+            _flag(each, "locked") or each.required("name") in coupled for each in coordinates
+        )
+        if not whole:
+            return [self._freedom(coordinates[k], kind, axis) for kind, axis, k in chain]
+        turn = _turn([self._default(each) for each in coordinates[:3]])
+        slides = [
+            self._freedom(coordinates[k], kind, axis) for kind, axis, k in chain if kind == "slide"
+        ]
+        return [*slides, Freedom(name, "ball", X, element, turn=turn)]
+
+    def _default(self, coordinate: Element) -> float:
+        return _numbers(coordinate, "default_value", 1, (0.0,))[0]
+
+    def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> Freedom:
+        """Return the move of a coordinate; lock it if the file does."""
+        name = coordinate.required("name")
+        if name in self.values:
+            raise coordinate.repeated_name(name, "the coordinates")
+        self.values[name] = self._default(coordinate)
+        if _flag(coordinate, "locked"):
+            self.ties.append(Coupling(f"{name}.lock", {name: 1.0}, {}, (0.0,), coordinate))
+        lower, upper = "-inf", "inf"
+        if _flag(coordinate, "clamped"):
+            lower, upper = map(repr, _numbers(coordinate, "range", 2, (-np.inf, np.inf)))
+        limit = Element(coordinate.file, "limit", {"lower": lower, "upper": upper}, coordinate.line)
+        return Freedom(name, kind, axis, replace(coordinate, children=[limit]), self.values[name])
+
+    def _custom(self, element: Element, name: str) -> list[Freedom]:
+        """Return the moves of a custom joint: of each coordinate the first axis that it moves as
+        much as itself; other axes follow.
+        """
+        coordinates = {each.required("name"): each for each in self._coordinates(element, name, 0)}
+        space = element.child(SPACE)
+        if space is None:
+            raise element.fault(f"<{SPACE}>: missing, expected six axes; add it")
+        given = {each.required("name"): each for each in space.only("TransformAxis")}
+        curves: dict[str, tuple[str, Polynomial]] = {}
+        for each in AXES:
+            curves[each] = _curve(given[each], coordinates) if each in given else ("", _ZERO)
+        leads = {
+            coordinate: each
+            for each in (*AXES[:3], *AXES[3:])
+            if (coordinate := curves[each][0]) and _is_own(curves[each][1])
+        }
+        for coordinate, own in coordinates.items():
+            if coordinate not in leads:
+                raise own.fault(
+                    "moves no axis of its joint as much as itself, expected one axis"
+                    " with a line of slope 1 or -1; correct the joint"
+                )
+        freedoms: list[Freedom] = []
+        for k, each in enumerate(AXES):
+            coordinate, curve = curves[each]
+            kind: Kind = "slide" if k < 3 else "hinge"
+            axis = (X, Y, Z)[k % 3]
+            if each in given and (child := given[each].child("axis")) is not None:
+                axis = direction(child, child.text_numbers(3))
+            constant = float(curve.coef[0])
+            if leads.get(coordinate) == each:
+                if constant:
+                    freedoms.append(Freedom("", kind, axis, element, constant, stands=True))
+                slope = float(curve.coef[1])
+                freedoms.append(self._freedom(coordinates[coordinate], kind, slope * axis))
+            elif coordinate:
+                value = float(curve(self._default(coordinates[coordinate])))
+                follower = f"{name}.{each}"
+                freedoms.append(Freedom(follower, kind, axis, given[each], value))
+                self.values[follower] = value
+                self._follow(f"{follower}.curve", follower, coordinate, curve, given[each])
+            elif constant:
+                freedoms.append(Freedom("", kind, axis, element, constant, stands=True))
+        return freedoms
+
+    def _follow(
+        self, name: str, follower: str, leader: str, curve: Polynomial, element: Element
+    ) -> None:
+        """Let a coordinate follow a curve of another one; the tie is of their changes."""
+        at = self._default_of(leader)
+        changed = curve(Polynomial([at, 1.0])) - self.values[follower]
+        coefficients = [float(x) for x in changed.coef]
+        self.ties.append(Coupling(name, {follower: 1.0}, {leader: 1.0}, coefficients, element))
+
+    def _default_of(self, name: str) -> float:
+        coordinate = next((x for x in self._all("Coordinate") if x.required("name") == name), None)
+        return self.values.get(name, 0.0) if coordinate is None else self._default(coordinate)
+
+    def _constrain(self, element: Element) -> None:
+        graph, name = self.graph, element.required("name")
+        if element.tag not in CONSTRAINTS:
+            raise element.fault(
+                f"is a {element.tag}, expected one of {', '.join(CONSTRAINTS)}; leave it out by"
+                f" --without {name}"
+            )
+        element.require_children(IN_CONSTRAINT)
+        if not _flag(element, "isEnforced", default=True):
+            graph.tree.count("constraints that are not enforced")
+            return
+        if element.tag == "CoordinateCouplerConstraint":
+            self._couple(name, element)
+            return
+        welded = element.tag == "WeldConstraint"
+        sockets = [f"socket_frame{k}" if welded else f"socket_body_{k}" for k in (1, 2)]
+        ends = [self._frame(element, each) for each in sockets]
+        if not welded:
+            ends = [
+                (link, place.then(Place(_vector(element, f"location_body_{k}"))))
+                for k, (link, place) in enumerate(ends, 1)
+            ]
+        links = ends[0][0], ends[1][0]
+        if links[0] == links[1]:
+            raise element.fault(f"ties {links[0]!r} to itself, expected two bodies; correct it")
+        first, second = (graph.places[link].then(place) for link, place in ends)
+        if element.tag == "ConstantDistanceConstraint":
+            (length,) = _numbers(element, "constant_distance", 1, (0.0,))
+            rod = Closure(name, links, (Place(first.at), Place(second.at)), element, "distance")
+            graph.rods.append(replace(rod, length=length))
+            return
+        moves = () if welded else (Move(name, "ball", first.at, X, element),)
+        graph.loops.append(Loop(Joint(name, links, moves, element), (first, second)))
+
+    def _couple(self, name: str, element: Element) -> None:
+        """Let a coordinate follow others."""
+        follower = _text(element, "dependent_coordinate_name")
+        leaders = _text(element, "independent_coordinate_names").split()
+        for key, each in [("dependent", follower), *(("independent", x) for x in leaders)]:
+            if each not in self.values:
+                raise element.unknown_name(f"{key}_coordinate", each, self.values, "a coordinate")
+        (scale,) = _numbers(element, "scale_factor", 1, (1.0,))
+        around = element.child("coupled_coordinates_function")
+        functions = around.children if around else []
+        if len(functions) != 1:
+            raise element.fault("coupled_coordinates_function: expected one function; correct it")
+        if len(leaders) == 1:
+            curve = scale * _function(functions[0])
+            self._follow(name, follower, leaders[0], curve, element)
+            return
+        if functions[0].tag != "LinearFunction":
+            raise element.fault("is a curve of several coordinates, expected a line; correct it")
+        numbers = _numbers(functions[0], "coefficients", len(leaders) + 1)
+        weights = {follower: 1.0}
+        for leader, slope in zip(leaders, numbers, strict=False):
+            weights[leader] = weights.get(leader, 0.0) - scale * slope
+        apart = scale * numbers[-1] - sum(w * self.values[x] for x, w in weights.items())
+        self.ties.append(Coupling(name, weights, {}, (apart,), element))
+
+    def _forces(self) -> None:
+        """Add springs and motors; count other forces."""
+        tree = self.graph.tree
+        forces = [
+            each
+            for section in self.model.only("ForceSet")
+            for objects in section.only("objects")
+            for each in objects.children
+        ]
+        for each in forces:
+            coordinate = _text(each, "coordinate")
+            if not _flag(each, "appliesForce", default=True):
+                tree.count("forces that are not applied")
+            elif each.tag == "SpringGeneralizedForce" and coordinate in self.values:
+                numbers = [
+                    _numbers(each, key, 1, (0.0,))[0]
+                    for key in ("stiffness", "viscosity", "rest_length")
+                ]
+                tree.springs[coordinate] = Spring(*numbers)
+            elif each.tag == "BushingForce":
+                self._bush(each)
+            elif each.tag == "PointToPointSpring":
+                self._spring(each)
+            else:
+                if each.tag.endswith("CoordinateActuator") and coordinate in self.values:
+                    tree.actuated.add(coordinate)
+                tree.count(each.tag)
+
+    def _spring(self, element: Element) -> None:
+        ends = [self._frame(element, f"socket_body{k}") for k in (1, 2)]
+        places = [
+            self.graph.places[link].then(place.then(Place(_vector(element, f"point{k}"))))
+            for k, (link, place) in enumerate(ends, 1)
+        ]
+        stiffness, rest = (
+            _numbers(element, key, 1, (0.0,))[0] for key in ("stiffness", "rest_length")
+        )
+        self._strut(element, ends, places, Spring(stiffness, 0.0, rest))
+
+    def _bush(self, element: Element) -> None:
+        ends = [self._frame(element, f"socket_frame{k}") for k in (1, 2)]
+        places = [self.graph.places[link].then(place) for link, place in ends]
+        laws = [
+            _vector(element, key)
+            for key in words(
+                "translational_stiffness rotational_stiffness translational_damping"
+                " rotational_damping"
+            )
+        ]
+        numbers = [(float(x), float(y), float(z)) for x, y, z in laws]
+        self._strut(element, ends, places, BushingLaw(*numbers))
+        self.graph.tree.notes.append(f"{element}: {HALFWAY}")
+
+    def _strut(
+        self,
+        element: Element,
+        ends: Sequence[tuple[str, Place]],
+        places: Sequence[Place],
+        law: Spring | BushingLaw,
+    ) -> None:
+        links = ends[0][0], ends[1][0]
+        if links[0] == links[1]:
+            raise element.fault(f"ties {links[0]!r} to itself, expected two bodies; correct it")
+        pair = places[0], places[1]
+        name = element.required("name")
+        self.graph.struts.append(Strut(name, links, pair, law, element, element.tag))
+
+
+_ZERO = Polynomial([0.0])
+
+
+def _is_own(curve: Polynomial) -> bool:
+    """Return whether a curve is a line of slope 1 or -1."""
+    return len(curve.coef) == 2 and abs(curve.coef[1]) == 1.0
+
+
+def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, Polynomial]:
+    """Return the coordinate of an axis of a custom joint, empty without one, and its curve."""
+    names = _text(axis, "coordinates").split()
+    around = axis.child("function")
+    functions = [
+        each for each in (around or axis).children if each.tag not in ("coordinates", "axis")
+    ]
+    if not functions and not names:
+        return "", _ZERO
+    if len(functions) != 1 or len(names) > 1:
+        raise axis.fault(
+            f"found {len(functions)} functions of {len(names)} coordinates, expected one of one;"
+            " correct it"
+        )
+    curve = _function(functions[0])
+    if len(curve.coef) == 1 or not names:
+        if len(curve.coef) > 1:
+            raise axis.fault("has no coordinate, expected one for its function; add it")
+        return "", curve
+    if names[0] not in coordinates:
+        raise axis.unknown_name("coordinates", names[0], coordinates, "a coordinate of the joint")
+    return names[0], curve
+
+
+def _function(element: Element) -> Polynomial:
+    """Return a function of one coordinate."""
+    match element.tag:
+        case "Constant":
+            found = Polynomial(_numbers(element, "value", 1, (0.0,)))
+        case "LinearFunction":
+            found = Polynomial(_numbers(element, "coefficients", 2)[::-1])
+        case "PolynomialFunction":
+            count = len(_text(element, "coefficients").split())
+            found = Polynomial(_numbers(element, "coefficients", max(count, 1))[::-1])
+        case "MultiplierFunction":
+            (scale,) = _numbers(element, "scale", 1, (1.0,))
+            around = element.child("function")
+            inner = [each for each in (around or element).children if each.tag != "scale"]
+            if len(inner) != 1:
+                raise element.fault(f"found {len(inner)} functions, expected one; correct it")
+            found = scale * _function(inner[0])
+        case _:
+            raise element.fault(
+                f"is a {element.tag}, a curve for which there is no joint, expected one of"
+                f" {', '.join(FUNCTIONS)}; fit a polynomial"
+            )
+    return found.trim()
+
+
+def _turn(angles: Sequence[float]) -> Quat:
+    """Return the turns about x, y and z of the body, one after the other."""
+    turns = (turn_about(axis, angle) for axis, angle in zip((X, Y, Z), angles, strict=True))
+    return unit_quaternion(reduce(Quat.__mul__, turns, IDENTITY))
+
+
+def _text(element: Element, tag: str) -> str:
+    child = element.child(tag)
+    return "" if child is None else child.text
+
+
+def _numbers(
+    element: Element, tag: str, count: int, default: Sequence[float] | None = None
+) -> tuple[float, ...]:
+    child = element.child(tag)
+    if child is None and default is not None:
+        return tuple(default)
+    if child is None:
+        raise element.fault(f"<{tag}>: missing, expected {count} numbers; add it")
+    return child.text_numbers(count)
+
+
+def _vector(element: Element, tag: str) -> Vec3:
+    return vec(_numbers(element, tag, 3, (0.0, 0.0, 0.0)))
+
+
+def _flag(element: Element, tag: str, *, default: bool = False) -> bool:
+    child = element.child(tag)
+    if child is None:
+        return default
+    if child.text not in ("true", "false"):
+        raise child.fault(f"found {shown(child.text)}, expected true or false; correct the text")
+    return child.text == "true"

@@ -1,0 +1,345 @@
+"""OpenSim: poses by chains of frames against rotation matrices, custom joints, constraints."""
+
+import importlib.util
+import math
+import re
+import sys
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.errors import CaseError
+from scipy.spatial.transform import Rotation
+
+from ..support.model_poses import coordinate as since_design
+from ..support.model_poses import solution
+from ..support.osim_texts import (
+    FOUR_BAR,
+    axis,
+    coordinate,
+    frame,
+    joint,
+    line,
+    model,
+    tagged,
+    texts,
+)
+
+EXACT = 1e-13
+DRIVE = Supplied(drive=("A:0:0.5:5",))
+P = (0.1, 0.2, 0.3), (0.3, -0.2, 0.5)
+C = (0.1, -0.3, 0.2), (0.2, 0.4, -0.1)
+Q = (0.2, -0.4, 0.7, 0.1, 0.5, -0.3)
+NONE = (0.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(text, name="m.osim"):
+        file = tmp_path / name
+        file.write_text(text)
+        return file
+
+    return written
+
+
+def transform(at=NONE, angles=NONE):
+    """The frame of a translation and of turns about x, y, z of the body."""
+    found = np.eye(4)
+    found[:3, :3] = Rotation.from_euler("XYZ", angles).as_matrix()
+    found[:3, 3] = at
+    return found
+
+
+MOTIONS = {
+    "PinJoint": (1, lambda a: transform(angles=(0, 0, a))),
+    "SliderJoint": (1, lambda a: transform((a, 0, 0))),
+    "UniversalJoint": (2, lambda a, b: transform(angles=(a, b, 0))),
+    "GimbalJoint": (3, lambda *q: transform(angles=q)),
+    "BallJoint": (3, lambda *q: transform(angles=q)),
+    "PlanarJoint": (3, lambda a, x, y: transform((x, y, 0), (0, 0, a))),
+    "FreeJoint": (6, lambda a, b, c, *at: transform(at, (a, b, c))),
+    "WeldJoint": (0, lambda: transform()),
+}
+
+
+def placed(tree, name):
+    place = tree.places[name]
+    e0, *e = place.turn
+    found = np.eye(4)
+    found[:3, :3] = Rotation.from_quat([*e, e0]).as_matrix()
+    found[:3, 3] = [*place.at]
+    return found
+
+
+@pytest.mark.parametrize("locked", ["", "<locked>true</locked>"])
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_joint_places_its_child_by_its_coordinates(write, kind, locked):
+    """On a link that turns, and of one that a second joint carries."""
+    count, motion = MOTIONS[kind]
+    names = [coordinate(f"q{k}", Q[k], locked * (k == 0)) for k in range(count)]
+    text = model(
+        "abc",
+        [
+            joint("PinJoint", "first", "", "a", coordinate("turn", 0.3), P, C),
+            joint(kind, "j", "a", "b", "".join(names), P, C),
+            joint("SliderJoint", "last", "b", "c"),
+        ],
+    )
+    tree = read_tree(write(text))
+    inverse = np.linalg.inv(transform(*C))
+    a = transform(*P) @ transform(angles=(0, 0, 0.3)) @ inverse
+    expected = a @ transform(*P) @ motion(*Q[:count]) @ inverse
+    assert np.allclose(placed(tree, "b"), expected, rtol=0, atol=EXACT)
+    assert np.allclose(placed(tree, "c"), expected, rtol=0, atol=EXACT)
+    values = {name: move.value for name, move in tree.moves.items() if move.is_axial}
+    assert values["turn"] == 0.3
+    assert "last_coord_0" in values
+    if kind not in ("BallJoint", "FreeJoint") or locked:
+        assert [values[f"q{k}"] for k in range(count)] == [*Q[:count]]
+    assert len(tree.ties) == (bool(locked) and count > 0)
+
+
+def test_point_constraint_closes_the_loop(write):
+    case = load(write(FOUR_BAR), DRIVE)
+    found = solution(case)
+    for k, angle in enumerate(case.sweep.values):
+        turned = [since_design(case.mechanism, found, case.mechanism.joint(x), k) for x in "ABD"]
+        assert turned == pytest.approx([angle, -angle, angle], abs=EXACT)
+    assert case.source.split(LEFT_OUT)[1] == "nothing"
+
+
+def custom(coordinates, *axes):
+    given = {each.split('"')[1] for each in axes}
+    rest = [
+        axis(f"{kind}{k}", tuple(float(k == each) for each in (1, 2, 3)))
+        for kind in ("rotation", "translation")
+        for k in (1, 2, 3)
+        if f"{kind}{k}" not in given
+    ]
+    inside = tagged("SpatialTransform", "".join((*axes, *rest)))
+    return joint("CustomJoint", "knee", "", "a", coordinates, P, C, inside=inside)
+
+
+SQUARE = tagged("PolynomialFunction", texts(coefficients=(0.3, 0.2, 0.1)))
+HALF = tagged("MultiplierFunction", f"<function>{line(1, 2)}</function><scale>0.5</scale>")
+
+
+def test_axes_of_custom_joint_follow_their_coordinates(write):
+    """A hinge against its axis and off zero, a slide by a line, one by a curve, one that stands."""
+    axes = (
+        axis("rotation1", (0, 0, 2), line(-1, 0.4), "bend"),
+        axis("rotation2", (1, 0, 0), tagged("Constant", "<value>0.25</value>")),
+        axis("translation1", (1, 1, 0), SQUARE, "bend"),
+        axis("translation2", (0, 1, 0), HALF, "bend"),
+        axis("translation3", (0, 0, 1), line(1, 0), "lift"),
+    )
+    text = model("a", [custom(coordinate("bend", 0.7) + coordinate("lift", -0.2), *axes)])
+    file = write(text)
+
+    def expected(bend, lift):
+        at = (0.3 * bend**2 + 0.2 * bend + 0.1) * np.array([1, 1, 0]) / math.sqrt(2)
+        at += np.array([0, 0.5 * bend + 1, lift])
+        motion = (
+            transform(at) @ transform(angles=(0, 0, 0.4 - bend)) @ transform(angles=(0.25, 0, 0))
+        )
+        return transform(*P) @ motion @ np.linalg.inv(transform(*C))
+
+    assert np.allclose(placed(read_tree(file), "a"), expected(0.7, -0.2), rtol=0, atol=EXACT)
+    case = load(file, Supplied(drive=("bend:0.7:1.2:5",), hold=("lift",)))
+    found = solution(case)
+    for bend, at in zip(np.linspace(0.7, 1.2, 5), found.bodies["a"].r, strict=True):
+        assert np.allclose(at, expected(bend, -0.2)[:3, 3], rtol=0, atol=EXACT)
+    assert any("bend 0.7" in note for note in case.assembly)
+
+
+def coupler(leaders, follower, function, scale=""):
+    return tagged(
+        "CoordinateCouplerConstraint",
+        f"<coupled_coordinates_function>{function}</coupled_coordinates_function>"
+        + texts(independent_coordinate_names=leaders, dependent_coordinate_name=follower)
+        + scale,
+        "tie",
+    )
+
+
+PINS = [
+    joint("PinJoint", x, "", x.lower(), coordinate(x, v))
+    for x, v in zip("ABC", (0.1, 0.4, 0.3), strict=True)
+]
+
+
+@pytest.mark.parametrize(
+    ("tie", "law"),
+    [
+        (coupler("A", "B", line(2, 0.2)), lambda a: 2 * a + 0.2),
+        (
+            coupler("A", "B", line(2, 0.2), "<scale_factor>-1</scale_factor>"),
+            lambda a: -2 * a - 0.2,
+        ),
+        (coupler("A", "B", SQUARE), lambda a: 0.3 * a * a + 0.2 * a + 0.1),
+        (coupler("A C", "B", line(2, 3, 0.1)), lambda a: 2 * a + 0.9 + 0.1),
+    ],
+    ids="line scaled curve two".split(),
+)
+def test_coupled_coordinate_follows(write, tie, law):
+    """From where the file has it to where the coupler wants it, at the start and later."""
+    case = load(write(model("abc", PINS, tie)), Supplied(drive=("A:0:0.5:5",), hold=("C",)))
+    found = solution(case)
+    (start,) = re.findall(r"B (-?[\d.]+)", next(x for x in case.assembly if "model's zero" in x))
+    zero = law(0.1)
+    assert float(start) == pytest.approx(zero, rel=1e-8)
+    joint = case.mechanism.joint("B")
+    turned = [since_design(case.mechanism, found, joint, k) + zero for k in range(5)]
+    assert turned == pytest.approx([law(a) for a in np.linspace(0, 0.5, 5)], abs=1e-9)
+
+
+def test_welds_and_rods_tie_frames(write):
+    weld = tagged(
+        "WeldConstraint",
+        texts(socket_frame1="one", socket_frame2="/bodyset/b")
+        + tagged("frames", frame("one", "a", (1, 0, 0), (0.1, 0, 0))),
+        "weld",
+    )
+    rod = tagged(
+        "ConstantDistanceConstraint",
+        texts(socket_body_1="/bodyset/a", socket_body_2="/ground", constant_distance=(2.0,))
+        + texts(location_body_2=(2, 0, 0)),
+        "rod",
+    )
+    off = coupler("A", "A", line(1, 0), "<isEnforced>false</isEnforced>")
+    tree = read_tree(write(model("abc", PINS, weld + rod + off)))
+    ties = {each.name: each for each in tree.ties}
+    assert (ties["weld"].holds, ties["rod"].holds, ties["rod"].length) == ("frame", "distance", 2.0)
+    assert [*ties["rod"].places[1].at] == [2, 0, 0]
+    assert ties["weld"].links == ("a", "b")
+    assert tree.left_out["constraints that are not enforced"] == 1
+
+
+def test_facts_beside_motion_are_read(write):
+    heavy = (
+        '<Body name="a">'
+        + texts(mass=(2.0,), mass_center=(0.1, 0.2, 0.3), inertia=(1.0, 2.0, 2.5, 0.1, 0.2, 0.3))
+        + "</Body>"
+    )
+    bounded = texts(range=(-0.5, 0.75), clamped="true")
+    pin = joint("PinJoint", "A", "", "a", coordinate("A", 0.0, bounded))
+    law = texts(coordinate="A", stiffness=(5.0,), rest_length=(0.1,), viscosity=(0.5,))
+    ends = texts(socket_body1="/ground", socket_body2="/bodyset/a", point1=(0, 1, 0))
+    forces = (
+        tagged("SpringGeneralizedForce", law, "s")
+        + tagged("CoordinateActuator", texts(coordinate="A"), "motor")
+        + tagged("Millard2012EquilibriumMuscle", "", "muscle")
+        + tagged("PointToPointSpring", ends + texts(stiffness=(7.0,), rest_length=(0.5,)), "p")
+    )
+    marker = tagged("Marker", texts(socket_parent_frame="/bodyset/a", location=(0, 1, 0)), "tip")
+    more = tagged("MarkerSet", tagged("objects", marker), "markerset") + texts(gravity=(0, 0, -3))
+    file = write(model([heavy], [pin], forces=forces, more=more))
+    tree = read_tree(file)
+    (mass,) = tree.masses["a"]
+    assert (mass.mass, [*mass.center], mass.inertia[0, 2]) == (2.0, [0.1, 0.2, 0.3], 0.2)
+    assert tree.springs["A"].rest == 0.1
+    assert [(each.spring.stiffness, [*each.places[0].at]) for each in tree.struts] == [
+        (7.0, [0, 1, 0])
+    ]
+    assert tree.left_out == {"CoordinateActuator": 1, "Millard2012EquilibriumMuscle": 1}
+    assert tree.gravity == (0, 0, -3)
+    assert [*tree.sites["tip"][1].at] == [0, 1, 0]
+    found = undriven_file(file).coordinates["A"]
+    assert (found.limit.lower, found.limit.upper, found.actuated) == (-0.5, 0.75, True)
+    assert load(file).sweep.driver == "A"
+
+
+REFUSED = {
+    "ellipsoid": (model("a", [joint("EllipsoidJoint", "j", "", "a")]), "found 'EllipsoidJoint'"),
+    "constraint": (
+        model("abc", PINS, tagged("PointOnLineConstraint", "", "tie")),
+        "is a PointOnLineConstraint, expected one of PointConstraint",
+    ),
+    "spline": (
+        model("a", [custom(coordinate("q"), axis("rotation1", (1, 0, 0), "<SimmSpline/>", "q"))]),
+        "is a SimmSpline, a curve for which there is no joint",
+    ),
+    "no own axis": (
+        model("a", [custom(coordinate("q"), axis("rotation1", (1, 0, 0), line(2, 0), "q"))]),
+        "moves no axis of its joint as much as itself",
+    ),
+    "frame": (
+        model("a", [joint("PinJoint", "j", "b", "a")]),
+        "socket_parent: found '/bodyset/b', expected a frame of the model",
+    ),
+    "itself": (model("a", [joint("PinJoint", "j", "a", "a")]), "joins 'a' with itself"),
+    "coordinate": (
+        model("abc", PINS, coupler("X", "B", line(1, 0))),
+        "independent_coordinate: found 'X', expected a coordinate",
+    ),
+    "twice": (
+        model("ab", [joint("PinJoint", x, "", x.lower(), coordinate("q")) for x in "AB"]),
+        "found 'q' again",
+    ),
+    "mistyped": (
+        model("a", [joint("PinJoint", "j", "", "a", coordinate("q", 0.0, "<lockd>true</lockd>"))]),
+        "did you mean 'locked'",
+    ),
+    "flag": (
+        model("a", [joint("PinJoint", "j", "", "a", coordinate("q", 0.0, "<locked>1</locked>"))]),
+        "found '1', expected true or false",
+    ),
+    "numbers": (
+        model("a", [joint("PinJoint", "j", "", "a", p=[(0, "nan", 0)])]).replace("'", ""),
+        "<translation>: found '0 nan 0', expected 3 numbers",
+    ),
+    "ring": (
+        model(
+            [
+                '<Body name="a"><components><PhysicalOffsetFrame name="f"><socket_parent>f'
+                "</socket_parent></PhysicalOffsetFrame></components></Body>"
+            ],
+            ['<PinJoint name="j"><socket_parent_frame>/ground</socket_parent_frame>'
+             "<socket_child_frame>/bodyset/a/f</socket_child_frame></PinJoint>"],
+        ),
+        "by a ring of frames",
+    ),
+    "units": (model("abc", PINS, more=texts(length_units="mm")), "expected meters"),
+    "version": (model("abc", PINS, version="4.5"), "found '4.5', expected 40000 or more"),
+    "no model": ('<OpenSimDocument Version="40000"/>', "found no single <Model>"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", REFUSED)
+def test_what_is_not_read_is_refused(write, fault):
+    text, message = REFUSED[fault]
+    with pytest.raises(CaseError, match=re.escape(message)):
+        load(write(text), DRIVE)
+
+
+def test_constraint_is_left_out_by_name(write):
+    text = model("abc", PINS, tagged("PointOnLineConstraint", "", "tie"))
+    tree = read_tree(write(text), ["tie"])
+    assert any("PointOnLineConstraint" in note for note in tree.notes)
+
+
+OLD = """<OpenSimDocument Version="30000"><Model name="old"><BodySet><objects>
+<Body name="ground"/><Body name="a"><mass>2</mass><Joint><PinJoint name="A">
+<parent_body>ground</parent_body><location_in_parent>0 1 0</location_in_parent>
+<orientation_in_parent>0 0.5 0</orientation_in_parent><location>0 0 2</location>
+<CoordinateSet><objects><Coordinate name="q"><default_value>0.3</default_value></Coordinate>
+</objects></CoordinateSet></PinJoint></Joint></Body></objects></BodySet></Model></OpenSimDocument>
+"""
+
+
+def test_older_documents_need_the_library(write, monkeypatch):
+    monkeypatch.setitem(sys.modules, "opensim", None)
+    with pytest.raises(CaseError, match=r"found 30000, expected 40000 or more; .* pip install"):
+        read_tree(write(OLD))
+
+
+@pytest.mark.skipif(importlib.util.find_spec("opensim") is None, reason="no OpenSim")
+def test_older_documents_are_brought_up_to_date(write):
+    tree = read_tree(write(OLD))
+    expected = transform((0, 1, 0), (0, 0.5, 0)) @ transform(angles=(0, 0, 0.3))
+    expected = expected @ transform((0, 0, -2))
+    assert np.allclose(placed(tree, "a"), expected, rtol=0, atol=EXACT)
+    assert tree.moves["q"].value == 0.3

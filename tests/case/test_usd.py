@@ -1,0 +1,712 @@
+"""USD: joints between frames of scaled and nested prims, against closed forms and MJCF."""
+
+import importlib.util
+import math
+import re
+import sys
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.trees.driving import read_start
+from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.errors import CaseError, KincheckError
+from kincheck.core.studies.same import compare
+
+from ..support.model_poses import coordinate, solution
+from ..support.usd_texts import EXCLUDED, FOUR_BAR, body, joint, locked, prim, stage
+
+pytestmark = pytest.mark.skipif(importlib.util.find_spec("pxr") is None, reason="no usd-core")
+EXACT = 1e-13
+SINGLE = 3e-7
+DRIVE = Supplied(drive=("A:0:0.5:5",))
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(*prims, name="m.usda", **more):
+        file = tmp_path / name
+        file.write_text(stage(*prims, **more))
+        return file
+
+    return written
+
+
+def tree_of(file):
+    return read_tree(file)
+
+
+def test_excluded_joint_closes_the_loop(write):
+    """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
+    case = load(write(*FOUR_BAR), DRIVE)
+    found = solution(case)
+    for k, angle in enumerate(case.sweep.values):
+        turned = [coordinate(case.mechanism, found, case.mechanism.joint(x), k) for x in "ABDC"]
+        assert turned == pytest.approx([angle, -angle, angle, angle], abs=EXACT)
+    pin = np.stack([np.sin(case.sweep.values), 0 * case.sweep.values, np.cos(case.sweep.values)])
+    assert np.allclose(found.points["b"].position, 2 * pin.T, rtol=0, atol=EXACT)
+
+
+CENTIMETRES = (
+    prim("PhysicsScene", "scene"),
+    body("a", (0, 0, 0)),
+    body("b", (0, 200, 0)),
+    body("c", (400, 0, 0)),
+    joint("Revolute", "A", "", "a", axis="Z"),
+    joint("Revolute", "B", "a", "b", (0, 200, 0), axis="Z"),
+    joint("Revolute", "C", "b", "c", (400, 0, 0), (0, 200, 0), EXCLUDED, axis="Z"),
+    joint("Revolute", "D", "", "c", (400, 0, 0), axis="Z"),
+)
+"""The same with y up, in the units that USD has unless a stage says others."""
+SCALED = (
+    body("a", ops="double3 xformOp:scale = (0.5, 2, 4)"),
+    body("b", (0, 0, 2), ops="double3 xformOp:scale = (8, 1, 1)"),
+    body("c", (4, 0, 0)),
+    joint("Revolute", "A", "", "a"),
+    joint("Revolute", "B", "a", "b", (0, 0, 0.5)),
+    joint("Revolute", "C", "b", "c", (0.5, 0, 0), (0, 0, 2), EXCLUDED),
+    joint("Revolute", "D", "", "c", (4, 0, 0)),
+)
+APART = (
+    *(body("a", (7, 7, 7)), body("b", (1, 0, 3)), body("c", (4, 0, 0))),
+    *FOUR_BAR[3:],
+)
+"""Places that their joints do not have."""
+NESTED = (
+    prim(
+        "Xform",
+        "arm",
+        lines=[
+            "double3 xformOp:translate = (0, 0, 1)",
+            'uniform token[] xformOpOrder = ["xformOp:translate"]',
+            body("a", (0, 0, -1)),
+            *(body("b", (0, 0, 1)), body("c", (4, 0, -1))),
+        ],
+    ),
+    joint("Revolute", "A", "", "arm/a"),
+    joint("Revolute", "B", "arm/a", "arm/b", (0, 0, 2)),
+    joint("Revolute", "C", "arm/b", "arm/c", (4, 0, 0), (0, 0, 2), EXCLUDED),
+    joint("Revolute", "D", "arm/c", "", (0, 0, 0), (4, 0, 0)),
+)
+
+
+@pytest.mark.parametrize(
+    ("prims", "units"),
+    [
+        (CENTIMETRES, ""),
+        (CENTIMETRES, 'metersPerUnit = 0.01\n    upAxis = "Y"'),
+        (SCALED, None),
+        (APART, None),
+        (NESTED, None),
+        ([each.replace(EXCLUDED, "") for each in FOUR_BAR], None),
+    ],
+    ids="fallback centimetres scaled apart nested plain".split(),
+)
+def test_units_scales_and_places_leave_the_mechanism(write, prims, units):
+    mechanism = undriven_file(write(*FOUR_BAR, name="truth.usda"))
+    other = undriven_file(write(*prims, **({} if units is None else {"units": units})))
+    found = compare(mechanism, other, {})
+    assert found.verdict == "same", found.reason
+    assert found.largest < 1e-12
+
+
+def test_gravity_goes_down_the_up_axis(write):
+    heavy = "float physics:mass = 1\n"
+    prims = [*CENTIMETRES]
+    prims[1] = body(
+        "a",
+        (0, 0, 0),
+        heavy + "float3 physics:diagonalInertia = (1e4, 1e4, 1e4)",
+        "point3f physics:centerOfMass = (0, 10, 0)",
+        apis="RigidBody Mass",
+    )
+    case = load(write(*prims, units=""), DRIVE)
+    assert case.mechanism.gravity == (0.0, -9.81, 0.0)
+    assert case.mechanism.body("a").mass == 1.0
+    assert case.mechanism.body("a").center_of_mass == pytest.approx((0, 0.1, 0), abs=EXACT)
+    assert case.mechanism.body("a").inertia[:3] == pytest.approx((1, 1, 1), abs=EXACT)
+    assert any("metersPerUnit is not given" in note for note in case.assembly)
+    scene = "vector3f physics:gravityDirection = (0, 0, 2)\nfloat physics:gravityMagnitude = 162"
+    prims[0] = prim("PhysicsScene", "scene", lines=[scene])
+    moon = load(write(*prims, units=""), DRIVE).mechanism.gravity
+    assert moon == pytest.approx((0, 0, 1.62), abs=EXACT)
+
+
+KINDS = {
+    "": "slide slide slide ball",
+    "transX transY transZ": "ball",
+    "transX transY transZ rotX rotY": "hinge",
+    "rotX rotY rotZ": "slide slide slide",
+    "transY transZ rotX rotY rotZ": "slide",
+    "transX rotX rotY": "slide slide hinge",
+    "transX transZ rotX rotZ": "slide hinge",
+    "transX transY transZ rotX rotY rotZ": "",
+}
+
+
+@pytest.mark.parametrize("lock", KINDS)
+def test_generic_joint_leaves_what_it_does_not_lock(write, lock):
+    carrier = joint("Revolute", "base", "", "a")
+    file = write(
+        body("a"), body("b"), carrier, joint("", "j", "a", "b", (0, 0, 0), (0, 0, 0), *locked(lock))
+    )
+    tree = tree_of(file)
+    kinds = [move.kind for name, move in tree.moves.items() if name.split(".")[0] == "j"]
+    if not lock:  # it holds nothing
+        assert kinds == []
+        assert tree.moves["b"].kind == "free"
+    else:
+        assert " ".join(kinds) == KINDS[lock]
+    axes = {name.split(".")[-1]: [*move.axis] for name, move in tree.moves.items() if "." in name}
+    for name, axis in axes.items():
+        if name.startswith("trans"):
+            assert axis == [float(letter == name[-1]) for letter in "XYZ"]
+
+
+ARM = (body("a"), body("b"), joint("Revolute", "j", "", "a"))
+"""A body on a hinge, and a free one."""
+ENDS = "rel physics:body0 = </r/a>", "rel physics:body1 = </r/b>"
+REFUSED = {
+    "limit without schema": (
+        prim("PhysicsJoint", "k", lines=[*ENDS, "float limit:rotX:physics:low = 5"]),
+        "limit:rotX: found without the schema PhysicsLimitAPI:rotX",
+    ),
+    "lock beside zero": (
+        joint(
+            "",
+            "k",
+            "a",
+            "b",
+            *[(0, 0, 0)] * 2,
+            "float limit:rotX:physics:low = 5",
+            "float limit:rotX:physics:high = 5",
+        ),
+        "lock the joint out of its frames",
+    ),
+    "distance limit": (
+        joint("", "k", "a", "b", *[(0, 0, 0)] * 2, "float limit:distance:physics:high = 5"),
+        "limits a distance",
+    ),
+    "rope": (
+        joint("Distance", "k", "a", "b", *[(0, 0, 0)] * 2, "float physics:maxDistance = 5"),
+        "found a range",
+    ),
+    "reversed limits": (
+        joint(
+            "Revolute",
+            "k",
+            "a",
+            "b",
+            *[(0, 0, 0)] * 2,
+            "float physics:lowerLimit = 5",
+            "float physics:upperLimit = -5",
+        ),
+        "is above",
+    ),
+    "gear": (prim("PhysxPhysicsGearJoint", "k"), "PhysxPhysicsGearJoint, which may couple"),
+    "rack": (prim("PhysxPhysicsRackAndPinionJoint", "k"), "may couple joints"),
+    "unknown joint": (prim("PhysicsHelicalJoint", "k"), "may join bodies"),
+    "attachment": (
+        prim("PhysxPhysicsAttachment", "k", lines=["rel actor0 = </r/a>", "rel actor1 = </r/b>"]),
+        "may join bodies a, b",
+    ),
+    "tendon": (
+        joint("Revolute", "k", "a", "b", apis="PhysxTendonAxisRootAPI:t"),
+        "PhysxTendonAxisRootAPI:t, which may couple",
+    ),
+    "no such body": (joint("Revolute", "k", "a", "bb"), "found '/r/bb', expected a prim"),
+    "itself": (joint("Revolute", "k", "a", "a"), "joins 'a' with itself"),
+    "world": (joint("Revolute", "k", "", ""), "joins 'the world' with itself"),
+    "mistyped": (
+        joint(
+            "Revolute", "k", "a", "b", *[(0, 0, 0)] * 2, "bool physics:exludeFromArticulation = 1"
+        ),
+        "did you mean 'excludeFromArticulation'",
+    ),
+    "axis": (joint("Revolute", "k", "a", "b", axis="W"), "expected one of X, Y, Z"),
+    "zero turn": (
+        joint(
+            "Revolute", "k", "a", "b", *[(0, 0, 0)] * 2, "quatf physics:localRot0 = (0, 0, 0, 0)"
+        ),
+        "localRot0: is zero",
+    ),
+    "not finite": (joint("Revolute", "k", "a", "b", ("inf", 0, 0)), "localPos0: found"),
+    "mirrored": (body("c", ops="double3 xformOp:scale = (1, -1, 1)"), "is mirrored by its scale"),
+    "flat": (body("c", ops="double3 xformOp:scale = (1, 0, 1)"), "is scaled to nothing"),
+    "sheared": (
+        body("c", ops="double3 xformOp:scale = (1, 2, 1)\ndouble xformOp:rotateZ = 30"),
+        "is sheared",
+    ),
+    "mimic without schema": (
+        joint(
+            "Revolute",
+            "k",
+            "a",
+            "b",
+            *[(0, 0, 0)] * 2,
+            "rel physxMimicJoint:rotY:referenceJoint = </r/j>",
+        ),
+        "without the schema PhysxMimicJointAPI:rotY",
+    ),
+    "unknown leader": (
+        joint(
+            "Revolute",
+            "k",
+            "a",
+            "b",
+            *[(0, 0, 0)] * 2,
+            "rel newton:mimicJoint = </r/i>",
+            apis="NewtonMimicAPI",
+        ),
+        "newton:mimicJoint: found '/r/i', expected a joint",
+    ),
+    "leader without coordinate": (
+        joint("Spherical", "s", "", "b")
+        + "\n"
+        + joint(
+            "Revolute",
+            "k",
+            "a",
+            "b",
+            *[(0, 0, 0)] * 2,
+            "rel newton:mimicJoint = </r/s>",
+            apis="NewtonMimicAPI",
+        ),
+        "couples 's', expected joints with one coordinate",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", REFUSED)
+def test_what_is_not_read_is_refused(write, fault):
+    prims, message = REFUSED[fault]
+    with pytest.raises(CaseError, match=re.escape(message)):
+        tree_of(write(*ARM, prims))
+
+
+@pytest.mark.parametrize("name", ["k", "PhysxPhysicsGearJoint", "PhysxPhysicsGearJoint/k"])
+def test_left_out_by_name_is_told(write, name):
+    file = write(*ARM, prim("PhysxPhysicsGearJoint", "k"))
+    tree = read_tree(file, [name])
+    assert any("</r/k>" in note for note in tree.notes)
+
+
+MIMICS = {
+    "physx": (
+        "PhysxMimicJointAPI:rotY",
+        [
+            "rel physxMimicJoint:rotY:referenceJoint = </r/A>",
+            "float physxMimicJoint:rotY:gearing = -2",
+            "float physxMimicJoint:rotY:offset = 30",
+        ],
+        lambda q: 2 * q - math.radians(30),
+    ),
+    "newton": (
+        "NewtonMimicAPI",
+        [
+            "rel newton:mimicJoint = </r/A>",
+            "float newton:mimicCoef0 = 30",
+            "float newton:mimicCoef1 = -0.5",
+        ],
+        lambda q: math.radians(30) - 0.5 * q,
+    ),
+}
+
+
+@pytest.mark.parametrize("dialect", MIMICS)
+def test_mimic_joint_follows_its_leader(write, dialect):
+    api, lines, law = MIMICS[dialect]
+    follower = joint("Revolute", "B", "a", "b", (0, 0, 1), (0, 0, 0), *lines, apis=api)
+    file = write(body("a"), body("b", (0, 0, 1)), joint("Revolute", "A", "", "a"), follower)
+    found = solution(case := load(file, DRIVE))
+    zero = law(0.0)
+    turned = [coordinate(case.mechanism, found, case.mechanism.joint("B"), k) for k in range(5)]
+    assert [q + zero for q in turned] == pytest.approx(
+        [law(q) for q in case.sweep.values], abs=EXACT
+    )
+    assert any(f"B {zero:.9g}" in note for note in case.assembly)
+
+
+def test_newton_mimic_of_a_slide_counts_degrees(write):
+    """A thread of 0.36 m in a turn: a thousandth of the stage's unit in a degree."""
+    nut = joint(
+        "Prismatic",
+        "nut",
+        "",
+        "b",
+        *[(0, 0, 0)] * 2,
+        "rel newton:mimicJoint = </r/A>",
+        "float newton:mimicCoef1 = 0.001",
+        apis="NewtonMimicAPI",
+    )
+    case = load(write(body("a"), body("b"), joint("Revolute", "A", "", "a"), nut), DRIVE)
+    shift = solution(case).points["b"].position[:, 1]
+    assert shift == pytest.approx(0.36 / math.tau * case.sweep.values, abs=EXACT)
+
+
+def test_motors_limits_and_starts_of_drives(write):
+    """In degrees and units of the stage; a drive without gains is no motor."""
+    drive = [
+        "float drive:angular:physics:stiffness = 10",
+        "float physics:lowerLimit = -30",
+        "float physics:upperLimit = 60",
+        "float drive:angular:physics:targetPosition = 45",
+        "float drive:angular:physics:maxForce = 5",
+    ]
+    off = [
+        "float drive:linear:physics:stiffness = 0",
+        "float drive:linear:physics:damping = 0",
+        "float physics:upperLimit = 20",
+        "float state:linear:physics:position = 10",
+    ]
+    file = write(
+        body("a"),
+        body("b"),
+        joint("Revolute", "A", "", "a", *[(0, 0, 0)] * 2, *drive, apis="PhysicsDriveAPI:angular"),
+        joint("Prismatic", "B", "a", "b", *[(0, 0, 0)] * 2, *off, apis="PhysicsDriveAPI:linear"),
+        units='metersPerUnit = 0.01\n    upAxis = "Z"',
+    )
+    found = undriven_file(file).coordinates
+    turn, slide = found["A"], found["B"]
+    assert (turn.actuated, slide.actuated) == (True, False)
+    assert [turn.limit.lower, turn.limit.upper] == pytest.approx(np.radians([-30, 60]))
+    assert (slide.limit.lower, slide.limit.upper) == (-math.inf, pytest.approx(0.2))
+    assert turn.limit.effort == pytest.approx(5e-4)
+    tree = tree_of(file)
+    assert tree.starts == {"target": [f"A={math.radians(45)!r}"], "state": ["B=0.1"]}
+    case = load(file, Supplied(drive=("A:0:1:3",), hold=("B",), start=("keyframe:target",)))
+    assert any("keyframe:target" in each for each in (case.source, *case.assembly))
+
+
+def test_rods_and_switched_off_joints(write):
+    rod = joint(
+        "Distance",
+        "rod",
+        "a",
+        "b",
+        (0, 0, 1),
+        (0, 0, 0),
+        "float physics:minDistance = 2",
+        "float physics:maxDistance = 2",
+        axis=None,
+    )
+    off = joint(
+        "Fixed", "off", "a", "b", *[(0, 0, 0)] * 2, "bool physics:jointEnabled = false", axis=None
+    )
+    tree = tree_of(
+        write(body("a"), body("b", (0, 2, 1)), joint("Revolute", "A", "", "a"), rod, off)
+    )
+    (tie,) = tree.ties
+    assert (tie.holds, tie.length) == ("distance", 2.0)
+    assert any("</r/off> is switched off" in note for note in tree.notes)
+
+
+MASS = "float physics:mass = 6"
+SHAPE = '{kind} "{name}"'
+
+
+def test_masses_of_bodies_and_of_their_colliders(write):
+    """Of a box of 1, 2, 3 m, a ball, and own numbers in turned axes."""
+    box = prim(
+        "Cube",
+        "box",
+        "Collision",
+        [
+            "double size = 1",
+            "double3 xformOp:scale = (1, 2, 3)",
+            "double3 xformOp:translate = (0, 0, 1)",
+            'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"]',
+        ],
+    )
+    ball = prim(
+        "Sphere", "ball", "Collision Mass", ["double radius = 0.1", "float physics:mass = 2"]
+    )
+    rod = prim(
+        "Cylinder",
+        "rod",
+        "Collision",
+        ["double radius = 1", "double height = 2", 'uniform token axis = "X"'],
+    )
+    turned = "quatf physics:principalAxes = (0.70710677, 0, 0, 0.70710677)"
+    file = write(
+        body("a", (0, 0, 0), MASS, box, apis="RigidBody Mass"),
+        body("b", (0, 0, 0), ball),
+        body("c", (0, 0, 0), rod, "float physics:density = 3", apis="RigidBody Mass"),
+        body(
+            "d",
+            (0, 0, 0),
+            MASS,
+            "point3f physics:centerOfMass = (1, 0, 0)",
+            turned,
+            "float3 physics:diagonalInertia = (1, 2, 3)",
+            apis="RigidBody Mass",
+            ops="double3 xformOp:scale = (2, 2, 2)",
+        ),
+        body("e", (0, 0, 0), prim("Mesh", "mesh", "Collision")),
+        *(joint("Revolute", name.upper(), "", name) for name in "abcde"),
+    )
+    tree = tree_of(file)
+    found = {name: (m.mass, *m.center, *np.diag(m.inertia)) for name, (m,) in tree.masses.items()}
+    volume = math.pi * 2
+    across = 3 * volume * (3 + 4) / 12
+    assert found == {
+        "a": pytest.approx((6, 0, 0, 1, 6.5, 5, 2.5), abs=EXACT),
+        "b": pytest.approx((2, 0, 0, 0, *[0.4 * 2 * 0.01] * 3), abs=EXACT),
+        "c": pytest.approx(
+            (3 * volume, 0, 0, 0, 3 * volume / 2, across, across), rel=1e-12, abs=EXACT
+        ),
+        "d": pytest.approx((6, 2, 0, 0, 2, 1, 3), abs=EXACT),
+    }
+    assert tree.unweighed == {"e"}
+
+
+def test_references_instances_and_variants(write, tmp_path):
+    """A link in a file of its own, placed twice; a variant that moves a joint."""
+    (tmp_path / "parts").mkdir()
+    link = stage(prim("Xform", "geometry")).replace(
+        'def Xform "r"', 'def Xform "r" (\nprepend apiSchemas = ["PhysicsRigidBodyAPI"]\n)'
+    )
+    (tmp_path / "parts" / "link.usda").write_text(
+        link.replace("upAxis", 'defaultPrim = "r"\nupAxis')
+    )
+    named = [
+        prim("Xform", name, metadata="instanceable = true\nprepend references = @parts/link.usda@")
+        for name in "ab"
+    ]
+    tall = """variantSet "height" = {
+        "low" { over "b" { } }
+        "high" { over "J" { point3f physics:localPos0 = (0, 0, 5) } }
+    }""".replace("{ ", "{\n").replace(" }", "\n}")
+    text = stage(
+        *named, joint("Revolute", "A", "", "a"), joint("Revolute", "J", "a", "b", None), tall
+    )
+    chosen = '(\nvariants = {\nstring height = "high"\n}\nprepend variantSets = "height"\n)'
+    file = tmp_path / "m.usda"
+    file.write_text(text.replace('def Xform "r"', f'def Xform "r" {chosen}'))
+    tree = tree_of(file)
+    assert [*tree.places["b"].at] == [0, 0, 5]
+    assert "variants that are read: height high" in tree.notes
+    copies = {}
+    from pxr import Usd, UsdUtils
+
+    for suffix in (".usdc", ".usdz", ".usd"):
+        other = tmp_path / f"m{suffix}"
+        flat = Usd.Stage.Open(str(file)).Flatten()
+        if suffix == ".usdz":
+            assert UsdUtils.CreateNewUsdzPackage(str(file), str(other))
+        else:
+            flat.Export(str(other))
+        copies[suffix] = [*tree_of(other).places["b"].at]
+    assert [*copies.values()] == [[0, 0, 5]] * 3
+
+
+@pytest.mark.parametrize(
+    ("asset", "problem"),
+    [
+        ("nowhere.usda", "found the reference 'nowhere.usda', expected a file in the folder"),
+        ("/etc/passwd", "which is elsewhere"),
+        ("../../far.usda", "which is elsewhere"),
+        ("https://example.org/a.usd", "expected a file in the folder"),
+        ("m.usda", "cannot be composed"),
+        ("broken.usda", "line 3: not valid USD: Expected }"),
+    ],
+)
+def test_files_from_elsewhere_are_refused(write, tmp_path, asset, problem):
+    folder = tmp_path / "in" / "here"
+    folder.mkdir(parents=True)
+    (tmp_path / "far.usda").write_text(stage())
+    (folder / "broken.usda").write_text('#usda 1.0\ndef Xform "a" {\n')
+    file = folder / "m.usda"
+    file.write_text(stage(*ARM, prim("Xform", "x", metadata=f"prepend references = @{asset}@</r>")))
+    with pytest.raises(CaseError, match=re.escape(problem)):
+        tree_of(file)
+
+
+INVALID = b'#usda 1.0\ndef "\xff\xff"'
+OTHER = [b"", b"hello", b"PXR-USDC", b"PK\x03\x04", bytes(99), INVALID]
+
+
+@pytest.mark.parametrize("data", OTHER, ids=range(len(OTHER)))
+@pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usdz", ".usd"])
+def test_other_data_is_no_stage(tmp_path, suffix, data):
+    file = tmp_path / f"m{suffix}"
+    file.write_bytes(data)
+    with pytest.raises(CaseError, match=r"not valid USD|has no|no body"):
+        tree_of(file)
+
+
+def test_missing_library_says_what_to_install(write, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pxr.Usd", None)
+    with pytest.raises(KincheckError, match=r"reading m.usda needs pxr.*pip install .*usd-core"):
+        tree_of(write(*ARM))
+
+
+def test_random_chain_is_that_of_mjcf(write, tmp_path):
+    """Turned frames in single precision, with a loop by a ball."""
+    rng = np.random.default_rng(0)
+
+    def quaternion(x):
+        q = np.asarray(x, dtype=float)
+        return q / np.linalg.norm(q)
+
+    bodies, joints, xml = [], [], ""
+    last, around = "", (np.zeros(3), np.array([1.0, 0, 0, 0]))
+    for k in range(4):
+        at, turn, axis = (
+            rng.normal(size=3),
+            quaternion(rng.normal(size=4)),
+            quaternion(rng.normal(size=3)),
+        )
+        name = f"l{k}"
+        xml += (
+            f'<body name="{name}" pos="{" ".join(map(repr, at.tolist()))}"'
+            f' quat="{" ".join(map(repr, turn.tolist()))}"><joint name="j{k}"'
+            f' axis="{" ".join(map(repr, axis.tolist()))}"/>'
+        )
+        # the frame whose x is the axis, in the body
+        half = quaternion([1.0 + axis[0], 0.0, -axis[2], axis[1]])
+        ends = [
+            f"quatf physics:localRot0 = {tuple(product(turn, half).tolist())}",
+            f"quatf physics:localRot1 = {tuple(half.tolist())}",
+        ]
+        joints.append(
+            joint("Revolute", f"j{k}", last, name, tuple(at.tolist()), (0, 0, 0), *ends, axis="X")
+        )
+        around = (around[0] + turned(around[1], at), product(around[1], turn))
+        bodies.append(
+            body(
+                name, around[0].tolist(), ops=f"quatd xformOp:orient = {tuple(around[1].tolist())}"
+            )
+        )
+        last = name
+    point = around[0] + turned(around[1], np.array([0.1, 0.2, 0.3]))
+    joints.append(
+        joint("Spherical", "loop", "", "l3", tuple(point.tolist()), (0.1, 0.2, 0.3), EXCLUDED)
+    )
+    other = tmp_path / "m.xml"
+    other.write_text(
+        f"<mujoco><worldbody>{xml}{'</body>' * 4}</worldbody><equality><connect"
+        f' body1="l3" anchor="0.1 0.2 0.3"/></equality></mujoco>'
+    )
+    found = compare(undriven_file(write(*bodies, *joints)), undriven_file(other), {})
+    assert found.verdict == "same", found.reason
+    assert EXACT < found.largest < SINGLE * 10
+
+
+def product(p, q):
+    (a, *u), (b, *v) = p, q
+    u, v = np.array(u), np.array(v)
+    return np.array([a * b - u @ v, *(a * v + b * u + np.cross(u, v))])
+
+
+def turned(q, x):
+    return product(product(q, np.array([0.0, *x])), q * [1, -1, -1, -1])[1:]
+
+
+TURN = "quatd xformOp:orient = ({}, 0, {}, 0)"
+
+
+def turned_by(degrees):
+    half = math.radians(degrees) / 2
+    return TURN.format(math.cos(half), math.sin(half))
+
+
+def test_coordinates_at_the_start_are_those_of_transforms(write):
+    """In centimetres; the second joint counts the world on its body, and the third follows."""
+    follow = ["rel newton:mimicJoint = </r/A>", "float newton:mimicCoef1 = 3"]
+    file = write(
+        body("a", (0, 0, 100), ops=turned_by(30)),
+        body("b", (0, 0, 200), ops=turned_by(-40)),
+        body("c", (0, 7, 300), ops=turned_by(90)),
+        joint("Revolute", "A", "", "a", (0, 0, 100)),
+        joint("Revolute", "B", "b", "", None, (0, 0, 200)),
+        joint("Revolute", "C", "", "c", (0, 0, 300), None, *follow, apis="NewtonMimicAPI"),
+        units="metersPerUnit = 0.01",
+    )
+    tree = tree_of(file)
+    found = [tree.moves[name].value for name in "ABC"]
+    assert np.degrees(found) == pytest.approx([30, 40, 90], abs=1e-12)
+    places = np.array([[*tree.places[name].at] for name in "abc"])
+    assert places == pytest.approx(np.array([[0, 0, 1], [0, 0, 2], [0, 0, 3]]), abs=EXACT)
+    (tie,) = tree.ties
+    assert tie.coefficients[0] == pytest.approx(0.0, abs=EXACT)
+    assert any("c by 0.07 m and" in note and "a by" not in note for note in tree.notes)
+
+
+def test_rod_is_measured_where_joints_place_its_bodies(write):
+    rod = joint("Distance", "rod", "a", "b", (0, 0, 1), None, axis=None)
+    lengths = "float physics:minDistance = 1\nfloat physics:maxDistance = 1\n}"
+    file = write(
+        body("a", (9, 9, 9)),
+        body("b", (0, 0, 2)),
+        joint("Revolute", "A", "", "a"),
+        rod.removesuffix("}") + lengths,
+    )
+    (tie,) = tree_of(file).ties
+    assert [*tie.places[0].at] == [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        ("metresPerUnit = 1", "did you mean 'metersPerUnit'"),
+        ('metersPerUnit = "cm"', "Failed to parse value"),
+        ("metersPerUnit = 0", "expected positive numbers"),
+    ],
+)
+def test_units_that_make_no_sense_are_refused(write, units, message):
+    with pytest.raises(CaseError, match=message):
+        tree_of(write(*ARM, units=units))
+
+
+def placed(tree, start, name):
+    place = read_start(tree, start).pose.as_tree().places[name]
+    e0, *e = place.turn
+    return [*place.at, *e, e0]
+
+
+def test_chain_and_universal_joint_are_as_in_newton(write):
+    """Poses of Newton 1.8 by its own reader, at equal coordinates, in single precision."""
+    turn = "quatf physics:localRot{} = (0.9238795, {})"
+    ends = turn.format(0, "0.3826834, 0, 0"), turn.format(1, "0, 0, 0.3826834")
+    limits = [
+        f"float limit:{axis}:physics:{end} = {sign}{size}"
+        for axis, size in (("transY", 9), ("rotY", 170), ("rotZ", 170))
+        for end, sign in (("low", "-"), ("high", ""))
+    ]
+    file = write(
+        *(body("a"), body("b"), joint("Revolute", "A", "", "a")),
+        joint(
+            "",
+            "U",
+            "a",
+            "b",
+            (0.5, 0, 0),
+            (0, 0.25, 0),
+            *ends,
+            *limits,
+            *locked("transX transZ rotX"),
+        ),
+    )
+    tree = tree_of(file)
+    start = "A=0.3 U.transY=0.2 U.rotY=-0.7 U.rotZ=0.4".split()
+    expected = [0.389729, 0.020423, -0.188806, 0.364771, -0.115834, -0.353477, 0.853568]
+    assert placed(tree, start, "b") == pytest.approx(expected, abs=1e-6)
+    assert any("rotY and then rotZ, a universal joint as in Newton" in x for x in tree.notes)
+    scaled = body("a", (0.1, 0.2, 0.3), ops="double3 xformOp:scale = (2, 2, 2)")
+    slide = joint("Prismatic", "B", "a", "b", (0.5, 0, 0), (0, 0.25, 0), *ends, axis="Z")
+    last = joint(
+        "Revolute",
+        "C",
+        "b",
+        "c",
+        (0, 0, 1),
+        None,
+        "quatf physics:localRot1 = (0.9238795, 0, 0.3826834, 0)",
+        axis="X",
+    )
+    first = joint("Revolute", "A", "", "a", (0.1, 0.2, 0.3))
+    tree = tree_of(write(scaled, body("b"), body("c"), first, slide, last))
+    expected = [1.100272, -0.773528, 0.747934, -0.111818, 0.029388, -0.261765, 0.958182]
+    assert placed(tree, ["A=0.3", "B=0.2", "C=-0.7"], "c") == pytest.approx(expected, abs=1e-6)
