@@ -129,6 +129,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             return found
         every, ends = port.Eval(simulator.get_context()), iter(moves)
         for body in model["bodies"]:
+            last = None
             for _ in body["moves"]:
                 last = next(ends)
             frame = last.frame_on_child().CalcPoseInWorld(simulator.get_context())

@@ -15,8 +15,7 @@ import pytest
 from kincheck.core.cli import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.record import Outcome, Results, to_json
-from kincheck.core.history.export import NUMBERS
-from kincheck.core.history.queries import export, faultless, read
+from kincheck.core.history.queries import NUMBERS, export, faultless, read
 from kincheck.core.history.store import HistoryError, Store
 from kincheck.core.report.figures import Past, trend_figures
 from kincheck.core.report.trends import trends
@@ -298,7 +297,7 @@ def test_rules_find_the_run_to_compare_with(path):
     with pytest.raises(
         KincheckError,
         match=(
-            r"there is no run 'green'; give a number of the history, a results.json, last-green or"
+            r"there is no run 'green'. Give a number of the history, a results.json, last-green or"
         ),
     ):
         reported(path, against="green")
@@ -331,7 +330,7 @@ def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
     )
     assert main.main(["report"]) == 2
     assert (
-        "no run without a history; give --history FILE, or a results.json"
+        "no run without a history. Give --history FILE, or a results.json"
         in capsys.readouterr().err
     )
 
@@ -399,7 +398,7 @@ def test_impossible_exports_are_refused(path, tmp_path, monkeypatch):
     nights(path, 1)
     with Store(path) as store:
         with pytest.raises(
-            KincheckError, match=r"ends in '.xlsx'; give a file that ends in .parquet or .csv"
+            KincheckError, match=r"ends in '.xlsx'. Give a file that ends in .parquet or .csv"
         ):
             export(store, tmp_path / "all.xlsx")
         with pytest.raises(KincheckError, match="cannot be written"):

@@ -280,7 +280,7 @@ def test_a_file_of_another_program_is_left_alone(path):
     other.execute("CREATE TABLE bookmarks (url TEXT)")
     other.close()
     before = path.read_bytes()
-    with pytest.raises(HistoryError, match="a database of another program; give another file"):
+    with pytest.raises(HistoryError, match=r"a database of another program. Give another file"):
         Store(path)
     assert path.read_bytes() == before
     path.write_bytes(b"not a database at all" * 100)
@@ -393,7 +393,7 @@ def test_disk_error_during_run_keeps_results(path):
 def test_resume_takes_history_from_environment(path):
     process = kincheck("run", "--resume")
     assert (
-        "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"
+        "--resume needs a history. Give --history FILE, or set KINCHECK_HISTORY."
         in process.communicate()[1]
     )
     assert process.returncode == 2

@@ -270,12 +270,12 @@ def test_case_file_uses_joint_type_option(in_folder, capsys, tmp_path, monkeypat
         ),
         (
             'type = "gear"',
-            "own:Mine: the type 'gear' belongs to joints that couple two others; give it another",
+            "own:Mine: the type 'gear' belongs to joints that couple two others. Give it another",
         ),
         (
             "pass",
             (
-                'own:Mine has no type, the name of such joints in case files; write type = "..."'
+                'own:Mine has no type, the name of such joints in case files. Write type = "..."'
                 " in the class"
             ),
         ),
@@ -350,18 +350,18 @@ REFUSED = (
     ("text", "said"),
     [
         ("def f(:\n    pass\n",
-         "SyntaxError: invalid syntax ({file}, line 1: def f(:); correct it"),
+         "SyntaxError: invalid syntax ({file}, line 1: def f(:). Correct it."),
         ("\nx = 1\n  y = 2\n",
-         "IndentationError: unexpected indent ({file}, line 3: y = 2); correct it"),
+         "IndentationError: unexpected indent ({file}, line 3: y = 2). Correct it."),
         (RAISING, "ZeroDivisionError: division by zero ({file}, line 2: return 1 / 0, called"
-                  " from {file}, line 4: f()); "),
+                  " from {file}, line 4: f()). "),
         ("import nowhere_to_be_found\n",
-         "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found); "),
-        ("import brok\n", "No module named 'brok' ({file}, line 1: import brok); correct it"),
+         "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found). "),
+        ("import brok\n", "No module named 'brok' ({file}, line 1: import brok). Correct it."),
         ("import broken_too\n", "was never closed ({too}, line 2: x = (, called from {file},"
-                                " line 1: import broken_too); "),
+                                " line 1: import broken_too). "),
         (ENDLESS, "{file}, line 2: f(), called from {file}, line 2: f(), called from {file},"
-                  " line 4: f()); "),
+                  " line 4: f()). "),
         (REFUSED, "joins 'a' with itself; a joint needs two different bodies ({file}, line 2:"
                   " ball = Spherical("),
     ],

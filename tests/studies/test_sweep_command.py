@@ -349,7 +349,7 @@ def test_resume_uses_undamaged_chunks(arguments, whole, stopped, tmp_path, lost)
 def test_resume_without_part_starts_over(arguments, tmp_path, capsys):
     assert main([*arguments, "--out", str(tmp_path / "out"), "--resume"]) == 0
     assert main([*arguments, "--resume"]) == 2
-    assert "--resume continues from a folder of results: give --out DIR" in capsys.readouterr().err
+    assert "--resume continues from a folder of results. Give --out DIR" in capsys.readouterr().err
 
 
 def test_interrupt_before_first_chunk(arguments, tmp_path, capsys, stop):

@@ -242,7 +242,7 @@ FAULTS = [
     ),
     (
         "hardpoints.tip = {at = 'tip', sigma = 1.0, half_width = 1.0}",
-        'or both with distribution = "truncated_normal"; correct the keys',
+        'or both with distribution = "truncated_normal". Correct the keys',
     ),
     ("limits.y = {}", "limits.y: found neither low nor high"),
     ("limits.y = {low = 2, high = 1}", "limits.y: found low = 2 and high = 1"),
