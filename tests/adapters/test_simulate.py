@@ -1,6 +1,7 @@
 """Simulations in time, and their limits."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,10 +24,43 @@ from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, from_json
+from kincheck.core.harness.run import run
 from kincheck.core.mechanism.motions import Sine
 
 from ..support.mechanisms import mcpherson
-from ..support.simulating import record, simulation, strut, worst
+
+
+def simulation(name):
+    found = adapters.engine(name, "simulate")
+    if found.version() is None:
+        pytest.skip(f"{name} is not installed")
+    return found
+
+
+def record(case, engine):
+    (found,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    return found
+
+
+def worst(found):
+    """Largest position, velocity and acceleration error; None where there is none."""
+    by_quantity = {"position": [], "velocity": [], "acceleration": []}
+    for deviations in found.errors.values():
+        for quantity, deviation in deviations.items():
+            by_quantity[quantity].append(deviation.max_abs)
+    return [max(values, default=None) for values in by_quantity.values()]
+
+
+@cache
+def strut(samples=41):
+    case = cases.load("mcpherson_strut")
+    return replace(
+        case,
+        sweep=replace(case.sweep, values=np.linspace(-0.08, 0.08, samples)),
+        reference={},
+        truth=Truth.CONSENSUS_ONLY,
+    )
+
 
 # Largest errors on the strut at 1 m/s [m, m/s, m/s^2], about three times what was measured: an
 # order of accuracy lost is found.

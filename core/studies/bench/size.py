@@ -240,7 +240,8 @@ def _scaling(key: tuple[str, int], case: Case, found: Trajectory, seconds: Sprea
     if not found.solved.all():
         raise SolveError(f"bench: {name} of {size}: {found.message}")
     x, y = (case.reference[output.name].position for output in case.outputs)
-    off = found.points[case.outputs[0].points[0]].position - np.stack([x, y, 0.0 * x], axis=1)
+    expected = np.stack([x, y, np.zeros_like(x)], axis=1)
+    off = found.points[case.outputs[0].points[0]].position - expected
     return Scaling(
         mechanism=name,
         size=size,

@@ -48,15 +48,12 @@ def interpreted(engine: NativeEngine) -> NativeEngine:
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
     """Return the answers in order; an error becomes a failure."""
-    found: dict[int, Answer | Failure] = {}
-    away = [k for k, pair in enumerate(pairs) if not may_run_here(pair.engine)]
-    for k, pair in enumerate(pairs):
-        if may_run_here(pair.engine):
-            found[k] = once(pair)
-    if away:
+    found = {k: once(pair) for k, pair in enumerate(pairs) if may_run_here(pair.engine)}
+    if away := [k for k in range(len(pairs)) if k not in found]:
         from ...harness.workers.pool import in_workers
 
-        for k, attempt in in_workers(1, Limits(PATIENCE, MEMORY))([pairs[k] for k in away]):
+        untimed = [replace(pairs[k], timed=False) for k in away]
+        for k, attempt in in_workers(1, Limits(PATIENCE, MEMORY))(untimed):
             found[away[k]] = attempt.result
     return [found[k] for k in range(len(pairs))]
 
