@@ -30,7 +30,7 @@ REFUSED = [
     ("stress --replay x.toml --seed 0",
      "--replay judges files, which belong to no family. Leave out --seed"),
     ("stress --replay x.toml --samples 2000 --no-proofs --family units",
-     "leave out --family, --samples, --no-proofs"),
+     "Leave out --family, --samples, --no-proofs"),
     ("stress --family units --tol 1e-12",
      "--tol is for replayed files, and families have their own tolerances. Leave it"),
     ("run rssr --memory 1e300",

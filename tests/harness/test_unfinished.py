@@ -217,8 +217,8 @@ def test_unwritable_history_is_read_whole(path, merged):
                 with pytest.raises(
                     HistoryError,
                     match=(
-                        r"its latest records are still in history.sqlite-wal, .* copy both files"
-                        " to a writable folder$"
+                        r"its latest records are still in history.sqlite-wal, .* Copy both files"
+                        " to a writable folder.$"
                     ),
                 ):
                     Store(there, writable=False)

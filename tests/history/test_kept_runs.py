@@ -162,3 +162,16 @@ def test_the_state_of_a_repository(tmp_path):
 
 def test_calibration_is_a_time():
     assert 0.0 < calibration() < 60.0
+
+
+def test_state_of_repository_writes_no_index(tmp_path):
+    """Its lock would stay if the time limit ends git."""
+    git = ("git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c")
+    (tmp_path / "case.toml").write_text("a")
+    for words in (["init"], ["add", "."], ["commit", "-m", "first"]):
+        subprocess.run([*git, *words], check=True, capture_output=True)
+    index = tmp_path / ".git" / "index"
+    before = index.read_bytes()
+    os.utime(tmp_path / "case.toml", (1.0, 1.0))
+    assert git_state(tmp_path)["changed"] is False
+    assert index.read_bytes() == before

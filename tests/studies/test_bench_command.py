@@ -55,7 +55,7 @@ def test_run_refuses_invalid_benchmark_file(tmp_path, capsys):
     (tmp_path / "bench.json").write_text("{}")
     bad = str(tmp_path / "bench.json")
     assert main.main(["run", "rssr", "--engine", "native", "--bench", bad]) == 2
-    assert "give --out" in capsys.readouterr().err
+    assert "Give --out" in capsys.readouterr().err
     assert (
         main.main(["run", "rssr", "--engine", "native", "--bench", bad, "--out", str(tmp_path)])
         == 2

@@ -79,7 +79,7 @@ def test_case_file_uses_joint_type_option(in_folder, capsys, tmp_path, monkeypat
     assert main(f"explain {file} --joint-type pin_in_slot:PinSlot".split()) == 2
     assert (
         capsys.readouterr().err
-        == "kincheck: module 'pin_in_slot' has no class 'PinSlot'. Did you mean 'PinInSlot'?\n"
+        == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
     )
 
 
@@ -179,14 +179,14 @@ REFUSED = (
         ("\nx = 1\n  y = 2\n",
          "IndentationError: unexpected indent ({file}, line 3: y = 2). Correct it."),
         (RAISING, "ZeroDivisionError: division by zero ({file}, line 2: return 1 / 0, called"
-                  " from {file}, line 4: f()); "),
+                  " from {file}, line 4: f()). "),
         ("import nowhere_to_be_found\n",
-         "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found); "),
+         "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found). "),
         ("import brok\n", "No module named 'brok' ({file}, line 1: import brok). Correct it."),
         ("import broken_too\n", "was never closed ({too}, line 2: x = (, called from {file},"
-                                " line 1: import broken_too); "),
+                                " line 1: import broken_too). "),
         (ENDLESS, "{file}, line 2: f(), called from {file}, line 2: f(), called from {file},"
-                  " line 4: f()); "),
+                  " line 4: f()). "),
         (REFUSED, "joins 'a' with itself; a joint needs two different bodies ({file}, line 2:"
                   " ball = Spherical("),
     ],

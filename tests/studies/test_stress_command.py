@@ -110,7 +110,9 @@ def test_stress_without_examined_samples_has_status_2(tmp_path, capsys, monkeypa
     assert main.main(["stress", "--replay", str(file)]) == 2
     out, err = capsys.readouterr()
     assert "unsupported 181" in out
-    assert "kincheck: no sample of native was examined: give another engine or other files\n" in err
+    assert (
+        "kincheck: no sample of native was examined. Give another engine or other files.\n" in err
+    )
 
 
 def test_samples_without_a_verdict_are_counted_apart():

@@ -130,7 +130,7 @@ def test_limits_of_a_rate_take_its_order(tmp_path):
     case = crank()
     limits = (Limit("y.velocity", high=0.4),)
     variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
-    with pytest.raises(KincheckError, match=r"limits of y.velocity: .+ give --order 1"):
+    with pytest.raises(KincheckError, match=r"limits of y.velocity: .+ Give --order 1"):
         sweep_designs(case, variation, samples=4)
     found = sweep_designs(case, variation, samples=4, order=1)
     assert found.limits[0].unit == "m/s"
