@@ -106,8 +106,8 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
     if found is None:
         close = similar(name, members)
         known = ", ".join(members) or "none"
-        remedy = f"Did you mean {close!r}?" if close else f"Its {kind}s: {known}."
-        raise KincheckError(f"module {module_name!r} has no class {name!r}. {remedy}")
+        remedy = f"did you mean {close!r}?" if close else f"its {kind}s: {known}"
+        raise KincheckError(f"module {module_name!r} has no class {name!r}; {remedy}")
     return found
 
 

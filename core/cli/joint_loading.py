@@ -37,7 +37,7 @@ def named_joint(where: str) -> type[Joint]:
             f" {', '.join(sorted(Joint.registry))}."
         )
     raise KincheckError(
-        f"{unknown('joint type', where, sorted(Joint.registry))}. Write MODULE:CLASS"
+        f"{unknown('joint type', where, sorted(Joint.registry))}; write MODULE:CLASS"
         " for your own class, such as my_joint:MyJoint for a class in my_joint.py."
     )
 

@@ -144,8 +144,12 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     def git(*arguments: str) -> str | None:
         try:
             done = subprocess.run(
-                # a repository's configuration may name programs for these
-                ["git", "-c", "core.fsmonitor=false", "-C", folder, *arguments],
+                # a repository's configuration may name programs for these; a lock of its index
+                # would stay if the time limit ends git
+                [
+                    *("git", "--no-optional-locks", "-c", "core.fsmonitor=false"),
+                    *("-C", folder, *arguments),
+                ],
                 capture_output=True,
                 text=True,
                 timeout=10,

@@ -163,12 +163,18 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """Results for readers. `name` is also the name of its files."""
+    """Results for readers.
+
+    Attributes:
+        name: also of its files.
+        linked: whether the page begins with links to its sections.
+    """
 
     name: str
     headline: str
     facts: Sequence[str]
     sections: Sequence[Section]
+    linked: bool = False
 
 
 def deliver(

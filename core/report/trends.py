@@ -9,10 +9,19 @@ from ..harness.labels import motion_unit, product
 from ..history.queries import Entry, History, unit_of
 from ..history.steps import steps
 from ..history.store import RunRow
-from .figures import Figure, Mark, Past, Style, marks, trend_figures
+from .figures import Past, Style, marks, trend_figures
 from .page_model import Plot
 from .regressions import step_says
-from .sections import environment, figure_parts
+from .sections import Diagram, Report, Section
+from .sections import page as page_of
+
+HOW = (
+    "Errors are in tolerances: above the dotted line is a failure, with a red cross; exactly zero"
+    " is drawn on the lowest line",
+    "Upright lines: dashed, a step; dotted, another version",
+    "Point at a figure to read its values",
+)
+"""How the diagrams of a history are read."""
 
 
 def trends(history: History) -> dict[str, list[Past]]:
@@ -80,23 +89,24 @@ def page(history: History, *, title: str) -> str:
     by_case = trends(history)
     names = dict.fromkeys(past.engine for each in by_case.values() for past in each)
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}
-    figures: dict[str, Figure] = {}
-    cases: list[tuple[str, list[Style], list[Plot], list[Mark]]] = []
+    found: list[Section] = []
     for place, (case, each) in enumerate(sorted(by_case.items()), 1):
-        plots: list[Plot] = []
-        for what, figure in trend_figures(each, styles).items():
-            plots.append(
+        drawn = [styles[name] for name in dict.fromkeys(past.engine for past in each)]
+        diagrams = [
+            Diagram(
                 Plot(
                     f"{what}-{place}",
                     f"{what.replace('-', ' ')} of each engine on {case}, by run, log axis",
                     "",
-                )
+                ),
+                figure,
+                drawn,
             )
-            figures[plots[-1].figure] = figure
-        drawn = [styles[name] for name in dict.fromkeys(past.engine for past in each)]
-        cases.append((case, drawn, plots, marks(each)))
-    return (
-        environment()
-        .get_template("history.html")
-        .render(title=title, runs=len(history.runs), cases=cases, **figure_parts(figures))
-    )
+            for what, figure in trend_figures(each, styles).items()
+        ]
+        said = [mark.text for mark in marks(each)]
+        nothing = [] if diagrams else ["No engine has solved it in these runs."]
+        found.append(Section(case, said, nothing, (), 0, (), diagrams))
+    runs = len(history.runs)
+    facts = [f"{runs} run{'s' * (runs != 1)}, oldest first", *HOW]
+    return page_of(Report("history", title, facts, found, linked=True))

@@ -20,7 +20,7 @@ from kincheck.core.report.page_model import Material
 from kincheck.core.report.progress import complain, progress
 from kincheck.core.report.report import render
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
-from kincheck.core.studies.tolerance.tables import _csv
+from kincheck.core.studies.board.truth import _csv
 from markdown_it import MarkdownIt
 
 from ..report.page import Page

@@ -196,7 +196,7 @@ def test_invalid_scheduler_address_is_refused(address, monkeypatch):
     message = str(caught.value)
     assert message.startswith(f"scheduler {address}: found no address (")
     assert message.endswith(
-        "), expected HOST:PORT or tcp://HOST:PORT. Write it as `dask scheduler` prints it"
+        "), expected HOST:PORT or tcp://HOST:PORT. Write it as `dask scheduler` prints it."
     )
 
 

@@ -98,7 +98,7 @@ def test_check_engine_stops_on_protocol_error(few):
 @pytest.mark.parametrize(
     ("where", "message"),
     [
-        (f"{HERE}:Fauly", "has no class 'Fauly'. Did you mean 'Faulty'?"),
+        (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
         (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
         (
             f"{HERE}:np",

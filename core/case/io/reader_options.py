@@ -27,7 +27,8 @@ class Supplied:
             " (.yaml, .json) and scripts (.m)."
         ),
         MODELS: (
-            "Models (MJCF, URDF, SDF, USD, OpenSim), which do not state drivers, and datasets of Adams (.adm)."
+            "Models (MJCF, URDF, SDF, USD, OpenSim), which do not state drivers, and datasets of"
+            " Adams (.adm)."
         ),
     }
 

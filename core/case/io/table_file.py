@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import importlib
+import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
@@ -36,11 +37,20 @@ def write_csv(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -
         return put_csv(file, columns, chunks)
 
 
-def put_csv(file: TextIO, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -> int:
+def csv_text(columns: Iterable[str], rows: Rows) -> str:
+    """Return a table as the text of a CSV file with plain line ends."""
+    text = io.StringIO()
+    put_csv(text, dict.fromkeys(columns, Kind.TEXT), [rows], "\n")
+    return text.getvalue()
+
+
+def put_csv(
+    file: TextIO, columns: Mapping[str, Kind], chunks: Iterable[Rows], end: str = "\r\n"
+) -> int:
     """Write the lines of a CSV file and return the number of rows."""
     truths = [k for k, kind in enumerate(columns.values()) if kind is Kind.TRUTH]
     count = 0
-    writer = csv.writer(file)
+    writer = csv.writer(file, lineterminator=end)
     writer.writerow([cell(name) for name in columns])
     for rows in chunks:
         for row in rows:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
 from rich.console import Console
 from rich.text import Text
 
-from ...case.io.escape import cell
+from ...case.io.table_file import csv_text
 from ...errors import number_of
 from ...harness.labels import notes, number
 from ...report import terminal
@@ -279,7 +277,7 @@ def envelope_csv(results: SweepResults) -> str:
         for k, value in enumerate(scaled(driver_scale, results.driver[swept])):
             found = (column[k] for column in numbers)
             rows.append([name, unit, k, value, driver_unit, *found, *partial])
-    return _csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def gradient_csv(results: SweepResults) -> str:
@@ -299,7 +297,7 @@ def gradient_csv(results: SweepResults) -> str:
                 *(factor * each.scale, its, scale * effect(each), unit),
             ]
         )
-    return _csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def limits_csv(results: SweepResults) -> str:
@@ -317,17 +315,9 @@ def limits_csv(results: SweepResults) -> str:
         name = each.output or "all"
         shares = (each.share_of_all, each.share_of_complete)
         rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
-    return _csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def scaled(scale: float, values: Iterable[float | None]) -> list[float | None]:
     """Return numbers times a factor; None stays None."""
     return [None if value is None else scale * value for value in values]
-
-
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([cell(each) for each in row] for row in rows)
-    return text.getvalue()
