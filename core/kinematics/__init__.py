@@ -92,15 +92,16 @@ if TYPE_CHECKING:
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
     from .replay import (
         TURN,
+        Needed,
         Residuals,
         Worst,
         begun_turns,
         count_turns,
         judged_part,
+        needed_forces,
         replayed,
         residuals,
     )
-    from .replayed_forces import Needed, needed_forces
     from .statics.equations import LoadPoint
     from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
@@ -132,8 +133,10 @@ _NAMES = {
     "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
-    "replay": "TURN Residuals Worst begun_turns count_turns judged_part replayed residuals",
-    "replayed_forces": "Needed needed_forces",
+    "replay": (
+        "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces replayed"
+        " residuals"
+    ),
     "statics.equations": "LoadPoint",
     "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",

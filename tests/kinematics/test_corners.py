@@ -2,6 +2,8 @@
 and never stepped over.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kincheck.core import (
@@ -155,3 +157,15 @@ def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
         np.testing.assert_allclose(
             each.points["tip"].position, found[0].points["tip"].position, rtol=0.0, atol=1e-12
         )
+
+
+def test_verdict_beside_a_gap_ignores_wanted_points():
+    """The crank's own motion is smooth, whatever the rocker does."""
+    mechanism, turn = (
+        loop(np.pi - 1.0, 1e-7, rod=1.2 - 1e-10, rocker=0.8),
+        np.linspace(0.0, 2.0, 300),
+    )
+    pinned = replace(mechanism, points=[Point("pin", "crank", (1.0, 0.0, 0.0))])
+    whole, crank = (solve(each, "turn", turn) for each in (mechanism, pinned))
+    assert not whole.solved.all()
+    np.testing.assert_array_equal(crank.solved, whole.solved)

@@ -31,7 +31,9 @@ def test_no_more_often_than_so(monkeypatch):
 def test_few_samples_are_tried_in_vain(monkeypatch):
     tried, found, renew = list[float](), list[int](), Followed.renew
     monkeypatch.setattr(
-        Choice, "anew", lambda self, route, lane: tried.append(lane[route.model.slots["from time"]])
+        Choice,
+        "anew",
+        lambda self, route, lane, path: tried.append(lane[route.model.slots["from time"]]),
     )
     monkeypatch.setattr(
         Followed,
@@ -93,11 +95,11 @@ def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
     model = recent_model(loop(), Request(("turn",), ("tracer",)))
     route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.0, 1.5])))
     lane = march(route, 1e-12, visit={1}).visited[1]
-    standing = Choice(model).anew(route, lane)
+    standing = Choice(model).anew(route, lane, route.path)
     assert standing is None  # none are better there
     beside = replace(route, path=Path({"turn": Ramp(1.0)}, np.array([0.0, ALONG - 1e-3])))
     lane = march(beside, 1e-12, visit={1}).visited[1]
-    standing = Choice(model).anew(beside, lane)
+    standing = Choice(model).anew(beside, lane, beside.path)
     assert standing is not None
     before = {name: lane[model.vectors[f"from {name}"]] for name in model.state}
     sample = beside.sampled(np.array([ALONG - 1e-3]))

@@ -46,14 +46,6 @@ BETTER = 3.0
 AS_GOOD = 0.3
 
 
-@dataclass(frozen=True, eq=False)
-class Standing:
-    """A lane of a model at a pose: the motion continues from there with the model's rows."""
-
-    model: Model
-    lane: Array
-
-
 class Choice:
     """The rows of a motion so far.
 
@@ -64,14 +56,14 @@ class Choice:
     def __init__(self, model: Model) -> None:
         self.models = [model]
 
-    def anew(self, route: Route, lane: Array) -> Standing | None:
-        """Return rows chosen at the pose of a lane on a route, and a lane there with these rows;
-        None if none are better.
+    def anew(self, route: Route, lane: Array, path: Path) -> Route | None:
+        """Return the route from the pose of a lane on another one along a path, with rows chosen
+        there; None if none are better.
         """
-        model, slots = route.model, route.model.slots
+        model, slots, time = route.model, route.model.slots, _time(route, lane)
         if not model.selection.dropped:
             return None
-        system, sample = system_of(model), route.sampled(lane[[slots[FROM + TIME]]])
+        system, sample = system_of(model), route.sampled(np.array([time]))
         (matrix,) = system.jacobian(system.evaluate(system.state(lane[:, None]), sample)[2])
         if not np.isfinite(matrix).all():
             return None
@@ -100,7 +92,7 @@ class Choice:
         # it is there
         for name in (LARGEST_SIGMA, FROM + LARGEST_SIGMA):
             stands[best.slots[name]] = max(stands[best.slots[name]], largest)
-        return Standing(best, stands)
+        return Route(best, path, stands, time)
 
 
 def chosen(
@@ -179,21 +171,6 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
-    """A singular pose on the motion.
-
-    Attributes:
-        lane: all slots of the last pose before it.
-        time: of this pose.
-        route: the route with the passage.
-    """
-
-    lane: Array
-    time: float
-    route: Route
-
-
-@dataclass(frozen=True, eq=False)
 class Stuck:
     """A sample too near to a passage to be reached from either side.
 
@@ -218,7 +195,7 @@ class Followed:
         part_of: the part of each sample, shape (n,).
         choice: of rows.
         ends: the remaining ends.
-        passages, stuck: passed singular poses, and samples near them.
+        passages, stuck: ends at which singular poses are passed, and samples near them.
     """
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
@@ -230,7 +207,7 @@ class Followed:
         ]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
-        self.passages: list[Passage] = []
+        self.passages: list[End] = []
         self.stuck: list[Stuck] = []
         self.renewed = 0
         self._stood: dict[int, Array] = {}
@@ -275,19 +252,13 @@ class Followed:
         routes = {k: self.parts[int(self.part_of[k])].route for k in left}
         without = 0
         while left and without < WITHOUT:
-            here = left[0]
-            standing = self.choice.anew(routes[here], lanes[here])
-            if standing is None:
+            here, samples = left[0], np.array(left)
+            route = self.choice.anew(routes[here], lanes[here], self._path(samples))
+            if route is None:
                 without += 1
                 left = left[1:]
             else:
-                samples = np.array(left)
-                self._follow(
-                    Route(
-                        standing.model, self._path(samples), standing.lane, float(self.times[here])
-                    ),
-                    samples,
-                )
+                self._follow(route, samples)
                 self.renewed += 1
                 left = [k for k in left[1:] if self.in_question[k]]
 
@@ -299,17 +270,20 @@ class Followed:
             and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]
         ):
             return None
-        here, number = _time(end.route, end.lane), self._number(end.route)
+        here, number = end.time, self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0
-        standing = self.choice.anew(end.route, end.lane) if self.renewed < MOST else None
-        if standing is not None:
+        missing = np.empty(0, np.intp)
+        if number is not None:
+            missing = self._missing(number, side, end.wanted)
+        path = end.route.path if number is None else self._path(missing)
+        other = None
+        if self.renewed < MOST:
+            other = self.choice.anew(end.route, end.lane, path)
+        if other is not None:
             self.renewed += 1
             if number is None:
-                return self._arrive(Route(standing.model, end.route.path, standing.lane, here))
-            missing = self._missing(number, side, end.wanted)
-            ends = self._follow(
-                Route(standing.model, self._path(missing), standing.lane, here), missing
-            )
+                return self._arrive(other)
+            ends = self._follow(other, missing)
             return [each for each in ends if side * (each.wanted - here) >= 0.0]
         if (
             end.failure is FailureKind.LEFT_OFF and number is not None
@@ -325,13 +299,11 @@ class Followed:
         )
         if passed is None:
             return None
-        self.passages.append(Passage(end.lane, here, end.route))
-        over = passed.poses[-1].lane
+        self.passages.append(end)
+        over = onward(end.route.model, passed.poses[-1].lane, path)
         if number is None:
-            return self._arrive(onward(end.route, over, end.route.path.times))
-        missing = self._missing(number, side, end.wanted)
-        ends = self._follow(onward(end.route, over, self.times[missing]), missing)
-        beyond = _time(end.route, over)
+            return self._arrive(over)
+        ends, beyond = self._follow(over, missing), over.start
         back = [each for each in ends if side * (each.wanted - beyond) < 0.0]
         # a sample right beyond the pose is not given up for want of better rows
         while back and back[0].failure is FailureKind.LEFT_OFF:

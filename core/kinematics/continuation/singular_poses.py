@@ -19,7 +19,7 @@ singular one does not lie on the polynomial.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
@@ -414,15 +414,9 @@ def _on_curve(eight: Array, near: Array, error: float) -> bool:
     return bool((np.abs(eight @ EIGHT - near) <= known).all())
 
 
-def onward(route: Route, lane: Array, times: Array) -> Route:
-    """Return the route from a lane on this one to other times."""
-    since = float(lane[route.model.slots[FROM + TIME]])
-    return Route(
-        route.model,
-        Path(route.path.motions, times, route.path.design),
-        arrived(route.model, lane),
-        since,
-    )
+def onward(model: Model, lane: Array, path: Path) -> Route:
+    """Return the route from a lane on a path along it."""
+    return Route(model, path, arrived(model, lane), float(lane[model.slots[FROM + TIME]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -465,7 +459,8 @@ def bridge(
     model, known = route.model, None
 
     def reach(at: RoutePose, time: float, crossing: bool) -> RoutePose | None:
-        found = march(onward(route, at.lane, np.array([time])), tol, {0}, crossing=crossing)
+        there = replace(route.path, times=np.array([time]))
+        found = march(onward(model, at.lane, there), tol, {0}, crossing=crossing)
         return RoutePose(model, found.visited[0], found.kept[:, 0]) if found.visited else None
 
     if near is not None:

@@ -22,10 +22,10 @@ from ...mechanism.motions import Path
 from ...trajectory import Array
 from ..compiled.compiled_model import Model
 from ..compiled.dense_equations import System, system_of
-from ..compiled.request import FROM, SIGMA, TESTS, TIME
+from ..compiled.request import SIGMA, TESTS
 from ..compiled.routes import LONGEST_KEPT, Route
 from ..formulation.acceptance_criteria import AMPLIFIED, WORSE
-from .segments import BETTER, Followed, Passage
+from .segments import BETTER, Followed
 from .singular_poses import (
     BEYOND,
     CONTINUED,
@@ -365,9 +365,9 @@ class _Scrutiny:
             more = f"crosses {len(others) - NAMED} more singular poses, between samples"
             self.findings.notes.append(more)
 
-    def _crossed(self, passage: Passage) -> None:
-        path, time = passage.route.path, passage.time
-        singularity = examine_lane(passage.route, passage.lane, time)
+    def _crossed(self, end: End) -> None:
+        path, time = end.route.path, end.time
+        singularity = examine_lane(end.route, end.lane, time)
         if singularity.regular:  # the motion knows nothing of the choice of rows
             return
         self.findings.add_pose("crossed", path, time, singularity)
@@ -389,9 +389,9 @@ class _Scrutiny:
         """Add the reason why a side ended: a limit point ahead, or the singularity nearest to its
         last pose.
         """
-        message, route, slots = end.message, end.route, end.route.model.slots
+        message, route, time = end.message, end.route, end.time
         if end.failure is not FailureKind.TOO_MANY_PARTS:
-            system, time = system_of(route.model), float(end.lane[slots[FROM + TIME]])
+            system = system_of(route.model)
             state, way = system.state(end.lane[:, None]), 1 if end.wanted > time else -1
             ahead = limit_ahead(system, route.path, state, time, way, self.tol)
             if ahead is not None:

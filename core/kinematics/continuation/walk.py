@@ -244,6 +244,11 @@ class End:
     wanted: float
     failure: FailureKind
 
+    @property
+    def time(self) -> float:
+        """The time of the last pose [s]."""
+        return float(self.lane[self.route.model.slots[FROM + TIME]])
+
 
 def _columns(side: Side, at: int, stop: int) -> NDArray[np.intp]:
     """Return the columns of samples of a side among all samples."""
@@ -323,7 +328,8 @@ class Marcher:
         before.
         """
         side, anew = self.grid.sides[number], True
-        for stop in self._stops(side) if self.visit else [side.count]:
+        stops = self._stops(side) if self.visit else {side.count: -1}
+        for stop, sample in stops.items():
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
             walk = SideWalk(self, number)
@@ -333,7 +339,7 @@ class Marcher:
                 self.kept[:, columns], self.solved[columns] = np.nan, False
                 return self._end(side, at, self.anchor(number), failure)
             if self.visit:
-                self._stand(number, at)
+                self.visited[sample] = self.anchor(number)
         return None
 
     def worsen(self, columns: NDArray[np.intp]) -> None:
@@ -358,17 +364,11 @@ class Marcher:
         """The time at which a lane stands."""
         return float(lane[self.slots[FROM + TIME]])
 
-    def _stops(self, side: Side) -> list[int]:
-        """Return the number of samples of a side up to each one to visit."""
+    def _stops(self, side: Side) -> dict[int, int]:
+        """Return the samples to visit on a side, by the number of samples up to each, in order."""
         place = np.argsort(self.route.by_time)
-        passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
-        return sorted(count for count in passed if 1 <= count <= side.count)
-
-    def _stand(self, number: int, passed: int) -> None:
-        side = self.route.sides[number]
-        sample = int(self.route.by_time[side.first + side.step * (passed - 1)])
-        if sample in self.visit:
-            self.visited[sample] = self.anchor(number)
+        passed = {int((place[k] - side.first) * side.step) + 1: k for k in self.visit}
+        return {count: passed[count] for count in sorted(passed) if 1 <= count <= side.count}
 
     def _end(self, side: Side, at: int, anchor: Array, failure: PoseFailure) -> End:
         if failure.kind is not FailureKind.TOO_MANY_PARTS:
