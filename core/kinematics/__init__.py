@@ -101,7 +101,7 @@ if TYPE_CHECKING:
         residuals,
     )
     from .replayed_forces import Needed, needed_forces
-    from .statics.equations import LoadPoint
+    from .statics.equations import LoadPoint, with_free_coordinates
     from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
@@ -134,7 +134,7 @@ _NAMES = {
     "one_design": "Solver followed_angle followed_attitude follower solve",
     "replay": "TURN Residuals Worst begun_turns count_turns judged_part replayed residuals",
     "replayed_forces": "Needed needed_forces",
-    "statics.equations": "LoadPoint",
+    "statics.equations": "LoadPoint with_free_coordinates",
     "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
