@@ -1,6 +1,8 @@
 """The names of `import kincheck`, and when they are loaded."""
 
 import ast
+import inspect
+import json
 import math
 import subprocess
 import sys
@@ -9,8 +11,10 @@ import kincheck
 import kincheck.adapters
 import kincheck.core
 import pytest
+from kincheck.core.case.io.reader_options import CurveOptions
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.core.primitives.dot10 import Dot10
+from kincheck.core.cli.main import main, parser
+from kincheck.primitives import Dot10
 
 from .support.sources import ROOT
 
@@ -207,3 +211,48 @@ def test_another_thing_than_a_class_or_an_engine_is_told(given):
     for function in (kincheck.check_engine, lambda engine: kincheck.run("rssr", [engine])):
         with pytest.raises(kincheck.KincheckError, match=f"{given} is no engine: name, mode, loop"):
             function(given)
+
+
+COMMANDS_IN_PYTHON = {
+    "run": kincheck.run,
+    "explain": kincheck.explain,
+    "sweep": kincheck.sweep,
+    "free": kincheck.free,
+    "compare": kincheck.compare,
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS_IN_PYTHON)
+def test_function_has_the_options_of_its_command(name):
+    """All but those that print, write or store, which have no use in Python."""
+    function, command = COMMANDS_IN_PYTHON[name], parser([name]).commands()[name]
+    options = {each.help for each in command.arguments()}
+    arguments = inspect.signature(function).parameters
+    text = " ".join(inspect.getdoc(function).split())
+    untold = {each for each in arguments if f"{each}: " not in text}
+    assert untold <= {"supplied", "curve", "rates"}
+    shared = [each for each in options if " ".join(f"{each}.".split()[:6]) in text]
+    assert len(shared) >= len(arguments) - 3
+
+
+@pytest.mark.parametrize(
+    ("function", "given", "said"),
+    [
+        ("explain", {"samples": 0}, "samples: '0' is not a whole number of 1 or more"),
+        ("explain", {"tol": -1.0}, "tol: '-1.0' is not a positive number"),
+        ("free", {"duration": "long"}, "duration: 'long' is not a positive number"),
+        ("run", {"mode": "simulated"}, "there is no mode 'simulated'; did you mean 'simulate'"),
+        ("run", {"curve": CurveOptions(signs="iso8855")}, "options for measured curves need a"),
+    ],
+)
+def test_function_refuses_what_its_command_refuses(function, given, said):
+    with pytest.raises(kincheck.KincheckError, match=said):
+        getattr(kincheck, function)("rssr", **given)
+
+
+def test_run_takes_options_of_the_command(tmp_path, capsys):
+    file = tmp_path / "r.json"
+    assert main(["run", "rssr", "--engine", "native", "--reactions", "--json", str(file)]) == 0
+    (record,) = kincheck.run("rssr", "native", reactions=True).records
+    assert [*record.outputs] == [*json.loads(file.read_text())["records"][0]["outputs"]]
+    assert len(record.outputs) > 3

@@ -414,6 +414,14 @@ class DriverEffort(ForceMeasure):
             )
         return forces.drivers[self.driver] * self.ratio
 
+    def undetermined(self, forces: Forces) -> str:
+        if self.ratio is None or not (still := int(np.isnan(self.ratio).sum())):
+            return ""
+        return (
+            f"at {still} of {len(self.ratio)} samples joint {self.at!r} is at a dead centre of the"
+            f" motion of driver {self.driver!r}, where no effort at it holds"
+        )
+
 
 @dataclass(frozen=True)
 class ElementForce(ForceMeasure):

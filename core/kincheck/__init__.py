@@ -25,13 +25,13 @@ if TYPE_CHECKING:
         compliance,
         explain,
         free,
+        live,
         load,
         report,
         run,
         sweep,
     )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
-    from kincheck.core.kincheck.by_name import live
 
 _BY_NAME = (
     *("check_engine", "compare", "compliance", "explain", "free", "live"),

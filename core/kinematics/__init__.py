@@ -102,7 +102,7 @@ if TYPE_CHECKING:
         replayed,
         residuals,
     )
-    from .statics.equations import LoadPoint
+    from .statics.equations import LoadPoint, with_free_coordinates
     from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
@@ -137,7 +137,7 @@ _NAMES = {
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces replayed"
         " residuals"
     ),
-    "statics.equations": "LoadPoint",
+    "statics.equations": "LoadPoint with_free_coordinates",
     "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",

@@ -161,6 +161,57 @@ def test_resting_pose_needs_no_effort(tmp_path, engine):
     assert found["angle"] == pytest.approx([angle], abs=1e-12)
 
 
+def test_resting_pose_needs_no_drivers(tmp_path):
+    """Joints' coordinates that nothing drives are held where they rest, by drivers of their
+    names; one of both is enough to be driven.
+    """
+    bare = ARM[: ARM.index("[drivers.lift]")] + ARM[ARM.index("[forces.coil]") :]
+    bare += "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
+    bare += '[outputs.z]\npoint = "tip"\ncomponent = "z"\n[equilibrium]\n'
+    lift = '[drivers.lift]\ntype = "joint_angle"\njoint = "shoulder"\n'
+    heights = [values(read(tmp_path, text))["z"] for text in (bare, bare + lift)]
+    assert heights[0] == pytest.approx(heights[1], abs=1e-14)
+    case = read(tmp_path, bare)
+    assert [driver.name for driver in case.mechanism.drivers] == ["shoulder", "elbow"]
+    assert "the resting pose is held by drivers of shoulder, elbow" in case.assembly
+    found = values(case, "mujoco")
+    for name in ("shoulder", "elbow"):
+        assert found[f"{name}.effort"] == pytest.approx([0.0], abs=1e-11)
+
+
+def test_driver_may_have_the_name_of_a_sprung_joint(tmp_path):
+    """A single joint; its row had been left out with the driver's."""
+    alone = ARM.partition("[bodies.hand]")[0] + ARM[ARM.index("[forces.coil]") :]
+    alone += TURNED[TURNED.index("[joints.pin]") : TURNED.index("[points.post]")]
+    alone += TURNED[TURNED.index("[drivers.turn]") :]
+    alone = alone.replace('"beam"', '"arm"').replace("drivers.turn", "drivers.pin")
+    alone = alone.replace('joint = "shoulder"', 'joint = "pin"').replace('"turn"', '"pin"')
+    alone += '[outputs.effort]\ntype = "driver_effort"\ndriver = "pin"\n'
+    turn = np.array([0.0, 0.3, 0.6])
+    expected = 50.0 * turn - 2.0 * G * 0.2 * np.cos(turn)
+    assert values(read(tmp_path, alone))["effort"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_effort_at_a_dead_centre_says_why_it_has_none(tmp_path):
+    """A straight slider crank: no force on the slider holds it."""
+    text = ARM.partition("[bodies.arm]")[0] + TURNED[TURNED.index("[drivers.turn]") :]
+    for body, x in (("crank", 0.5), ("rod", 2.0), ("slider", 3.0)):
+        text += f"[bodies.{body}]\nmass = 1.0\ncenter_of_mass = [{x}, 0.0, 0.0]\n"
+    for name, i, j, x in (
+        ("pin", "ground", "crank", 0.0),
+        ("knee", "crank", "rod", 1.0),
+        ("wrist", "rod", "slider", 3.0),
+    ):
+        text += f'[joints.{name}]\ntype = "revolute"\nbodies = ["{i}", "{j}"]\n'
+        text += f"point = [{x}, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n"
+    text += '[joints.slide]\ntype = "translational"\nbodies = ["ground", "slider"]\n'
+    text += "point = [3.0, 0.0, 0.0]\naxis = [1.0, 0.0, 0.0]\n"
+    text += '[outputs.e]\ntype = "driver_effort"\ndriver = "turn"\nat = "slide"\n'
+    (record,) = run([read(tmp_path, text)], [NativeEngine()], tol=1e-12).records
+    assert record.outputs["e"].position[0] is None
+    assert "at 1 of 3 samples joint 'slide' is at a dead centre" in record.outputs["e"].reason
+
+
 class Heavy(NativeEngine):
     """An engine with twice the gravity."""
 

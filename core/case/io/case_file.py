@@ -9,12 +9,12 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, cast
 
-from ...errors import CaseError, MechanismError, unknown
+from ...errors import CaseError, MechanismError, SolveError, unknown
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
 from .compliance import read_resting, read_rig
-from .document import LONGEST_TEXT, Section, explained, read_tables, shown, toml_table
+from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown, toml_table
 from .mechanism_sections import (
     free_lines,
     mechanism_lines,
@@ -77,7 +77,10 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
 
         resting = read_resting(root.at("equilibrium"), mechanism)
         with explained(file, "equilibrium", units.length):
-            case = at_rest(case, resting)
+            try:
+                case = at_rest(case, resting)
+            except SolveError as error:
+                raise fault(file, "equilibrium", str(error)) from None
     case = _with_outputs(root, case, units)
     if resting is not None:
         from .resting import with_efforts
@@ -104,8 +107,12 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
 
 
 def _with_free(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return the tables of a file; beside [free], those of a driven motion may be left out."""
+    """Return the tables of a file; beside [free] and [equilibrium], those of a driven motion may be
+    left out.
+    """
     free = tables.get("free")
+    if "equilibrium" in tables:
+        return {"drivers": {}, **tables}
     if not isinstance(free, dict):
         return tables
     free = cast("dict[str, Any]", free)

@@ -72,7 +72,8 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
         point = section.typed(PointKeys)
         points.append(Point(name, point.body, units.place(point.position)))
     joints, couplers = _joints(root, units)
-    drivers = _drivers(root.at("drivers"), units, free=root.at("free").value is not None)
+    free = any(root.at(table).value is not None for table in ("free", "equilibrium"))
+    drivers = _drivers(root.at("drivers"), units, free=free)
     forces = [
         _built(section, section.class_of("force", ELEMENTS), units, name)
         for name, section in root.at("forces").each()

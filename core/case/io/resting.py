@@ -11,7 +11,7 @@ from ...algebra import Vec3
 from ...errors import CaseError, MechanismError
 from ...jet import Jet
 from ...joints.base import unit
-from ...kinematics import Equilibria, StaticModel
+from ...kinematics import Equilibria, StaticModel, with_free_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import JointDriver, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
@@ -34,7 +34,7 @@ def at_rest(case: Case, resting: Resting) -> Case:
         CaseError: a driver that moves is free.
         SolveError: there is no equilibrium near the design, or nothing holds a body.
     """
-    mechanism, sweep = case.mechanism, case.sweep
+    mechanism, sweep = with_free_coordinates(case.mechanism), case.sweep
     moving = {*sweep.motions, sweep.driver} - {TIME}
     if loose := sorted(moving - {*resting.held}):
         raise CaseError(
@@ -61,7 +61,10 @@ def at_rest(case: Case, resting: Resting) -> Case:
     else:
         motions = {name: _through(path.times, x) for name, x in values.items()}
         at = replace(sweep, rate=0.0, motions={**sweep.motions, **motions})
-    return replace(case, sweep=at, assembly=(*case.assembly, *unstable))
+    added = [each.name for each in mechanism.drivers[len(case.mechanism.drivers) :]]
+    notes = [f"the resting pose is held by drivers of {', '.join(added)}"] if added else []
+    assembly = (*case.assembly, *notes, *unstable)
+    return replace(case, mechanism=mechanism, sweep=at, assembly=assembly)
 
 
 def with_efforts(case: Case, resting: Resting) -> Case:

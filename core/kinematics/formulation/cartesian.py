@@ -94,7 +94,7 @@ class Cartesian:
     @property
     def conditions(self) -> Sequence[Condition]:
         far, found, first = self._from_ground, list[Condition](), 0
-        for _, group in groupby(self.constraints, key=_named):
+        for _, group in groupby(self.constraints, key=_condition):
             members = [*group]
             rows = range(first, first := first + sum(map(_count, members)))
             pairs = [c for c in members if isinstance(c, Constraint)]
@@ -277,6 +277,11 @@ class Cartesian:
 def _named(c: Constraint | Relation) -> tuple[str, str]:
     """Return the names of the joint or driver, and of the primitive."""
     return c.owner, "Relation" if isinstance(c, Relation) else type(c.primitive).__name__
+
+
+def _condition(c: Constraint | Relation) -> tuple[object, ...]:
+    """Return the names, and what tells a driver from a joint or coupler of its name."""
+    return _named(c), c.coordinate if isinstance(c, Constraint) else len(c.weights)
 
 
 def _values(c: Relation, at: Configuration) -> list[Scalar]:

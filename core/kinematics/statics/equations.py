@@ -16,7 +16,7 @@ equations. `rest` is the unbalance at design, taken away little by little.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
@@ -27,6 +27,7 @@ from ...errors import SolveError
 from ...joints import AxialJoint
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver
 from ...primitives.base import Drive, Twist
 from ...program import (
     Elimination,
@@ -123,6 +124,33 @@ def static_equations(mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> S
         SolveError: nothing holds a body in some direction.
     """
     return _Tracer(mechanism, loads).equations()
+
+
+def with_free_coordinates(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with drivers of joints' coordinates that its own drivers leave free, as
+    far as joints have any.
+    """
+    driven = {(x.joint, x.freedom) for x in mechanism.drivers if isinstance(x, JointDriver)}
+    names = {each.name for each in mechanism.drivers}
+    candidates = [
+        cls(joint.name if joint.name not in names else f"{joint.name}.{cls.freedom}", joint.name)
+        for joint in mechanism.joints
+        for cls in (JointAngle, JointDisplacement)
+        if cls.freedom in joint.freedoms and (joint.name, cls.freedom) not in driven
+    ]
+    every = replace(mechanism, drivers=[*mechanism.drivers, *candidates])
+    frame, drives = frames(every), {each.name: Drive() for each in every.drivers}
+    found = constraints(every, frame, drives, named=angles(every))
+    rows = rows_at(Cartesian(found, frame.moving))
+    first, chosen = len(rows) - len(candidates), list[Driver]()
+    kept = rows[:first]
+    for driver, row in zip(candidates, rows[first:], strict=True):
+        if len(independent_rows(wider := np.vstack([kept, row]), 0)) > len(
+            independent_rows(kept, 0)
+        ):
+            kept = wider
+            chosen.append(driver)
+    return replace(mechanism, drivers=[*mechanism.drivers, *chosen])
 
 
 class _Tracer:
@@ -322,7 +350,7 @@ class _Tracer:
         raise SolveError(
             f"{motion_of(self.formulation.columns, motion)} freely: no joint, spring or bushing"
             f" holds it at the design position{known}; give stiffness or turning_stiffness there,"
-            " or hold a driver"
+            " hold a driver, or give another design position"
         )
 
     def _newton(self, factor: Elimination, left: Sequence[Scalar], at_design: _AtDesign) -> Program:

@@ -359,20 +359,26 @@ class _Study:
 
     def _value(self, output: Quantity, found: Equilibria, step: Array) -> Jet:
         """Return an output, with its slope by a motion of the unknowns in place of its rate."""
-        unknown = np.full(len(found.share), np.nan)
-        at, design = dict[str, Vec3](), dict[str, Vec3]()
-        for name in output.points:
+
+        def at(name: str) -> tuple[Array, Array]:
             point = self.mechanism.point(name)
-            place = found.place(point.body, point.position)
             moved = found.motion(step, point.body, point.position)
-            at[name] = Vec3(*(Jet(place[:, k], moved[:, k], unknown) for k in range(3)))
-            still = np.zeros(())
-            design[name] = Vec3(*(Jet(np.array(x), still, still) for x in point.position))
-        jet = output.of(at, design)
-        n = len(unknown)
-        return Jet(
-            *(np.broadcast_to(np.asarray(x, np.float64), (n,)) for x in (jet.x, jet.v, jet.a))
-        )
+            return found.place(point.body, point.position), moved
+
+        return self._output(output, at, len(found.share))
+
+    def _output(self, output: Quantity, at: Callable[[str], tuple[Array, Array]], n: int) -> Jet:
+        """Return an output of n samples by places of points and their rates, shape (n, 3)."""
+        unknown, still = np.full(n, np.nan), np.zeros(())
+        moving, design = dict[str, Vec3](), dict[str, Vec3]()
+        for name in output.points:
+            place, rate = at(name)
+            moving[name] = Vec3(*(Jet(place[:, k], rate[:, k], unknown) for k in range(3)))
+            position = self.mechanism.point(name).position
+            design[name] = Vec3(*(Jet(np.array(x), still, still) for x in position))
+        jet = output.of(moving, design)
+        x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
+        return Jet(x, v, a)
 
     def _rates(self, found: Equilibria) -> dict[str, Curve]:
         """Return wheel rates, and roll stiffness; see the documentation for definitions."""
@@ -427,22 +433,17 @@ class _Study:
             )
         except SolveError:  # it has other freedoms, and no rigid curve to compare with
             return {}
-        found = dict[str, Array]()
-        for output in self.case.outputs:
-            if output.forces or output in self.lacking:
-                continue
-            at, design = dict[str, Vec3](), dict[str, Vec3]()
-            for name in output.points:
-                motion, still = moved.points[name], np.zeros(())
-                rate = motion.velocity if motion.velocity is not None else motion.position * np.nan
-                unknown = np.full(len(values), np.nan)
-                at[name] = Vec3(
-                    *(Jet(motion.position[:, k], rate[:, k], unknown) for k in range(3))
-                )
-                place = mechanism.point(name).position
-                design[name] = Vec3(*(Jet(np.array(x), still, still) for x in place))
-            found[output.name] = np.where(moved.solved, output.of(at, design).x, np.nan)
-        return found
+
+        def at(name: str) -> tuple[Array, Array]:
+            motion = moved.points[name]
+            rate = motion.velocity if motion.velocity is not None else motion.position * np.nan
+            return motion.position, rate
+
+        return {
+            output.name: np.where(moved.solved, self._output(output, at, len(values)).x, np.nan)
+            for output in self.case.outputs
+            if not output.forces and output not in self.lacking
+        }
 
 
 def _stiffnesses(each: Any) -> Sequence[float]:
