@@ -167,7 +167,11 @@ FAULTS = {
     "no such output": ({}, {"columns": ["toe=tow"]}, ["--map: found 'tow'", "'toe'"]),
     "no equals": ({}, {"columns": ["toe"]}, ["--map: found 'toe'", "COLUMN=OUTPUT"]),
     "stated unit contradicts": ({}, {"columns": ["toe=toe [rad]"]}, ["in 'deg' and 'rad'"]),
-    "accuracy of two outputs": ({}, {"accuracy": ["0.1"]}, ["--accuracy", "with a column"]),
+    "accuracy of two units": (
+        {"head": "travel [mm],toe,half_track_change [mm]"},
+        {"accuracy": ["0.1"]},
+        ["--accuracy", "toe, half_track_change", '"toe=0.1"'],
+    ),
     "accuracy of nothing": ({}, {"accuracy": ["caster=1 deg"]}, ["'caster'", "with a column"]),
     "a gap": ({"form": "{},,{}"}, {}, ["'toe [deg]'", "0 numbers", "expected 4"]),
 }
@@ -210,6 +214,15 @@ def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
     judged_by, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
     (toe,) = [output for output in judged_by.outputs if output.name == "toe"]
     assert toe.atol == pytest.approx(math.radians(0.02), rel=1e-14)
+
+
+def test_bare_accuracy_holds_for_all_columns(tmp_path, car):
+    case, rows = car
+    file = rig(tmp_path, rows, "Travel [mm],toe [deg],camber [rad]", "{0},{1},{2}")
+    judged_by, _ = with_curve(case, file, CurveOptions(accuracy=("0.02",)))
+    found = {output.name: output.atol for output in judged_by.outputs}
+    assert found["toe"] == pytest.approx(math.radians(0.02), rel=1e-14)
+    assert found["camber"] == 0.02
 
 
 def test_first_rows_with_gaps_are_samples(tmp_path):

@@ -76,7 +76,14 @@ def test_without_a_radius_nothing_is_at_the_road():
     ("supplied", "extra", "fragments"),
     [
         ({"wheel_radius": "30 deg"}, "", ["--wheel-radius", "'30 deg'", "a length"]),
-        ({"wheel_radius": "300"}, "", ["--wheel-radius", "300 m", "0.02 to 3 m"]),
+        (
+            {"wheel_radius": "300"},
+            "",
+            ["--wheel-radius", "300 m", "0.02 to 3 m", "say its unit: 300mm"],
+        ),
+        ({"wheelbase": "2600"}, "", ["--wheelbase", "0.1 to 20 m", "2600mm"]),
+        ({"cg_height": "500"}, "", ["--cg-height", "0.005 to 6 m", "500mm"]),
+        ({"rack_per_turn": "50"}, "", ["--rack-per-turn", "0.001 to 1 m", "50mm"]),
         ({"wheel_radius": "0.3"}, "wheel_contact,0,612,0\n", ["--wheel-radius", "wheel_contact"]),
         ({}, "wheel_contact,0,612,220\n", ["wheel_contact", "0.008 m"]),
         ({}, "wheel_axis,0,412,228\n", ["wheel_axis", "inboard", "mirror"]),

@@ -210,17 +210,30 @@ def _with_accuracy(
     file: Path, outputs: Sequence[Quantity], compared: Mapping[str, Column], texts: Sequence[str]
 ) -> tuple[Quantity, ...]:
     """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT". Without a
-    unit the number is in that of the output's column; without an output it holds for the only one.
+    unit the number is in that of the output's column; without an output it holds for all of them.
+
+    Raises:
+        CaseError: no such output, no such unit, or a number alone for columns of several units.
     """
     stated: dict[str, float] = {}
     units = {output.name: output.unit for output in outputs if output.name in compared}
     for text in texts:
         name, equals, right = (part.strip() for part in text.partition("="))
-        if not equals and len(compared) == 1:
-            (name,), right = compared, name
-        if name not in units:
-            raise unknown_name(file, "--accuracy", name, units, "an output with a column")
-        stated[name] = size_of(file, "--accuracy", name, right, units[name], compared[name].convert)
+        names, alone = [name], not equals and name not in units
+        if alone:
+            names, right = [*units], name
+        if alone and len({*units.values()}) > 1:
+            raise fault(
+                file,
+                "--accuracy",
+                f"found {shown(text)}, and columns of several units: {', '.join(units)}, expected"
+                f' the output it is of; say --accuracy "{names[0]}={text}"',
+            )
+        for name in names:
+            if name not in units:
+                raise unknown_name(file, "--accuracy", name, units, "an output with a column")
+            bare = compared[name].convert
+            stated[name] = size_of(file, "--accuracy", name, right, units[name], bare)
     why = f"the accuracy of {file.name}, as its user states it"
     found: list[Any] = [*outputs]
     for k, output in enumerate(found):

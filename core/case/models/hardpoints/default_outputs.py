@@ -33,7 +33,10 @@ from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
 AXLE = ("track", "roll_angle", "axle_roll_center_height", "axle_roll_center_offset")
 RADII = (0.02, 3.0)
-"""Radii of wheels [m], from model cars to haulage trucks."""
+WHEELBASES, HEIGHTS, TURNS = (0.1, 20.0), (0.005, 6.0), (1e-3, 1.0)
+"""Radii of wheels, wheelbases, heights of the centre of gravity and rack travels per turn [m], from
+model cars to haulage trucks.
+"""
 
 
 def vehicle_of(
@@ -71,14 +74,9 @@ def vehicle_of(
             f"found {radius}, and the point {named[WHEEL_CONTACT]}, expected one of them;"
             " leave out --wheel-radius",
         )
-    size = math.dist(center, contact) if contact else _length(file, "wheel-radius", radius)
-    if size is not None and not RADII[0] <= size <= RADII[1]:
-        raise fault(
-            file,
-            named[WHEEL_CONTACT] if contact else "--wheel-radius",
-            f"found a wheel's radius of {size:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
-            " correct it",
-        )
+    size = math.dist(center, contact) if contact else _length(file, "wheel-radius", radius, RADII)
+    if contact is not None:
+        _require_within(file, named[WHEEL_CONTACT], size, RADII)
     position = supplied.position
     if position is not None and position not in list(Axle):
         raise unknown_name(file, "--position", position, [*Axle], "an axle")
@@ -94,16 +92,16 @@ def vehicle_of(
         wheel_radius=size,
         wheel_contact=WHEEL_CONTACT if contact else None,
         axle=None if position is None else Axle(position),
-        wheelbase=_length(file, "wheelbase", supplied.wheelbase),
-        cg_height=_length(file, "cg-height", supplied.cg_height),
-        rack_per_turn=_length(file, "rack-per-turn", supplied.rack_per_turn),
+        wheelbase=_length(file, "wheelbase", supplied.wheelbase, WHEELBASES),
+        cg_height=_length(file, "cg-height", supplied.cg_height, HEIGHTS),
+        rack_per_turn=_length(file, "rack-per-turn", supplied.rack_per_turn, TURNS),
         brake_share=_share(file, "brake-share", supplied.brake_share),
         drive_share=_share(file, "drive-share", supplied.drive_share),
         kingpin=template.kingpin or None,
     )
 
 
-def _length(file: Path, option: str, text: str | None) -> float | None:
+def _length(file: Path, option: str, text: str | None, range_: tuple[float, float]) -> float | None:
     """Return the length stated by an option [m]."""
     if text is None:
         return None
@@ -115,9 +113,21 @@ def _length(file: Path, option: str, text: str | None) -> float | None:
             f"--{option}",
             f"found {shown(text)}, expected a length; say --{option} 0.3 or 300mm",
         ) from None
-    if not 0.0 < found < float("inf"):
-        raise fault(file, f"--{option}", f"found {found:.6g} m, expected a length; correct it")
+    _require_within(file, f"--{option}", found, range_)
     return found
+
+
+def _require_within(
+    file: Path, where: str, size: float | None, range_: tuple[float, float]
+) -> None:
+    least, most = range_
+    if size is not None and not least <= size <= most:
+        raise fault(
+            file,
+            where,
+            f"found {size:.6g} m, expected a length of {least:g} to {most:g} m; correct it, or say"
+            f" its unit: {size:.6g}mm",
+        )
 
 
 def _share(file: Path, option: str, text: str | None) -> float | None:
