@@ -188,7 +188,7 @@ function remembered(key, text) {
     remembered(numbers(), JSON.stringify(parts.design.rows()));
     trouble("");
     parts.table.show();
-    parts.planes.draw();
+    parts.planes.await();
     ask(false);
   }
   // Ask for the motion: at once for what one solution gives, and for the rest when a gesture rests.

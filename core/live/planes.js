@@ -1,6 +1,7 @@
 "use strict";
 // Three plane views in which points are dragged.
 
+const LATE = 60; // time for an answer, before the points are drawn without it [ms]
 const NEAR = 14; // from a pointer to the point that it takes [px]
 const PLANE_VIEWS = [
   ["y z", "front"],
@@ -11,7 +12,7 @@ const PLANE_VIEWS = [
 // The views of a table's points in a box.
 //   metres: from a position in the file to global metres, and `file` back;
 //   design: the numbers; choose: called with the point that is taken.
-// Returns `change` (the drawing), `ghost` (another drawing behind it), `draw`, `choose` (a point)
+// Returns `change` (the drawing), `ghost` (another drawing behind it), `await`, `choose` (a point)
 // and `spots` (the places of all points in a view [px]).
 function planes(box, points, { metres, file, step }, design, choose) {
   const state = { drawing: null, motion: null, bounds: null, ghost: null, chosen: -1 };
@@ -121,12 +122,14 @@ function planes(box, points, { metres, file, step }, design, choose) {
 
   // Several changes before the next picture are drawn once.
   let due = 0;
+  let late = 0;
   function draw() {
     due = due || requestAnimationFrame(drawNow);
   }
   function drawNow() {
     cancelAnimationFrame(due);
-    due = 0;
+    clearTimeout(late);
+    due = late = 0;
     views.forEach((view) => view.draw());
   }
   const lines = (drawing) => {
@@ -136,7 +139,8 @@ function planes(box, points, { metres, file, step }, design, choose) {
   };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   return {
-    draw,
+    // Draw the points alone if the drawing to come is late.
+    await: () => (late = late || setTimeout(draw, LATE)),
     spots: (view) => views[view].spots(),
     change(drawing, motion) {
       state.drawing = drawing;

@@ -312,7 +312,7 @@ def test_page_stands_in_frames_of_notebooks_alone(browser, car, framed):
     notebook = ThreadingHTTPServer(("127.0.0.1", 0), Notebook)
     Thread(target=notebook.serve_forever, daemon=True).start()
     browser("Page.navigate", url=f"http://localhost:{notebook.server_port}/")
-    end = monotonic() + (60 if framed else 2)
+    end = monotonic() + (60 if framed else 1)
     while monotonic() < end and server.points is None:
         sleep(0.05)
     assert (server.points is not None) == framed

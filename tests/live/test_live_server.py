@@ -474,15 +474,6 @@ def test_what_cannot_be_served_is_status_2(words, car):
     assert "Traceback" not in errors
 
 
-def test_axle_answers_for_both_wheels(car):
-    from kincheck.core.live.table import LiveTable
-
-    live = LiveTable(car, Supplied(travel="0.03:5", axle="roll"))
-    points = [each.position for each in live.opening([]).points]
-    outputs = live.solve(Solve(points=points)).outputs
-    assert outputs["left_camber"] == pytest.approx(outputs["right_camber"][::-1], abs=1e-12)
-
-
 @pytest.mark.parametrize("axle", ["heave", "roll", "steer"])
 def test_axle_answers_all_outputs_as_run(car, axle):
     """Derivatives by travel with the steering held too."""
