@@ -1,7 +1,8 @@
 """A mechanism as .osim, the XML of OpenSim, whose simulator is Simbody.
 
 The format has no velocities, and its ball joints lock at a right angle, so the model is written in
-its start pose, where all coordinates are zero. A body has its frame of the case. Loops are closed
+its start pose. Hinges and slides have the coordinates of the case there, as default values; those
+of balls, crosses and free bodies are zero. A body has its frame of the case. Loops are closed
 by Simbody's constraints of a point, a distance or a whole frame; coordinate couplers relate
 coordinates to one another by a factor or a polynomial. Spring-dampers are forces of OpenSim. Names
 in OpenSim are parts of paths: an underscore replaces characters with a meaning in paths.
@@ -14,9 +15,11 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.polynomial import Polynomial as Powers
 
-from ...core.algebra import IDENTITY, Quat, vec
+from ...core.algebra import IDENTITY, Quat, triple, vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
@@ -36,8 +39,9 @@ from .hung_tree import Hung, Tie, hung, loops
 from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (
-    " Written by kincheck. Lengths are in m, angles in rad. {} Coordinates are zero at the start,"
-    " which is the pose of this file{}.{}{} "
+    " Written by kincheck. Lengths are in m, angles in rad. {} This file is in the pose of the"
+    " start{}. Coordinates are those of the case; those of balls, crosses and free bodies are zero"
+    " there.{}{} "
 )
 KINDS = {
     "slide": "SliderJoint",
@@ -69,16 +73,17 @@ def write(
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
     require_known(mechanism, "OpenSim")
-    model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
+    values = joint_coordinates(mechanism, way)
+    values = {key: x + zeros.get(key, 0.0) for key, x in values.items()}
+    gravity = mechanism.gravity if mechanism.has_loads else NONE
+    model = _Model(at_start(mechanism, way), gravity, values)
     model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    values = joint_coordinates(mechanism, way)
-    zero = text.zeros_of({key: x + zeros.get(key, 0.0) for key, x in values.items()})
     masses, left_out = text.facts(mechanism, model.sprung, True, model.tree.frames.values())
     others = [f.name for f in mechanism.forces if getattr(f, "law", "") != Law.CARDAN]
     left_out += text.own_law(mechanism, model.sprung.intersection(others), "OpenSim")
     closed = loops(model.tree.ties, TIES[:3])
-    add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, zero + left_out))
+    add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, left_out))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
     return {".osim": document(model.root, sets, reserved=[GROUND])}
 
@@ -97,8 +102,12 @@ SPRINGS = ("ExpressionBasedPointToPointForce", "SpringGeneralizedForce", "Bushin
 class _Model:
     """The document during its construction; the mechanism is at its start."""
 
-    def __init__(self, mechanism: Mechanism, gravity: Vector) -> None:
+    def __init__(
+        self, mechanism: Mechanism, gravity: Vector, values: Mapping[tuple[str, str], float]
+    ) -> None:
         self.tree = hung(mechanism)
+        # values of coordinates at the start, by name
+        self.values = {name: values.get(key, 0.0) for key, name in self.tree.coordinates.items()}
         self.root = ET.Element("OpenSimDocument", Version="40000")
         model = ET.SubElement(self.root, "Model", name=_name(mechanism.name))
         ET.SubElement(model, "Ground", name=GROUND)
@@ -176,21 +185,29 @@ class _Model:
         element = ET.SubElement(joints, KINDS[joint.move], name=_name(joint.name))
         add_text(element, "socket_parent_frame", "parent")
         add_text(element, "socket_child_frame", "child")
-        suffixes = COORDINATES[joint.move]
+        suffixes, value = COORDINATES[joint.move], self.values.get(joint.name, 0.0)
         coordinates = ET.SubElement(element, "coordinates") if suffixes else element
         for suffix in suffixes:
             coordinate = ET.SubElement(coordinates, "Coordinate", name=_name(joint.name + suffix))
-            add_text(coordinate, "default_value", "0")
+            add_text(coordinate, "default_value", numbers([value]))
             add_text(coordinate, "range", "-1e9 1e9")
         frames = ET.SubElement(element, "frames")
         turn = _turns(orientation(joint.move, joint.axis))
         if joint.move in ("fixed", "free"):
             turn = attitude(self.frame(joint.child))
-        for end, body in (("parent", joint.parent), ("child", joint.child)):
+        # the frame on the parent stands where the coordinate is zero
+        zero, back = joint.point, turn
+        if joint.move == "slide":
+            along = np.array([*unit(joint.axis)])
+            zero = triple(np.array(joint.point) - value * along)
+        elif joint.move == "hinge":
+            back = turn * about(vec((0.0, 0.0, 1.0)), -value)
+        ends = (("parent", joint.parent, zero, back), ("child", joint.child, joint.point, turn))
+        for end, body, point, axes in ends:
             frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=end)
             add_text(frame, "socket_parent", _path(body))
-            add_text(frame, "translation", numbers(self.local(body, joint.point)))
-            add_text(frame, "orientation", numbers(self.angles(body, turn)))
+            add_text(frame, "translation", numbers(self.local(body, point)))
+            add_text(frame, "orientation", numbers(self.angles(body, axes)))
 
     def angles(self, body: str, turn: Quat) -> tuple[float, float, float]:
         """Return the angles of a rotation, global at design, in the axes of a link [rad]."""
@@ -239,7 +256,8 @@ class _Model:
             element = ET.SubElement(forces, SPRINGS[1], name=_name(force.name))
             add_text(element, "coordinate", _name(coordinate))
             add_text(element, "stiffness", numbers([force.stiffness]))
-            add_text(element, "rest_length", numbers([force.free_angle]))
+            rest = force.free_angle + self.values[coordinate]
+            add_text(element, "rest_length", numbers([rest]))
             add_text(element, "viscosity", numbers([force.damping]))
             return True
         return False
@@ -247,7 +265,12 @@ class _Model:
     def couple(
         self, constraints: ET.Element, name: str, one: str, other: str, follows: Sequence[float]
     ) -> None:
-        """Let one coordinate follow a polynomial of another, the constant first."""
+        """Let one coordinate follow a polynomial of another, both from the start, the constant
+        first.
+        """
+        y, x = (self.values.get(each, 0.0) for each in (one, other))
+        curve = Powers(follows)(Powers((-x, 1.0))) + y
+        follows = curve.coef.tolist()
         element = ET.SubElement(constraints, "CoordinateCouplerConstraint", name=_name(name))
         function = ET.SubElement(
             ET.SubElement(element, "coupled_coordinates_function"),

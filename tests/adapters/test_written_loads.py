@@ -24,7 +24,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Point
-from kincheck.core.mechanism.motions import JointAngle
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
 from scipy.spatial.transform import Rotation
 
 # The arm: masses [kg] and their places, global at design [m].
@@ -517,3 +517,28 @@ def test_written_joint_is_driven_as_in_case(to, kind, swapped, carried, tmp_path
         T = turn(Z, WHERE["base"], Q) @ T
     np.testing.assert_allclose(at, T[:3, :3] @ Q + T[:3, 3], rtol=0, atol=EXACT)
     np.testing.assert_allclose(axes, T[:3, :3] @ TURNED_COORDINATES, rtol=0, atol=EXACT)
+
+
+STARTS = {"revolute": {"joint": 0.7}, "translational": {"joint": -0.3}}
+
+
+@pytest.mark.parametrize("swapped", [False, True], ids=["second", "first"])
+@pytest.mark.parametrize("kind", STARTS)
+@pytest.mark.parametrize("to", ["mjcf", "osim"])
+def test_start_elsewhere_keeps_the_zeros(to, kind, swapped, tmp_path):
+    """Driven to zero, the model is in the design pose; driven on, where the case is."""
+    name, read = SIMULATORS[to]
+    pytest.importorskip(name, reason=f"{name} is not installed")
+    driver = JointAngle if kind == "revolute" else JointDisplacement
+    still = case(kind, swapped, carried=False)
+    mechanism = replace(still.mechanism, drivers=[driver("drive", "joint")])
+    driven = replace(still, mechanism=mechanism, sweep=Sweep("drive", np.array([0.0, 0.7])))
+    (start,) = STARTS[kind].values()
+    texts = written(driven, adapters.writer(to), start)
+    _, values, moved = JOINTS[kind]
+    at, axes = read(texts, {"joint": 0.0}, tmp_path)
+    np.testing.assert_allclose(at, Q, rtol=0, atol=EXACT)
+    np.testing.assert_allclose(axes, TURNED_COORDINATES, rtol=0, atol=EXACT)
+    T = np.linalg.inv(moved) if swapped else moved
+    at, _ = read(texts, values, tmp_path)
+    np.testing.assert_allclose(at, T[:3, :3] @ Q + T[:3, 3], rtol=0, atol=EXACT)

@@ -249,7 +249,7 @@ def test_best_is_best_by_error():
     worse, nearer = (replace_row(row, runs=[Run(error=each)]) for each in (4e-4, 2e-4))
     found = better(default, worse)
     assert (found.column, found.settings, found.runs) == ("best", {}, default.runs)
-    assert found.message == "the defaults are nearer here than mu 0.1, with error 0.0004 m"
+    assert found.message == "the defaults are nearer: other settings have an error of 0.0004 m"
     assert better(default, nearer) is nearer
     assert better(replace_row(default, runs=[]), worse) is worse
 

@@ -228,8 +228,8 @@ def _osim(texts, mechanism, folder):
     file.write_text(texts[".osim"], encoding="utf-8")
     model = o.Model(str(file))
     state = model.initSystem()
-    assert {each.getDefaultValue() for each in model.getCoordinateSet()} <= {0.0}
-    state.setQ(o.Vector(state.getNQ(), 0.0))
+    for each in model.getCoordinateSet():
+        each.setValue(state, each.getDefaultValue(), False)
     model.realizePosition(state)
     G, bodies = o.Matrix(), model.getBodySet()
     model.getMatterSubsystem().calcG(state, G)

@@ -140,7 +140,8 @@ def _cells(row: Row) -> list[str]:
         row.group,
         f"{row.engine} {row.integrator}",
         row.column,
-        f"{row.state}: {row.message}" if row.message else row.state,
+        # the remedy stands once, below
+        f"{row.state}: {row.message.partition(';')[0]}" if row.message else row.state,
         number(last.step) if last.step else "own" if last.accuracy else "–",
         *(number(each) for each in (last.error, last.gap, last.energy)),
         "not given" if row.measured and last.reaction is None else number(last.reaction),

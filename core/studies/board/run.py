@@ -157,8 +157,7 @@ def better(default: Row, best: Row) -> Row:
     """Return the row of the best known settings, or the default's if its error is smaller."""
     if not default.error or not best.error or default.error >= ALIKE * best.error:
         return best
-    values = ", ".join(f"{name} {value}" for name, value in best.settings.items())
-    message = f"the defaults are nearer here than {values}, with error {best.error:.3g} m"
+    message = f"the defaults are nearer: other settings have an error of {best.error:.3g} m"
     return msgspec.structs.replace(default, column="best", message=message)
 
 
