@@ -96,10 +96,14 @@ def _same(options: argparse.Namespace, registry: Registry) -> int:
             f"same: found one file, expected two or more, or --converted-by"
             f" {', '.join(CONVERTERS)}; add one"
         )
-    first, *others = (_read(name, registry, options.without) for name in names)
-    used = {name for each in (first, *others) for name in each.without}
-    require_used(Path(names[0]), options.without, used)
-    others += [_converted(name, Path(names[0]), registry) for name in options.converted_by]
+    try:
+        first, *others = (_read(name, registry, options.without) for name in names)
+        used = {name for each in (first, *others) for name in each.without}
+        require_used(Path(names[0]), options.without, used)
+        others += [_converted(name, Path(names[0]), registry) for name in options.converted_by]
+    except KincheckError as error:
+        with with_json(_unread(names, str(error)), options.json):
+            raise
     found = [compare(first, other, given) for other in others]
     with with_json(_report(found), options.json):
         console = page(options.json)
@@ -138,6 +142,18 @@ def _converted(name: str, file: Path, registry: Registry) -> Undriven:
         out = Path(folder) / f"{file.stem} by {name}.xml"
         out.write_text(text, encoding="utf-8")
         return undriven_file(out)
+
+
+def _unread(names: Sequence[str], reason: str) -> dict[str, Any]:
+    """Return the report on files one of which cannot be read."""
+    none: dict[str, Any] = {
+        "largest_m": None,
+        "allowed_by_digits_m": None,
+        "freedoms": [],
+        "lost": [],
+        "poses": 0,
+    }
+    return {"files": [*names], "verdict": "not judged", "reason": reason, **none}
 
 
 def _report(found: Sequence[Comparison]) -> dict[str, Any]:
