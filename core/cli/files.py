@@ -232,10 +232,14 @@ class Same(Command):
                 f"same: found one file, expected two or more, or --converted-by"
                 f" {', '.join(CONVERTERS)}. Add one."
             )
-        first, *others = (_read(name, registry, self.without) for name in names)
-        used = {name for each in (first, *others) for name in each.without}
-        require_used(Path(names[0]), self.without, used)
-        others += [_converted(name, Path(names[0]), registry) for name in self.converted_by]
+        try:
+            first, *others = (_read(name, registry, self.without) for name in names)
+            used = {name for each in (first, *others) for name in each.without}
+            require_used(Path(names[0]), self.without, used)
+            others += [_converted(name, Path(names[0]), registry) for name in self.converted_by]
+        except KincheckError as error:
+            with with_json(_unread(names, str(error)), self.json):
+                raise
         found = [compare(first, other, given) for other in others]
         with with_json(_report(found), self.json):
             console = page(self.json)
@@ -274,6 +278,18 @@ def _converted(name: str, file: Path, registry: Registry) -> Undriven:
         out = Path(folder) / f"{file.stem} by {name}.xml"
         out.write_text(text, encoding="utf-8")
         return undriven_file(out)
+
+
+def _unread(names: Sequence[str], reason: str) -> dict[str, Any]:
+    """Return the report on files one of which cannot be read."""
+    none: dict[str, Any] = {
+        "largest_m": None,
+        "allowed_by_digits_m": None,
+        "freedoms": [],
+        "lost": [],
+        "poses": 0,
+    }
+    return {"files": [*names], "verdict": "not judged", "reason": reason, **none}
 
 
 def _report(found: Sequence[Comparison]) -> dict[str, Any]:

@@ -201,3 +201,58 @@ def test_without_leaves_elements_out_of_both_files(tmp_path, capsys):
     assert "tied.urdf: left out by --without: line 12: <tie>" in capsys.readouterr().out
     assert main(["same", files[1], files[1], "--without", "mimik"]) == 2
     assert "did you mean 'mimic'?" in capsys.readouterr().err
+
+
+OFFSET = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="a"><joint name="first" axis="0 1 0"/><geom size="0.1"/></body>
+<body name="b" pos="1 0 0"><joint name="second" axis="0 1 0"/><geom size="0.1"/></body>
+</worldbody><equality>
+<joint joint1="second" joint2="first" polycoef="0.1 1.5 0 0 0"/></equality></mujoco>"""
+
+
+def written_as_urdf(file: Path, *drive: str) -> Path:
+    out = file.parent / "written.urdf"
+    assert main(["export", str(file), *drive, "--to", "urdf", "--out", str(out)]) == 0
+    return out
+
+
+def test_written_coupling_with_an_offset_moves_a_zero(tmp_path, capsys):
+    """Links stand in the file where they stood in the model at that coordinate."""
+    (file := tmp_path / "offset.xml").write_text(OFFSET)
+    written = written_as_urdf(file, "--drive", "first:-0.2:0.2")
+    capsys.readouterr()
+    assert main(["same", str(file), str(written)]) == 0
+    assert "zero of second: moved by -0.1 rad in written.urdf" in capsys.readouterr().out
+
+
+SLIDER = """<sdf version="1.9"><model name="ram">
+<link name="boom"><inertial><mass>2</mass></inertial></link>
+<link name="rod"><pose>1 0 0.1 0 0 0</pose><inertial><mass>1</mass></inertial></link>
+<link name="barrel"><pose>0.5 0 -0.4 0 0 0</pose><inertial><mass>1</mass></inertial></link>
+<joint name="boom_pin" type="revolute"><parent>world</parent><child>boom</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="rod_pin" type="revolute"><parent>boom</parent><child>rod</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="barrel_pin" type="revolute"><parent>world</parent><child>barrel</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="ram" type="prismatic"><parent>barrel</parent><child>rod</child>
+<axis><xyz>1 0 1</xyz></axis></joint></model></sdf>"""
+
+
+def test_loops_opened_elsewhere_are_the_same(tmp_path, capsys):
+    """A link without mass between two joints has no partner, and needs none."""
+    (tmp_path / "ram.sdf").write_text(SLIDER)
+    (file := tmp_path / "ram.toml").touch()
+    assert main(["import", str(tmp_path / "ram.sdf"), "--drive", "ram:-0.1:0.1"]) == 0
+    file.write_text(capsys.readouterr().out)
+    assert main(["same", str(file), str(written_as_urdf(file))]) == 0
+    assert "placed where they fit: ram.copy" in capsys.readouterr().out
+
+
+def test_unreadable_file_is_reported_as_json(tmp_path, capsys):
+    (file := tmp_path / "gripper.urdf").write_text(GRIPPER)
+    assert main(["same", str(file), str(tmp_path / "none.urdf"), "--json", "-"]) == 2
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "not judged"
+    assert "no such file" in found["reason"]
+    assert found["poses"] == 0

@@ -70,6 +70,13 @@ class Undriven:
     notes: Sequence[str] = ()
     without: Collection[str] = ()
 
+    def is_between(self, link: str) -> bool:
+        """Return whether a link only stands between joints: it has no mass, and others have."""
+        mechanism = self.mechanism
+        weighed = any(body.mass for body in mechanism.moving)
+        joints = mechanism.joints_on.get(link, ())
+        return weighed and not mechanism.body(link).mass and len(joints) > 1
+
     @property
     def chain(self) -> int:
         """Largest number of joints between the ground and a link."""

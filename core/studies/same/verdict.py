@@ -193,10 +193,14 @@ class _Pair:
 
     def _unjudged(self, walked: Sequence[Walked]) -> str:
         """Return why nothing can be judged; empty if something can."""
-        if all(self.match.alone) or not self.match.partner:
+        alone = [
+            [link for link in links if not file.is_between(link)]
+            for file, links in zip(self.files, self.match.alone, strict=True)
+        ]
+        if all(alone) or not self.match.partner:
             names = [
-                f"{shortened([*links], MOST_NAMED)} of {file.name}"
-                for file, links in zip(self.files, self.match.alone, strict=True)
+                f"{shortened(links or [*each], MOST_NAMED)} of {file.name}"
+                for file, links, each in zip(self.files, alone, self.match.alone, strict=True)
             ]
             return (
                 f"links without a partner: {' and '.join(names)}; name partners by --match"
