@@ -115,7 +115,7 @@ class Registry:
             raise KincheckError(
                 unknown("case", name, known)
                 + ". Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
-                " .urdf, .sdf, .usd or .adm."
+                " .urdf, .sdf, .usd, .osim or .adm"
             )
         # a dataset says itself which freedoms are left to a recording
         if not driven or (supplied.recorded and Path(name).suffix.lower() in DATASETS):

@@ -48,6 +48,17 @@ def test_excluded_joint_closes_the_loop(write):
     assert np.allclose(found.points["b"].position, 2 * pin.T, rtol=0, atol=EXACT)
 
 
+def test_equality_of_mujoco_closes_a_loop(write):
+    prims = [*FOUR_BAR]
+    prims[5] = (
+        prims[5]
+        .replace(EXCLUDED, "")
+        .replace(" (\n", ' (\nprepend apiSchemas = ["MjcEqualityConnectAPI"]', 1)
+    )
+    prims[3], prims[5] = prims[5], prims[3]  # a tree would take the first ones
+    assert [tie.name for tie in tree_of(write(*prims)).ties] == ["C.closure"]
+
+
 CENTIMETRES = (
     prim("PhysicsScene", "scene"),
     body("a", (0, 0, 0)),

@@ -1,1 +1,1 @@
-"""Models in other formats: MJCF, URDF, SDF and hardpoint tables, read into cases."""
+"""Models in other formats: MJCF, URDF, SDF, USD, OpenSim and hardpoint tables, read into cases."""

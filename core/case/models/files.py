@@ -59,7 +59,7 @@ UNREAD = {
             ".iam",
             ".catproduct",
         ),
-        "cannot be read; write the model out as MJCF, URDF or SDF from the program that made it",
+        "cannot be read; write it out as MJCF, URDF, SDF or USD from the program that made it",
     ),
     **dict.fromkeys(
         (".step", ".stp", ".stl", ".obj", ".dae", ".iges", ".igs", ".fbx", ".glb", ".gltf", ".wrl"),

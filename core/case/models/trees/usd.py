@@ -32,6 +32,8 @@ from .usd_stage import UNITS
 
 BODY, DRIVE = "PhysicsRigidBodyAPI", "PhysicsDriveAPI"
 PHYSX_MIMIC, NEWTON_MIMIC = "PhysxMimicJointAPI", "NewtonMimicAPI"
+EQUALITY = "MjcEquality"
+"""Start of schemas of MuJoCo for joints that close loops."""
 GAINS = ("stiffness", "damping")
 COUPLING = words("Tendon EqualityJoint MimicJoint Gear Rack")
 """In names of schemas that couple joints."""
@@ -232,6 +234,7 @@ class _Reader:
                 " in PhysX no axis comes first, which is another joint for large turns"
             )
         closes = element.flag("physics:excludeFromArticulation", default=False)
+        closes = closes or EQUALITY in apis
         freedoms = [
             Freedom(f"{name}{each.end}", each.kind, each.axis, self._limited(element, each))
             for each in axes
