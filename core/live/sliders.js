@@ -53,7 +53,8 @@ function sliders(box, drivers, { moved, refuse, sweep }) {
     const travel = make("div", { className: "travel", hidden: true });
     const row = make("div", { className: "slider" });
     const label = make("span", { textContent: name });
-    row.append(label, slider, number, make("span", { textContent: unitName(driver) }), travel, note);
+    const unit = make("span", { textContent: unitName(driver) });
+    row.append(label, slider, number, unit, travel, note);
     return { driver, row, travel, set, note, place };
   });
   const button = (textContent, act) => {
@@ -74,7 +75,8 @@ function sliders(box, drivers, { moved, refuse, sweep }) {
   const distance = Object.assign(document.createElement("span"), { className: "quiet" });
   const last = document.createElement("div");
   last.className = "row";
-  last.append(home, button("sweep of the file", sweep), "distance from singular poses ", meter, distance);
+  const file = button("sweep of the file", sweep);
+  last.append(home, file, "distance from singular poses ", meter, distance);
   box.replaceChildren(...rows.map(({ row }) => row), last);
 
   return {
