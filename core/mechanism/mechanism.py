@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -402,6 +402,12 @@ class Mechanism:
     def parts_of(self, name: str) -> tuple[str, ...]:
         """Return the names of the mechanism's joints in place of a given joint."""
         return tuple(each.name for each in self.joints if self.given_name(each.name) == name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone: what was computed from them must not change the pickle, which
+        keys the cache of compiled programs.
+        """
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def _parts(self) -> Mapping[str, str]:

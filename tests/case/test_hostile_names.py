@@ -14,13 +14,13 @@ import msgspec
 import pytest
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.escape import cell, file_name, visible
+from kincheck.core.case.io.table_file import csv_text
 from kincheck.core.harness.record import Outcome, Record, Results, to_json
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.page_model import Material
 from kincheck.core.report.progress import complain, progress
 from kincheck.core.report.report import render
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
-from kincheck.core.studies.board.truth import _csv
 from markdown_it import MarkdownIt
 
 from ..report.page import Page
@@ -182,7 +182,7 @@ def test_json_is_read_again_as_it_was(name: str):
 
 
 def test_spreadsheets_compute_nothing(name: str):
-    _, row = csv.reader(io.StringIO(_csv(["head"], [[name]])))
+    _, row = csv.reader(io.StringIO(csv_text(["head"], [[name]])))
     assert len(row) == 1
     assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")
     assert row[0].isprintable()

@@ -127,7 +127,7 @@ def test_exported_mjcf_keeps_zeros_of_model(model, tmp_path, capsys):
     assert float(pin.get("springref")) == pytest.approx(np.radians(10), abs=EXACT)
 
 
-@pytest.mark.parametrize("to", ["urdf", "sdf", "osim", "exudyn"])
+@pytest.mark.parametrize("to", ["urdf", "sdf", "exudyn"])
 def test_exports_with_another_zero_say_it(to, model, tmp_path):
     out = tmp_path / "again"
     assert main(["export", str(model), *DRIVE, "--to", to, "--out", str(out)]) == 0

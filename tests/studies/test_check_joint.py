@@ -137,7 +137,7 @@ def test_no_specimen():
 
     with pytest.raises(
         KincheckError,
-        match=r"field 'teeth' has no kind; declare it by .* or offer some by a classmethod",
+        match=r"field 'teeth' has no kind. Declare it by .* or offer some by a classmethod",
     ):
         check_joint(Odd)
     with pytest.raises(KincheckError, match="no specimens were offered"):

@@ -232,7 +232,7 @@ def test_wrong_closed_form_is_a_defect():
             for j in case.mechanism.joints
         ],
     )
-    with pytest.raises(DefectError, match="correct the family"):
+    with pytest.raises(DefectError, match="Correct the family"):
         closed(replace(case, mechanism=wrong), motion)
 
 

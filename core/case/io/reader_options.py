@@ -48,6 +48,12 @@ class Supplied:
         metavar="X,Y,Z",
         heading=HARDPOINTS,
     )
+    travel: str | None = option(
+        "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
+        " up: --travel=-40:120mm:33; in metres without a unit",
+        metavar="M[:SAMPLES]",
+        heading=HARDPOINTS,
+    )
     side: str | None = option(
         "side of the wheel, left or right; without it, the side follows from the points",
         metavar="SIDE",
@@ -84,12 +90,6 @@ class Supplied:
         "motion of both wheels, the right one a mirror image of the left, and a rack: heave,"
         " roll or steer, over --travel of the left wheel or of the rack",
         metavar="MOTION",
-        heading=HARDPOINTS,
-    )
-    travel: str | None = option(
-        "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
-        " up: --travel=-40:120mm:33; in metres without a unit",
-        metavar="M[:SAMPLES]",
         heading=HARDPOINTS,
     )
     rack: str | None = option(
