@@ -44,6 +44,22 @@ def test_joints_commanded_by_ros2_control_have_motors(tmp_path):
     assert [*load(file).sweep.path.motions] == ["shoulder", "elbow"]
 
 
+GRIPPER = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
+<body name="left"><joint name="left" axis="0 0 1" range="0 0.8"/></body>
+<body name="right" pos="1 0 0"><joint name="right" axis="0 0 1" range="0 0.8"/></body></worldbody>
+<tendon><fixed name="split"><joint joint="right" coef="0.5"/><joint joint="left" coef="0.5"/></fixed>
+</tendon>COUPLING<actuator><general tendon="split"/></actuator></mujoco>"""
+
+
+def test_motor_of_tendon_moves_its_joints(tmp_path):
+    coupling = '<equality><joint joint1="left" joint2="right"/></equality>'
+    (file := tmp_path / "gripper.xml").write_text(GRIPPER.replace("COUPLING", coupling))
+    assert load(file).sweep.driver == "right"
+    file.write_text(GRIPPER.replace("COUPLING", ""))
+    with pytest.raises(CaseError, match="nothing said of what drives it"):
+        load(file)
+
+
 @pytest.mark.parametrize(("motors", "upper"), [(("shoulder",), "1"), (("shoulder", "elbow"), "-1")])
 def test_too_few_motors_or_limits_ask(motors, upper, tmp_path):
     with pytest.raises(CaseError, match="nothing said of what drives it"):

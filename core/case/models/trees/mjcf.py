@@ -159,8 +159,13 @@ class _Reader:
             qpos = key.attributes.get("qpos")
             numbers = None if qpos is None else qpos.split()
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
-        driven = [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS]
-        tree.actuated.update(filter(None, driven))
+        motors = [each for each in root.below() if each.tag in _ACTUATORS]
+        for motor in motors:
+            tendon = self.tendons.get(motor.attributes.get("tendon", ""))
+            if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
+                motor = next(tendon.only("joint"), motor)
+            if name := motor.attributes.get("joint"):
+                tree.actuated.add(name)
         tree.degrees, tree.limited = self.compiler.degrees, self.compiler.limited
         if tree.masses:
             tree.gravity = self._gravity()
