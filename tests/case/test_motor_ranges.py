@@ -47,8 +47,8 @@ def test_joints_commanded_by_ros2_control_have_motors(tmp_path):
 GRIPPER = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
 <body name="left"><joint name="left" axis="0 0 1" range="0 0.8"/></body>
 <body name="right" pos="1 0 0"><joint name="right" axis="0 0 1" range="0 0.8"/></body></worldbody>
-<tendon><fixed name="split"><joint joint="right" coef="0.5"/><joint joint="left" coef="0.5"/></fixed>
-</tendon>COUPLING<actuator><general tendon="split"/></actuator></mujoco>"""
+<tendon><fixed name="split"><joint joint="right" coef="0.5"/><joint joint="left" coef="0.5"/>
+</fixed></tendon>COUPLING<actuator><general tendon="split"/></actuator></mujoco>"""
 
 
 def test_motor_of_tendon_moves_its_joints(tmp_path):
