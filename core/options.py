@@ -262,6 +262,7 @@ def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable
             width=100,
             initial_indent="    ",
             subsequent_indent="        ",
+            break_on_hyphens=False,
         )
         for each in signature.parameters
         if (option := options.get(each))

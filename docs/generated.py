@@ -3,6 +3,8 @@ engines.
 """
 
 import argparse
+import inspect
+import re
 import subprocess
 import sys
 import tempfile
@@ -10,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
+import kincheck
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.cli.main import parser as parser_of
@@ -151,6 +154,36 @@ def types() -> str:
 
 
 @cache
+def function(name: str) -> str:
+    """Return the section of a function that is made of a command: its arguments and what they mean;
+    empty for another one, which its source describes.
+    """
+    found = getattr(kincheck, name)
+    if "__signature__" not in vars(found):
+        return ""
+    signature = inspect.signature(found)
+    arguments, star = list[str](), False
+    for each in signature.parameters.values():
+        if each.kind is each.KEYWORD_ONLY and not star:
+            star = True
+            arguments.append("*")
+        plain = str(each.replace(annotation=str(each.annotation).strip("'")))
+        arguments.append(re.sub("'([^']*)'", r"\1", plain, count=1).replace("<factory>", "..."))
+    code = "".join(f"    {each},\n" for each in arguments)
+    answer = str(signature.return_annotation).strip("'")
+    about, *sections = re.split(r"\n\n(Raises|Args):\n", inspect.getdoc(found) or "")
+    parts = [
+        f"### {name} {{ #kincheck.by_name.{name} }}",
+        f"```python\n{name}(\n{code}) -> {answer}\n```",
+        about,
+    ]
+    for title, text in zip(sections[::2], sections[1::2], strict=True):
+        items = re.findall(r"^    ([\w, ]+): (.*?)(?=^    \w|\Z)", text, re.MULTILINE | re.DOTALL)
+        rows = [(f"`{each}`", meaning) for each, meaning in items]
+        parts.append(_table(("Argument" if title == "Args" else "Raises", ""), rows))
+    return "\n\n".join(parts)
+
+
 def joints() -> str:
     """Return the table of joint types and installed engines, from a run."""
     with tempfile.TemporaryDirectory() as folder:

@@ -11,6 +11,7 @@ from mkdocs.structure.files import File
 FORMULA = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL
 )
+FUNCTION = re.compile(r"^::: kincheck\.by_name\.(\w+)$", re.MULTILINE)
 JOINTS = re.compile(r"<!-- joints:begin -->.*<!-- joints:end -->", re.DOTALL)
 
 
@@ -23,7 +24,10 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, **_):
-    """Replace the table of joints and engines by that of a run of the installed engines."""
+    """Replace the table of joints and engines by that of a run of the installed engines, and
+    functions by their arguments, which follow from the options of commands.
+    """
+    markdown = FUNCTION.sub(lambda found: generated.function(found[1]) or found[0], markdown)
     return JOINTS.sub(lambda _: generated.joints(), markdown)
 
 
