@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,7 +9,6 @@ from ..errors import KincheckError
 from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
 from ..options import option, options, positive, whole
 from .parser import Command
-from .parser import add_options as add_to_parser
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -67,12 +65,7 @@ class Isolated(Command):
     scheduler: str | None = option(SCHEDULER, metavar="ADDRESS", heading=ISOLATION, default=None)
 
 
-def add_options(parser: argparse.ArgumentParser, *_: object) -> None:
-    """Add the options to a command for pairs of case and engine."""
-    add_to_parser(parser, Isolated)
-
-
-def contradictions(options: Isolated | argparse.Namespace) -> list[str]:
+def contradictions(options: Isolated) -> list[str]:
     """Return the contradictions between the options."""
     problems: list[str] = []
     if options.scheduler is not None and options.jobs is not None:
@@ -102,9 +95,7 @@ def unreachable(options: Any) -> list[str]:
         return [str(error)]
 
 
-def solver(
-    options: Isolated | argparse.Namespace, engines: Sequence[Engine]
-) -> tuple[Solver, dict[str, Any]]:
+def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
     """Return the solver of the pairs, and its settings for the results."""
     from ..harness.workers.distributed import on_cluster
     from ..harness.workers.pool import solver_for

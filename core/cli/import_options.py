@@ -1,8 +1,7 @@
-"""Options for files: a user's joint types, and facts that files of other tools lack."""
+"""Values of options that depend on files and cases."""
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,21 +9,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
-from ..options import with_values
-from . import parser
-from .registry import add_joint_types
-from .registry import tell_left_out as tell_left_out
 
 if TYPE_CHECKING:
     from ..case.case import Case
 
 T = TypeVar("T")
-
-
-def add_options(command: argparse.ArgumentParser) -> None:
-    """Add the options to a command's parser."""
-    add_joint_types(command)
-    parser.add_options(command, Supplied)
 
 
 def return_cases(cases: Sequence[T], supplied: Supplied) -> tuple[list[T | str], Supplied]:
@@ -37,12 +26,6 @@ def return_cases(cases: Sequence[T], supplied: Supplied) -> tuple[list[T | str],
         option: tuple(name for name in each if name not in files) for option, each in given.items()
     }
     return [*cases, *files], replace(supplied, **left)
-
-
-def supplied(options: argparse.Namespace) -> Supplied:
-    """Return the facts supplied by options."""
-    own = {name: getattr(options, name, None) for name in ("bushings",)}
-    return with_values(parser.values_of(Supplied, options), **own)
 
 
 def driver_value(text: str | None, case: Case) -> float | None:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from ..case.io.reader_options import CurveOptions
 from ..errors import KincheckError
 from ..options import option, options
-from .parser import Command, add_options, values_of
+from .parser import Command
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..case.io.reference_curve import CurveOptions
+    from ..case.io.reader_options import CurveOptions
     from ..harness.engine import Engine
 
 
@@ -28,16 +26,6 @@ MODE = "mode of the engines; default: projection, or simulate if an engine has o
 
 HISTORY = "KINCHECK_HISTORY"
 """Environment variable: the history file if --history is not given."""
-
-
-def add_curve_options(command: argparse.ArgumentParser) -> None:
-    """Add the options for a measured curve, see --reference."""
-    add_options(command, CurveOptions)
-
-
-def curve_options(options: argparse.Namespace) -> CurveOptions:
-    """Return the options of a measured curve."""
-    return values_of(CurveOptions, options)
 
 
 def judged(
