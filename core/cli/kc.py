@@ -21,10 +21,9 @@ from ..options import (
     options,
     with_values,
 )
-from . import execution_options
-from .execution_options import Isolated
+from . import shared_options
 from .registry import Registry, Status
-from .run_options import TOL
+from .shared_options import TOL, Isolated
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -108,9 +107,9 @@ class MeasureCompliance(Isolated):
         from ..studies.compliance import study, views
         from .destinations import Destinations
 
-        problems = execution_options.contradictions(self)
+        problems = shared_options.contradictions(self)
         engines = self._engines(registry, problems)
-        if problems := problems or execution_options.unreachable(self):
+        if problems := problems or shared_options.unreachable(self):
             raise KincheckError("\n".join(problems))
         typed, axle = self.supplied.travel, self.supplied.axle
         travel = None if typed is None else _values("--travel", typed, LENGTHS)
@@ -174,7 +173,7 @@ class MeasureCompliance(Isolated):
         from ..history.runs import keep
         from ..history.store import HistoryError
 
-        solver, settings = execution_options.solver(self, engines)
+        solver, settings = shared_options.solver(self, engines)
         keeping = None
         if self.history is not None:
             settings["selection"] = {

@@ -14,7 +14,7 @@ from ..options import argument, group, joint_types, option, options, switch, who
 from ..report.progress import complain
 from .parser import Command
 from .registry import Registry, Status
-from .run_options import TOL, judged
+from .shared_options import TOL, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
