@@ -129,7 +129,7 @@ IMPORTS = {
         "studies/compliance live"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
-    "kincheck": (". case case/io harness report studies/compliance live cli primitives __init__"),
+    "kincheck": (". case case/io harness report studies/compliance cli primitives __init__"),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

@@ -219,6 +219,7 @@ COMMANDS_IN_PYTHON = {
     "sweep": kincheck.sweep,
     "free": kincheck.free,
     "compare": kincheck.compare,
+    "serve": kincheck.live,
 }
 
 

@@ -2,66 +2,26 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import KincheckError
 from ..extras import ENVIRONMENTS
 from ..harness.resource_limits import TIMEOUT
-from .option_types import add_several, positive, whole
+from ..options import destination, option, options, positive, whole
+from .parser import Command
 from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..studies.board.truth import Truth
 
-STEPS = 1000
 
-
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    board: argparse.ArgumentParser = commands.add_parser(
-        "board",
-        help="measure how well engines step the free motion of closed loops",
-        description=_board.__doc__,
-    )
-    board.set_defaults(do=_board)
-    add_several(board, "--engine", "engines to step with; default: all")
-    add_several(board, "--case", "built-in cases or files with [free]; default: all built-in ones")
-    board.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="folder for the site: index.html, board.json, and a folder for each row",
-    )
-    board.add_argument(
-        "--against",
-        type=Path,
-        metavar="FILE",
-        help="board.json to continue; exit status 1 if a row is worse; default: that in DIR",
-    )
-    board.add_argument(
-        "--steps",
-        type=whole(1),
-        default=STEPS,
-        metavar="N",
-        help=f"least number of the longest steps, which are then halved; default {STEPS}",
-    )
-    board.add_argument(
-        "--timeout",
-        type=positive,
-        default=TIMEOUT,
-        metavar="SECONDS",
-        help=f"limit for an engine on a case with one column of settings; default {TIMEOUT:g}",
-    )
-
-
-def _board(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class CompareSteppers(Command):
     """Step the free motion of closed loops with the time steppers of all engines, and compare with
     the truth of kincheck free: error, gap, energy, cost, and order by halved steps.
 
@@ -71,60 +31,97 @@ def _board(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 the site is written; 1 a row is worse than in --against; 2 the tool could not do
     all of its work.
     """
-    from msgspec.structs import replace
 
-    from ..case.io.atomic_files import write_all
-    from ..harness.record import to_json
-    from ..report.sections import page, print_report
-    from ..studies.board import run
-    from ..studies.board.page import report
-    from ..studies.board.results import Board, earlier_rows
-    from ..studies.board.truth import truth_of
-    from .destinations import Destinations
+    about: ClassVar[str] = "measure how well engines step the free motion of closed loops"
+    engine: tuple[str, ...] = option(
+        "engines to step with; default: all", metavar="NAME", several="together", default=()
+    )
+    case: tuple[str, ...] = option(
+        "built-in cases or files with [free]; default: all built-in ones",
+        metavar="NAME",
+        several="together",
+        default=(),
+    )
+    out: Path = destination(
+        "folder for the site: index.html, board.json, and a folder for each row",
+        Path,
+        "DIR",
+        required=True,
+    )
+    against: Path | None = destination(
+        "board.json to continue; exit status 1 if a row is worse; default: that in DIR", Path
+    )
+    steps: int = option(
+        "least number of the longest steps, which are then halved; default %(default)s",
+        whole(1),
+        "N",
+        default=1000,
+    )
+    timeout: float = option(
+        f"limit for an engine on a case with one column of settings; default {TIMEOUT:g}",
+        positive,
+        "SECONDS",
+        default=TIMEOUT,
+    )
 
-    assert registry.stepper_files is not None
-    if (folder := os.environ.get(ENVIRONMENTS)) and not Path(folder).is_dir():
-        raise KincheckError(f"{ENVIRONMENTS}: there is no folder {folder}; make it, or unset it")
-    wanted, to = run.steppers(options.engine), Destinations.of(options)
-    if unwritable := to.problems(["board.json", "index.html"]):
-        raise KincheckError("\n".join(unwritable))
-    unread = dict[str, str]()
-    cases = registry.find_cases(options.case, unread, driven=False)
-    if not options.case:
-        every = map(registry.case, registry.cases())
-        cases = [case for case in every if case.free is not None]
-    problems = [*unread.values()]
-    make, file = registry.stepper_files, options.out / "board.json"
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from msgspec.structs import replace
 
-    def files(engine: str, truth: Truth) -> Mapping[str, str]:
-        return make(engine, truth.case.mechanism, truth.twists)
+        from ..case.io.atomic_files import write_all
+        from ..harness.record import to_json
+        from ..report.sections import page, print_report
+        from ..studies.board import run
+        from ..studies.board.page import report
+        from ..studies.board.results import Board, earlier_rows
+        from ..studies.board.truth import truth_of
+        from .destinations import Destinations
 
-    if options.against and not options.against.exists():
-        raise KincheckError(f"--against: there is no file {options.against}; give a board.json")
-    earlier = earlier_rows(options.against or file)
-    found, worse = Board.begun(datetime.now().astimezone()), False
-    given = {name: getattr(options, name) for name in ("out", "steps", "timeout")}
-    for case in cases:
-        try:
-            truth = truth_of(case)
-            found = replace(found, truths=[*found.truths, truth.facts])
-            for row in run.rows_of(truth, wanted, files, earlier, registry.apart, **given):
-                found = replace(found, rows=[*found.rows, row])
-                before = earlier.get(row.key)
-                grown = options.against and before and row.worse_than(before)
-                worse = worse or bool(grown)
-                print(
-                    f"{row.case}: {row.name}: {row.state}{', worse' if grown else ''}",
-                    file=sys.stderr,
-                )
-        except KincheckError as error:
-            problems.append(str(error))
-        # after each case, so that an interrupt loses only the last one
+        assert registry.stepper_files is not None
+        if (folder := os.environ.get(ENVIRONMENTS)) and not Path(folder).is_dir():
+            raise KincheckError(
+                f"{ENVIRONMENTS}: there is no folder {folder}; make it, or unset it"
+            )
+        wanted, to = run.steppers(self.engine), Destinations.of(self)
+        if unwritable := to.problems(["board.json", "index.html"]):
+            raise KincheckError("\n".join(unwritable))
+        unread = dict[str, str]()
+        cases = registry.find_cases(self.case, unread, driven=False)
+        if not self.case:
+            every = map(registry.case, registry.cases())
+            cases = [case for case in every if case.free is not None]
+        problems = [*unread.values()]
+        make, file = registry.stepper_files, self.out / "board.json"
+
+        def files(engine: str, truth: Truth) -> Mapping[str, str]:
+            return make(engine, truth.case.mechanism, truth.twists)
+
+        if self.against and not self.against.exists():
+            raise KincheckError(f"--against: there is no file {self.against}; give a board.json")
+        earlier = earlier_rows(self.against or file)
+        found, worse = Board.begun(datetime.now().astimezone()), False
+        given = {name: getattr(self, name) for name in ("out", "steps", "timeout")}
+        for case in cases:
+            try:
+                truth = truth_of(case)
+                found = replace(found, truths=[*found.truths, truth.facts])
+                for row in run.rows_of(truth, wanted, files, earlier, registry.apart, **given):
+                    found = replace(found, rows=[*found.rows, row])
+                    before = earlier.get(row.key)
+                    grown = self.against and before and row.worse_than(before)
+                    worse = worse or bool(grown)
+                    print(
+                        f"{row.case}: {row.name}: {row.state}{', worse' if grown else ''}",
+                        file=sys.stderr,
+                    )
+            except KincheckError as error:
+                problems.append(str(error))
+            # after each case, so that an interrupt loses only the last one
+            if found.rows:
+                text = page(report(found)).encode()
+                problems += write_all([(file, to_json(found)), (self.out / "index.html", text)])
         if found.rows:
-            text = page(report(found)).encode()
-            problems += write_all([(file, to_json(found)), (options.out / "index.html", text)])
-    if found.rows:
-        print_report(report(found), sys.stdout)
-    if problems:
-        raise KincheckError("\n".join(dict.fromkeys(problems)))
-    return Status.DEVIATES if worse else Status.WITHIN
+            print_report(report(found), sys.stdout)
+        if problems:
+            raise KincheckError("\n".join(dict.fromkeys(problems)))
+        return Status.DEVIATES if worse else Status.WITHIN

@@ -21,7 +21,7 @@ from ..options import (
 from ..report.progress import complain
 from .parser import Command
 from .registry import Registry, Status, tell_left_out
-from .run_options import TOL
+from .shared_options import TOL
 
 if TYPE_CHECKING:
     from ..case.case import Case

@@ -11,7 +11,7 @@ from ..options import (
 )
 from .parser import Command
 from .registry import Registry, Status
-from .run_options import TOL
+from .shared_options import TOL
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -24,11 +24,10 @@ from ..options import (
     verbosity,
     whole,
 )
-from . import import_options
 from .files import formats, keep_texts
 from .parser import Command
 from .registry import Registry, Status, given
-from .run_options import TOL
+from .shared_options import TOL, driver_value
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -251,7 +250,7 @@ class ListAssemblies(Command):
         case = registry.case_of(self)
         found = survey(
             case,
-            import_options.driver_value(self.at, case),
+            driver_value(self.at, case),
             samples=self.samples,
             seed=self.seed,
         )

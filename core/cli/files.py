@@ -23,9 +23,9 @@ from ..options import (
     options,
     switch,
 )
-from . import import_options
 from .parser import Command
 from .registry import Registry, Status, tell_left_out
+from .shared_options import driver_value, return_cases
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -79,7 +79,7 @@ class Export(Command):
             raise KincheckError(unknown("format", self.to, registry.writers))
         case = registry.case_of(self, driven=False)
         keep_texts(
-            written(case, registry.writer(self.to), import_options.driver_value(self.at, case)),
+            written(case, registry.writer(self.to), driver_value(self.at, case)),
             case.name,
             self.out,
         )
@@ -144,7 +144,7 @@ class Import(Command):
         from ..case.io.schema import SCHEMA_FILE
 
         require_writable([("--out", self.out)])
-        files, supplied = import_options.return_cases(self.case, self.supplied)
+        files, supplied = return_cases(self.case, self.supplied)
         if len(files) != 1:
             raise KincheckError(
                 f"import: found {len(files)} files, expected one. Name it before --hold."

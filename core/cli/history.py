@@ -13,7 +13,7 @@ from ..options import argument, destination, json_file, option, options, switch,
 from ..report.progress import complain
 from .parser import Command
 from .registry import Registry, Status
-from .run_options import HISTORY
+from .shared_options import HISTORY
 
 if TYPE_CHECKING:
     from ..case.io.atomic_files import Content

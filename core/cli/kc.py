@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..case.io.reader_options import HARDPOINTS, Supplied
 from ..errors import KincheckError
-from . import execution_options, import_options
-from .option_types import add_several, positive
-from .parser import Parser
+from ..options import (
+    argument,
+    destination,
+    group,
+    joint_types,
+    option,
+    options,
+    with_values,
+)
+from . import shared_options
 from .registry import Registry, Status
-from .run_options import TOL
+from .shared_options import TOL, Isolated
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -25,77 +32,23 @@ if TYPE_CHECKING:
     from ..harness.record import Record, Results
 
 MOST, UNLESS_GIVEN = 100_000, "25"
-TRAVEL = (
-    "A:B[:N]",
-    "travel of the wheel from design, or of the steering with --axle steer: N samples, default 25,"
-    " from A to B: --travel=-60mm:60mm:25, which is the default; one number is one sample; in"
-    " metres without a unit",
-)
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    command: Parser
-    command = commands.add_parser(
-        "kc",
-        help="kinematics and compliance: equilibria on bushings over travel and loads",
-        description=_kc.__doc__,
+@dataclass(frozen=True)
+class FromDesign(Supplied):
+    """Options of the readers; the travel counts from design, of any file."""
+
+    travel: str | None = option(
+        "travel of the wheel from design, or of the steering with --axle steer: N samples, default"
+        " 25, from A to B: --travel=-60mm:60mm:25, which is the default; one number is one sample;"
+        " in metres without a unit",
+        metavar="A:B[:N]",
+        heading=HARDPOINTS,
     )
-    command.set_defaults(do=_kc)
-    command.add_argument(
-        "case",
-        metavar="CASE",
-        help="name of a built-in case, or path to a case file or a hardpoint table",
-    )
-    command.add_argument(
-        "--load",
-        action="append",
-        default=[],
-        metavar="NAME=A:B:N",
-        help=(
-            "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
-            " braking or aligning; 25 samples unless given; one number is a load that acts over all"
-            " travel; may be repeated"
-        ),
-    )
-    command.add_argument(
-        "--bushings",
-        type=Path,
-        metavar="FILE",
-        help=(
-            "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
-            " [bushings.ROLE], as kincheck templates NAME --bushings prints; else tables"
-            " [joints.NAME.bushings.X] as in case files"
-        ),
-    )
-    add_several(
-        command,
-        "--engine",
-        "check the equilibria by these engines: each finds them by its own kinematics, gravity"
-        " and rows, exudyn-static by its own solver, and gets a verdict against native",
-    )
-    command.add_argument(
-        "--history",
-        type=Path,
-        metavar="FILE",
-        help="store the records of native and of these engines in this file, as kincheck run does",
-    )
-    command.add_argument(
-        "--csv", type=Path, metavar="FILE", help="write the curves, in mm, deg, N, kN"
-    )
-    command.add_argument(
-        "--json", metavar="FILE", help="write the results in SI; - for standard output"
-    )
-    command.add_argument(
-        "--out", type=Path, metavar="DIR", help="write the page DIR/kc.html, and results.json"
-    )
-    execution_options.add_options(command, positive)
-    import_options.add_options(command)
-    (travel,) = (each for each in command.arguments() if each.dest == "travel")
-    travel.metavar, travel.help = TRAVEL
 
 
-def _kc(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class MeasureCompliance(Isolated):
     """Find the equilibria of a suspension with springs, bushings and loads, and their compliance.
 
     Joints with bushings give way to them. --axle heave, roll or steer moves both wheels of an axle.
@@ -104,118 +57,155 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
     ends in an error; 2 a sample has no equilibrium, and its message gives the last load that has
     one, or the tool could not do its work.
     """
-    from ..case.io.atomic_files import write
-    from ..case.models.files import is_table
-    from ..case.units import LENGTHS
-    from ..harness.record import to_json
-    from ..harness.standard import STANDARD
-    from ..report.progress import complain, lacking
-    from ..report.table import print_table
-    from ..report.terminal import with_json
-    from ..studies.compliance import study, views
-    from .destinations import Destinations
 
-    problems = execution_options.contradictions(options)
-    engines = _engines(options, registry, problems)
-    if problems := problems or execution_options.unreachable(options):
-        raise KincheckError("\n".join(problems))
-    travel = None if options.travel is None else _values("--travel", options.travel, LENGTHS)
-    table = os.path.isfile(options.case) and is_table(Path(options.case))
-    axle = options.axle
-    if not table:
-        options.axle = options.travel = None
-    elif travel is not None and travel[0] == travel[-1]:
-        options.travel = None  # the sweep of the table's case, of which this sample is none
-    elif travel is not None:
-        options.travel = f"{travel[0]}:{travel[-1]}:{len(travel)}"
-    own, options.bushings = options.bushings, options.bushings if table else None
-    case = registry.find_case(options.case, import_options.supplied(options), driven=False)
-    import_options.tell_left_out([case])
-    if own is not None and not table:
-        from ..case.io.mechanism_sections import with_bushings
-
-        case = with_bushings(case, own)
-    to = Destinations.of(options)
-    if unwritable := to.problems(["kc.html", *(["results.json"] if engines else [])]):
-        raise KincheckError("\n".join(unwritable))
-    loads = dict(map(_load, options.load))
-    results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
-    if to.csv is not None:
-        write("--csv", to.csv, views.table(results).encode())
-    if engines:
-        results = replace(results, checked=_checked(options, engines, results.cases, problems))
-    checked = results.checked
-    if to.out is not None:
-        if checked is not None:
-            write("--out", to.out / "results.json", to_json(checked))
-        write("--out", to.out / "kc.html", views.page(results).encode())
-    out = sys.stderr if options.json == "-" else sys.stdout
-    with with_json(views.as_data(results), options.json):
-        print(*views.lines(results), sep="\n", file=out)
-        if checked is not None:
-            print_table(checked, out, reactions=True)
-        complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
-    named = [each.name for each in engines if each.name != STANDARD]
-    problems += results.failures + (lacking(checked, (), named) if checked else [])
-    if problems:
-        raise KincheckError("\n".join(problems))
-    bad = checked is not None and any(each.outcome.bad for each in checked.records)
-    return Status.DEVIATES if bad else Status.WITHIN
-
-
-def _engines(options: argparse.Namespace, registry: Registry, problems: list[str]) -> list[Engine]:
-    """Return native and the named engines; none if nothing is to be checked or stored."""
-    found = registry.find_engines(options.engine, problems)
-    if not (options.engine or options.history):
-        return []
-    native = registry.baseline(found)
-    return [native, *found] if native is not None else found
-
-
-def _checked(
-    options: argparse.Namespace,
-    engines: Sequence[Engine],
-    cases: Sequence[Case],
-    problems: list[str],
-) -> Results:
-    """Return the records of the engines, stored in the history if there is one."""
-    from ..harness import run as running
-    from ..history.runs import keep
-    from ..history.store import HistoryError
-
-    solver, settings = execution_options.solver(options, engines)
-    keeping = None
-    if options.history is not None:
-        settings["selection"] = {
-            "cases": [each.name for each in cases],
-            "engines": [each.name for each in engines],
-            "options": {},
-        }
-        try:
-            keeping = keep(
-                options.history,
-                cases,
-                engines,
-                tol=TOL,
-                command=options.command,
-                settings=settings,
-                resume=False,
-            )
-        except HistoryError as error:
-            problems.append(f"{error}; the run is not in the history")
-
-    def add(record: Record, done: int, total: int) -> None:
-        if keeping is not None:
-            keeping.add(record)
-
-    facts = keeping.facts if keeping is not None else settings
-    results = running.run(
-        cases, engines, tol=TOL, progress=add, command=options.command, solver=solver, facts=facts
+    about: ClassVar[str] = "kinematics and compliance: equilibria on bushings over travel and loads"
+    case: str = argument(
+        "name of a built-in case, or path to a case file or a hardpoint table", "CASE"
     )
-    if keeping is not None:
-        keeping.end(results, interrupted=False)
-        problems += keeping.problems + keeping.store.damage
-    return results
+    load: tuple[str, ...] = option(
+        "curve over a load at design, as lateral=-3000:3000:31 [N, N m]: longitudinal, lateral,"
+        " braking or aligning; 25 samples unless given; one number is a load that acts over all"
+        " travel; may be repeated",
+        metavar="NAME=A:B:N",
+        several="repeated",
+        default=(),
+    )
+    bushings: Path | None = option(
+        "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
+        " [bushings.ROLE], as kincheck templates NAME --bushings prints; else tables"
+        " [joints.NAME.bushings.X] as in case files",
+        Path,
+        "FILE",
+        default=None,
+    )
+    engine: tuple[str, ...] = option(
+        "check the equilibria by these engines: each finds them by its own kinematics, gravity"
+        " and rows, exudyn-static by its own solver, and gets a verdict against native",
+        metavar="NAME",
+        several="together",
+        default=(),
+    )
+    history: Path | None = destination(
+        "store the records of native and of these engines in this file, as kincheck run does", Path
+    )
+    csv: Path | None = destination("write the curves, in mm, deg, N, kN", Path)
+    json: str | None = destination("write the results in SI; - for standard output")
+    out: Path | None = destination("write the page DIR/kc.html, and results.json", Path, "DIR")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: FromDesign = group(default_factory=FromDesign)
+
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        from ..case.io.atomic_files import write
+        from ..case.models.files import is_table
+        from ..case.units import LENGTHS
+        from ..harness.record import to_json
+        from ..harness.standard import STANDARD
+        from ..report.progress import complain, lacking
+        from ..report.table import print_table
+        from ..report.terminal import with_json
+        from ..studies.compliance import study, views
+        from .destinations import Destinations
+
+        problems = shared_options.contradictions(self)
+        engines = self._engines(registry, problems)
+        if problems := problems or shared_options.unreachable(self):
+            raise KincheckError("\n".join(problems))
+        typed, axle = self.supplied.travel, self.supplied.axle
+        travel = None if typed is None else _values("--travel", typed, LENGTHS)
+        table = os.path.isfile(self.case) and is_table(Path(self.case))
+        # the sweep of a table's case; one sample is none
+        swept = table and travel is not None and travel[0] != travel[-1]
+        supplied = replace(
+            self.supplied,
+            travel=f"{travel[0]}:{travel[-1]}:{len(travel)}" if travel and swept else None,
+            axle=axle if table else None,
+            bushings=self.bushings if table else None,
+        )
+        case = registry.case_of(with_values(self, supplied=supplied), driven=False)
+        if self.bushings is not None and not table:
+            from ..case.io.mechanism_sections import with_bushings
+
+            case = with_bushings(case, self.bushings)
+        to = Destinations.of(self)
+        if unwritable := to.problems(["kc.html", *(["results.json"] if engines else [])]):
+            raise KincheckError("\n".join(unwritable))
+        loads = dict(map(_load, self.load))
+        results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
+        if to.csv is not None:
+            write("--csv", to.csv, views.table(results).encode())
+        if engines:
+            results = replace(results, checked=self._checked(engines, results.cases, problems))
+        checked = results.checked
+        if to.out is not None:
+            if checked is not None:
+                write("--out", to.out / "results.json", to_json(checked))
+            write("--out", to.out / "kc.html", views.page(results).encode())
+        out = sys.stderr if self.json == "-" else sys.stdout
+        with with_json(views.as_data(results), self.json):
+            print(*views.lines(results), sep="\n", file=out)
+            if checked is not None:
+                print_table(checked, out, reactions=True)
+            complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
+        named = [each.name for each in engines if each.name != STANDARD]
+        problems += results.failures + (lacking(checked, (), named) if checked else [])
+        if problems:
+            raise KincheckError("\n".join(problems))
+        bad = checked is not None and any(each.outcome.bad for each in checked.records)
+        return Status.DEVIATES if bad else Status.WITHIN
+
+    def _engines(self, registry: Registry, problems: list[str]) -> list[Engine]:
+        """Return native and the named engines; none if nothing is to be checked or stored."""
+        found = registry.find_engines(self.engine, problems)
+        if not (self.engine or self.history):
+            return []
+        native = registry.baseline(found)
+        return [native, *found] if native is not None else found
+
+    def _checked(
+        self,
+        engines: Sequence[Engine],
+        cases: Sequence[Case],
+        problems: list[str],
+    ) -> Results:
+        """Return the records of the engines, stored in the history if there is one."""
+        from ..harness import run as running
+        from ..history.runs import keep
+        from ..history.store import HistoryError
+
+        solver, settings = shared_options.solver(self, engines)
+        keeping = None
+        if self.history is not None:
+            settings["selection"] = {
+                "cases": [each.name for each in cases],
+                "engines": [each.name for each in engines],
+                "options": {},
+            }
+            try:
+                keeping = keep(
+                    self.history,
+                    cases,
+                    engines,
+                    tol=TOL,
+                    command=self.command,
+                    settings=settings,
+                    resume=False,
+                )
+            except HistoryError as error:
+                problems.append(f"{error}; the run is not in the history")
+
+        def add(record: Record, done: int, total: int) -> None:
+            if keeping is not None:
+                keeping.add(record)
+
+        facts = keeping.facts if keeping is not None else settings
+        results = running.run(
+            cases, engines, tol=TOL, progress=add, command=self.command, solver=solver, facts=facts
+        )
+        if keeping is not None:
+            keeping.end(results, interrupted=False)
+            problems += keeping.problems + keeping.store.damage
+        return results
 
 
 def _load(text: str) -> tuple[str, Any]:

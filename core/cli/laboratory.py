@@ -29,7 +29,7 @@ from ..options import (
 from ..report.progress import complain
 from .parser import Command
 from .registry import Registry, Status, given
-from .run_options import MODE, MODES, TOL
+from .shared_options import MODE, MODES, TOL
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine

@@ -166,9 +166,6 @@ def parser(argv: Sequence[str]) -> Parser:
     named = [name for name in COMMANDS if argv and argv[0] == name]
     for name in named or COMMANDS:
         module, _, cls = COMMANDS[name].partition(":")
-        command = getattr(importlib.import_module(f".{module}", __package__), cls or "add")
-        if cls:
-            add_command(commands, name, command)
-        else:
-            command(commands)
+        command = getattr(importlib.import_module(f".{module}", __package__), cls)
+        add_command(commands, name, command)
     return found

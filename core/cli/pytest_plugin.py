@@ -96,7 +96,7 @@ class CaseFile(pytest.File):
         """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..case.io.reader_options import CurveOptions
         from ..errors import KincheckError
-        from .run_options import recorded_engines
+        from .shared_options import recorded_engines
 
         registry = _registry()
         try:
@@ -165,7 +165,7 @@ def _solved(case: Case, engine: Engine) -> Record:
     from ..harness.run import run
     from ..harness.standard import STANDARD
     from ..harness.workers.pool import in_workers
-    from .run_options import TOL
+    from .shared_options import TOL
 
     native = engine.name == STANDARD
     solver = here if may_run_here(engine) else in_workers(1, Limits())

@@ -33,11 +33,10 @@ from ..options import (
     with_values,
 )
 from ..report.progress import complain, lacking, progress, uncompared
-from . import execution_options, import_options, run_options
+from . import shared_options
 from .class_loading import WHERE
-from .execution_options import Isolated
 from .registry import Registry, Status, tell_left_out
-from .run_options import HISTORY, MODE, MODES, TOL, WithRecordings, judged
+from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, WithRecordings, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -177,7 +176,7 @@ class Run(Isolated, WithRecordings):
         from .destinations import Destinations
 
         plan = _planned(self, registry, Destinations())
-        solver, _ = execution_options.solver(self, plan.engines)
+        solver, _ = shared_options.solver(self, plan.engines)
         how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver}
         return with_scenes(running.run(plan.cases, plan.engines, tol=self.tol, **how), plan.cases)
 
@@ -244,7 +243,7 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
     Raises:
         KincheckError: all problems, if no case is readable or an option is wrong.
     """
-    problems: list[str] = execution_options.contradictions(options)
+    problems: list[str] = shared_options.contradictions(options)
     if options.resume and options.history is None:
         problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
     if options.bench is not None and options.out is None:
@@ -262,7 +261,7 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
         )
     elif options.recorded:
         try:
-            cases[0], recorded = run_options.recorded_engines(
+            cases[0], recorded = shared_options.recorded_engines(
                 options.recorded,
                 cases[0],
                 options.curve,
@@ -287,12 +286,12 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
             problems += str(error).splitlines()
     engines = _engines(options, registry, problems)
     baseline = registry.baseline(engines)
-    if recorded and run_options.undriven(cases[0]):
+    if recorded and shared_options.undriven(cases[0]):
         engines, baseline = [], None
     if options.fmu and options.jobs == 0:
         problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
     try:
-        foreign = run_options.foreign_engines(options, cases, options.curve.columns)
+        foreign = shared_options.foreign_engines(options, cases, options.curve.columns)
         engines += [*foreign, *recorded]
     except KincheckError as error:
         problems += str(error).splitlines()
@@ -303,7 +302,7 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
         if keys.count((name, mode)) > 1
     ][:1]
     problems += to.problems(history=options.history)
-    problems = problems or execution_options.unreachable(options)
+    problems = problems or shared_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does
     # not look like the previous run.
     if problems or not (cases or to.wanted or options.history is not None):
@@ -331,7 +330,7 @@ def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | No
     from ..harness import run as running
     from ..harness.workers.distributed import ClusterError
 
-    solver, settings = execution_options.solver(options, plan.engines)
+    solver, settings = shared_options.solver(options, plan.engines)
     if plan.unread:
         settings["unread"] = plan.unread
     settings["selection"] = selection(options)
@@ -406,7 +405,7 @@ def _with_cases(options: Run, registry: Registry) -> Run:
         and not WHERE.fullmatch(name)
         and (name in registry.cases() or Path(name).suffix)
     ]
-    cases, supplied = import_options.return_cases(
+    cases, supplied = shared_options.return_cases(
         (*several(options.cases), *swallowed), options.supplied
     )
     return with_values(

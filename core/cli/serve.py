@@ -2,80 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
 import webbrowser
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..case.io.reader_options import CurveOptions, Supplied
 from ..errors import KincheckError
+from ..options import argument, group, joint_types, option, options, switch, whole
 from ..report.progress import complain
-from . import import_options
-from .option_types import whole
+from .parser import Command
 from .registry import Registry, Status
-from .run_options import TOL, add_curve_options, curve_options, judged
+from .shared_options import TOL, judged
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..case.io.reader_options import Supplied
     from ..harness.record import Record, Results
-    from ..live.server import Judge, Live
+    from ..live.server import Judge, Live, LiveServer
 
 
-def add(commands: Any) -> None:
-    """Add the command to the parser."""
-    serving: argparse.ArgumentParser
-    serving = commands.add_parser(
-        "serve",
-        help="edit a suspension or move a mechanism in a browser",
-        description=_serve.__doc__,
-    )
-    serving.set_defaults(do=_serve)
-    serving.add_argument(
-        "file", metavar="FILE", help="table of hardpoints, case file, model, or built-in case"
-    )
-    serving.add_argument(
-        "--port",
-        type=whole(0),
-        default=0,
-        metavar="N",
-        help="port of this machine; default: a free one",
-    )
-    serving.add_argument(
-        "--no-browser", action="store_true", help="print the address, and open no browser"
-    )
-    serving.add_argument(
-        "--once", action="store_true", help="end when the page is closed, with status 0"
-    )
-    serving.add_argument(
-        "--measure",
-        type=whole(1),
-        metavar="N",
-        help=(
-            "make N edits of a table, print how long each step takes, in the browser too unless"
-            " --no-browser, and end"
-        ),
-    )
-    serving.add_argument(
-        "--reference",
-        type=Path,
-        metavar="FILE",
-        help=(
-            "measured curve (.csv, .xlsx, ...) or proved reference (.json) to lay over the curves,"
-            " with its tolerance"
-        ),
-    )
-    serving.add_argument(
-        "--vary",
-        type=Path,
-        metavar="FILE",
-        help="tolerances of a table, as of kincheck sweep: histograms, and limits in the curves",
-    )
-    import_options.add_options(serving)
-    add_curve_options(serving)
-
-
-def _serve(options: argparse.Namespace, registry: Registry) -> int:
+@options
+class Serve(Command):
     """Serve a page on this machine alone. On a table of hardpoints it shows curves, scene and key
     numbers of the design while points are dragged or typed; on any other mechanism, its pose while
     drivers are moved by sliders.
@@ -84,69 +32,111 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
     only. Ctrl-C ends it, with status 130; status 2 means that the file cannot be read or the port
     cannot be used.
     """
-    from ..live.server import LiveServer
 
-    file, supplied = Path(options.file), import_options.supplied(options)
-    curve = curve_options(options)
-    if not options.reference and curve != type(curve)():
-        raise KincheckError("options for measured curves need a curve: give --reference FILE")
-
-    def referenced(case: Case) -> Case:
-        if not options.reference:
-            return case
-        (case,), notes = judged([case], [options.reference], curve, None)
-        if told != notes:
-            told[:] = notes
-            complain(notes)
-        return case
-
-    def read() -> Live:
-        return opened(registry, options.file, supplied, referenced, options.vary)
-
-    told = list[str]()
-    wanted: int = options.measure or 0
-    if wanted:
-        _measured(read(), wanted)
-        if options.no_browser:
-            return Status.WITHIN
-    server = LiveServer(
-        file, read, registry.engines, judge_by(registry), port=options.port, once=options.once
+    about: ClassVar[str] = "edit a suspension or move a mechanism in a browser"
+    case: str | Path | Case = argument(
+        "table of hardpoints, case file, model, or built-in case", "FILE"
     )
-    try:
-        address = server.address + f"&measure={wanted}" * bool(wanted)
-        print(address, flush=True)
-        if not options.no_browser and not webbrowser.open(address) and wanted:
-            raise KincheckError("--measure: no browser is found; give --no-browser, or set BROWSER")
-        server.ended.wait()
-    finally:
-        server.close()
-    if wanted:
-        _print_times("browser", server.measured)
-    return Status.WITHIN
+    port: int = option(
+        "port of this machine; default: a free one", whole(0), "N", default=0, init=False
+    )
+    no_browser: bool = switch("print the address, and open no browser", init=False)
+    once: bool = switch("end when the page is closed, with status 0", init=False)
+    measure: int | None = option(
+        "make N edits of a table, print how long each step takes, in the browser too unless"
+        " --no-browser, and end",
+        whole(1),
+        "N",
+        init=False,
+    )
+    reference: str | Path | None = option(
+        "measured curve (.csv, .xlsx, ...) or proved reference (.json) to lay over the curves,"
+        " with its tolerance",
+        Path,
+        "FILE",
+        default=None,
+    )
+    variation: str | Path | None = option(
+        "tolerances of a table, as of kincheck sweep: histograms, and limits in the curves",
+        Path,
+        "FILE",
+        flag="--vary",
+        default=None,
+    )
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
+    curve: CurveOptions = group(default_factory=CurveOptions, init=False)
 
+    def answer(self, registry: Registry) -> LiveServer:
+        """Serve the page of `kincheck serve`; a notebook on this machine shows it in a frame.
 
-def opened(
-    registry: Registry,
-    name: str,
-    supplied: Supplied,
-    referenced: Callable[[Case], Case],
-    vary: Path | None,
-) -> Live:
-    """Return a table of hardpoints with its file of tolerances, or any other mechanism, opened.
+        The server's `case` has the numbers of the page, and its `close` ends it.
 
-    Raises:
-        KincheckError: it cannot be read, or there are tolerances of no table.
-    """
-    from ..case.models.files import is_table
-    from ..live.model import LiveModel
-    from ..live.table import LiveTable
+        Raises:
+            KincheckError: the file cannot be read, or a library is missing.
+        """
+        return self._server(registry, self._reader(registry), framed=True)
 
-    file = Path(name)
-    if name not in registry.cases() and file.is_file() and is_table(file, supplied):
-        return LiveTable(file, supplied, referenced, vary)
-    if vary:
-        raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
-    return LiveModel(file, referenced(registry.find_case(name, supplied)))
+    def run(self, registry: Registry) -> int:
+        """Do the work of the command line."""
+        if not self.reference and self.curve != CurveOptions():
+            raise KincheckError("options for measured curves need a curve: give --reference FILE")
+        wanted, read = self.measure or 0, self._reader(registry)
+        if wanted:
+            _measured(read(), wanted)
+            if self.no_browser:
+                return Status.WITHIN
+        server = self._server(registry, read, port=self.port, once=self.once)
+        try:
+            address = server.address + f"&measure={wanted}" * bool(wanted)
+            print(address, flush=True)
+            if not self.no_browser and not webbrowser.open(address) and wanted:
+                raise KincheckError(
+                    "--measure: no browser is found; give --no-browser, or set BROWSER"
+                )
+            server.ended.wait()
+        finally:
+            server.close()
+        if wanted:
+            _print_times("browser", server.measured)
+        return Status.WITHIN
+
+    def _server(self, registry: Registry, read: Callable[[], Live], **how: Any) -> LiveServer:
+        from ..live.server import LiveServer
+
+        return LiveServer(self._file, read, registry.engines, judge_by(registry), **how)
+
+    @property
+    def _file(self) -> Path:
+        return Path(self.case if isinstance(self.case, str | Path) else self.case.name)
+
+    def _reader(self, registry: Registry) -> Callable[[], Live]:
+        """Return the function that opens a table of hardpoints, or any other mechanism."""
+        from ..case.models.files import is_table
+        from ..live.model import LiveModel
+        from ..live.table import LiveTable
+
+        told = list[str]()
+
+        def referenced(case: Case) -> Case:
+            if self.reference is None:
+                return case
+            (case,), notes = judged([case], [Path(self.reference)], self.curve, None)
+            if self.command and told != notes:
+                told[:] = notes
+                complain(notes)
+            return replace(case, assembly=(*case.assembly, *notes))
+
+        def read() -> Live:
+            case, file, vary = self.case, self._file, self.variation
+            typed = isinstance(case, str | Path) and str(case) not in registry.cases()
+            if typed and file.is_file() and is_table(file, self.supplied):
+                return LiveTable(file, self.supplied, referenced, Path(vary) if vary else None)
+            if vary:
+                raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
+            return LiveModel(file, referenced(registry.find_case(case, self.supplied)))
+
+        return read
 
 
 def _print_times(name: str, times: Sequence[float]) -> None:

@@ -30,11 +30,10 @@ from ..options import (
 from ..report.progress import complain, lacking, uncompared
 from ..studies.variation.study_choices import Incomplete, Sampling
 from ..version import VERSION
-from . import execution_options
-from .execution_options import SCHEDULER
+from . import shared_options
 from .parser import Command
 from .registry import Registry, Status
-from .run_options import TOL
+from .shared_options import SCHEDULER, TOL
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -166,7 +165,7 @@ class Sweep(Command):
 
         whole = registry.case_of(self)
         case = only(whole, self.output, problems)
-        problems = problems or execution_options.unreachable(self)
+        problems = problems or shared_options.unreachable(self)
         if problems:
             raise KincheckError("\n".join(problems))
         variation = limited(self, read_variation(Path(self.variation), whole), whole, case)

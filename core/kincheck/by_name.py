@@ -3,19 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case
-from kincheck.core.case.io.reader_options import NOTHING, CurveOptions, Supplied
+from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.cli.checks import CheckEngine
 from kincheck.core.cli.compare import Compare
 from kincheck.core.cli.examine import Explain, MoveFreely
 from kincheck.core.cli.main import registry
 from kincheck.core.cli.registry import Registry
 from kincheck.core.cli.run import Run
-from kincheck.core.cli.run_options import judged
-from kincheck.core.cli.serve import judge_by, opened
+from kincheck.core.cli.serve import Serve
 from kincheck.core.cli.sweep import Sweep
 from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
@@ -23,9 +22,6 @@ from kincheck.core.options import function_of, several
 from kincheck.core.report.report import write_report
 from kincheck.core.studies.compliance import study
 from kincheck.core.studies.compliance.study import ComplianceResults
-
-if TYPE_CHECKING:
-    from kincheck.core.live.server import Live, LiveServer
 
 _Options = ParamSpec("_Options")
 _Answer = TypeVar("_Answer")
@@ -51,6 +47,7 @@ sweep = _function("sweep", Sweep)
 free = _function("free", MoveFreely)
 compare = _function("compare", Compare)
 check_engine = _function("check_engine", CheckEngine)
+live = _function("live", Serve)
 
 
 def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
@@ -98,47 +95,6 @@ def compliance(
     if not (team := several(engines)):
         return found
     return replace(found, checked=run(found.cases, ("native", *team), jobs=jobs))
-
-
-def live(
-    case: str | Path | Case,
-    supplied: Supplied = NOTHING,
-    *,
-    reference: str | Path | None = None,
-    variation: str | Path | None = None,
-) -> "LiveServer":
-    """Serve the page of `kincheck serve`; a notebook on this machine shows it in a frame.
-
-    The server's `case` has the numbers of the page, and its `close` ends it.
-
-    Args:
-        case: path of a table of hardpoints or of another file, name of a case, or a case.
-        supplied: facts missing in a file of another tool.
-        reference: measured curve, or proved reference, to lay over the curves.
-        variation: file of tolerances of a table.
-
-    Raises:
-        KincheckError: the file cannot be read, or a library is missing.
-    """
-    from kincheck.core.live.model import LiveModel
-    from kincheck.core.live.server import LiveServer
-
-    known = registry()
-
-    def referenced(case: Case) -> Case:
-        if reference is None:
-            return case
-        (found,), notes = judged([case], [Path(reference)], CurveOptions(), None)
-        return replace(found, assembly=(*found.assembly, *notes))
-
-    def read() -> "Live":
-        if isinstance(case, Case):
-            return LiveModel(Path(case.name), referenced(case))
-        return opened(known, str(case), supplied, referenced, vary)
-
-    vary = None if variation is None else Path(variation)
-    file = Path(case.name if isinstance(case, Case) else case)
-    return LiveServer(file, read, known.engines, judge_by(known), framed=True)
 
 
 def report(results: Results, file: str | Path) -> None:

@@ -34,7 +34,9 @@ def test_a_command_loads_no_other():
         " name.startswith('kincheck.core.cli.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == ("checks class_loading main parser registry run_options")
+    assert done.stdout.splitlines()[-1] == (
+        "checks class_loading main parser registry shared_options"
+    )
 
 
 def test_the_start_loads_nothing_that_is_not_needed():

@@ -16,7 +16,7 @@ import numpy as np
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import CurveOptions
-from kincheck.core.cli.run_options import recorded_engines
+from kincheck.core.cli.shared_options import recorded_engines
 from kincheck.core.recorded.engine import RecordedEngine
 from kincheck.core.recorded.fmu import read_fmu
 

@@ -136,7 +136,7 @@ def test_interrupted_run_lists_missing_pairs(tmp_path, monkeypatch):
         yield from islice(here(pairs), 1)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kincheck.core.cli.execution_options.solver", lambda *_: (stopped, {}))
+    monkeypatch.setattr("kincheck.core.cli.shared_options.solver", lambda *_: (stopped, {}))
     file = tmp_path / "results.json"
     assert main.main(f"run rssr bennett --engine native --json {file}".split()) == 130
     assert read_results(file).missing == [("bennett", "native", "projection")]

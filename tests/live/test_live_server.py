@@ -218,6 +218,11 @@ def test_mechanism_speaks_the_schema():
     server.close()
 
 
+def test_case_from_python_has_no_tolerances_of_a_table(tmp_path):
+    with pytest.raises(KincheckError, match="--vary: rssr is no table of hardpoints; give one"):
+        kincheck_live(load("rssr"), variation=tmp_path / "vary.toml")
+
+
 def test_case_from_python_follows_the_page(car):
     server = kincheck_live(car, TRAVEL)
     with page_of(server) as socket:

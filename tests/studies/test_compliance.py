@@ -281,9 +281,9 @@ def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
     (tmp_path / "strut.toml").write_text(strut_text())
     out = tmp_path / "found.json"
     case = str(tmp_path / "strut.toml")
-    assert main(["kc", case, "--travel=0:0.9:2", "--json", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert "no equilibrium at travel 0.9 m: the last is at travel" in said
+    assert main(["kc", case, "--travel=0:0.9:2", "--json", str(out), "--out", str(tmp_path)]) == 2
+    for said in (capsys.readouterr().err, (tmp_path / "kc.html").read_text()):
+        assert "no equilibrium at travel 0.9 m: the last is at travel" in said
     found = json.loads(out.read_text())
     assert found["wheel_load"][0] > 0.0
     assert found["wheel_load"][1] is None

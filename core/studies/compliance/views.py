@@ -6,7 +6,6 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,11 @@ from ...case.compliance import Load
 from ...harness.record import Record, Results
 from ...report.figures import Figure, Style
 from ...report.page_model import Plot
-from ...report.sections import environment, figure_parts
+from ...report.sections import Diagram, Report, Section
+from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .study import ComplianceCurves, ComplianceResults
+from .study import ComplianceCurves, ComplianceResults, Curve
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -37,7 +37,6 @@ SHOWN: Mapping[str, tuple[str, float]] = {
     "N m/rad": ("N m/deg", 1.0 / DEGREE),
 }
 """Unit and factor of tables and pages, by SI unit; files in JSON are in SI."""
-_HERE = Path(__file__).parent
 
 
 def as_data(results: ComplianceResults) -> dict[str, Any]:
@@ -63,9 +62,9 @@ def agreement(checked: Results) -> list[dict[str, Any]]:
             "engine": each.engine,
             "mode": each.mode,
             "outcome": each.outcome.shown,
+            "message": each.message,
             "wheel_center": _largest(each, lambda name: "wheel_center_" in name),
             "wheel_load": _largest(each, lambda name: name.endswith("wheel_load")),
-            "message": each.message,
         }
         for each in checked.records
     ]
@@ -112,7 +111,6 @@ def table(results: ComplianceResults) -> str:
     first = results.travel
     center = [f"wheel_center_{axis} [mm]" for axis in "xyz"]
     names = {name: SHOWN.get(each.unit, (each.unit, 1.0)) for name, each in first.outputs.items()}
-    rigid = [f"{name}.rigid" for name in first.rigid]
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
     if results.signs:
@@ -125,10 +123,8 @@ def table(results: ComplianceResults) -> str:
             curves.wheel_load,
             *(size * curves.outputs[name].values for name, (_, size) in names.items()),
             *(
-                names[each.removesuffix(".rigid")][1] * curves.rigid[each.removesuffix(".rigid")]
-                if curves.rigid
-                else np.full(len(curves.at), np.nan)
-                for each in rigid
+                names[name][1] * curves.rigid[name] if curves.rigid else math.nan * curves.at
+                for name in first.rigid
             ),
         ]
         for at, *row in zip(curves.at, *columns, strict=True):
@@ -159,50 +155,60 @@ def lines(results: ComplianceResults) -> Iterator[str]:
 
 def page(results: ComplianceResults) -> str:
     """Return the page: curves over travel with the rigid ones beside, then over each load."""
-    figures: dict[str, Figure] = {}
-    sections: list[tuple[str, list[Style], list[Plot]]] = []
-    soft, rigid = Style.number(0, "with bushings"), Style.number(1, "rigid joints")
-    for number, curves in enumerate((results.travel, *results.loads.values())):
-        unit, factor = unit_of_axis(curves)
-        x, plots = _drawn(factor * curves.at), list[Plot]()
-        load = ("wheel_load", "N", curves.wheel_load)
-        every = [load, *((name, each.unit, each.values) for name, each in curves.outputs.items())]
-        for name, si, values in every:
-            shown, size = SHOWN.get(si, (si, 1.0))
-            data = [soft.curve(x, _drawn(size * values))]
-            if name in curves.rigid:
-                data.append(rigid.curve(x, _drawn(size * curves.rigid[name])))
-            key = f"curve-{number}-{len(plots)}"
-            plots.append(Plot(key, f"{name} over {curves.axis}", ""))
-            figures[key] = {
-                "data": data,
-                "layout": {
-                    "xaxis": {"title": {"text": with_unit(curves.axis, unit)}, "zeroline": True},
-                    "yaxis": {"title": {"text": with_unit(name, shown)}},
-                    "hovermode": "x unified",
-                },
-            }
-        styles = [soft, rigid] if curves.rigid else [soft]
-        sections.append((f"Over {curves.axis}", styles, plots))
-    return (
-        environment(_HERE)
-        .get_template("compliance.html")
-        .render(
-            title=f"Kinematics and compliance of {results.case}",
-            results=results,
-            sections=sections,
-            matrix=_matrix(results.travel),
-            agreement=agreement(results.checked) if results.checked else [],
-            **figure_parts(figures),
-        )
+    every = (results.travel, *results.loads.values())
+    sections = [_section(number, curves) for number, curves in enumerate(every)]
+    if results.checked is not None:
+        sections.append(_agreement(results.checked))
+    k = int(np.argmin(np.abs(results.travel.at)))
+    matrix = [[f"{x:.4g}" for x in row] for row in results.travel.compliance[k].tolist()]
+    note = (
+        "Rows: displacement [m] and turn [rad] at the contact; columns: force [N] and torque [N m]"
+        " there; global axes, six for each wheel."
     )
+    sections.append(Section("Compliance at design", [], [note], [], 0, matrix))
+    facts = (
+        results.signs,
+        "equilibria with springs, bushings and weight",
+        "the height of the wheel's centre is held",
+        "point at a figure to read its values",
+    )
+    return render(Report("kc", f"Kinematics and compliance of {results.case}", facts, sections))
+
+
+def _section(number: int, curves: ComplianceCurves) -> Section:
+    """Return the diagrams over travel or over a load."""
+    soft, rigid = Style.number(0, "with bushings"), Style.number(1, "rigid joints")
+    styles = [soft, rigid] if curves.rigid else [soft]
+    unit, factor = unit_of_axis(curves)
+    x, diagrams = _drawn(factor * curves.at), list[Diagram]()
+    for name, each in {"wheel_load": Curve(curves.wheel_load, "N"), **curves.outputs}.items():
+        shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        data = [soft.curve(x, _drawn(size * each.values))]
+        if name in curves.rigid:
+            data.append(rigid.curve(x, _drawn(size * curves.rigid[name])))
+        figure: Figure = {
+            "data": data,
+            "layout": {
+                "xaxis": {"title": {"text": with_unit(curves.axis, unit)}, "zeroline": True},
+                "yaxis": {"title": {"text": with_unit(name, shown)}},
+                "hovermode": "x unified",
+            },
+        }
+        plot = Plot(f"curve-{number}-{len(diagrams)}", f"{name} over {curves.axis}", "")
+        diagrams.append(Diagram(plot, figure, styles))
+    title = f"Over {curves.axis}"
+    return Section(title, curves.failures, curves.notes, [], 0, [], diagrams)
+
+
+def _agreement(checked: Results) -> Section:
+    rows = [
+        [x if isinstance(x, str) else "–" if x is None else f"{x:.1e}" for x in row.values()]
+        for row in agreement(checked)
+    ]
+    columns = ["case", "engine", "mode", "outcome", "message", "wheel centre [m]", "wheel load [N]"]
+    note = "The same equilibria by each engine; largest deviations from the native engine."
+    return Section("Agreement of engines", [], [note], columns, 5, rows)
 
 
 def _drawn(values: Array) -> list[float | None]:
     return [float(f"{x:.10g}") if math.isfinite(x) else None for x in values.tolist()]
-
-
-def _matrix(curves: ComplianceCurves) -> list[list[str]]:
-    """Return the compliance at the sample nearest to design as text [SI]."""
-    k = int(np.argmin(np.abs(curves.at)))
-    return [[f"{x:.4g}" for x in row] for row in curves.compliance[k].tolist()]

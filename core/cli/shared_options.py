@@ -1,22 +1,26 @@
-"""Options of kincheck run, and defaults shared with other commands."""
+"""Options that commands share, and what they mean for cases, references and engines."""
 
 from __future__ import annotations
 
-import argparse
+import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from ..case.io.reader_options import CurveOptions
+from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
-from ..options import option, options
-from .parser import Command, add_options, values_of
+from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
+from ..options import option, options, positive, whole
+from .parser import Command
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..case.io.reference_curve import CurveOptions
+    from ..case.io.reader_options import CurveOptions
     from ..harness.engine import Engine
+    from ..harness.execution import Solver
 
+T = TypeVar("T")
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of coordinates of
 # one metre, and a thousandth of the outputs' 1e-9 m. A mechanism may amplify it a hundredfold
@@ -29,15 +33,140 @@ MODE = "mode of the engines; default: projection, or simulate if an engine has o
 HISTORY = "KINCHECK_HISTORY"
 """Environment variable: the history file if --history is not given."""
 
+SCHEDULER = (
+    "solve on the workers of this dask.distributed scheduler instead; it exchanges pickles: whoever"
+    " runs or reaches it runs code as you, here and on the workers"
+)
 
-def add_curve_options(command: argparse.ArgumentParser) -> None:
-    """Add the options for a measured curve, see --reference."""
-    add_options(command, CurveOptions)
+
+ISOLATION = "isolation"
 
 
-def curve_options(options: argparse.Namespace) -> CurveOptions:
-    """Return the options of a measured curve."""
-    return values_of(CurveOptions, options)
+def limit(text: str) -> float:
+    """Return the number in the text of a limit."""
+    number = positive(text)
+    if number > MOST:
+        raise KincheckError(f"{text!r} is too large. Give {MOST:g} at most.")
+    return number
+
+
+@options
+class Isolated(Command):
+    """A command for pairs of case and engine, each solved in a worker process."""
+
+    HEADINGS: ClassVar[Mapping[str, str]] = {
+        ISOLATION: "Each case is solved with each engine in a worker process."
+    }
+    jobs: int | None = option(
+        "worker processes at a time; default: half the processors; 0 solves in this process,"
+        " without limits: the default if only the native engine runs and no limit is given",
+        whole(0),
+        "N",
+        heading=ISOLATION,
+        default=None,
+    )
+    timeout: float | None = option(
+        f"limit for one case with one engine; default {TIMEOUT:g}, a hundred times as long"
+        " as the built-in cases take",
+        limit,
+        "SECONDS",
+        heading=ISOLATION,
+        default=None,
+    )
+    memory: float | None = option(
+        f"limit for a worker process, on Linux; default {MEMORY:g}, sixteen times as much as"
+        " the built-in cases take",
+        limit,
+        "GB",
+        heading=ISOLATION,
+        default=None,
+    )
+    scheduler: str | None = option(SCHEDULER, metavar="ADDRESS", heading=ISOLATION, default=None)
+
+
+def contradictions(options: Isolated) -> list[str]:
+    """Return the contradictions between the options."""
+    problems: list[str] = []
+    if options.scheduler is not None and options.jobs is not None:
+        problems.append(
+            "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs."
+        )
+    if options.jobs == 0 and (options.timeout or options.memory):
+        problems.append(
+            "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
+            " --memory, or --jobs."
+        )
+    return problems
+
+
+def unreachable(options: Any) -> list[str]:
+    """Return why the requested cluster cannot be reached. This takes time, so it is the last check
+    before the work.
+    """
+    if options.scheduler is None:
+        return []
+    from ..harness.workers.distributed import ClusterError, connected, loaded
+
+    try:
+        with connected(loaded(), options.scheduler):
+            return []
+    except ClusterError as error:
+        return [str(error)]
+
+
+def solver(options: Isolated, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
+    """Return the solver of the pairs, and its settings for the results."""
+    from ..harness.workers.distributed import on_cluster
+    from ..harness.workers.pool import solver_for
+
+    limits = Limits(options.timeout or TIMEOUT, options.memory or MEMORY)
+    limited = {"timeout": limits.timeout, "memory_gb": limits.memory}
+    if options.scheduler is not None:
+        return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
+    wanted = limits if options.timeout or options.memory else None
+    found, jobs = solver_for(engines, options.jobs, wanted)
+    if jobs:
+        from ..program.disk_cache import ready
+
+        ready()  # its note would not be seen from a worker
+    return found, {"jobs": jobs, **(limited if jobs else {})}
+
+
+def return_cases(cases: Sequence[T], supplied: Supplied) -> tuple[list[T | str], Supplied]:
+    """Return cases and facts with the files of --hold, --start and --without among the cases: these
+    options take several names, and in `run --hold knee hip model.xml` also the file.
+    """
+    given = {name: getattr(supplied, name) for name in ("hold", "start", "without")}
+    files = [name for each in given.values() for name in each if os.path.isfile(name)]
+    left = {
+        option: tuple(name for name in each if name not in files) for option, each in given.items()
+    }
+    return [*cases, *files], replace(supplied, **left)
+
+
+def driver_value(text: str | None, case: Case) -> float | None:
+    """Return the value of the swept driver in an option, in SI; None without one.
+
+    Raises:
+        KincheckError: it is no number, or has the unit of something else.
+    """
+    from ..case.case import TIME
+    from ..case.io.document import measure
+    from ..case.units import ANGLES, LENGTHS, SECOND
+
+    if text is None:
+        return None
+    driver = case.sweep.driver
+    turns = driver != TIME and case.mechanism.driver(driver).turns
+    units = {"s": SECOND} if driver == TIME else ANGLES if turns else LENGTHS
+    bare = "s" if driver == TIME else "rad" if turns else "m"
+    try:
+        return measure(text, units, bare)[0]
+    except ValueError:
+        raise KincheckError(
+            f"--at: {text!r} is not a number with one of the units {', '.join(units)}, or in"
+            f" {bare}. Give a value of the driver {driver}."
+        ) from None
 
 
 def judged(
