@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeVar, cast
 
-from ..errors import KincheckError, brief, similar, unknown
+from ..errors import brief, similar, unknown
 from ..options import Option, declared, flags_of, options, with_values
+from .option_types import reader
 
 if TYPE_CHECKING:
     from .registry import Registry
@@ -170,7 +171,7 @@ def add_options(parser: argparse.ArgumentParser, cls: Any, given: Collection[str
         if name in given:  # a default would overwrite what stands there
             facts["default"] = argparse.SUPPRESS
         if meaning.action != "store_true":
-            facts |= {"type": _reader(meaning.read), "metavar": meaning.metavar}
+            facts |= {"type": reader(meaning.read), "metavar": meaning.metavar}
             facts["choices"] = meaning.choices
         for key in ("nargs", "action", "required"):
             if value := getattr(meaning, key):
@@ -187,21 +188,6 @@ def _name_of(each: Field[Any], meaning: Option) -> str:
     """Return the name of an option in the namespace."""
     *_, last = [each.name, *flags_of(each, meaning)]
     return last.removeprefix("--").replace("-", "_")
-
-
-def _reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Return a reader whose messages argparse prints."""
-    if read is str:
-        return str
-
-    def reader(text: str) -> Any:
-        try:
-            return read(text)
-        except KincheckError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
-
-    reader.__name__ = read.__name__  # in argparse's own messages
-    return reader
 
 
 def values_of(cls: type[T], found: argparse.Namespace) -> T:

@@ -88,8 +88,8 @@ def _serve(options: argparse.Namespace, registry: Registry) -> int:
 
     file, supplied = Path(options.file), import_options.supplied(options)
     curve = curve_options(options)
-    if not options.reference and curve != type(curve)():
-        raise KincheckError("options for measured curves need a curve: give --reference FILE")
+    if not options.reference and curve.without_curve:
+        raise KincheckError(curve.without_curve)
 
     def referenced(case: Case) -> Case:
         if not options.reference:
