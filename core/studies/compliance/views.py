@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from ...case.compliance import Load
+from ...errors import number_of
 from ...harness.record import Record, Results
 from ...report.figures import Figure, Style
 from ...report.page_model import Plot
 from ...report.sections import environment, figure_parts
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .study import ComplianceCurves, ComplianceResults
+from .study import MOST_SAID, ComplianceCurves, ComplianceResults
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -140,12 +141,25 @@ def _cell(value: float) -> str:
     return repr(float(value)) if math.isfinite(value) else ""
 
 
+def failures(results: ComplianceResults) -> list[str]:
+    """Return the first samples without equilibrium, the number of further ones, and a remedy."""
+    every = results.failures
+    if not every:
+        return []
+    more = len(every) - MOST_SAID
+    rest = f"{number_of(more, 'further sample')} without equilibrium; " if more > 0 else ""
+    return [*every[:MOST_SAID], f"{rest}give less travel or load, or stiffer springs and bushings"]
+
+
 def lines(results: ComplianceResults) -> Iterator[str]:
     """Yield the slopes and rates at the sample nearest to design, and the ends of each curve."""
     curves = results.travel
-    k = int(np.argmin(np.abs(curves.at)))
     unit, factor = unit_of_axis(curves)
     yield f"{results.case}: {results.signs}"
+    k = _near_design(curves)
+    if not math.isfinite(curves.wheel_load[k]):
+        yield f"no equilibrium at any of {len(curves.at)} samples of travel"
+        return
     yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
     for name, each in curves.outputs.items():
         shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
@@ -190,6 +204,7 @@ def page(results: ComplianceResults) -> str:
         .render(
             title=f"Kinematics and compliance of {results.case}",
             results=results,
+            failures=failures(results),
             sections=sections,
             matrix=_matrix(results.travel),
             agreement=agreement(results.checked) if results.checked else [],
@@ -203,6 +218,14 @@ def _drawn(values: Array) -> list[float | None]:
 
 
 def _matrix(curves: ComplianceCurves) -> list[list[str]]:
-    """Return the compliance at the sample nearest to design as text [SI]."""
-    k = int(np.argmin(np.abs(curves.at)))
+    """Return the compliance at the sample nearest to design as text [SI]; empty without any."""
+    k = _near_design(curves)
+    if not math.isfinite(curves.wheel_load[k]):
+        return []
     return [[f"{x:.4g}" for x in row] for row in curves.compliance[k].tolist()]
+
+
+def _near_design(curves: ComplianceCurves) -> int:
+    """Return the sample nearest to design, of those with an equilibrium if there are any."""
+    reached = np.isfinite(curves.wheel_load)
+    return int(np.argmin(np.where(reached, np.abs(curves.at), np.inf)))
