@@ -110,10 +110,9 @@ class ComplianceResults:
     checked: Results | None = None
 
     def __repr__(self) -> str:
-        loads = "".join(f", {len(x.at)} of {load} load" for load, x in self.loads.items())
-        found = f"{number_of(len(self.travel.at), 'sample')} of travel{loads}"
+        found = number_of(len(self.travel.at), "sample")
         lost = f", {len(self.failures)} without equilibrium" if self.failures else ""
-        return f"<ComplianceResults: {self.case}, {found}{lost}>"
+        return f"<ComplianceResults: {self.case}, {found} of travel{lost}>"
 
     @property
     def failures(self) -> list[str]:
