@@ -243,12 +243,18 @@ def test_function_has_the_options_of_its_command(name):
         ("explain", {"tol": -1.0}, "tol: '-1.0' is not a positive number"),
         ("free", {"duration": "long"}, "duration: 'long' is not a positive number"),
         ("run", {"mode": "simulated"}, "there is no mode 'simulated'; did you mean 'simulate'"),
-        ("run", {"curve": CurveOptions(signs="iso8855")}, "options for measured curves need a"),
+        ("run", {"curve": CurveOptions(signs="iso8855")}, "--signs: for a measured curve, and"),
     ],
 )
 def test_function_refuses_what_its_command_refuses(function, given, said):
     with pytest.raises(kincheck.KincheckError, match=said):
         getattr(kincheck, function)("rssr", **given)
+
+
+@pytest.mark.parametrize("function", ["compare", "explain", "run"])
+def test_what_is_no_case_is_refused(function):
+    with pytest.raises(kincheck.KincheckError, match="found 1, expected a case"):
+        getattr(kincheck, function)([1, 2] if function == "compare" else 1)
 
 
 def test_run_takes_options_of_the_command(tmp_path, capsys):

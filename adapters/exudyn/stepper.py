@@ -35,12 +35,15 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         mass = system.AddMarker(items.MarkerBodyMass(bodyNumber=number[body["name"]]))
         system.AddLoad(items.LoadMassProportional(markerNumber=mass, loadVector=model["gravity"]))
 
-    def marker(body: str, point: Any) -> Any:
-        at = [*(np.array(point) - center[body])]
-        return system.AddMarker(items.MarkerBodyRigid(bodyNumber=number[body], localPosition=at))
+    def marker(body: str, point: Any, turn: Any = None) -> Any:
+        frame = np.eye(4)
+        frame[:3, 3] = np.array(point) - center[body]
+        if turn is not None:
+            frame[:3, :3] = turn
+        return system.AddMarker(items.MarkerBodyRigid(bodyNumber=number[body], localHT=frame))
 
-    def ends(each: Any) -> list[Any]:
-        return [marker(*end) for end in zip(each["bodies"], each["points"], strict=True)]
+    def ends(each: Any, turn: Any = None) -> list[Any]:
+        return [marker(*end, turn) for end in zip(each["bodies"], each["points"], strict=True)]
 
     connectors: dict[str, Any] = {}
     for joint in model["joints"]:
@@ -53,12 +56,8 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             continue
         if not joint["rows"]:
             raise NotImplementedError(f"GenericJoint cannot be {joint['type']} ({joint['name']})")
-        A = np.array(joint["frame"]).T
         made = items.GenericJoint(
-            markerNumbers=ends(joint),
-            constrainedAxes=joint["rows"],
-            rotationMarker0=A,
-            rotationMarker1=A,
+            markerNumbers=ends(joint, np.array(joint["frame"]).T), constrainedAxes=joint["rows"]
         )
         connectors[joint["name"]] = system.AddObject(made)
     for each in model["springs"]:

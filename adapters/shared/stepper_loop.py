@@ -146,7 +146,8 @@ def main(stepper: Callable[..., Any], version: Callable[[], str]) -> None:
             done = {**effort, "message": f"{type(error).__name__}: {error}"[:300]}
         found["runs"].append(done)
         (folder / "result.json").write_text(json.dumps(found, indent=1), "utf-8")
-        print(*(f"{name} {value}" for name, value in done.items()), sep="  ", flush=True)
+        said = [f"{name} {value}" for name, value in done.items() if value != ""]
+        print(*said, sep="  ", flush=True)
     (folder / "result.json").write_text(json.dumps(found, indent=1), "utf-8")
     if found["message"]:
         print(found["message"])

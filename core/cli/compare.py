@@ -130,7 +130,8 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
     """
     given: list[str | Case] = []
     for each in options.cases:
-        given += registry.matching(str(each)) if isinstance(each, str | Path) else [each]
+        texts = isinstance(each, str | Path)
+        given += registry.matching(str(each)) if texts else [registry.find_case(each)]
     names = [*map(_name_of, given)]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise KincheckError(f"{twice}: found twice. Leave one out.")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, number_of, unknown
 from ..options import (
     ONE_CASE,
     argument,
@@ -381,8 +381,8 @@ class MoveFreely(Command):
         with with_json(found.facts, self.json):
             print(
                 f"{found.case}: {len(found.times)} samples to {found.times[-1]:.9g} s,"
-                f" {found.freedoms} degrees of freedom, {found.redundant} redundant rows,"
-                f" {found.method}",
+                f" {number_of(found.freedoms, 'degree of freedom', 'degrees of freedom')},"
+                f" {number_of(found.redundant, 'redundant row')}, {found.method}",
                 f"  change when all steps are halved: {found.error:.1e} m,"
                 f" {found.turning_error:.1e} rad",
                 f"  change of energy less work: {found.energy_error:.1e} J; largest gap:"

@@ -148,7 +148,8 @@ class MeasureCompliance(Isolated):
                 print_table(checked, out, reactions=True)
             complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
         named = [each.name for each in engines if each.name != STANDARD]
-        problems += results.failures + (lacking(checked, (), named) if checked else [])
+        problems += views.failures(results)
+        problems += lacking(checked, (), named) if checked else []
         if problems:
             raise KincheckError("\n".join(problems))
         bad = checked is not None and any(each.outcome.bad for each in checked.records)

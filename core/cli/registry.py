@@ -75,9 +75,7 @@ class Registry:
             tell_left_out([case])
         return case
 
-    def find_case(
-        self, name: str | Path | Case, supplied: Supplied = NOTHING, *, driven: bool = True
-    ) -> Case:
+    def find_case(self, name: object, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
         """Return the case of a name or in a file, and a case itself.
 
         Args:
@@ -88,11 +86,14 @@ class Registry:
             KincheckError: there is no such case, a pattern matches several, its file is invalid,
                 or its drivers do not match its degrees of freedom.
         """
+        from ..case.case import Case
         from ..case.models.files import DATASETS, SUFFIXES, load
         from ..kinematics import require_driven
 
-        if not isinstance(name, str | Path):
+        if isinstance(name, Case):
             return name
+        if not isinstance(name, str | Path):
+            raise KincheckError(f"found {name!r}, expected a case. Give its name, file or Case.")
         name = str(name)
         matching, known = self.matching(name), self.cases()
         if len(matching) > 1:

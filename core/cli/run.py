@@ -270,10 +270,8 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
             )
         except KincheckError as error:
             problems += str(error).splitlines()
-    if not (options.reference or options.recorded or options.fmu) and (
-        options.curve != CurveOptions()
-    ):
-        problems.append("options for measured curves need a curve. Give --reference FILE.")
+    if not (options.reference or options.recorded or options.fmu):
+        problems += filter(None, [options.curve.without_curve])
     if options.reference and not problems:
         try:
             # a reference may name an unreadable case, which does not stop the others

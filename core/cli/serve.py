@@ -79,8 +79,8 @@ class Serve(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        if not self.reference and self.curve != CurveOptions():
-            raise KincheckError("options for measured curves need a curve: give --reference FILE")
+        if not self.reference and self.curve.without_curve:
+            raise KincheckError(self.curve.without_curve)
         wanted, read = self.measure or 0, self._reader(registry)
         if wanted:
             _measured(read(), wanted)

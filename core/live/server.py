@@ -153,6 +153,9 @@ class LiveServer:
         self.address = f"http://{HOST}:{self.port}/?token={self.token}"
         Thread(target=self.listener.serve_forever, daemon=True).start()
 
+    def __repr__(self) -> str:
+        return f"<live page of {self.file.name}: {self.address}>"
+
     def _repr_html_(self) -> str:
         """Return the page in a frame, for a notebook on this machine."""
         return f'<iframe src="{self.address}" style="width:100%;height:900px;border:0"></iframe>'

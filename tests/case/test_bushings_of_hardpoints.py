@@ -158,7 +158,7 @@ def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
     ("text", "expected"),
     [
         ("[bushings.lca_frnt]\nstiffness = 5e6\n", "did you mean 'lca_front'"),
-        ("[bushings.wheel_center]\nstiffness = 5e6\n", "expected a role of a joint"),
+        ("[bushings.wheel_center]\nstiffness = 5e6\n", "a role of a joint of double_wishbone"),
         (
             "[joints.tie_rod.bushings.a]\nstiffness = 5e6\npoint = [0.07, 0.22, 0.16]\n",
             r"at neither end of the rod; give the one on 'ground', \[0.07 m, 0.22 m, 0.15 m\]",

@@ -31,6 +31,14 @@ def test_motors_move_through_their_limits(tmp_path):
     assert any("shoulder, elbow move through their limits" in note for note in case.assembly)
 
 
+def test_one_motor_is_said_in_the_singular(tmp_path):
+    note = "elbow moves through its limits"
+    file = tmp_path / "arm.urdf"
+    text = arm(tmp_path, "shoulder", "elbow").read_text()
+    file.write_text(text.replace('name="shoulder" type="revolute"', 'name="shoulder" type="fixed"'))
+    assert any(note in each for each in load(file).assembly)
+
+
 def test_joints_commanded_by_ros2_control_have_motors(tmp_path):
     file = arm(tmp_path, "elbow")
     commanded = '<joint name="shoulder"><command_interface name="position"/></joint>'

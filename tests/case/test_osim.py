@@ -102,8 +102,9 @@ def test_joint_places_its_child_by_its_coordinates(write, kind, locked):
     assert len(tree.ties) == (bool(locked) and count > 0)
 
 
-def test_point_constraint_closes_the_loop(write):
-    case = load(write(FOUR_BAR), DRIVE)
+@pytest.mark.parametrize("text", [FOUR_BAR, FOUR_BAR.replace('<Ground name="ground"/>', "")])
+def test_point_constraint_closes_the_loop(write, text):
+    case = load(write(text), DRIVE)
     found = solution(case)
     for k, angle in enumerate(case.sweep.values):
         turned = [since_design(case.mechanism, found, case.mechanism.joint(x), k) for x in "ABD"]

@@ -40,6 +40,12 @@ REFUSED = [
     ("stress --family unit", "there is no family 'unit'; did you mean 'units'?"),
     ("stress --engine nativ", "there is no engine 'nativ'"),
     ("stress --samples 0", "'0' is not a whole number of 1 or more"),
+    ("serve rssr --port abc", "--port: 'abc' is not a whole number of 0 or more"),
+    ("board --out x --steps abc", "--steps: 'abc' is not a whole number of 1 or more"),
+    ("board --out x --timeout abc", "--timeout: 'abc' is not a positive number"),
+    ("run rssr --accuracy 0.02 --signs iso8855",
+     "--signs, --accuracy: for a measured curve, and there is none; add --reference FILE"),
+    ("serve rssr --accuracy 0.02", "--accuracy: for a measured curve, and there is none"),
     ("stress --replay nowhere.toml", "no such file"),
     ("stress --tol -1", "is not a positive number"),
     *((f"sweep mcpherson_strut --vary vary.toml {options}", said) for options, said in (

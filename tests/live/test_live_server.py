@@ -234,6 +234,7 @@ def test_case_from_python_follows_the_page(car):
         page.told("answer")
     assert server.case.mechanism.point("uca_outer").position[1] == pytest.approx(0.542)
     assert server.address in server._repr_html_()
+    assert server.address in repr(server)
     server.close()
 
 

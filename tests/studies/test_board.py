@@ -199,11 +199,17 @@ def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
     assert main(["board", *given, "--out", str(file.parent), "--against", "none.json"]) == 2
 
 
-def test_reproducer_runs_alone_and_repeats_the_row(site, rows):
-    row = rows["mujoco", "RK4", "best"]
+@pytest.mark.parametrize(
+    ("engine", "integrator"), [("mujoco", "RK4"), ("exudyn", "GeneralizedAlpha")]
+)
+def test_reproducer_runs_alone_and_repeats_the_row(site, rows, engine, integrator):
+    row = rows[engine, integrator, "best"]
     folder = site / row["folder"]
     command = [sys.executable, "-P", "-S", "-c", ALONE, str(folder / "run.py")]
-    subprocess.run(command, check=True, capture_output=True, env={**os.environ, "OWN": ENGINES})
+    environment = {**os.environ, "OWN": ENGINES}
+    done = subprocess.run(command, check=True, capture_output=True, env=environment)
+    assert b"Deprecation" not in done.stderr
+    assert b"message" not in done.stdout
     again = json.loads((folder / "result.json").read_text("utf-8"))
     assert errors(again) == errors(row)
 

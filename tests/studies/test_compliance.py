@@ -289,6 +289,20 @@ def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
     assert found["wheel_load"][1] is None
 
 
+def test_load_beyond_equilibrium_is_named_and_counted(tmp_path, capsys):
+    found = repr(compliance(strut(tmp_path), [0.0, 9.0]))
+    assert found.endswith(", 2 samples of travel, 1 without equilibrium>")
+    case = str(tmp_path / "strut.toml")
+    page = ["--out", str(tmp_path)]
+    assert main(["kc", case, "--travel=-0.06:0.06:7", "--load", "braking=3e9", *page]) == 2
+    out, err = capsys.readouterr()
+    assert "no equilibrium at any of 7 samples of travel" in out
+    assert "nan" not in out + (tmp_path / "kc.html").read_text().partition('id="matrix"')[2]
+    said = err.splitlines()
+    assert "no equilibrium at travel -0.06 m with braking 3e+09 N: the last is" in said[-6]
+    assert "2 further samples without equilibrium; give less travel or load" in said[-1]
+
+
 @pytest.mark.parametrize(
     ("more", "options", "expected"),
     [

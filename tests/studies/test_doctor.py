@@ -52,6 +52,8 @@ def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
         "distributed",
         "pyarrow",
         "pyyaml",
+        "usd-core",
+        "websockets",
         "pandas",
         "xarray",
         "matplotlib",

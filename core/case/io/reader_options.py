@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import ClassVar
 
-from ...options import option, positive, switch
+from ...options import declared, flags_of, option, positive, switch
 
 HARDPOINTS, MODELS = "hardpoints", "models"
 
@@ -231,3 +231,18 @@ class CurveOptions:
         flag="--at-reference",
         heading=CURVES,
     )
+
+    @property
+    def without_curve(self) -> str:
+        """The message if there is no curve that they are for; empty without any of them."""
+        given = [
+            flags_of(each, meaning)[0]
+            for each, meaning, _ in declared(CurveOptions)
+            if meaning is not None and getattr(self, each.name) not in (None, False, (), [])
+        ]
+        if not given:
+            return ""
+        return (
+            f"{', '.join(given)}: for a measured curve, and there is none; add --reference FILE, or"
+            f" leave {'it' if len(given) == 1 else 'them'} out"
+        )

@@ -243,7 +243,7 @@ def size_of(file: Path, option: str, name: str, text: str, unit: str, bare: Conv
         raise fault(
             file,
             option,
-            f"found {shown(f'{name}={text}')}, expected OUTPUT=NUMBER UNIT; say {option}"
+            f"found {shown(text)}, expected a positive number with or without a unit; say {option}"
             f' "{name}=0.02 {"deg" if unit == "rad" else unit}"',
         )
     if stated := stated.strip():

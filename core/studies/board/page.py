@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
+from ...errors import number_of
 from ...harness.labels import number
 from ...report.figures import Figure, Style, floored, ticked_axis
 from ...report.page_model import Plot
@@ -94,7 +95,7 @@ def _section(truth: TruthFacts, rows: Sequence[Row]) -> Section:
     styles = [Style.number(k, row.name) for k, row in enumerate(measured)]
     verdict = [
         f"{truth.source}. {truth.duration:.6g} s, {truth.samples} samples, {truth.points} points,"
-        f" {truth.freedoms} freedom{'s' * (truth.freedoms > 1)}, {truth.redundant} redundant rows.",
+        f" {number_of(truth.freedoms, 'freedom')}, {number_of(truth.redundant, 'redundant row')}.",
         f"Truth: {truth.method}. Halving its steps moves a point by {number(truth.error)} m, and"
         f" changes energy minus work by {number(truth.energy)} J.",
         *([truth.message] if truth.message else []),

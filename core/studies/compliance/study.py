@@ -26,7 +26,7 @@ from ...case.compliance import Load, Rig
 from ...case.measures import DriverEffort
 from ...case.quantity import ORDERS, Output, Quantity, with_markers
 from ...case.suspension import PerTravel
-from ...errors import KincheckError, SolveError
+from ...errors import KincheckError, SolveError, number_of, shortened
 from ...harness.record import Results
 from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, solve
@@ -40,6 +40,8 @@ WITHIN, SAME_LOAD, ROUND_OFF = 1e-12, 1e-9, 1e-15
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 GOAL = "engines differ by round-off"
 DEFAULT_TRAVEL = np.linspace(-0.06, 0.06, 25)
+MOST_SAID = 5
+"""Failures and outputs that messages name."""
 
 
 class AxleMotion(StrEnum):
@@ -91,7 +93,7 @@ class ComplianceCurves:
     turning: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ComplianceResults:
     """Results of a study: over travel, and over each load at design by its name.
 
@@ -106,6 +108,11 @@ class ComplianceResults:
     signs: str = ""
     cases: tuple[Case, ...] = ()
     checked: Results | None = None
+
+    def __repr__(self) -> str:
+        found = number_of(len(self.travel.at), "sample")
+        lost = f", {len(self.failures)} without equilibrium" if self.failures else ""
+        return f"<ComplianceResults: {self.case}, {found} of travel{lost}>"
 
     @property
     def failures(self) -> list[str]:
@@ -154,6 +161,10 @@ def compliance(
     return ComplianceResults(case.name, over_travel, curves, study.signs, tuple(cases))
 
 
+def _said(load: Load, value: float) -> str:
+    return f"{load} {value:.6g} {'N m' if load is Load.ALIGNING else 'N'}"
+
+
 class _Study:
     def __init__(self, case: Case, axle: AxleMotion) -> None:
         self.case, self.axle, self.rig = case, axle, case.rig or Rig()
@@ -199,7 +210,12 @@ class _Study:
         unit = "m"
         if self.steering and self.mechanism.driver(self.steering).turns:
             unit = "rad"
-        curves = self._curves("travel", values, found, lambda x: f"{what} {x:.6g} {unit}")
+
+        def said(x: float, share: float) -> str:
+            under = [_said(load, share * float(value)) for load, value in loads.items()]
+            return " with ".join([f"{what} {share * x:.6g} {unit}", *under])
+
+        curves = self._curves("travel", values, found, said)
         return replace(curves, rigid=self._rigid(values), turning=unit == "rad")
 
     def case_of(
@@ -245,8 +261,7 @@ class _Study:
     def over_load(self, load: Load, values: Array) -> ComplianceCurves:
         """Return the curves over a load at design."""
         found = self.model.solve(self._loads({load: values}, len(values)), {})
-        unit = "N m" if load is Load.ALIGNING else "N"
-        return self._curves(load, values, found, lambda x: f"{load} {x:.6g} {unit}")
+        return self._curves(load, values, found, lambda x, share: _said(load, share * x))
 
     def _loads(self, loads: Mapping[Load, Array], n: int) -> dict[str, Array]:
         found = {point.name: np.zeros((n, 6)) for wheel in self.wheels for point in wheel.points}
@@ -257,7 +272,7 @@ class _Study:
         return found
 
     def _curves(
-        self, axis: str, at: Array, found: Equilibria, what: Callable[[float], str]
+        self, axis: str, at: Array, found: Equilibria, what: Callable[[float, float], str]
     ) -> ComplianceCurves:
         wheel, lost = self.wheels[0], ~found.reached
         outputs = self._outputs(found) | self._rates(found)
@@ -266,22 +281,22 @@ class _Study:
             return _blanked(values, lost)
 
         failures = [
-            f"no equilibrium at {what(float(at[k]))}: the last is at"
-            f" {what(float(at[k] * found.share[k]))}, where the path turns back (snap-through) or"
-            " meets another one"
+            f"no equilibrium at {what(float(at[k]), 1.0)}: the last is at"
+            f" {what(float(at[k]), float(found.share[k]))}, where the path turns back"
+            " (snap-through) or meets another one"
             for k in np.flatnonzero(lost)
         ]
         unstable = [
-            f"the equilibrium at {what(float(x))} is unstable: {way}"
+            f"the equilibrium at {what(float(x), 1.0)} is unstable: {way}"
             for x, way, ok in zip(at, found.unstable, found.reached, strict=True)
             if way and ok
         ]
         notes = [f"{unstable[0]}; {len(unstable)} samples in all"] if unstable else []
         if self.lacking:
-            listed = ", ".join(output.name for output in self.lacking)
+            listed = shortened([output.name for output in self.lacking], MOST_SAID)
             notes.append(
-                f"not computed: {listed}: slopes of what is a slope by itself; kincheck run has"
-                " them for rigid joints"
+                f"not computed: {listed}: slopes of slopes, or with the other wheel held; kincheck"
+                " run has them for rigid joints"
             )
         if not self.mechanism.forces:
             notes.append(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...case.compliance import Load
+from ...errors import number_of
 from ...harness.record import Record, Results
 from ...report.figures import Figure, Style
 from ...report.page_model import Plot
@@ -18,7 +19,7 @@ from ...report.sections import Diagram, Report, Section
 from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .study import ComplianceCurves, ComplianceResults, Curve
+from .study import MOST_SAID, ComplianceCurves, ComplianceResults, Curve
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -136,12 +137,25 @@ def _cell(value: float) -> str:
     return repr(float(value)) if math.isfinite(value) else ""
 
 
+def failures(results: ComplianceResults) -> list[str]:
+    """Return the first samples without equilibrium, the number of further ones, and a remedy."""
+    every = results.failures
+    if not every:
+        return []
+    more = len(every) - MOST_SAID
+    rest = f"{number_of(more, 'further sample')} without equilibrium; " if more > 0 else ""
+    return [*every[:MOST_SAID], f"{rest}give less travel or load, or stiffer springs and bushings"]
+
+
 def lines(results: ComplianceResults) -> Iterator[str]:
     """Yield the slopes and rates at the sample nearest to design, and the ends of each curve."""
     curves = results.travel
-    k = int(np.argmin(np.abs(curves.at)))
     unit, factor = unit_of_axis(curves)
     yield f"{results.case}: {results.signs}"
+    k = _near_design(curves)
+    if not math.isfinite(curves.wheel_load[k]):
+        yield f"no equilibrium at any of {len(curves.at)} samples of travel"
+        return
     yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
     for name, each in curves.outputs.items():
         shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
@@ -159,8 +173,11 @@ def page(results: ComplianceResults) -> str:
     sections = [_section(number, curves) for number, curves in enumerate(every)]
     if results.checked is not None:
         sections.append(_agreement(results.checked))
-    k = int(np.argmin(np.abs(results.travel.at)))
-    matrix = [[f"{x:.4g}" for x in row] for row in results.travel.compliance[k].tolist()]
+    k = _near_design(results.travel)
+    found = (
+        results.travel.compliance[k].tolist() if np.isfinite(results.travel.wheel_load[k]) else []
+    )
+    matrix = [[f"{x:.4g}" for x in row] for row in found]
     note = (
         "Rows: displacement [m] and turn [rad] at the contact; columns: force [N] and torque [N m]"
         " there; global axes, six for each wheel."
@@ -212,3 +229,9 @@ def _agreement(checked: Results) -> Section:
 
 def _drawn(values: Array) -> list[float | None]:
     return [float(f"{x:.10g}") if math.isfinite(x) else None for x in values.tolist()]
+
+
+def _near_design(curves: ComplianceCurves) -> int:
+    """Return the sample nearest to design, of those with an equilibrium if there are any."""
+    reached = np.isfinite(curves.wheel_load)
+    return int(np.argmin(np.where(reached, np.abs(curves.at), np.inf)))

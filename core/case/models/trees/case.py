@@ -99,9 +99,10 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
         if own.driven and len(own.driven) == Freedom(model, axes).dof:
             driving = own
             names = shortened([*own.driven], MOST_NAMED)
+            moves = "moves through its" if len(own.driven) == 1 else "move through their"
             note = (
-                f"nothing is said of what drives it: {names} move through their limits, as the file"
-                " has motors there; other motions by --drive"
+                f"nothing is said of what drives it: {names} {moves} limits, as the file has motors"
+                " there; other motions by --drive"
             )
             model = replace(model, notes=(*model.notes, note))
     chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)

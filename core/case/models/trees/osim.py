@@ -211,6 +211,8 @@ class _Reader:
         tried = [normpath(joined(each, text)) for each in (owner, owner.rpartition("/")[0] or "/")]
         tried += [f"/bodyset/{text}", f"/{text}"]
         found = next((path for path in tried if path in self.paths), "")
+        if not found and "/ground" in tried:  # OpenSim has a ground without <Ground> too
+            return self.graph.add_world(), ORIGIN
         frame = self.paths.get(found)
         if frame is None or not text or frame.tag not in ("Ground", "Body", "PhysicalOffsetFrame"):
             known = [path for path, each in self.paths.items() if each.tag == "Body"]
