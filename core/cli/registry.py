@@ -89,11 +89,16 @@ class Registry:
             KincheckError: there is no such case, a pattern matches several, its file is invalid,
                 or its drivers do not match its degrees of freedom.
         """
+        from ..case.case import Case
         from ..case.models.files import DATASETS, SUFFIXES, load
         from ..kinematics import require_driven
 
-        if not isinstance(name, str | Path):
+        if isinstance(name, Case):
             return name
+        if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise KincheckError(f"{name!r} is no case. Give a name, a path, or a kincheck.Case.")
+        if not isinstance(supplied, Supplied):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise KincheckError(f"supplied: found {supplied!r}, expected kincheck.Supplied(...)")
         name = str(name)
         matching, known = self.matching(name), self.cases()
         if len(matching) > 1:
@@ -112,9 +117,10 @@ class Registry:
         elif Path(name).suffix in SUFFIXES or os.sep in name or os.path.exists(name):
             case = load(Path(name), supplied)
         else:
+            missing = unknown("case", name, known)
             raise KincheckError(
-                unknown("case", name, known)
-                + ". Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
+                f"{missing}{'' if missing.endswith('?') else '.'}"
+                " Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
                 " .urdf, .sdf, .usd, .osim or .adm"
             )
         # a dataset says itself which freedoms are left to a recording
