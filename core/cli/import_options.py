@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
-from ..options import with_values
+from ..options import group, joint_types, options, with_values
 from . import parser
-from .registry import add_joint_types
 from .registry import tell_left_out as tell_left_out
 
 if TYPE_CHECKING:
@@ -21,10 +20,15 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
+@options
+class _Files:
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied)
+
+
 def add_options(command: argparse.ArgumentParser) -> None:
     """Add the options to a command's parser."""
-    add_joint_types(command)
-    parser.add_options(command, Supplied)
+    parser.add_options(command, _Files)
 
 
 def return_cases(cases: Sequence[T], supplied: Supplied) -> tuple[list[T | str], Supplied]:

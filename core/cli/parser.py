@@ -27,6 +27,11 @@ class Parser(argparse.ArgumentParser):
     usage of the outermost parser. Here their own command reports them first.
     """
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        # values such as -60mm:60mm are no options
+        self._negative_number_matcher = re.compile(r"-\.?\d")
+
     def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, args: Any = None, namespace: Any = None
     ) -> Any:

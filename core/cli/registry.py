@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -262,20 +261,6 @@ class Registry:
 def tell_left_out(cases: Iterable[Case]) -> None:
     """Print on standard error the parts of other tools' files that were left out."""
     complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)
-
-
-def add_joint_types(command: argparse.ArgumentParser) -> None:
-    """Add the option for joint types to a command for case files; `main` loads the classes."""
-    command.add_argument(
-        "--joint-type",
-        action="append",
-        default=[],
-        metavar="MODULE:CLASS",
-        help=(
-            "your own joint type for case files, in a module of this folder or an installed one;"
-            " may be repeated; check-joint checks it"
-        ),
-    )
 
 
 def given(options: object, names: Iterable[str]) -> str:
