@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any, Literal, TypeVar, cast, dataclass_transform
@@ -208,34 +208,48 @@ def read_values(found: T) -> T:
         KincheckError: a value cannot be read.
     """
     values: dict[str, Any] = {}
-    for each, meaning, _ in declared(type(found)):
+    for each, meaning, below in declared(type(found)):
         value: Any = getattr(found, each.name)
-        if meaning is None or not each.init or meaning.action == "store_true":
+        default: Any = cast("Any", each).default
+        if not each.init:
+            continue
+        if meaning is None:
+            values[each.name] = below() if value is None else value
+            if not isinstance(values[each.name], type(below())):
+                raise KincheckError(
+                    f"{each.name}: found {value!r}, expected kincheck.{type(below()).__name__}(...)"
+                )
+            continue
+        if meaning.action == "store_true":
+            if value is not None and value not in (True, False):
+                raise KincheckError(f"{each.name}: found {value!r}, expected True or False")
             continue
 
         def read(one: Any, meaning: Option = meaning) -> Any:
             return one if meaning.read is str else meaning.read(str(one))
 
-        many = isinstance(each.default, tuple) or meaning.nargs == "+"
+        many = isinstance(default, tuple) or meaning.nargs == "+"
+        known = [*map(str, meaning.choices or ())]
+        if known and not many and value is not None and str(value) not in known:
+            raise KincheckError(unknown(each.name, str(value), known))
         try:
             if many:
                 values[each.name] = tuple(map(read, several(value)))
             elif value is not None:
                 values[each.name] = read(value)
+            elif default is not MISSING:
+                values[each.name] = default
         except (KincheckError, ValueError) as error:
             raise KincheckError(f"{each.name}: {error}") from None
-        one, known = values.get(each.name), meaning.choices or ()
-        if known and not many and one not in (None, *known):
-            raise KincheckError(unknown(each.name, str(one), [*map(str, known)]))
     return with_values(found, **values)
 
 
-def several(given: T | Sequence[T] | None) -> tuple[T, ...]:
+def several(given: T | Iterable[T] | None) -> tuple[T, ...]:
     """Return the values of an option that takes several, one, or none."""
     if given is None:
         return ()
-    one = isinstance(given, str) or not isinstance(given, Sequence)
-    return tuple(cast("Sequence[T]", (given,) if one else given))
+    one = isinstance(given, str | Mapping) or not isinstance(given, Iterable)
+    return tuple(cast("Iterable[T]", (given,) if one else given))
 
 
 def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable[..., Any]:
@@ -252,10 +266,15 @@ def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable
     def found(*args: Any, **kwargs: Any) -> Any:
         if len(args) > 1 and first is not None and first.nargs == "+":
             args = (args,)  # the only argument without a name
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as error:
+            known = ", ".join(signature.parameters)
+            raise TypeError(f"{name}: {error}; its arguments: {known}") from None
         return call(read_values(command(*args, **kwargs)))
 
     signature, answer = inspect.signature(command), inspect.signature(command.answer)
-    options = {each.name: each for each, meaning, _ in declared(command) if meaning is not None}
+    helps = {each.name: each for each, meaning, _ in declared(command) if meaning is not None}
     lines = [
         fill(
             f"{each}: {option.metadata['option'].help % {'default': option.default}}.",
@@ -265,7 +284,7 @@ def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable
             break_on_hyphens=False,
         )
         for each in signature.parameters
-        if (option := options.get(each))
+        if (option := helps.get(each))
     ]
     found.__name__ = found.__qualname__ = name
     found.__doc__ = "\n".join([inspect.getdoc(command.answer) or "", "", "Args:", *lines])

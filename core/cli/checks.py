@@ -71,6 +71,7 @@ TOPOLOGIES = {
     "outputs of orientation": "mcpherson_suspension",
 }
 """Built-in cases by a word on their structure."""
+NAME_ONE = "Name one engine to check: MODULE:CLASS or --engine-command."
 
 
 @options
@@ -104,6 +105,8 @@ class CheckEngine(Command):
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine
 
+        if self.engine is not None and self.engine_command is not None:
+            raise KincheckError(NAME_ONE)
         program = self.engine_command
         engine = ProgramEngine(program) if program is not None else self.engine
         problems = list[str]()
@@ -116,8 +119,8 @@ class CheckEngine(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        if (self.engine is None) == (self.engine_command is None):
-            raise KincheckError("Name one engine to check: MODULE:CLASS or --engine-command.")
+        if self.engine is None and self.engine_command is None:
+            raise KincheckError(NAME_ONE)
         report = self.answer(registry)
         report.print(sys.stdout, quiet=self.quiet)
         return Status.WITHIN if report.passed else Status.DEVIATES

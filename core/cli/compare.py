@@ -87,6 +87,11 @@ class Compare(Command):
             if not each.driver or each.solved != each.samples
         ]
         if len(designs.curves) < len(cases):
+            apart = "; ".join(designs.other.values()) or "no name is the same"
+            unsolved = unsolved or [
+                f"{', '.join(each.name for each in cases)}: have no output in common: {apart}."
+                " Compare designs with the same outputs."
+            ]
             raise KincheckError("\n".join(unsolved))
         if self.command:
             tell_left_out(cases)
@@ -136,7 +141,8 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise KincheckError(f"{twice}: found twice. Leave one out.")
     if len(names) < 2:
-        raise KincheckError(f"{names[0]}: found one design, expected two or more. Name another.")
+        count = f"{names[0]}: found one design" if names else "compare: found none"
+        raise KincheckError(f"{count}, expected two or more. Name another.")
     cases: list[Case] = []
     problems: list[str] = []
     for each in given:

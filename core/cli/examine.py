@@ -365,6 +365,8 @@ class MoveFreely(Command):
             )
         rates: Mapping[str, float] = given.rates if given else {}
         rates = rates if self.rates is None else self.rates
+        if not isinstance(rates, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise KincheckError(f"rates: found {rates!r}, expected {{DRIVER or JOINT: rate}}")
         return free_of(replace(case, free=Free(duration, samples, rates)))
 
     def run(self, registry: Registry) -> int:

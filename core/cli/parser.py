@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, field
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeVar, cast
 
 from ..errors import KincheckError, brief, similar, unknown
@@ -25,6 +26,11 @@ class Parser(argparse.ArgumentParser):
     argparse reports unknown options and superfluous arguments after all other errors, with the
     usage of the outermost parser. Here their own command reports them first.
     """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        # values such as -60mm:60mm are no options
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, args: Any = None, namespace: Any = None
@@ -75,6 +81,19 @@ class Parser(argparse.ArgumentParser):
             action,
             f"{brief(str(value))!r} is none of {', '.join(names)}"
             + (f"; did you mean {close!r}?" if close else ""),
+        )
+
+    def _get_option_tuples(self, option_string: str) -> list[Any]:
+        """Return the options that an abbreviation means: --eng is --engine, and not
+        --engine-command, which only lengthens it.
+        """
+        found: list[Any] = cast("Any", super())._get_option_tuples(option_string)
+        names = [each[1] for each in found]
+        first = min(names, key=len, default="")
+        return (
+            [min(found, key=lambda each: len(each[1]))]
+            if (found and all(name.startswith(f"{first}-") for name in names if name != first))
+            else found
         )
 
     def _own_options(self, args: Sequence[str]) -> Iterator[str]:
@@ -170,7 +189,7 @@ def add_options(parser: argparse.ArgumentParser, cls: Any, given: Collection[str
         if name in given:  # a default would overwrite what stands there
             facts["default"] = argparse.SUPPRESS
         if meaning.action != "store_true":
-            facts |= {"type": _reader(meaning.read), "metavar": meaning.metavar}
+            facts |= {"type": _reader(meaning), "metavar": meaning.metavar}
             facts["choices"] = meaning.choices
         for key in ("nargs", "action", "required"):
             if value := getattr(meaning, key):
@@ -189,16 +208,23 @@ def _name_of(each: Field[Any], meaning: Option) -> str:
     return last.removeprefix("--").replace("-", "_")
 
 
-def _reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+def _reader(meaning: Option) -> Callable[[str], Any]:
     """Return a reader whose messages argparse prints."""
+    read = meaning.read
     if read is str:
         return str
 
     def reader(text: str) -> Any:
+        if read is Path and not text:  # which would be this folder
+            raise argparse.ArgumentTypeError("found an empty name; give one, or leave it out")
         try:
             return read(text)
         except KincheckError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
+        except ValueError:
+            if meaning.choices:
+                return text  # refused with the choices
+            raise
 
     reader.__name__ = read.__name__  # in argparse's own messages
     return reader

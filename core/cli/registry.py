@@ -92,8 +92,10 @@ class Registry:
 
         if isinstance(name, Case):
             return name
-        if not isinstance(name, str | Path):
-            raise KincheckError(f"found {name!r}, expected a case. Give its name, file or Case.")
+        if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise KincheckError(f"{name!r} is no case. Give a name, a path, or a kincheck.Case.")
+        if not isinstance(supplied, Supplied):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise KincheckError(f"supplied: found {supplied!r}, expected kincheck.Supplied(...)")
         name = str(name)
         matching, known = self.matching(name), self.cases()
         if len(matching) > 1:
@@ -112,9 +114,10 @@ class Registry:
         elif Path(name).suffix in SUFFIXES or os.sep in name or os.path.exists(name):
             case = load(Path(name), supplied)
         else:
+            missing = unknown("case", name, known)
             raise KincheckError(
-                unknown("case", name, known)
-                + ". Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
+                f"{missing}{'' if missing.endswith('?') else '.'}"
+                " Case files end in .toml or .json, tables in .csv or .xlsx, models in .xml,"
                 " .urdf, .sdf, .usd, .osim or .adm"
             )
         # a dataset says itself which freedoms are left to a recording

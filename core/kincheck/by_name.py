@@ -60,7 +60,7 @@ def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
     Raises:
         KincheckError: there is no such case, or its file is invalid.
     """
-    return registry().find_case(str(name), supplied, driven=False)
+    return registry().find_case(name, supplied, driven=False)
 
 
 def compliance(

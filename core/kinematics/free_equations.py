@@ -386,9 +386,13 @@ def start_velocities(
     if not rates:
         return np.zeros(equations.unknowns)
     known = coordinates(mechanism)
-    for name in rates:
+    for name, rate in rates.items():
+        what = ""
         if name not in known:
             what = unknown("driver or joint with a rotation or translation", name, known)
+        elif isinstance(rate, str) or not np.isfinite(rate):
+            what = f"{name}: found {rate!r}, expected a number"
+        if what:
             raise SolveError(f"rates of mechanism {mechanism.name!r}: {what}")
     named = [known[name] for name in rates]
     held = [each for each in (*mechanism.drivers, *known.values()) if each not in named]

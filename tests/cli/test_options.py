@@ -2,6 +2,10 @@
 anything is computed.
 """
 
+import math
+import re
+
+import kincheck
 import pytest
 from kincheck.core.case.io.atomic_files import unwritable
 from kincheck.core.cli.main import main
@@ -37,6 +41,14 @@ REFUSED = [
      "argument --memory: '1e300' is too large. Give 1e+09 at most."),
     ("run rssr --timeout 2e9",
      "argument --timeout: '2e9' is too large. Give 1e+09 at most."),
+    ("run rssr --out=", "argument --out: found an empty name; give one, or leave it out"),
+    ("kc rssr --travel -60mm:60mm:5", "rssr: no point is the wheel's centre"),
+    ("export rssr --at -3degg --to mjcf", "'-3degg' is not a number with one of the units"),
+    ("run rssrr", "did you mean 'rssr'? Case files end in"),
+    ("compare mcpherson_suspension mcpherson_strut", "have no output in common"),
+    ("sweep rssr --vary x --sampling ltin",
+     "'ltin' is none of random, latin, sobol; did you mean 'latin'?"),
+    ("sweep rssr --vary x --order x", "'x' is none of 0, 1, 2"),
     ("stress --family unit", "there is no family 'unit'; did you mean 'units'?"),
     ("stress --engine nativ", "there is no engine 'nativ'"),
     ("stress --samples 0", "'0' is not a whole number of 1 or more"),
@@ -90,6 +102,22 @@ ONE_FILE = [
 ]  # fmt: skip
 
 
+PYTHON = [
+    (lambda: kincheck.run(3, "native"), "3 is no case. Give a name, a path, or"),
+    (lambda: kincheck.load(["rssr"]), "['rssr'] is no case"),
+    (lambda: kincheck.load("rssr", "mm"), "supplied: found 'mm', expected kincheck.Supplied(...)"),
+    (lambda: kincheck.explain("rssr", "mm"), "supplied: found 'mm', expected kincheck.Supplied"),
+    (lambda: kincheck.run("rssr", static="no"), "static: found 'no', expected True or False"),
+    (lambda: kincheck.sweep("rssr", "x", sampling="ltin"), "did you mean 'latin'?"),
+    (lambda: kincheck.compare([]), "compare: found none, expected two or more"),
+    (lambda: kincheck.check_engine("native", engine_command="x"), "Name one engine to check"),
+    (lambda: kincheck.free("bricard", rates=[1]), "rates: found [1], expected {DRIVER or JOINT"),
+    (lambda: kincheck.free("bricard", rates={"hinge": math.nan}), "hinge: found nan, expected"),
+    (lambda: kincheck.run("rssr", engine="native"), "run: got an unexpected keyword argument"),
+    (lambda: kincheck.explain(), "explain: missing a required argument: 'case'; its arguments:"),
+]  # fmt: skip
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """In a folder with a file, a link to it, a folder, and what varies of a strut."""
@@ -108,6 +136,25 @@ def test_invalid_command_lines_are_refused(line, said, here, capsys):
     out, err = capsys.readouterr()
     assert (out, said in err) == ("", True), err
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(("call", "said"), PYTHON)
+def test_invalid_arguments_in_python_are_refused(call, said):
+    with pytest.raises((kincheck.KincheckError, TypeError), match=re.escape(said)):
+        call()
+
+
+def test_none_and_any_iterable_are_arguments():
+    found = kincheck.run((each for each in ["rssr"]), {"native"}, tol=None, supplied=None)
+    assert [(each.case, each.engine) for each in found.records] == [("rssr", "native")]
+    assert found.run["tol"] == 1e-12
+
+
+def test_an_abbreviation_is_the_shortest_option(capsys):
+    assert main(["run", "rssr", "--eng", "native", "-q"]) == 0
+    assert capsys.readouterr().out == "1 pass\n"
+    assert main(["run", "rssr", "--re", "native"]) == 2
+    assert "ambiguous option: --re could match --reference, --require" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("line", "option", "other"), ONE_FILE)

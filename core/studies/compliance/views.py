@@ -174,10 +174,9 @@ def page(results: ComplianceResults) -> str:
     if results.checked is not None:
         sections.append(_agreement(results.checked))
     k = _near_design(results.travel)
-    found = (
-        results.travel.compliance[k].tolist() if np.isfinite(results.travel.wheel_load[k]) else []
-    )
-    matrix = [[f"{x:.4g}" for x in row] for row in found]
+    matrix = list[list[str]]()
+    if math.isfinite(results.travel.wheel_load[k]):
+        matrix = [[f"{x:.4g}" for x in row] for row in results.travel.compliance[k].tolist()]
     note = (
         "Rows: displacement [m] and turn [rad] at the contact; columns: force [N] and torque [N m]"
         " there; global axes, six for each wheel."
