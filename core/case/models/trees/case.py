@@ -4,6 +4,7 @@ others held.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -37,7 +38,7 @@ from ...io.document import SMALLEST, explained, fault, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
-from .driving import Driving, Freedom, choose_held, read_driving, read_start
+from .driving import KEYFRAME, Driving, Freedom, choose_held, read_driving, read_start
 from .element import Names
 from .limits import motor_ranges
 from .place import Place, coordinates, rotation_vector
@@ -94,16 +95,22 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     model = assemble(start, supplied.closure, driving.moves)
     spins = find_spins(model.tree, driving.fixed)
     axes = {name: spin.axis for name, spin in spins.items()}
+    used = Counter({"keyframe: key": any(each.startswith(KEYFRAME) for each in supplied.start)})
     if not (driving.moves or driving.fixed or supplied.hold_rest):
         own = read_driving(tree, replace(supplied, drive=motor_ranges(tree)))
         if own.driven and len(own.driven) == Freedom(model, axes).dof:
             driving = own
-            names = shortened([*own.driven], MOST_NAMED)
-            note = (
-                f"nothing is said of what drives it: {names} move through their limits, as the file"
-                " has motors there; other motions by --drive"
+            names, used = shortened([*own.driven], MOST_NAMED), used + tree.motors
+            moves = (
+                f"joint {names} moves through its limits, as the file has a motor there"
+                if len(own.driven) == 1
+                else f"joints {names} move through their limits, as the file has motors there"
             )
+            note = f"nothing is said of what drives it: {moves}; other motions by --drive"
             model = replace(model, notes=(*model.notes, note))
+    left = {what: count - used[what] for what, count in tree.left_out.items()}
+    left_out = {what: count for what, count in left.items() if count}
+    model = replace(model, tree=replace(model.tree, left_out=left_out))
     chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:

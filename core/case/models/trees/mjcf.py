@@ -13,6 +13,7 @@ from typing import TypeAlias, cast
 from ....algebra import X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
+from ...io.document import shown
 from .element import Element, significant_digits, words
 from .mjcf_language import (
     DYNAMIC,
@@ -57,6 +58,7 @@ _EQUALITIES = ("connect", "weld", "joint", "tendon")
 _Part: TypeAlias = tuple[Element, Place, str]
 """An element, the place of the frame it is given in, and its default class."""
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
+RANGES = f"{DYNAMIC['range']} of joints"
 
 
 def whole_mjcf(file: Path, root: Element) -> Element:
@@ -159,8 +161,12 @@ class _Reader:
             qpos = key.attributes.get("qpos")
             numbers = None if qpos is None else qpos.split()
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
-        driven = [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS]
-        tree.actuated.update(filter(None, driven))
+        for section in root.only("actuator"):
+            for motor in section.only(*_ACTUATORS):
+                joint = {motor.attributes.get("joint", "")} & tree.moves.keys()
+                tree.add_motor(f"actuator: {motor.tag}", joint)
+        ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
+        tree.motors[RANGES] = sum(ranges)
         tree.degrees, tree.limited = self.compiler.degrees, self.compiler.limited
         if tree.masses:
             tree.gravity = self._gravity()
@@ -266,6 +272,7 @@ class _Reader:
                 self.tree.count(f"{what} of joints")
         reference = element.number("ref", 0.0)
         point = given.point(vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0))))
+        _require_range(element)
         if kind == "hinge":
             reference = self.compiler.angle(reference)
         axis = direction(element, "axis", element.numbers("axis", 3, default=(0.0, 0.0, 1.0)))
@@ -418,6 +425,7 @@ class _Reader:
                         tree.count(f"{what} of joints")
         for section in self.root.only("tendon"):
             for tendon in section.children:
+                _require_range(self.classes.complete(tendon, "tendon"))
                 try:
                     strut = self._strut(tendon)
                 except CaseError:
@@ -472,6 +480,19 @@ class _Reader:
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z
         return found
+
+
+def _require_range(element: Element) -> None:
+    """Refuse limits without a range between them, as MuJoCo does: they are meant as an equality."""
+    said, tag = element.attributes, "joint" if element.tag == "joint" else "tendon"
+    if said.get("limited") == "true":
+        lower, upper = element.numbers("range", 2, default=(0.0, 0.0))
+        if not lower < upper:
+            equality = f'<{tag} {tag}1="{said.get("name", "NAME")}" polycoef="CHANGE SINCE qpos0"/>'
+            raise element.fault(
+                f"range: found {shown(said.get('range', ''))} with limited, expected the lower"
+                f" limit first; correct it, or hold what is constant by an equality, {equality}"
+            )
 
 
 def _class(element: Element, childclass: str) -> str:

@@ -438,8 +438,8 @@ class _Reader:
             elif each.tag == "PointToPointSpring":
                 self._spring(each)
             else:
-                if each.tag.endswith("CoordinateActuator") and coordinate in self.values:
-                    tree.actuated.add(coordinate)
+                if each.tag.endswith("CoordinateActuator"):
+                    tree.add_motor(each.tag, {coordinate} & self.values.keys())
                 tree.count(each.tag)
 
     def _spring(self, element: Element) -> None:

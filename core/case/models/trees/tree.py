@@ -8,7 +8,8 @@ chain of massless ones, a move each. Loops are closed by ties.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -242,6 +243,8 @@ class Tree:
         unweighed: moving links whose masses cannot be read.
         springs: by move; others are of no move of the tree.
         actuated: moves with a motor.
+        motors: numbers of parts of motors and of limits of their moves, by their names in
+            `left_out`, where they are unless they say what drives the model.
         keyframes: by name.
         starts: keyframes of some moves alone, as --start takes their values.
         left_out: numbers of parts without a meaning for kinematics, by name.
@@ -270,6 +273,7 @@ class Tree:
     springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
     struts: list[Strut] = field(default_factory=list[Strut])
     actuated: set[str] = field(default_factory=set[str])
+    motors: Counter[str] = field(default_factory=Counter[str])
     starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
@@ -288,6 +292,11 @@ class Tree:
     def count(self, what: str) -> None:
         """Count one more omitted item."""
         self.left_out[what] = self.left_out.get(what, 0) + 1
+
+    def add_motor(self, part: str, moves: Collection[str]) -> None:
+        """Add a motor of moves, which is a part that is left out."""
+        self.actuated.update(moves)
+        self.motors[part] += bool(moves)
 
     def hang(
         self, element: Element, name: str, outer: str, place: Place, moves: Sequence[Move] = ()

@@ -147,15 +147,15 @@ class _Robot:
         add_ties(graph, ((each, self._named, framed) for each in root.children))
         self.beside.add(graph)
         self._require_apart(frames)
-        commanded = [
-            joint
-            for control in root.only("ros2_control")
-            for joint in control.only("joint")
-            if any(joint.only("command_interface"))
-        ]
-        driven = [joint for each in root.only("transmission") for joint in each.only("joint")]
-        names = {joint.attributes.get("name", "") for joint in (*driven, *commanded)}
-        graph.tree.actuated |= names & self.joints.keys()
+        for motor in root.only("transmission", "ros2_control"):
+            names = {
+                joint.attributes.get("name", "")
+                for joint in motor.only("joint")
+                if motor.tag == "transmission" or any(joint.only("command_interface"))
+            }
+            graph.tree.add_motor(motor.tag, names & self.joints.keys())
+        limited = [any(self.joints[name].only("limit")) for name in graph.tree.actuated]
+        graph.tree.motors["limit of joints"] = sum(limited)
 
     def _links(self) -> None:
         root, graph = self.root, self.graph
