@@ -40,7 +40,6 @@ from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
 from .driving import KEYFRAME, Driving, Freedom, choose_held, read_driving, read_start
 from .element import Names
-from .limits import motor_ranges
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, together
 
@@ -97,7 +96,7 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     axes = {name: spin.axis for name, spin in spins.items()}
     used = Counter({"keyframe: key": any(each.startswith(KEYFRAME) for each in supplied.start)})
     if not (driving.moves or driving.fixed or supplied.hold_rest):
-        own = read_driving(tree, replace(supplied, drive=motor_ranges(tree)))
+        own = read_driving(tree, replace(supplied, drive=_motor_ranges(tree)))
         if own.driven and len(own.driven) == Freedom(model, axes).dof:
             driving = own
             names, used = shortened([*own.driven], MOST_NAMED), used + tree.motors
@@ -117,6 +116,13 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
         note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
+
+
+def _motor_ranges(tree: Tree) -> tuple[str, ...]:
+    """Return the ranges of all joints with a motor, as --drive takes them; none without limits."""
+    limits = {name: move.limit for name, move in tree.joints.items() if name in tree.actuated}
+    ranges = (f"{name}:{each.lower!r}:{each.upper!r}" for name, each in limits.items())
+    return tuple(ranges) if all(each.is_range for each in limits.values()) else ()
 
 
 def _require_coupled(tree: Tree) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from ....algebra import IDENTITY, ZERO, Quat, Vec3
 from .element import Element
 from .graph import Graph, Joint, Loop
+from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .tree import Kind, Move
 
@@ -23,11 +24,11 @@ class Freedom:
 
     Attributes:
         axis: in the first frame, turned by the moves before.
-        element: with the limits of the move.
         value: its coordinate in the pose of the file [m or rad]; None for the nearest to the places
             of the links.
         stands: it keeps its value, and is no move.
         turn: of a ball, in the pose of the file; None for the nearest.
+        key: of its drive and state in USD, as names of schemas end.
     """
 
     name: str
@@ -37,6 +38,8 @@ class Freedom:
     value: float | None = None
     stands: bool = False
     turn: Quat | None = None
+    limit: Limit = NO_LIMIT
+    key: str = ""
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,10 @@ def _joined(
     motion, moved = joint.motion(second.seen_from(first))
     behind = first.then(motion)
     moves[joint.name] = [
-        Move(each.name, each.kind, behind.at, first.direction(axis), each.element, value)
+        Move(
+            *(each.name, each.kind, behind.at, first.direction(axis), each.element, value),
+            limit=each.limit,
+        )
         for each, axis, value in moved
     ]
     return Joint(joint.name, joint.links, moves[joint.name], joint.element), (behind, second)

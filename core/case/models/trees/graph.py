@@ -16,6 +16,7 @@ from ....algebra import Vec3, X
 from ....mechanism.mechanism import GROUND
 from ...io.document import SMALLEST
 from .element import Element, significant_digits
+from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place
 from .tree import WORLD, Closure, Coupling, Kind, Mass, Move, Strut, Tree
 
@@ -43,10 +44,18 @@ class Joint:
 
     @staticmethod
     def of(
-        name: str, links: tuple[str, str], at: Vec3, freedoms: Sequence[Freedom], element: Element
+        name: str,
+        links: tuple[str, str],
+        at: Vec3,
+        freedoms: Sequence[Freedom],
+        element: Element,
+        limit: Limit = NO_LIMIT,
     ) -> Joint:
         """Return a joint whose moves go through one point."""
-        moves = [Move(f"{name}{end}", kind, at, axis, element) for end, kind, axis in freedoms]
+        moves = [
+            Move(f"{name}{end}", kind, at, axis, element, limit=limit)
+            for end, kind, axis in freedoms
+        ]
         return Joint(name, links, moves, element)
 
     @property

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import TypeAlias, cast
@@ -15,6 +16,7 @@ from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
 from ...io.document import shown
 from .element import Element, significant_digits, words
+from .limits import Limit, limit_of
 from .mjcf_language import (
     DYNAMIC,
     EXPANDED,
@@ -167,7 +169,6 @@ class _Reader:
                 tree.add_motor(f"actuator: {motor.tag}", joint)
         ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
         tree.motors[RANGES] = sum(ranges)
-        tree.degrees, tree.limited = self.compiler.degrees, self.compiler.limited
         if tree.masses:
             tree.gravity = self._gravity()
         return tree
@@ -272,11 +273,40 @@ class _Reader:
                 self.tree.count(f"{what} of joints")
         reference = element.number("ref", 0.0)
         point = given.point(vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0))))
-        _require_range(element)
+        limit = self._limit(element)
         if kind == "hinge":
-            reference = self.compiler.angle(reference)
+            angle = self.compiler.angle
+            reference = angle(reference)
+            limit = replace(limit, lower=angle(limit.lower), upper=angle(limit.upper))
         axis = direction(element, "axis", element.numbers("axis", 3, default=(0.0, 0.0, 1.0)))
-        return Move(name, kind, point, given.direction(axis), element, reference)
+        return Move(name, kind, point, given.direction(axis), element, reference, limit)
+
+    def _limit(self, element: Element) -> Limit:
+        """Return the limits of a joint or tendon that act, in the units of the file.
+
+        Raises:
+            CaseError: they have no range between them, as MuJoCo refuses it; an equality is meant.
+        """
+        found: list[Limit] = []
+        for key, flag in (("range", "limited"), ("actuatorfrcrange", "actuatorfrclimited")):
+            said = element.choice(flag, ("true", "false", "auto"), "auto")
+            on = said == "true" or (said == "auto" and self.compiler.limited)
+            text = element.attributes.get(key, "") if on else ""
+            ends = text.split()
+            if ends and len(ends) != 2:
+                raise element.fault(f"{key}: expected two numbers; correct the attribute")
+            limit = limit_of(element, dict(zip(("lower", "upper"), ends, strict=False)))
+            if said == "true" and not limit.lower < limit.upper:
+                tag = "joint" if element.tag == "joint" else "tendon"
+                name = element.attributes.get("name", "NAME")
+                equality = f'<{tag} {tag}1="{name}" polycoef="CHANGE SINCE qpos0"/>'
+                raise element.fault(
+                    f"{key}: found {shown(text)} with {flag}, expected the lower limit first;"
+                    f" correct it, or hold what is constant by an equality, {equality}"
+                )
+            found.append(limit)
+        limit, effort = found
+        return replace(limit, effort=max(abs(effort.lower), abs(effort.upper)))
 
     def _equalities(self) -> None:
         names = set[str]()
@@ -425,7 +455,7 @@ class _Reader:
                         tree.count(f"{what} of joints")
         for section in self.root.only("tendon"):
             for tendon in section.children:
-                _require_range(self.classes.complete(tendon, "tendon"))
+                self._limit(self.classes.complete(tendon, "tendon"))
                 try:
                     strut = self._strut(tendon)
                 except CaseError:
@@ -480,19 +510,6 @@ class _Reader:
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z
         return found
-
-
-def _require_range(element: Element) -> None:
-    """Refuse limits without a range between them, as MuJoCo does: they are meant as an equality."""
-    said, tag = element.attributes, "joint" if element.tag == "joint" else "tendon"
-    if said.get("limited") == "true":
-        lower, upper = element.numbers("range", 2, default=(0.0, 0.0))
-        if not lower < upper:
-            equality = f'<{tag} {tag}1="{said.get("name", "NAME")}" polycoef="CHANGE SINCE qpos0"/>'
-            raise element.fault(
-                f"range: found {shown(said.get('range', ''))} with limited, expected the lower"
-                f" limit first; correct it, or hold what is constant by an equality, {equality}"
-            )
 
 
 def _class(element: Element, childclass: str) -> str:

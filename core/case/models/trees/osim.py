@@ -19,7 +19,6 @@ from pathlib import Path
 from posixpath import join as joined
 from posixpath import normpath
 
-import numpy as np
 from numpy.polynomial import Polynomial
 
 from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
@@ -30,6 +29,7 @@ from ...io.document import fault, read_text, shown
 from .element import Element, parse_xml, words
 from .framed import FramedJoint, Freedom, join
 from .graph import Graph, Joint, Loop
+from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .robot_elements import HALFWAY, direction, mass_in
 from .tree import BushingLaw, Closure, Coupling, Kind, Move, Spring, Strut, Tree
@@ -290,11 +290,9 @@ class _Reader:
         self.values[name] = self._default(coordinate)
         if _flag(coordinate, "locked"):
             self.ties.append(Coupling(f"{name}.lock", {name: 1.0}, {}, (0.0,), coordinate))
-        lower, upper = "-inf", "inf"
-        if _flag(coordinate, "clamped"):
-            lower, upper = map(repr, _numbers(coordinate, "range", 2, (-np.inf, np.inf)))
-        limit = Element(coordinate.file, "limit", {"lower": lower, "upper": upper}, coordinate.line)
-        return Freedom(name, kind, axis, replace(coordinate, children=[limit]), self.values[name])
+        clamped = _flag(coordinate, "clamped")
+        limit = Limit(*_numbers(coordinate, "range", 2, ())) if clamped else NO_LIMIT
+        return Freedom(name, kind, axis, coordinate, self.values[name], limit=limit)
 
     def _custom(self, element: Element, name: str) -> list[Freedom]:
         """Return the moves of a custom joint: of each coordinate the first axis that it moves as

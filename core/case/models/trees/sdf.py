@@ -19,6 +19,7 @@ from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from .element import Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
+from .limits import NO_LIMIT, Limit, limit_of
 from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
@@ -375,7 +376,7 @@ class _Joint:
     def read(self, links: tuple[str, str]) -> Joint:
         """Return the joint between two links; add mimics, couplings and springs."""
         joint = Joint.of(self.name, links, self.place.at, self._freedoms(), self.element)
-        moves = joint.moves
+        moves = [replace(each, limit=self._limit(each)) for each in joint.moves]
         mimics: list[Coupling] = []
         for tag, move in zip(("axis", "axis2"), moves, strict=False):
             for axis in self.element.only(tag):
@@ -385,7 +386,16 @@ class _Joint:
         if (element := self.element.child(MIMIC)) is not None:
             mimics.append(self._drake_mimic(moves, element))
         self.graph.couplings += mimics
-        return joint
+        return replace(joint, moves=moves)
+
+    def _limit(self, move: Move) -> Limit:
+        axis = self.element.child("axis2" if move.name.endswith(".2") else "axis")
+        found = axis and axis.child("limit")
+        if not found:
+            return NO_LIMIT
+        limit = limit_of(found, {each.tag: each.text for each in found.children})
+        sizes = (each if each >= 0.0 else math.inf for each in (limit.effort, limit.velocity))
+        return Limit(limit.lower, limit.upper, *sizes)
 
     def gearbox(self, links: tuple[str, str], joints: Sequence[Joint]) -> Coupling:
         """Return the coupling of the turns of two links about a third.

@@ -22,6 +22,7 @@ from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
 from ...io.document import LARGEST, shown
 from .element import Element, Names
+from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place
 
 WORLD = "world"
@@ -78,6 +79,7 @@ class Move:
         axis: unit vector [-]; without meaning for a ball and a free link.
         element: its place in the file.
         reference: its coordinate in the zero pose [rad or m].
+        limit: of its one coordinate.
         moved: change of its coordinate since the zero pose [rad or m].
         outer, inner: links it joins; the inner one moves on the outer.
     """
@@ -88,6 +90,7 @@ class Move:
     axis: Vec3
     element: Element
     reference: float = 0.0
+    limit: Limit = NO_LIMIT
     moved: float = 0.0
     outer: str = ""
     inner: str = ""
@@ -250,8 +253,6 @@ class Tree:
         left_out: numbers of parts without a meaning for kinematics, by name.
         notes: of its reader, beside every verdict.
         without: names by which the user leaves out elements.
-        dialect: root element of its file.
-        degrees, limited: of MJCF, limits are in degrees, and ranges are limits unless said.
     """
 
     file: Path
@@ -280,9 +281,6 @@ class Tree:
     notes: list[str] = field(default_factory=list[str])
     without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
-    dialect: str = ""
-    degrees: bool = False
-    limited: bool = True
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:

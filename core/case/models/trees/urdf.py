@@ -22,6 +22,7 @@ from ...io.document import shown
 from .beside import read_beside
 from .element import Element, words
 from .graph import Freedom, Graph, Joint, Loop
+from .limits import NO_LIMIT, Limit, limit_of
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
@@ -284,7 +285,7 @@ class _Robot:
             case _:  # of a file beside: a universal joint, by the letters of its axes
                 letters = {each: _AXES[each.lower()] for each in kind}
                 freedoms = [(f"_{k}", "hinge", place.direction(a)) for k, a in letters.items()]
-        return Joint.of(name, links, place.at, freedoms, element)
+        return Joint.of(name, links, place.at, freedoms, element, _limit(element))
 
     def _constraint(self, element: Element, default: str) -> Loop:
         """Return the joint of a <constraint> or <loop_joint>."""
@@ -379,6 +380,16 @@ class _Robot:
             read = IN_GAZEBO if any(_joints_of_sdf(gazebo)) else ()
             link = gazebo.attributes.get("reference", "")
             unread.require_all_apart(gazebo.children, read, link)
+
+
+def _limit(element: Element) -> Limit:
+    found = element.child("limit")
+    if found is None:
+        return NO_LIMIT
+    texts = {"lower": "0", "upper": "0", **found.attributes}
+    if element.attributes.get("type") == "continuous":
+        texts |= {"lower": "", "upper": ""}
+    return limit_of(found, texts)
 
 
 def _mass(element: Element) -> Mass | None:

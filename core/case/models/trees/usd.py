@@ -22,11 +22,11 @@ from ....mechanism.mechanism import Vector
 from .element import Element, words
 from .framed import FramedJoint, Freedom, join
 from .graph import Graph
-from .limits import INFINITE
+from .limits import INFINITE, NO_LIMIT, Limit, limit_of
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
 from .robot_elements import mimic
-from .tree import Closure, Kind, Move, Tree
-from .usd_joints import AXES, GENERIC, ROD, TYPES, Axis, axes_of
+from .tree import UNKNOWNS, Closure, Kind, Move, Tree
+from .usd_joints import AXES, GENERIC, ROD, TYPES, bounds_of, freedoms_of
 from .usd_mass import COLLIDER, masses_of
 from .usd_stage import UNITS
 
@@ -87,7 +87,6 @@ class _Reader:
         bodies = [path for path, each in self.prims.items() if _is_body(each)]
         self.names = _short(bodies)
         self.joints: dict[str, FramedJoint] = {}
-        self.axes: dict[str, Sequence[Axis]] = {}
         self.rods: list[tuple[str, Element, tuple[str, str], tuple[Place, Place], float]] = []
         self.moves: dict[str, list[Move]] = {}
 
@@ -217,30 +216,26 @@ class _Reader:
         if element.tag == ROD:
             self._add_rod(name, element, links, (f, g))
             return
-        axes = axes_of(element)
-        if sum(3 if each.kind == "ball" else 1 for each in axes) == 6:
+        freedoms = freedoms_of(element, name)
+        if sum(UNKNOWNS[each.kind] for each in freedoms) == 6:
             graph.tree.notes.append(f"{element} holds nothing: none of its axes is locked")
             return
         apis = element.attributes["apis"]
-        open_ = [f"{x.key}" for x in axes if x.key and f"LimitAPI:{x.key}" not in apis]
+        open_ = [x.key for x in freedoms if x.key and f"LimitAPI:{x.key}" not in apis]
         if element.tag == GENERIC and open_:
             graph.tree.notes.append(
                 f"{element} leaves {', '.join(open_)} free, which have no PhysicsLimitAPI; Newton"
                 " locks them"
             )
-        if len(turns := [each.key for each in axes if each.kind == "hinge"]) == 2:
+        if len(turns := [each.key for each in freedoms if each.kind == "hinge"]) == 2:
             graph.tree.notes.append(
                 f"{element} turns about {' and then '.join(turns)}, a universal joint as in Newton;"
                 " in PhysX no axis comes first, which is another joint for large turns"
             )
         closes = element.flag("physics:excludeFromArticulation", default=False)
         closes = closes or EQUALITY in apis
-        freedoms = [
-            Freedom(f"{name}{each.end}", each.kind, each.axis, self._limited(element, each))
-            for each in axes
-        ]
+        freedoms = [replace(each, limit=self._limit(element, each)) for each in freedoms]
         self.joints[name] = FramedJoint(name, element, links, (f, g), freedoms, closes)
-        self.axes[name] = axes
 
     def _end(self, element: Element, side: int) -> tuple[str, Place]:
         """Return the body of a joint, empty for the world, and the joint's frame in it [m]."""
@@ -300,11 +295,10 @@ class _Reader:
         """Return the unit of a coordinate [rad or m]."""
         return math.radians(1.0) if kind == "hinge" else self.metre
 
-    def _limited(self, element: Element, freedom: Axis) -> Element:
-        """Return the element of a move with its limits and motor, as <limit> of URDF has them."""
+    def _limit(self, element: Element, freedom: Freedom) -> Limit:
         if freedom.kind == "ball":
-            return element
-        lower, upper = freedom.bounds
+            return NO_LIMIT
+        lower, upper = bounds_of(freedom.key)
         keys = {
             "lower": lower,
             "upper": upper,
@@ -320,10 +314,10 @@ class _Reader:
                 said[name] = repr(element.number(key) * (force if name == "effort" else unit))
         if float(said["lower"]) > float(said["upper"]):
             raise element.fault(
-                f"{freedom.bounds[0]}: is above {freedom.bounds[1]}, expected the lower one;"
+                f"{lower}: is above {upper}, expected the lower one;"
                 " exchange them, or write a PhysicsFixedJoint if it is locked"
             )
-        return replace(element, children=[Element(element.file, "limit", said, element.line)])
+        return limit_of(element, said)
 
     def _couple(self) -> None:
         """Add mimic joints, and find the motors."""
@@ -343,9 +337,9 @@ class _Reader:
                 self.graph.tree.actuated.add(move.name)
         self.graph.tree.actuated -= followers
 
-    def _axes(self) -> Iterator[tuple[FramedJoint, Move, Axis]]:
+    def _axes(self) -> Iterator[tuple[FramedJoint, Move, Freedom]]:
         for joint in self.joints.values():
-            for move, axis in zip(self.moves[joint.name], self.axes[joint.name], strict=True):
+            for move, axis in zip(self.moves[joint.name], joint.freedoms, strict=True):
                 yield joint, move, axis
 
     def _mimics(self, joint: FramedJoint) -> Iterator[tuple[Move, float, float]]:
