@@ -38,7 +38,15 @@ from ...io.document import SMALLEST, explained, fault, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
-from .driving import KEYFRAME, Driving, Freedom, choose_held, read_driving, read_start
+from .driving import (
+    KEYFRAME,
+    Driving,
+    Freedom,
+    choose_held,
+    driving_of_motors,
+    read_driving,
+    read_start,
+)
 from .element import Names
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, together
@@ -96,19 +104,12 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     axes = {name: spin.axis for name, spin in spins.items()}
     used = Counter({"keyframe: key": any(each.startswith(KEYFRAME) for each in supplied.start)})
     if not (driving.moves or driving.fixed or supplied.hold_rest):
-        own = read_driving(tree, replace(supplied, drive=_motor_ranges(tree)))
+        own, note = driving_of_motors(tree, supplied)
         if own.driven and len(own.driven) == Freedom(model, axes).dof:
-            driving = own
-            names, used = shortened([*own.driven], MOST_NAMED), used + tree.motors
-            moves = (
-                f"joint {names} moves through its limits, as the file has a motor there"
-                if len(own.driven) == 1
-                else f"joints {names} move through their limits, as the file has motors there"
-            )
-            note = f"nothing is said of what drives it: {moves}; other motions by --drive"
+            driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
-    left = {what: count - used[what] for what, count in tree.left_out.items()}
-    left_out = {what: count for what, count in left.items() if count}
+    counts = Counter(tree.left_out) - used
+    left_out = {what: counts[what] for what in tree.left_out if counts[what]}
     model = replace(model, tree=replace(model.tree, left_out=left_out))
     chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
@@ -116,13 +117,6 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
         note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
-
-
-def _motor_ranges(tree: Tree) -> tuple[str, ...]:
-    """Return the ranges of all joints with a motor, as --drive takes them; none without limits."""
-    limits = {name: move.limit for name, move in tree.joints.items() if name in tree.actuated}
-    ranges = (f"{name}:{each.lower!r}:{each.upper!r}" for name, each in limits.items())
-    return tuple(ranges) if all(each.is_range for each in limits.values()) else ()
 
 
 def _require_coupled(tree: Tree) -> None:

@@ -217,19 +217,27 @@ class Element:
             return tuple(default)
         return self._parse(self.text, counts, "", "correct the text")
 
-    def value(self, tag: str, count: int) -> tuple[float, ...]:
-        """Return the numbers of the child of a tag, in its text or its attribute; zeros without
-        one.
+    def value(
+        self, tag: str, count: int, default: Sequence[float] | None = None
+    ) -> tuple[float, ...]:
+        """Return the numbers of the child of a tag, in its text or its attribute `value`.
 
         Raises:
-            CaseError: a wrong count, or an unusable number.
+            CaseError: it is missing without a default, a wrong count, or an unusable number.
         """
         child = self.child(tag)
+        if child is None and default is not None:
+            return tuple(default)
         if child is None:
-            return (0.0,) * count
+            raise self.fault(f"<{tag}>: missing, expected {count} numbers; add it")
         if "value" in child.attributes:
             return child.numbers("value", count)
-        return child.text_numbers(count, default=(0.0,) * count)
+        return child.text_numbers(count)
+
+    def child_text(self, tag: str) -> str:
+        """Return the text of the child of a tag; empty without one."""
+        child = self.child(tag)
+        return "" if child is None else child.text
 
     def required(self, name: str) -> str:
         """Return an attribute.

@@ -17,6 +17,7 @@ from ....mechanism.mechanism import GROUND, Vector
 from ...io.document import shown
 from .element import Element, significant_digits, words
 from .limits import Limit, limit_of
+from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     DYNAMIC,
     EXPANDED,
@@ -31,7 +32,6 @@ from .mjcf_language import (
     read_compiler,
     require_known_attributes,
 )
-from .mjcf_mass import STAND_INS, mass_of
 from .place import ORIGIN, Place, coordinates, unit_quaternion
 from .robot_elements import Unread
 from .tree import (

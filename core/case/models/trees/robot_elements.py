@@ -186,7 +186,7 @@ def _strut(graph: Graph, element: Element, link_of: LinkOf) -> Strut:
         graph.places[link].then(Place(point)) for link, point in zip(links, points, strict=True)
     )
     stiffness, damping, length = (
-        element.value(f"{element.tag}_{each}", 1)[0] for each in STRUT_LAW
+        element.value(f"{element.tag}_{each}", 1, (0.0,))[0] for each in STRUT_LAW
     )
     if min(stiffness, damping, length) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
@@ -204,7 +204,7 @@ def _bushing(element: Element, frame_of: FrameOf) -> Strut:
     for part in laws:
         if element.child(part) is None:
             raise element.fault(f"<{part}>: missing, expected three numbers; add it")
-    values = [coordinates(vec(element.value(part, 3))) for part in laws]
+    values = [coordinates(vec(element.value(part, 3, (0.0, 0.0, 0.0)))) for part in laws]
     if min(map(min, values)) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     if first == second:
@@ -234,7 +234,7 @@ def _ends(element: Element, link_of: LinkOf) -> tuple[tuple[str, str], tuple[Vec
     parts = [*(f"{tag}_body_{side}" for side in "AB"), f"{tag}_p_AP", f"{tag}_p_BQ"]
     element.require_children((*parts, *(f"{tag}_{each}" for each in STRUT_LAW)), closed=True)
     first, second = (link_of(*_named_child(element, part)) for part in parts[:2])
-    p, q = (vec(element.value(part, 3)) for part in parts[2:])
+    p, q = (vec(element.value(part, 3, (0.0, 0.0, 0.0))) for part in parts[2:])
     return (first, second), (p, q)
 
 

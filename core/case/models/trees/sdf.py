@@ -266,19 +266,13 @@ def _mass(element: Element) -> Mass | None:
             return None  # that of its collision shapes
         matrix = element.child("inertia")
         entries = [
-            default if matrix is None else _number(matrix, name, default)
+            default if matrix is None else matrix.value(name, 1, (default,))[0]
             for name, default in zip(ENTRIES, UNIT, strict=True)
         ]
-        mass = element.child("mass")
-        kilograms = 1.0 if mass is None else mass.text_numbers(1)[0]
-        return mass_in(pose_of(element.child("pose")), kilograms, entries)
+        (mass,) = element.value("mass", 1, (1.0,))
+        return mass_in(pose_of(element.child("pose")), mass, entries)
     except CaseError:
         return None
-
-
-def _number(element: Element, tag: str, default: float) -> float:
-    child = element.child(tag)
-    return default if child is None else child.text_numbers(1, default=(default,))[0]
 
 
 def _version(root: Element) -> tuple[int, ...]:
@@ -328,9 +322,6 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
     Raises:
         CaseError: an unknown link or joint, or a value that makes no sense.
     """
-    world = WORLD
-    while world in graph.places:
-        world += "'"
     joints: list[Joint] = []
     gears: list[tuple[_Joint, tuple[str, str]]] = []
     for full, framed in frames.joints.items():
@@ -341,10 +332,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         ends: list[str] = []
         for tag in ("parent", "child"):
             link = frames.link(element, within(framed.scope, text_of(element, tag)))
-            if not link and world not in graph.places:
-                graph.places[world], graph.elements[world] = ORIGIN, graph.root
-                graph.fixed.add(world)
-            ends.append(frames.short(link) if link else world)
+            ends.append(frames.short(link) if link else graph.add_world())
         if ends[0] == ends[1]:
             raise element.fault(
                 f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
@@ -406,7 +394,7 @@ class _Joint:
         element, named = self.element, text_of(self.element, "gearbox_reference_body")
         reference = self.frames.link(element, within(self.framed.scope, named))
         around = self.frames.short(reference) if reference else WORLD
-        ratio = _number(element, "gearbox_ratio", 1.0)
+        (ratio,) = element.value("gearbox_ratio", 1, (1.0,))
         second = "axis2" if element.child("axis2") is not None else "axis"
         weights: dict[str, float] = {}
         for tag, link, weight in (("axis", links[0], ratio), (second, links[1], 1.0)):
@@ -491,7 +479,7 @@ class _Joint:
         if self.frames.joints[full].element.attributes.get("type") in TWO_AXES:
             name = f"{name}.{1 + (other == 'axis2')}"
         factor, offset, reference = (
-            default if (child := element.child(tag)) is None else child.text_numbers(1)[0]
+            element.value(tag, 1, (default,))[0]
             for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
         )
         return mimic(move.name, name, offset - factor * reference, factor, element)

@@ -258,12 +258,8 @@ class _Robot:
 
         freedoms: list[Freedom]
         match kind:
-            case "revolute" | "continuous":
-                freedoms = [("", "hinge", axis())]
-            case "prismatic":
-                freedoms = [("", "slide", axis())]
-            case "spherical" | "ball":
-                freedoms = [("", "ball", X)]
+            case "revolute" | "continuous" | "prismatic" | "spherical" | "ball" | "fixed":
+                freedoms = [("", each, X if each == "ball" else axis()) for each in CLOSING[kind]]
             case "floating" if links[0] in graph.fixed:
                 return Joint(name, links, (), element, is_free=True)
             case "floating":
@@ -273,12 +269,10 @@ class _Robot:
                 f, g, h = triad((*axis(),))
                 freedoms = [(".slide1", "slide", f), (".slide2", "slide", g)]
                 freedoms.append((".rotation", "hinge", h))
-            case "fixed":
-                freedoms = []
             case "screw":
                 if element.child(PITCH) is None:
                     raise element.fault(f"<{PITCH}>: missing, expected metres in a turn; add it")
-                freedoms = screw(graph, name, element.value(PITCH, 1)[0], axis(), element)
+                freedoms = screw(graph, name, element.value(PITCH, 1, (0.0,))[0], axis(), element)
             case "universal":  # of Drake: about x of the parent, then y of the child
                 axes = enumerate((X, Y), 1)
                 freedoms = [(f".{k}", "hinge", place.direction(a)) for k, a in axes]

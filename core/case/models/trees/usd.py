@@ -15,21 +15,29 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
-from ....algebra import cross, quat, vec
+from ....algebra import X, Y, Z, cross, quat, vec
 from ....errors import remedy, shortened, similar
 from ....mechanism.mechanism import Vector
 from .element import Element, words
-from .framed import FramedJoint, Freedom, join
-from .graph import Graph
+from .graph import FramedFreedom, FramedJoint, Graph, join
 from .limits import INFINITE, NO_LIMIT, Limit, limit_of
+from .masses import COLLIDER, masses_of
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
 from .robot_elements import mimic
 from .tree import UNKNOWNS, Closure, Kind, Move, Tree
-from .usd_joints import AXES, GENERIC, ROD, TYPES, bounds_of, freedoms_of
-from .usd_mass import COLLIDER, masses_of
 from .usd_stage import UNITS
 
+AXES = {"X": X, "Y": Y, "Z": Z}
+TYPES: Mapping[str, Kind | None] = {
+    "PhysicsRevoluteJoint": "hinge",
+    "PhysicsPrismaticJoint": "slide",
+    "PhysicsSphericalJoint": "ball",
+    "PhysicsFixedJoint": None,
+}
+"""Joints with the one move they leave."""
+GENERIC, ROD = "PhysicsJoint", "PhysicsDistanceJoint"
 BODY, DRIVE = "PhysicsRigidBodyAPI", "PhysicsDriveAPI"
 PHYSX_MIMIC, NEWTON_MIMIC = "PhysxMimicJointAPI", "NewtonMimicAPI"
 EQUALITY = "MjcEquality"
@@ -295,7 +303,7 @@ class _Reader:
         """Return the unit of a coordinate [rad or m]."""
         return math.radians(1.0) if kind == "hinge" else self.metre
 
-    def _limit(self, element: Element, freedom: Freedom) -> Limit:
+    def _limit(self, element: Element, freedom: FramedFreedom) -> Limit:
         if freedom.kind == "ball":
             return NO_LIMIT
         lower, upper = bounds_of(freedom.key)
@@ -337,7 +345,7 @@ class _Reader:
                 self.graph.tree.actuated.add(move.name)
         self.graph.tree.actuated -= followers
 
-    def _axes(self) -> Iterator[tuple[FramedJoint, Move, Freedom]]:
+    def _axes(self) -> Iterator[tuple[FramedJoint, Move, FramedFreedom]]:
         for joint in self.joints.values():
             for move, axis in zip(self.moves[joint.name], joint.freedoms, strict=True):
                 yield joint, move, axis
@@ -467,3 +475,62 @@ def _require_spelt(element: Element, known: Sequence[str]) -> None:
         name = key.removeprefix("physics:")
         if name != key and name not in known and similar(name, known, CLOSE):
             raise element.fault(f"found the property {key!r}; {remedy(name, known)}")
+
+
+def freedoms_of(element: Element, name: str) -> list[FramedFreedom]:
+    """Return the moves that a joint leaves.
+
+    Raises:
+        CaseError: no joint leaves them, or limits make no sense.
+    """
+    if element.tag == GENERIC:
+        return _generic(element, name)
+    kind = TYPES[element.tag]
+    if kind is None:
+        return []
+    letter = element.choice("physics:axis", (*AXES,), "X")
+    key = {"hinge": "angular", "slide": "linear"}.get(kind, "")
+    return [FramedFreedom(name, kind, AXES[letter], element, key=key)]
+
+
+def bounds_of(key: str) -> tuple[str, str]:
+    """Return the names of the limits of a move."""
+    if key in ("angular", "linear"):
+        return "physics:lowerLimit", "physics:upperLimit"
+    return f"limit:{key}:physics:low", f"limit:{key}:physics:high"
+
+
+def _generic(element: Element, name: str) -> list[FramedFreedom]:
+    """Return the moves of a joint whose limits lock axes."""
+    apis = element.attributes["apis"].split()
+    found: list[FramedFreedom] = []
+    for prefix, kind in (("trans", "slide"), ("rot", "hinge")):
+        for letter, axis in AXES.items():
+            key = f"{prefix}{letter}"
+            low, high = bounds_of(key)
+            limited = f"PhysicsLimitAPI:{key}" in apis
+            if not limited and (low in element.attributes or high in element.attributes):
+                raise element.fault(
+                    f"limit:{key}: found without the schema PhysicsLimitAPI:{key}, so that programs"
+                    " do not read it alike; apply the schema, or remove the limit"
+                )
+            bounds = [element.attributes.get(each, "inf") for each in (low, high)]
+            if limited and "inf" not in bounds and "-inf" not in bounds:
+                least, most = element.number(low), element.number(high)
+                if least > most or least == most == 0.0:
+                    continue
+                if least == most:
+                    raise element.fault(
+                        f"{low}: found {least:g} for both limits, which lock the joint out of its"
+                        " frames, expected low above high for a lock; move the frame"
+                    )
+            found.append(FramedFreedom(f"{name}.{key}", cast("Kind", kind), axis, element, key=key))
+    if "PhysicsLimitAPI:distance" in apis:
+        raise element.fault(
+            "limits a distance, which acts at its ends alone; write a"
+            " PhysicsDistanceJoint, or leave it out by --without " + element.attributes["name"]
+        )
+    slides = [each for each in found if each.kind == "slide"]
+    if len(found) - len(slides) == 3:
+        found = [*slides, FramedFreedom(f"{name}.rot", "ball", X, element)]
+    return [replace(found[0], name=name)] if len(found) == 1 else found
