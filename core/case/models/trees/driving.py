@@ -38,6 +38,7 @@ CLEARLY = 0.01
 # Joints without a motor that --hold-rest holds unasked: the largest public model without motors, an
 # arm with a hand (MyoSuite), has 27. More are most often the loops that a file has lost.
 MOST_HELD = 30
+MOST_MOTORS = 8
 
 
 def read_start(tree: Tree, said: Sequence[str]) -> Start:
@@ -249,7 +250,7 @@ def driving_of_motors(tree: Tree, supplied: Supplied) -> tuple[Driving, str]:
     ranges = tuple(f"{name}:{each.lower!r}:{each.upper!r}" for name, each in limits.items())
     if not all(each.is_range for each in limits.values()):
         ranges = ()
-    names = shortened([*limits], MOST_NAMED)
+    names = shortened([*limits], MOST_MOTORS)
     moves = (
         f"joint {names} moves through its limits, as the file has a motor there"
         if len(limits) == 1

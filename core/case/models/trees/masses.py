@@ -14,6 +14,7 @@ import numpy as np
 
 from ....algebra import ZERO, X, Y, Z, quat, vec
 from ....errors import CaseError
+from ....trajectory import Array
 from ...io.document import usable
 from .element import Element
 from .mjcf_language import Classes, Compiler
@@ -69,10 +70,25 @@ def _inertial(element: Element) -> Mass:
     if mass < 0.0:
         raise element.fault("mass: is negative, expected a positive number of kg; correct it")
     if "fullinertia" in element.attributes:
-        xx, yy, zz, xy, xz, yz = element.numbers("fullinertia", 6)
-        return Mass(mass, ZERO, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        return Mass(mass, ZERO, inertia_of(element.numbers("fullinertia", 6)))
     moments = element.numbers("diaginertia", 3, default=(0.0, 0.0, 0.0))
     return Mass(mass, ZERO, np.diag(moments))
+
+
+def inertia_of(entries: Sequence[float]) -> Array:
+    """Return the matrix of moments about x, y and z and products of xy, xz and yz [kg m^2]."""
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def mass_in(place: Place, mass: float, entries: Sequence[float]) -> Mass | None:
+    """Return the mass of a link in its frame; None of a negative one.
+
+    Args:
+        place: centre of mass and axes of the inertia, in the frame of the link.
+        entries: see `inertia_of`.
+    """
+    return Mass(mass, ZERO, inertia_of(entries)).seen_in(place) if mass >= 0.0 else None
 
 
 def _geom(element: Element, compiler: Compiler) -> Mass | None:

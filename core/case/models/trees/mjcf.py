@@ -27,7 +27,6 @@ from .mjcf_language import (
     ROOT,
     WRITE_OUT,
     Classes,
-    direction,
     expand,
     read_compiler,
     require_known_attributes,
@@ -278,7 +277,7 @@ class _Reader:
             angle = self.compiler.angle
             reference = angle(reference)
             limit = replace(limit, lower=angle(limit.lower), upper=angle(limit.upper))
-        axis = direction(element, "axis", element.numbers("axis", 3, default=(0.0, 0.0, 1.0)))
+        axis = element.direction(element.numbers("axis", 3, default=(0.0, 0.0, 1.0)), "axis")
         return Move(name, kind, point, given.direction(axis), element, reference, limit)
 
     def _limit(self, element: Element) -> Limit:

@@ -29,8 +29,9 @@ from ...io.document import fault, read_text, shown
 from .element import Element, parse_xml, words
 from .graph import FramedFreedom, FramedJoint, Graph, Joint, Loop, join
 from .limits import NO_LIMIT, Limit
+from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .robot_elements import HALFWAY, direction, mass_in
+from .robot_elements import HALFWAY
 from .tree import BushingLaw, Closure, Coupling, Kind, Move, Spring, Strut, Tree
 
 VERSION_4 = 40_000
@@ -234,8 +235,7 @@ class _Reader:
         (a, f), (b, g) = (
             self._frame(element, f"socket_{each}_frame") for each in ("parent", "child")
         )
-        if a == b:
-            raise element.fault(f"joins {a!r} with itself, expected two bodies; correct a socket")
+        element.require_two(a, b)
         freedoms = (
             self._custom(element, name)
             if element.tag == CUSTOM
@@ -322,7 +322,7 @@ class _Reader:
             kind: Kind = "slide" if k < 3 else "hinge"
             axis = (X, Y, Z)[k % 3]
             if each in given and (child := given[each].child("axis")) is not None:
-                axis = direction(child, child.text_numbers(3))
+                axis = child.direction(child.text_numbers(3))
             constant = float(curve.coef[0])
             if leads.get(coordinate) == each:
                 if constant:
@@ -441,8 +441,7 @@ class _Reader:
             place = place.then(Place(_vector(element, point.format(k)))) if point else place
             links.append(link)
             places.append(self.graph.places[link].then(place))
-        if links[0] == links[1]:
-            raise element.fault(f"ties {links[0]!r} to itself, expected two bodies; correct it")
+        element.require_two(*links)
         return (links[0], links[1]), (places[0], places[1])
 
     def _spring(self, element: Element) -> None:

@@ -20,6 +20,7 @@ from ...io.document import read_text, shown
 from .element import Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
 from .limits import NO_LIMIT, Limit, limit_of
+from .masses import mass_in
 from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
@@ -32,8 +33,6 @@ from .robot_elements import (
     Unread,
     add_spring,
     add_ties,
-    direction,
-    mass_in,
     mimic,
     screw,
 )
@@ -333,11 +332,8 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         for tag in ("parent", "child"):
             link = frames.link(element, within(framed.scope, text_of(element, tag)))
             ends.append(frames.short(link) if link else graph.add_world())
-        if ends[0] == ends[1]:
-            raise element.fault(
-                f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
-            )
         links = ends[0], ends[1]
+        element.require_two(*links)
         if {*ends} <= graph.fixed:
             graph.tree.count("joints of what stands still")
             continue
@@ -456,7 +452,7 @@ class _Joint:
             given = given or MODEL
         if given:
             place = self.frames.place(axis, within(self.framed.scope, given))
-        return place.direction(direction(xyz or axis, numbers))
+        return place.direction((xyz or axis).direction(numbers))
 
     def _add_spring(self, move: Move, axis: Element) -> None:
         for dynamics in axis.only("dynamics"):

@@ -23,6 +23,7 @@ from .beside import read_beside
 from .element import Element, words
 from .graph import Freedom, Graph, Joint, Loop
 from .limits import NO_LIMIT, Limit, limit_of
+from .masses import mass_in
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
@@ -34,8 +35,6 @@ from .robot_elements import (
     Unread,
     add_spring,
     add_ties,
-    direction,
-    mass_in,
     mimic,
     screw,
 )
@@ -426,7 +425,7 @@ def _axis(element: Element, tag: str, place: Place) -> Vec3:
     if child is None:
         return place.direction(X)
     child.require_known(("xyz",), "URDF")
-    return place.direction(direction(child, child.numbers("xyz", 3)))
+    return place.direction(child.direction(child.numbers("xyz", 3)))
 
 
 def _frame_behind(first: Place, second: Place, moves: Sequence[Move]) -> Place:

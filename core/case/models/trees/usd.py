@@ -207,11 +207,7 @@ class _Reader:
             graph.tree.notes.append(f"{element} is switched off and joins nothing (jointEnabled)")
             return
         (first, f), (second, g) = self._end(element, 0), self._end(element, 1)
-        if first == second:
-            raise element.fault(
-                f"joins {first or 'the world'!r} with itself, expected two bodies; correct"
-                " physics:body0 or physics:body1"
-            )
+        element.require_two(first or "the world", second or "the world")
         links = first or graph.add_world(), second or graph.add_world()
         if {*links} <= graph.fixed:
             graph.tree.count("joints of what stands still")
