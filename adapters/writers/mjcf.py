@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
-from ...core.case.models.trees.mjcf_mass import STAND_INS
+from ...core.case.models.trees.masses import STAND_INS
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion

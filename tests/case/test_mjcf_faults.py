@@ -185,6 +185,14 @@ FAULTS = {
         ("<fixed", '<spatial name="rope"/><fixed'),
         ["tendon2", "'rope' is a spatial tendon"],
     ),
+    "tendon of no range": (
+        ('<fixed name="split"', '<fixed name="split" limited="true" range="0 0"'),
+        ["'split'", "range: found '0 0' with limited", '<tendon tendon1="split"'],
+    ),
+    "joint of no range": (
+        ('name="right_coupler_joint"', 'name="right_coupler_joint" limited="true" range="1 1"'),
+        ["range: found '1 1' with limited", '<joint joint1="right_coupler_joint"'],
+    ),
     "flex": ((FIRST, '<flex flex="cloth"/>' + FIRST), ["<flex>", "no joint for it"]),
 }
 

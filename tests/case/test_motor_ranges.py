@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
@@ -72,3 +73,21 @@ def test_motor_of_tendon_moves_its_joints(tmp_path):
 def test_too_few_motors_or_limits_ask(motors, upper, tmp_path):
     with pytest.raises(CaseError, match="nothing said of what drives it"):
         load(arm(tmp_path, *motors, upper=upper))
+
+
+WIPER = """<mujoco><worldbody>
+<body name="arm"><joint name="motor" range="-180 180"/></body></worldbody>
+<actuator><motor joint="motor"/><position tendon="none"/></actuator>
+<keyframe><key name="up" qpos="1"/><key name="down" qpos="0"/></keyframe></mujoco>"""
+
+
+def test_what_drives_a_model_is_not_left_out(tmp_path):
+    (file := tmp_path / "wiper.xml").write_text(WIPER)
+    case = load(file, Supplied(start=("keyframe:up",)))
+    assert case.source.split(LEFT_OUT)[1] == "actuator: position (1), keyframe: key (1)"
+    assert any("joint motor moves through its limits" in note for note in case.assembly)
+    assert load(arm(tmp_path, "shoulder", "elbow")).source.endswith(f"{LEFT_OUT}nothing")
+    driven = load(file, Supplied(drive=("motor:0:1",))).source
+    assert {"ranges of joints (1)", "actuator: motor (1)"} < {
+        *driven.split(LEFT_OUT)[1].split(", ")
+    }

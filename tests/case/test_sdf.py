@@ -158,7 +158,7 @@ FAULTS = {
     ),
     "five numbers": ("4 0 0 0 0.3 0", "4 0 0 0 0.3", "expected 6 numbers; correct the text"),
     "no axis": ("<axis><xyz>0 1 0</xyz></axis>", "", "<axis>: missing, expected an axis; add it"),
-    "zero axis": ("<xyz>0 1 0</xyz>", "<xyz>0 0 0</xyz>", "found zero, expected the direction"),
+    "zero axis": ("<xyz>0 1 0</xyz>", "<xyz>0 0 0</xyz>", "found zero, of no direction"),
     "unknown type": ('type="continuous"', 'type="planar"', "found 'planar', expected one of"),
     "old screw": ('type="continuous"', 'type="screw"', "<screw_thread_pitch>: missing"),
     "mistyped": (

@@ -34,7 +34,7 @@ FAULTS = {
         '<link name="c"/><link name="e"/>',
         r"found 2 links .*\(base, e\)",
     ),
-    "zero axis": ('xyz="0 1 0"', 'xyz="0 0 0"', "found zero, expected the direction of an axis"),
+    "zero axis": ('xyz="0 1 0"', 'xyz="0 0 0"', "found zero, of no direction"),
     "mistyped attribute": (
         'rpy="1 2 3"',
         'rpq="1 2 3"',

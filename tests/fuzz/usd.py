@@ -4,8 +4,7 @@ import re
 
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.trees.usd import IN_BODY, IN_JOINT
-from kincheck.core.case.models.trees.usd_joints import GENERIC, ROD, TYPES
+from kincheck.core.case.models.trees.usd import GENERIC, IN_BODY, IN_JOINT, ROD, TYPES
 
 from ..support.usd_texts import FOUR_BAR, body, joint, locked, prim, stage
 from .fuzzing import changing, read_or_refused, written

@@ -168,7 +168,7 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
             root = whole_mjcf(file, root)
     omitted: list[tuple[str, Element]] = []
     tree = read(file, root.pruned(without, omitted))
-    tree.dialect, tree.without = root.tag, {name for name, _ in omitted}
+    tree.without = {name for name, _ in omitted}
     if omitted:
         tree.notes.append(f"{WITHOUT}{', '.join(str(each) for _, each in omitted)}")
     return tree

@@ -14,7 +14,7 @@ from ..case import Case
 from .files import MODEL, kind_of, load, read_tree, root_of
 from .trees.case import undriven
 from .trees.element import Element, printed_digits
-from .trees.limits import NO_LIMIT, Limit, limit_of
+from .trees.limits import NO_LIMIT, Limit
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12
@@ -114,9 +114,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     root = root_of(file)
     mechanism, tree, spinning = undriven(read_tree(file, without))
     coordinates = {
-        name: Coordinate(
-            move.kind == "hinge", move.value, limit_of(tree, move), name in tree.actuated
-        )
+        name: Coordinate(move.kind == "hinge", move.value, move.limit, name in tree.actuated)
         for name, move in tree.joints.items()
         if move.is_axial
     }
@@ -130,7 +128,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         10.0**-digits if digits else 0.0,
         max(map(_angle_error, root.below()), default=0.0),
         is_model=True,
-        says_gravity=tree.dialect == "mujoco" or any(each.tag in _SCENES for each in root.below()),
+        says_gravity=root.tag == "mujoco" or any(each.tag in _SCENES for each in root.below()),
         notes=[f"{file.name}: {note}" for note in tree.notes],
         without=tree.without,
     )

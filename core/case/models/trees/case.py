@@ -4,6 +4,7 @@ others held.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -37,9 +38,16 @@ from ...io.document import SMALLEST, explained, fault, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
-from .driving import Driving, Freedom, choose_held, read_driving, read_start
+from .driving import (
+    KEYFRAME,
+    Driving,
+    Freedom,
+    choose_held,
+    driving_of_motors,
+    read_driving,
+    read_start,
+)
 from .element import Names
-from .limits import motor_ranges
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, together
 
@@ -94,17 +102,15 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     model = assemble(start, supplied.closure, driving.moves)
     spins = find_spins(model.tree, driving.fixed)
     axes = {name: spin.axis for name, spin in spins.items()}
+    used = Counter({"keyframe: key": any(each.startswith(KEYFRAME) for each in supplied.start)})
     if not (driving.moves or driving.fixed or supplied.hold_rest):
-        own = read_driving(tree, replace(supplied, drive=motor_ranges(tree)))
+        own, note = driving_of_motors(tree, supplied)
         if own.driven and len(own.driven) == Freedom(model, axes).dof:
-            driving = own
-            names = shortened([*own.driven], MOST_NAMED)
-            moves = "moves through its" if len(own.driven) == 1 else "move through their"
-            note = (
-                f"nothing is said of what drives it: {names} {moves} limits, as the file has motors"
-                " there; other motions by --drive"
-            )
+            driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
+    counts = Counter(tree.left_out) - used
+    left_out = {what: counts[what] for what in tree.left_out if counts[what]}
+    model = replace(model, tree=replace(model.tree, left_out=left_out))
     chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:

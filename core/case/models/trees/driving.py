@@ -38,6 +38,7 @@ CLEARLY = 0.01
 # Joints without a motor that --hold-rest holds unasked: the largest public model without motors, an
 # arm with a hand (MyoSuite), has 27. More are most often the loops that a file has lost.
 MOST_HELD = 30
+MOST_MOTORS = 8
 
 
 def read_start(tree: Tree, said: Sequence[str]) -> Start:
@@ -239,6 +240,24 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
             " are meant"
         )
     return name, np.linspace(start, stop, count), samples
+
+
+def driving_of_motors(tree: Tree, supplied: Supplied) -> tuple[Driving, str]:
+    """Return the driving of all joints with a motor through their limits, none without limits, and
+    a note on it.
+    """
+    limits = {name: move.limit for name, move in tree.joints.items() if name in tree.actuated}
+    ranges = tuple(f"{name}:{each.lower!r}:{each.upper!r}" for name, each in limits.items())
+    if not all(each.is_range for each in limits.values()):
+        ranges = ()
+    names = shortened([*limits], MOST_MOTORS)
+    moves = (
+        f"joint {names} moves through its limits, as the file has a motor there"
+        if len(limits) == 1
+        else f"joints {names} move through their limits, as the file has motors there"
+    )
+    note = f"nothing is said of what drives it: {moves}; other motions by --drive"
+    return read_driving(tree, replace(supplied, drive=ranges)), note
 
 
 class Freedom:

@@ -16,8 +16,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
 
+from ....algebra import Vec3
 from ....errors import CaseError, remedy, similar
 from ...io.document import decimal, fault, shown, unknown_name, usable
+from .place import unit_vector
 
 # Elements are some ten deep; but bodies of MJCF are in the bodies that carry them.
 DEEPEST, DEEPEST_BODY = 200, 5_000
@@ -79,6 +81,13 @@ class Element:
         return self.fault(
             f"name: found {shown(name)} again, expected a name of its own; rename one of {these}"
         )
+
+    def require_two(self, first: str, second: str) -> None:
+        """Refuse a joint, tie or spring of one link, or a coupling of one joint."""
+        if first == second:
+            raise self.fault(
+                f"joins {first!r} with itself, expected two bodies; correct one of the names"
+            )
 
     def too_many(self) -> CaseError:
         """Return the error of a document with more elements than are read."""
@@ -217,19 +226,27 @@ class Element:
             return tuple(default)
         return self._parse(self.text, counts, "", "correct the text")
 
-    def value(self, tag: str, count: int) -> tuple[float, ...]:
-        """Return the numbers of the child of a tag, in its text or its attribute; zeros without
-        one.
+    def value(
+        self, tag: str, count: int, default: Sequence[float] | None = None
+    ) -> tuple[float, ...]:
+        """Return the numbers of the child of a tag, in its text or its attribute `value`.
 
         Raises:
-            CaseError: a wrong count, or an unusable number.
+            CaseError: it is missing without a default, a wrong count, or an unusable number.
         """
         child = self.child(tag)
+        if child is None and default is not None:
+            return tuple(default)
         if child is None:
-            return (0.0,) * count
+            raise self.fault(f"<{tag}>: missing, expected {count} numbers; add it")
         if "value" in child.attributes:
             return child.numbers("value", count)
-        return child.text_numbers(count, default=(0.0,) * count)
+        return child.text_numbers(count)
+
+    def child_text(self, tag: str) -> str:
+        """Return the text of the child of a tag; empty without one."""
+        child = self.child(tag)
+        return "" if child is None else child.text
 
     def required(self, name: str) -> str:
         """Return an attribute.
@@ -251,6 +268,20 @@ class Element:
         if len(found) not in counts or not all(map(usable, found)):
             raise self.fault(f"{before}found {shown(text)}, expected {_numbers(counts)}; {advice}")
         return found
+
+    def direction(self, numbers: Sequence[float], name: str = "xyz") -> Vec3:
+        """Return the direction of three numbers, length one.
+
+        Raises:
+            CaseError: they are zero.
+        """
+        self.require_nonzero(numbers, name)
+        return unit_vector(numbers)
+
+    def require_nonzero(self, numbers: Sequence[float], name: str) -> None:
+        """Refuse a vector or quaternion of zeros."""
+        if math.hypot(*numbers) < 1e-10:  # as MuJoCo has it: shorter axes point anywhere
+            raise self.fault(f"{name}: found zero, of no direction, expected another; correct it")
 
     def choice(self, name: str, known: Sequence[str], default: str) -> str:
         """Return an attribute with one of a few values."""

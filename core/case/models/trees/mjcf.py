@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import TypeAlias, cast
@@ -13,7 +14,10 @@ from typing import TypeAlias, cast
 from ....algebra import X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
+from ...io.document import shown
 from .element import Element, significant_digits, words
+from .limits import Limit, limit_of
+from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     DYNAMIC,
     EXPANDED,
@@ -23,12 +27,10 @@ from .mjcf_language import (
     ROOT,
     WRITE_OUT,
     Classes,
-    direction,
     expand,
     read_compiler,
     require_known_attributes,
 )
-from .mjcf_mass import STAND_INS, mass_of
 from .place import ORIGIN, Place, coordinates, unit_quaternion
 from .robot_elements import Unread
 from .tree import (
@@ -57,6 +59,7 @@ _EQUALITIES = ("connect", "weld", "joint", "tendon")
 _Part: TypeAlias = tuple[Element, Place, str]
 """An element, the place of the frame it is given in, and its default class."""
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
+RANGES = f"{DYNAMIC['range']} of joints"
 
 
 def whole_mjcf(file: Path, root: Element) -> Element:
@@ -159,14 +162,16 @@ class _Reader:
             qpos = key.attributes.get("qpos")
             numbers = None if qpos is None else qpos.split()
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
-        motors = [each for each in root.below() if each.tag in _ACTUATORS]
-        for motor in motors:
-            tendon = self.tendons.get(motor.attributes.get("tendon", ""))
-            if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
-                motor = next(tendon.only("joint"), motor)
-            if name := motor.attributes.get("joint"):
-                tree.actuated.add(name)
-        tree.degrees, tree.limited = self.compiler.degrees, self.compiler.limited
+        for section in root.only("actuator"):
+            for motor in section.only(*_ACTUATORS):
+                tendon = self.tendons.get(motor.attributes.get("tendon", ""))
+                moved = motor
+                if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
+                    moved = next(tendon.only("joint"), motor)
+                joint = {moved.attributes.get("joint", "")} & tree.moves.keys()
+                tree.add_motor(f"actuator: {motor.tag}", joint)
+        ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
+        tree.motors[RANGES] = sum(ranges)
         if tree.masses:
             tree.gravity = self._gravity()
         return tree
@@ -271,10 +276,40 @@ class _Reader:
                 self.tree.count(f"{what} of joints")
         reference = element.number("ref", 0.0)
         point = given.point(vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0))))
+        limit = self._limit(element)
         if kind == "hinge":
-            reference = self.compiler.angle(reference)
-        axis = direction(element, "axis", element.numbers("axis", 3, default=(0.0, 0.0, 1.0)))
-        return Move(name, kind, point, given.direction(axis), element, reference)
+            angle = self.compiler.angle
+            reference = angle(reference)
+            limit = replace(limit, lower=angle(limit.lower), upper=angle(limit.upper))
+        axis = element.direction(element.numbers("axis", 3, default=(0.0, 0.0, 1.0)), "axis")
+        return Move(name, kind, point, given.direction(axis), element, reference, limit)
+
+    def _limit(self, element: Element) -> Limit:
+        """Return the limits of a joint or tendon that act, in the units of the file.
+
+        Raises:
+            CaseError: they have no range between them, as MuJoCo refuses it; an equality is meant.
+        """
+        found: list[Limit] = []
+        for key, flag in (("range", "limited"), ("actuatorfrcrange", "actuatorfrclimited")):
+            said = element.choice(flag, ("true", "false", "auto"), "auto")
+            on = said == "true" or (said == "auto" and self.compiler.limited)
+            text = element.attributes.get(key, "") if on else ""
+            ends = text.split()
+            if ends and len(ends) != 2:
+                raise element.fault(f"{key}: expected two numbers; correct the attribute")
+            limit = limit_of(element, dict(zip(("lower", "upper"), ends, strict=False)))
+            if said == "true" and not limit.lower < limit.upper:
+                tag = "joint" if element.tag == "joint" else "tendon"
+                name = element.attributes.get("name", "NAME")
+                equality = f'<{tag} {tag}1="{name}" polycoef="CHANGE SINCE qpos0"/>'
+                raise element.fault(
+                    f"{key}: found {shown(text)} with {flag}, expected the lower limit first;"
+                    f" correct it, or hold what is constant by an equality, {equality}"
+                )
+            found.append(limit)
+        limit, effort = found
+        return replace(limit, effort=max(abs(effort.lower), abs(effort.upper)))
 
     def _equalities(self) -> None:
         names = set[str]()
@@ -423,6 +458,7 @@ class _Reader:
                         tree.count(f"{what} of joints")
         for section in self.root.only("tendon"):
             for tendon in section.children:
+                self._limit(self.classes.complete(tendon, "tendon"))
                 try:
                     strut = self._strut(tendon)
                 except CaseError:

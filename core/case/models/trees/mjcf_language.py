@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 from os.path import isfile
 from pathlib import Path
 
-from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, vec
+from ....algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from .element import MOST_ELEMENTS, Element, file_near, parse_xml, words
-from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion, unit_vector
+from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")
 _FRAME = ("name", "childclass", "pos", *ORIENTATION)
@@ -221,7 +221,7 @@ class Compiler:
         ):  # of a site; its z axis goes from the second to the first
             numbers = element.numbers("fromto", 6)
             first, second = vec(numbers[:3]), vec(numbers[3:])
-            axis = direction(element, "fromto", (*(first - second),))
+            axis = element.direction((*(first - second),), "fromto")
             return Place(0.5 * (first + second), turn_to(axis))
         at = vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0)))
         given = [name for name in ORIENTATION if name in element.attributes]
@@ -238,38 +238,20 @@ class Compiler:
             case "euler":
                 return self.euler(numbers)
             case "quat":
-                _require_nonzero(element, name, numbers)
+                element.require_nonzero(numbers, name)
                 return unit_quaternion(quat(numbers))
             case "axisangle":
-                axis = direction(element, name, numbers[:3])
+                axis = element.direction(numbers[:3], name)
                 return turn_about(axis, self.angle(numbers[3]))
             case "zaxis":
-                return turn_to(direction(element, name, numbers))
+                return turn_to(element.direction(numbers, name))
             case _:
-                x, y = direction(element, name, numbers[:3]), vec(numbers[3:])
-                y = direction(element, name, (*(y - (x @ y) * x),))
+                x, y = element.direction(numbers[:3], name), vec(numbers[3:])
+                y = element.direction((*(y - (x @ y) * x),), name)
                 return turn_of_axes(x, y, cross(x, y))
 
 
 _AXES = {"x": X, "y": Y, "z": Z}
-
-
-def _require_nonzero(element: Element, name: str, numbers: Sequence[float]) -> None:
-    if math.hypot(*numbers) < 1e-10:  # as MuJoCo has it: shorter axes point anywhere
-        raise element.fault(
-            f"{name}: found axes of no direction, expected ones that span a frame; correct the"
-            " attribute"
-        )
-
-
-def direction(element: Element, name: str, numbers: Sequence[float]) -> Vec3:
-    """Return the direction of three numbers, length one.
-
-    Raises:
-        CaseError: they are zero.
-    """
-    _require_nonzero(element, name, numbers)
-    return unit_vector(numbers)
 
 
 def read_compiler(root: Element) -> Compiler:

@@ -19,7 +19,6 @@ from pathlib import Path
 from posixpath import join as joined
 from posixpath import normpath
 
-import numpy as np
 from numpy.polynomial import Polynomial
 
 from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
@@ -28,10 +27,11 @@ from ....extras import library
 from ...io.case_file import LARGEST_FILE
 from ...io.document import fault, read_text, shown
 from .element import Element, parse_xml, words
-from .framed import FramedJoint, Freedom, join
-from .graph import Graph, Joint, Loop
+from .graph import FramedFreedom, FramedJoint, Graph, Joint, Loop, join
+from .limits import NO_LIMIT, Limit
+from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .robot_elements import HALFWAY, direction, mass_in
+from .robot_elements import HALFWAY
 from .tree import BushingLaw, Closure, Coupling, Kind, Move, Spring, Strut, Tree
 
 VERSION_4 = 40_000
@@ -150,7 +150,7 @@ class _Reader:
             name
             for each in self._all("CoordinateCouplerConstraint")
             for key in ("independent_coordinate_names", "dependent_coordinate_name")
-            for name in _text(each, key).split()
+            for name in each.child_text(key).split()
         }
         joints = [found for each in every if (found := self._joint(each, coupled))]
         join(graph, joints)
@@ -165,7 +165,7 @@ class _Reader:
             name = marker.required("name")
             name += ".marker" * (name in graph.places)
             graph.frames[name] = link, graph.places[link].then(at)
-        x, y, z = _numbers(self.model, "gravity", 3, GRAVITY)
+        x, y, z = self.model.value("gravity", 3, GRAVITY)
         tree.gravity = x, y, z
         for section in self.model.children:
             if section.tag.endswith("Set") and section.tag not in _TIED:
@@ -195,8 +195,8 @@ class _Reader:
         if name in graph.places:
             raise element.repeated_name(name, "the bodies")
         graph.places[name], graph.elements[name] = ORIGIN, element
-        xx, yy, zz, xy, xz, yz = _numbers(element, "inertia", 6, (0.0,) * 6)
-        (mass,) = _numbers(element, "mass", 1, (0.0,))
+        xx, yy, zz, xy, xz, yz = element.value("inertia", 6, (0.0,) * 6)
+        (mass,) = element.value("mass", 1, (0.0,))
         if mass != 0.0:
             place = Place(_vector(element, "mass_center"))
             graph.masses[name] = mass_in(place, mass, (xx, yy, zz, xy, xz, yz))
@@ -207,7 +207,7 @@ class _Reader:
         Raises:
             CaseError: there is none, or frames hang on each other in a ring.
         """
-        text, owner = _text(element, key), self.owners[id(element)]
+        text, owner = element.child_text(key), self.owners[id(element)]
         tried = [normpath(joined(each, text)) for each in (owner, owner.rpartition("/")[0] or "/")]
         tried += [f"/bodyset/{text}", f"/{text}"]
         found = next((path for path in tried if path in self.paths), "")
@@ -225,7 +225,7 @@ class _Reader:
             raise frame.fault("hangs on itself by a ring of frames; correct socket_parent")
         frame.require_children(IN_FRAME)
         link, place = self._frame(frame, "socket_parent", depth + 1)
-        angles = _numbers(frame, "orientation", 3, (0.0,) * 3)
+        angles = frame.value("orientation", 3, (0.0,) * 3)
         return link, place.then(Place(_vector(frame, "translation"), _turn(angles)))
 
     def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
@@ -237,8 +237,7 @@ class _Reader:
         (a, f), (b, g) = (
             self._frame(element, f"socket_{each}_frame") for each in ("parent", "child")
         )
-        if a == b:
-            raise element.fault(f"joins {a!r} with itself, expected two bodies; correct a socket")
+        element.require_two(a, b)
         freedoms = (
             self._custom(element, name)
             if element.tag == CUSTOM
@@ -267,7 +266,7 @@ class _Reader:
             raise element.fault(f"found {len(given)} coordinates, expected {count}; correct it")
         return given
 
-    def _chain(self, element: Element, name: str, coupled: set[str]) -> list[Freedom]:
+    def _chain(self, element: Element, name: str, coupled: set[str]) -> list[FramedFreedom]:
         chain = CHAINS[element.tag]
         coordinates = self._coordinates(element, name, len(chain))
         whole = element.tag in ("BallJoint", "FreeJoint") and not any(
@@ -279,12 +278,12 @@ class _Reader:
         slides = [
             self._freedom(coordinates[k], kind, axis) for kind, axis, k in chain if kind == "slide"
         ]
-        return [*slides, Freedom(name, "ball", X, element, turn=turn)]
+        return [*slides, FramedFreedom(name, "ball", X, element, turn=turn)]
 
     def _default(self, coordinate: Element) -> float:
-        return _numbers(coordinate, "default_value", 1, (0.0,))[0]
+        return coordinate.value("default_value", 1, (0.0,))[0]
 
-    def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> Freedom:
+    def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> FramedFreedom:
         """Return the move of a coordinate; lock it if the file does."""
         name = coordinate.required("name")
         if name in self.values:
@@ -292,13 +291,11 @@ class _Reader:
         self.values[name] = self._default(coordinate)
         if _flag(coordinate, "locked"):
             self.ties.append(Coupling(f"{name}.lock", {name: 1.0}, {}, (0.0,), coordinate))
-        lower, upper = "-inf", "inf"
-        if _flag(coordinate, "clamped"):
-            lower, upper = map(repr, _numbers(coordinate, "range", 2, (-np.inf, np.inf)))
-        limit = Element(coordinate.file, "limit", {"lower": lower, "upper": upper}, coordinate.line)
-        return Freedom(name, kind, axis, replace(coordinate, children=[limit]), self.values[name])
+        clamped = _flag(coordinate, "clamped")
+        limit = Limit(*coordinate.value("range", 2, ())) if clamped else NO_LIMIT
+        return FramedFreedom(name, kind, axis, coordinate, self.values[name], limit=limit)
 
-    def _custom(self, element: Element, name: str) -> list[Freedom]:
+    def _custom(self, element: Element, name: str) -> list[FramedFreedom]:
         """Return the moves of a custom joint: of each coordinate the first axis that it moves as
         much as itself; other axes follow.
         """
@@ -321,27 +318,27 @@ class _Reader:
                     "moves no axis of its joint as much as itself, expected one axis"
                     " with a line of slope 1 or -1; correct the joint"
                 )
-        freedoms: list[Freedom] = []
+        freedoms: list[FramedFreedom] = []
         for k, each in enumerate(AXES):
             coordinate, curve = curves[each]
             kind: Kind = "slide" if k < 3 else "hinge"
             axis = (X, Y, Z)[k % 3]
             if each in given and (child := given[each].child("axis")) is not None:
-                axis = direction(child, child.text_numbers(3))
+                axis = child.direction(child.text_numbers(3))
             constant = float(curve.coef[0])
             if leads.get(coordinate) == each:
                 if constant:
-                    freedoms.append(Freedom("", kind, axis, element, constant, stands=True))
+                    freedoms.append(FramedFreedom("", kind, axis, element, constant, stands=True))
                 slope = float(curve.coef[1])
                 freedoms.append(self._freedom(coordinates[coordinate], kind, slope * axis))
             elif coordinate:
                 value = float(curve(self._default(coordinates[coordinate])))
                 follower = f"{name}.{each}"
-                freedoms.append(Freedom(follower, kind, axis, given[each], value))
+                freedoms.append(FramedFreedom(follower, kind, axis, given[each], value))
                 self.values[follower] = value
                 self._follow(f"{follower}.curve", follower, coordinate, curve, given[each])
             elif constant:
-                freedoms.append(Freedom("", kind, axis, element, constant, stands=True))
+                freedoms.append(FramedFreedom("", kind, axis, element, constant, stands=True))
         return freedoms
 
     def _follow(
@@ -372,19 +369,10 @@ class _Reader:
             self._couple(name, element)
             return
         welded = element.tag == "WeldConstraint"
-        sockets = [f"socket_frame{k}" if welded else f"socket_body_{k}" for k in (1, 2)]
-        ends = [self._frame(element, each) for each in sockets]
-        if not welded:
-            ends = [
-                (link, place.then(Place(_vector(element, f"location_body_{k}"))))
-                for k, (link, place) in enumerate(ends, 1)
-            ]
-        links = ends[0][0], ends[1][0]
-        if links[0] == links[1]:
-            raise element.fault(f"ties {links[0]!r} to itself, expected two bodies; correct it")
-        first, second = (graph.places[link].then(place) for link, place in ends)
+        keys = ("socket_frame{}",) if welded else ("socket_body_{}", "location_body_{}")
+        links, (first, second) = self._ends(element, *keys)
         if element.tag == "ConstantDistanceConstraint":
-            (length,) = _numbers(element, "constant_distance", 1, (0.0,))
+            (length,) = element.value("constant_distance", 1, (0.0,))
             rod = Closure(name, links, (Place(first.at), Place(second.at)), element, "distance")
             graph.rods.append(replace(rod, length=length))
             return
@@ -393,12 +381,12 @@ class _Reader:
 
     def _couple(self, name: str, element: Element) -> None:
         """Let a coordinate follow others."""
-        follower = _text(element, "dependent_coordinate_name")
-        leaders = _text(element, "independent_coordinate_names").split()
+        follower = element.child_text("dependent_coordinate_name")
+        leaders = element.child_text("independent_coordinate_names").split()
         for key, each in [("dependent", follower), *(("independent", x) for x in leaders)]:
             if each not in self.values:
                 raise element.unknown_name(f"{key}_coordinate", each, self.values, "a coordinate")
-        (scale,) = _numbers(element, "scale_factor", 1, (1.0,))
+        (scale,) = element.value("scale_factor", 1, (1.0,))
         around = element.child("coupled_coordinates_function")
         functions = around.children if around else []
         if len(functions) != 1:
@@ -409,7 +397,7 @@ class _Reader:
             return
         if functions[0].tag != "LinearFunction":
             raise element.fault("is a curve of several coordinates, expected a line; correct it")
-        numbers = _numbers(functions[0], "coefficients", len(leaders) + 1)
+        numbers = functions[0].value("coefficients", len(leaders) + 1)
         weights = {follower: 1.0}
         for leader, slope in zip(leaders, numbers, strict=False):
             weights[leader] = weights.get(leader, 0.0) - scale * slope
@@ -426,12 +414,12 @@ class _Reader:
             for each in objects.children
         ]
         for each in forces:
-            coordinate = _text(each, "coordinate")
+            coordinate = each.child_text("coordinate")
             if not _flag(each, "appliesForce", default=True):
                 tree.count("forces that are not applied")
             elif each.tag == "SpringGeneralizedForce" and coordinate in self.values:
                 numbers = [
-                    _numbers(each, key, 1, (0.0,))[0]
+                    each.value(key, 1, (0.0,))[0]
                     for key in ("stiffness", "viscosity", "rest_length")
                 ]
                 tree.springs[coordinate] = Spring(*numbers)
@@ -440,48 +428,48 @@ class _Reader:
             elif each.tag == "PointToPointSpring":
                 self._spring(each)
             else:
-                if each.tag.endswith("CoordinateActuator") and coordinate in self.values:
-                    tree.actuated.add(coordinate)
+                if each.tag.endswith("CoordinateActuator"):
+                    tree.add_motor(each.tag, {coordinate} & self.values.keys())
                 tree.count(each.tag)
 
+    def _ends(
+        self, element: Element, socket: str, point: str = ""
+    ) -> tuple[tuple[str, str], tuple[Place, Place]]:
+        """Return two links and a frame of each, global, by the keys of sockets and points."""
+        links: list[str] = []
+        places: list[Place] = []
+        for k in (1, 2):
+            link, place = self._frame(element, socket.format(k))
+            place = place.then(Place(_vector(element, point.format(k)))) if point else place
+            links.append(link)
+            places.append(self.graph.places[link].then(place))
+        element.require_two(*links)
+        return (links[0], links[1]), (places[0], places[1])
+
     def _spring(self, element: Element) -> None:
-        ends = [self._frame(element, f"socket_body{k}") for k in (1, 2)]
-        places = [
-            self.graph.places[link].then(place.then(Place(_vector(element, f"point{k}"))))
-            for k, (link, place) in enumerate(ends, 1)
-        ]
-        stiffness, rest = (
-            _numbers(element, key, 1, (0.0,))[0] for key in ("stiffness", "rest_length")
-        )
-        self._strut(element, ends, places, Spring(stiffness, 0.0, rest))
+        stiffness, rest = (element.value(key, 1, (0.0,))[0] for key in ("stiffness", "rest_length"))
+        ends = self._ends(element, "socket_body{}", "point{}")
+        self._strut(element, *ends, Spring(stiffness, 0.0, rest))
 
     def _bush(self, element: Element) -> None:
-        ends = [self._frame(element, f"socket_frame{k}") for k in (1, 2)]
-        places = [self.graph.places[link].then(place) for link, place in ends]
         laws = [
-            _vector(element, key)
-            for key in words(
-                "translational_stiffness rotational_stiffness translational_damping"
-                " rotational_damping"
-            )
+            element.value(f"{kind}_{law}", 3, (0.0, 0.0, 0.0))
+            for law in ("stiffness", "damping")
+            for kind in ("translational", "rotational")
         ]
-        numbers = [(float(x), float(y), float(z)) for x, y, z in laws]
-        self._strut(element, ends, places, BushingLaw(*numbers))
+        numbers = [(x, y, z) for x, y, z in laws]
+        self._strut(element, *self._ends(element, "socket_frame{}"), BushingLaw(*numbers))
         self.graph.tree.notes.append(f"{element}: {HALFWAY}")
 
     def _strut(
         self,
         element: Element,
-        ends: Sequence[tuple[str, Place]],
-        places: Sequence[Place],
+        links: tuple[str, str],
+        places: tuple[Place, Place],
         law: Spring | BushingLaw,
     ) -> None:
-        links = ends[0][0], ends[1][0]
-        if links[0] == links[1]:
-            raise element.fault(f"ties {links[0]!r} to itself, expected two bodies; correct it")
-        pair = places[0], places[1]
         name = element.required("name")
-        self.graph.struts.append(Strut(name, links, pair, law, element, element.tag))
+        self.graph.struts.append(Strut(name, links, places, law, element, element.tag))
 
 
 _ZERO = Polynomial([0.0])
@@ -494,7 +482,7 @@ def _is_own(curve: Polynomial) -> bool:
 
 def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, Polynomial]:
     """Return the coordinate of an axis of a custom joint, empty without one, and its curve."""
-    names = _text(axis, "coordinates").split()
+    names = axis.child_text("coordinates").split()
     around = axis.child("function")
     functions = [
         each for each in (around or axis).children if each.tag not in ("coordinates", "axis")
@@ -520,14 +508,14 @@ def _function(element: Element) -> Polynomial:
     """Return a function of one coordinate."""
     match element.tag:
         case "Constant":
-            found = Polynomial(_numbers(element, "value", 1, (0.0,)))
+            found = Polynomial(element.value("value", 1, (0.0,)))
         case "LinearFunction":
-            found = Polynomial(_numbers(element, "coefficients", 2)[::-1])
+            found = Polynomial(element.value("coefficients", 2)[::-1])
         case "PolynomialFunction":
-            count = len(_text(element, "coefficients").split())
-            found = Polynomial(_numbers(element, "coefficients", max(count, 1))[::-1])
+            count = len(element.child_text("coefficients").split())
+            found = Polynomial(element.value("coefficients", max(count, 1))[::-1])
         case "MultiplierFunction":
-            (scale,) = _numbers(element, "scale", 1, (1.0,))
+            (scale,) = element.value("scale", 1, (1.0,))
             around = element.child("function")
             inner = [each for each in (around or element).children if each.tag != "scale"]
             if len(inner) != 1:
@@ -547,24 +535,8 @@ def _turn(angles: Sequence[float]) -> Quat:
     return unit_quaternion(reduce(Quat.__mul__, turns, IDENTITY))
 
 
-def _text(element: Element, tag: str) -> str:
-    child = element.child(tag)
-    return "" if child is None else child.text
-
-
-def _numbers(
-    element: Element, tag: str, count: int, default: Sequence[float] | None = None
-) -> tuple[float, ...]:
-    child = element.child(tag)
-    if child is None and default is not None:
-        return tuple(default)
-    if child is None:
-        raise element.fault(f"<{tag}>: missing, expected {count} numbers; add it")
-    return child.text_numbers(count)
-
-
 def _vector(element: Element, tag: str) -> Vec3:
-    return vec(_numbers(element, tag, 3, (0.0, 0.0, 0.0)))
+    return vec(element.value(tag, 3, (0.0, 0.0, 0.0)))
 
 
 def _flag(element: Element, tag: str, *, default: bool = False) -> bool:

@@ -17,15 +17,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numpy as np
-
-from ....algebra import ZERO, Vec3, X, cross, vec
+from ....algebra import Vec3, X, cross, vec
 from ....errors import CaseError
 from ...io.document import decimal, shown, usable
 from .element import Element, Names, words
 from .graph import Freedom, Graph, Joint, Loop
-from .place import Place, coordinates, turn_of_axes, unit_vector
-from .tree import BushingLaw, Coupling, Mass, Spring, Strut
+from .place import Place, coordinates, turn_of_axes
+from .tree import BushingLaw, Coupling, Spring, Strut
 
 BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
 BUSHING = "drake:linear_bushing_rpy"
@@ -66,29 +64,6 @@ LinkOf: TypeAlias = Callable[[Element, str], str]
 """Name of the link that an element names."""
 FrameOf: TypeAlias = Callable[[Element, str], tuple[str, Place]]
 """Link of the frame that an element names, and the frame's global place."""
-
-
-def direction(element: Element, numbers: Sequence[float]) -> Vec3:
-    """Return a unit vector along three numbers.
-
-    Raises:
-        CaseError: they are zero.
-    """
-    if math.hypot(*numbers) < 1e-10:  # as in MJCF: shorter axes point anywhere
-        raise element.fault("xyz: found zero, expected the direction of an axis; correct it")
-    return unit_vector(numbers)
-
-
-def mass_in(place: Place, mass: float, entries: Sequence[float]) -> Mass | None:
-    """Return the mass of a link in its frame; None of a negative one.
-
-    Args:
-        place: centre of mass and axes of the inertia, in the frame of the link.
-        entries: the inertia, by `ENTRIES` [kg m^2].
-    """
-    xx, yy, zz, xy, xz, yz = entries
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Mass(mass, ZERO, inertia).seen_in(place) if mass >= 0.0 else None
 
 
 def add_spring(graph: Graph, move: str, values: Mapping[str, str]) -> None:
@@ -168,10 +143,7 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
         graph.loops.append(Loop(joint, (first, second)))
 
     for links, ties in found.items():
-        if links[0] == links[1]:
-            raise ties[0][0].fault(
-                f"ties {links[0]!r} to itself, expected two links; correct one of the bodies"
-            )
+        ties[0][0].require_two(*links)
         first, second = map(_frame, zip(*(points for _, *points in ties), strict=True))
         if first is not None and second is not None:
             add(ties[0][0], links, (first, second))
@@ -186,7 +158,7 @@ def _strut(graph: Graph, element: Element, link_of: LinkOf) -> Strut:
         graph.places[link].then(Place(point)) for link, point in zip(links, points, strict=True)
     )
     stiffness, damping, length = (
-        element.value(f"{element.tag}_{each}", 1)[0] for each in STRUT_LAW
+        element.value(f"{element.tag}_{each}", 1, (0.0,))[0] for each in STRUT_LAW
     )
     if min(stiffness, damping, length) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
@@ -204,11 +176,10 @@ def _bushing(element: Element, frame_of: FrameOf) -> Strut:
     for part in laws:
         if element.child(part) is None:
             raise element.fault(f"<{part}>: missing, expected three numbers; add it")
-    values = [coordinates(vec(element.value(part, 3))) for part in laws]
+    values = [coordinates(vec(element.value(part, 3, (0.0, 0.0, 0.0)))) for part in laws]
     if min(map(min, values)) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
-    if first == second:
-        raise element.fault(f"ties {first!r} to itself, expected two links; correct a frame")
+    element.require_two(first, second)
     links = first, second
     return Strut(
         _name(element, links), links, (place, other), BushingLaw(*values), element, BUSHING
@@ -234,7 +205,7 @@ def _ends(element: Element, link_of: LinkOf) -> tuple[tuple[str, str], tuple[Vec
     parts = [*(f"{tag}_body_{side}" for side in "AB"), f"{tag}_p_AP", f"{tag}_p_BQ"]
     element.require_children((*parts, *(f"{tag}_{each}" for each in STRUT_LAW)), closed=True)
     first, second = (link_of(*_named_child(element, part)) for part in parts[:2])
-    p, q = (vec(element.value(part, 3)) for part in parts[2:])
+    p, q = (vec(element.value(part, 3, (0.0, 0.0, 0.0))) for part in parts[2:])
     return (first, second), (p, q)
 
 

@@ -19,6 +19,8 @@ from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from .element import Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
+from .limits import NO_LIMIT, Limit, limit_of
+from .masses import mass_in
 from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
@@ -31,8 +33,6 @@ from .robot_elements import (
     Unread,
     add_spring,
     add_ties,
-    direction,
-    mass_in,
     mimic,
     screw,
 )
@@ -265,19 +265,13 @@ def _mass(element: Element) -> Mass | None:
             return None  # that of its collision shapes
         matrix = element.child("inertia")
         entries = [
-            default if matrix is None else _number(matrix, name, default)
+            default if matrix is None else matrix.value(name, 1, (default,))[0]
             for name, default in zip(ENTRIES, UNIT, strict=True)
         ]
-        mass = element.child("mass")
-        kilograms = 1.0 if mass is None else mass.text_numbers(1)[0]
-        return mass_in(pose_of(element.child("pose")), kilograms, entries)
+        (mass,) = element.value("mass", 1, (1.0,))
+        return mass_in(pose_of(element.child("pose")), mass, entries)
     except CaseError:
         return None
-
-
-def _number(element: Element, tag: str, default: float) -> float:
-    child = element.child(tag)
-    return default if child is None else child.text_numbers(1, default=(default,))[0]
 
 
 def _version(root: Element) -> tuple[int, ...]:
@@ -327,9 +321,6 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
     Raises:
         CaseError: an unknown link or joint, or a value that makes no sense.
     """
-    world = WORLD
-    while world in graph.places:
-        world += "'"
     joints: list[Joint] = []
     gears: list[tuple[_Joint, tuple[str, str]]] = []
     for full, framed in frames.joints.items():
@@ -340,15 +331,9 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         ends: list[str] = []
         for tag in ("parent", "child"):
             link = frames.link(element, within(framed.scope, text_of(element, tag)))
-            if not link and world not in graph.places:
-                graph.places[world], graph.elements[world] = ORIGIN, graph.root
-                graph.fixed.add(world)
-            ends.append(frames.short(link) if link else world)
-        if ends[0] == ends[1]:
-            raise element.fault(
-                f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
-            )
+            ends.append(frames.short(link) if link else graph.add_world())
         links = ends[0], ends[1]
+        element.require_two(*links)
         if {*ends} <= graph.fixed:
             graph.tree.count("joints of what stands still")
             continue
@@ -375,7 +360,7 @@ class _Joint:
     def read(self, links: tuple[str, str]) -> Joint:
         """Return the joint between two links; add mimics, couplings and springs."""
         joint = Joint.of(self.name, links, self.place.at, self._freedoms(), self.element)
-        moves = joint.moves
+        moves = [replace(each, limit=self._limit(each)) for each in joint.moves]
         mimics: list[Coupling] = []
         for tag, move in zip(("axis", "axis2"), moves, strict=False):
             for axis in self.element.only(tag):
@@ -385,7 +370,16 @@ class _Joint:
         if (element := self.element.child(MIMIC)) is not None:
             mimics.append(self._drake_mimic(moves, element))
         self.graph.couplings += mimics
-        return joint
+        return replace(joint, moves=moves)
+
+    def _limit(self, move: Move) -> Limit:
+        axis = self.element.child("axis2" if move.name.endswith(".2") else "axis")
+        found = axis and axis.child("limit")
+        if not found:
+            return NO_LIMIT
+        limit = limit_of(found, {each.tag: each.text for each in found.children})
+        sizes = (each if each >= 0.0 else math.inf for each in (limit.effort, limit.velocity))
+        return Limit(limit.lower, limit.upper, *sizes)
 
     def gearbox(self, links: tuple[str, str], joints: Sequence[Joint]) -> Coupling:
         """Return the coupling of the turns of two links about a third.
@@ -396,7 +390,7 @@ class _Joint:
         element, named = self.element, text_of(self.element, "gearbox_reference_body")
         reference = self.frames.link(element, within(self.framed.scope, named))
         around = self.frames.short(reference) if reference else WORLD
-        ratio = _number(element, "gearbox_ratio", 1.0)
+        (ratio,) = element.value("gearbox_ratio", 1, (1.0,))
         second = "axis2" if element.child("axis2") is not None else "axis"
         weights: dict[str, float] = {}
         for tag, link, weight in (("axis", links[0], ratio), (second, links[1], 1.0)):
@@ -458,7 +452,7 @@ class _Joint:
             given = given or MODEL
         if given:
             place = self.frames.place(axis, within(self.framed.scope, given))
-        return place.direction(direction(xyz or axis, numbers))
+        return place.direction((xyz or axis).direction(numbers))
 
     def _add_spring(self, move: Move, axis: Element) -> None:
         for dynamics in axis.only("dynamics"):
@@ -481,7 +475,7 @@ class _Joint:
         if self.frames.joints[full].element.attributes.get("type") in TWO_AXES:
             name = f"{name}.{1 + (other == 'axis2')}"
         factor, offset, reference = (
-            default if (child := element.child(tag)) is None else child.text_numbers(1)[0]
+            element.value(tag, 1, (default,))[0]
             for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
         )
         return mimic(move.name, name, offset - factor * reference, factor, element)

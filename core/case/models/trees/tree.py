@@ -8,7 +8,8 @@ chain of massless ones, a move each. Loops are closed by ties.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +22,7 @@ from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
 from ...io.document import LARGEST, shown
 from .element import Element, Names
+from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place
 
 WORLD = "world"
@@ -77,6 +79,7 @@ class Move:
         axis: unit vector [-]; without meaning for a ball and a free link.
         element: its place in the file.
         reference: its coordinate in the zero pose [rad or m].
+        limit: of its one coordinate.
         moved: change of its coordinate since the zero pose [rad or m].
         outer, inner: links it joins; the inner one moves on the outer.
     """
@@ -87,6 +90,7 @@ class Move:
     axis: Vec3
     element: Element
     reference: float = 0.0
+    limit: Limit = NO_LIMIT
     moved: float = 0.0
     outer: str = ""
     inner: str = ""
@@ -242,13 +246,13 @@ class Tree:
         unweighed: moving links whose masses cannot be read.
         springs: by move; others are of no move of the tree.
         actuated: moves with a motor.
+        motors: numbers of parts of motors and of limits of their moves, by their names in
+            `left_out`, where they are unless they say what drives the model.
         keyframes: by name.
         starts: keyframes of some moves alone, as --start takes their values.
         left_out: numbers of parts without a meaning for kinematics, by name.
         notes: of its reader, beside every verdict.
         without: names by which the user leaves out elements.
-        dialect: root element of its file.
-        degrees, limited: of MJCF, limits are in degrees, and ranges are limits unless said.
     """
 
     file: Path
@@ -270,15 +274,13 @@ class Tree:
     springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
     struts: list[Strut] = field(default_factory=list[Strut])
     actuated: set[str] = field(default_factory=set[str])
+    motors: Counter[str] = field(default_factory=Counter[str])
     starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
     notes: list[str] = field(default_factory=list[str])
     without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
-    dialect: str = ""
-    degrees: bool = False
-    limited: bool = True
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:
@@ -288,6 +290,11 @@ class Tree:
     def count(self, what: str) -> None:
         """Count one more omitted item."""
         self.left_out[what] = self.left_out.get(what, 0) + 1
+
+    def add_motor(self, part: str, moves: Collection[str]) -> None:
+        """Add a motor of moves, which is a part that is left out."""
+        self.actuated.update(moves)
+        self.motors[part] += bool(moves)
 
     def hang(
         self, element: Element, name: str, outer: str, place: Place, moves: Sequence[Move] = ()

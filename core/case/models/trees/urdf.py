@@ -22,6 +22,8 @@ from ...io.document import shown
 from .beside import read_beside
 from .element import Element, words
 from .graph import Freedom, Graph, Joint, Loop
+from .limits import NO_LIMIT, Limit, limit_of
+from .masses import mass_in
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
@@ -33,8 +35,6 @@ from .robot_elements import (
     Unread,
     add_spring,
     add_ties,
-    direction,
-    mass_in,
     mimic,
     screw,
 )
@@ -147,15 +147,15 @@ class _Robot:
         add_ties(graph, ((each, self._named, framed) for each in root.children))
         self.beside.add(graph)
         self._require_apart(frames)
-        commanded = [
-            joint
-            for control in root.only("ros2_control")
-            for joint in control.only("joint")
-            if any(joint.only("command_interface"))
-        ]
-        driven = [joint for each in root.only("transmission") for joint in each.only("joint")]
-        names = {joint.attributes.get("name", "") for joint in (*driven, *commanded)}
-        graph.tree.actuated |= names & self.joints.keys()
+        for motor in root.only("transmission", "ros2_control"):
+            names = {
+                joint.attributes.get("name", "")
+                for joint in motor.only("joint")
+                if motor.tag == "transmission" or any(joint.only("command_interface"))
+            }
+            graph.tree.add_motor(motor.tag, names & self.joints.keys())
+        limited = [any(self.joints[name].only("limit")) for name in graph.tree.actuated]
+        graph.tree.motors["limit of joints"] = sum(limited)
 
     def _links(self) -> None:
         root, graph = self.root, self.graph
@@ -257,12 +257,8 @@ class _Robot:
 
         freedoms: list[Freedom]
         match kind:
-            case "revolute" | "continuous":
-                freedoms = [("", "hinge", axis())]
-            case "prismatic":
-                freedoms = [("", "slide", axis())]
-            case "spherical" | "ball":
-                freedoms = [("", "ball", X)]
+            case "revolute" | "continuous" | "prismatic" | "spherical" | "ball" | "fixed":
+                freedoms = [("", each, X if each == "ball" else axis()) for each in CLOSING[kind]]
             case "floating" if links[0] in graph.fixed:
                 return Joint(name, links, (), element, is_free=True)
             case "floating":
@@ -272,19 +268,17 @@ class _Robot:
                 f, g, h = triad((*axis(),))
                 freedoms = [(".slide1", "slide", f), (".slide2", "slide", g)]
                 freedoms.append((".rotation", "hinge", h))
-            case "fixed":
-                freedoms = []
             case "screw":
                 if element.child(PITCH) is None:
                     raise element.fault(f"<{PITCH}>: missing, expected metres in a turn; add it")
-                freedoms = screw(graph, name, element.value(PITCH, 1)[0], axis(), element)
+                freedoms = screw(graph, name, element.value(PITCH, 1, (0.0,))[0], axis(), element)
             case "universal":  # of Drake: about x of the parent, then y of the child
                 axes = enumerate((X, Y), 1)
                 freedoms = [(f".{k}", "hinge", place.direction(a)) for k, a in axes]
             case _:  # of a file beside: a universal joint, by the letters of its axes
                 letters = {each: _AXES[each.lower()] for each in kind}
                 freedoms = [(f"_{k}", "hinge", place.direction(a)) for k, a in letters.items()]
-        return Joint.of(name, links, place.at, freedoms, element)
+        return Joint.of(name, links, place.at, freedoms, element, _limit(element))
 
     def _constraint(self, element: Element, default: str) -> Loop:
         """Return the joint of a <constraint> or <loop_joint>."""
@@ -381,6 +375,16 @@ class _Robot:
             unread.require_all_apart(gazebo.children, read, link)
 
 
+def _limit(element: Element) -> Limit:
+    found = element.child("limit")
+    if found is None:
+        return NO_LIMIT
+    texts = {"lower": "0", "upper": "0", **found.attributes}
+    if element.attributes.get("type") == "continuous":
+        texts |= {"lower": "", "upper": ""}
+    return limit_of(found, texts)
+
+
 def _mass(element: Element) -> Mass | None:
     """Return the mass of an <inertial>; None if it cannot be read, for motion does not need it."""
     element.require_known((), "URDF")
@@ -421,7 +425,7 @@ def _axis(element: Element, tag: str, place: Place) -> Vec3:
     if child is None:
         return place.direction(X)
     child.require_known(("xyz",), "URDF")
-    return place.direction(direction(child, child.numbers("xyz", 3)))
+    return place.direction(child.direction(child.numbers("xyz", 3)))
 
 
 def _frame_behind(first: Place, second: Place, moves: Sequence[Move]) -> Place:

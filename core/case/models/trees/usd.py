@@ -15,21 +15,29 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
-from ....algebra import cross, quat, vec
+from ....algebra import X, Y, Z, cross, quat, vec
 from ....errors import remedy, shortened, similar
 from ....mechanism.mechanism import Vector
 from .element import Element, words
-from .framed import FramedJoint, Freedom, join
-from .graph import Graph
-from .limits import INFINITE
+from .graph import FramedFreedom, FramedJoint, Graph, join
+from .limits import INFINITE, NO_LIMIT, Limit, limit_of
+from .masses import COLLIDER, masses_of
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
 from .robot_elements import mimic
-from .tree import Closure, Kind, Move, Tree
-from .usd_joints import AXES, GENERIC, ROD, TYPES, Axis, axes_of
-from .usd_mass import COLLIDER, masses_of
+from .tree import UNKNOWNS, Closure, Kind, Move, Tree
 from .usd_stage import UNITS
 
+AXES = {"X": X, "Y": Y, "Z": Z}
+TYPES: Mapping[str, Kind | None] = {
+    "PhysicsRevoluteJoint": "hinge",
+    "PhysicsPrismaticJoint": "slide",
+    "PhysicsSphericalJoint": "ball",
+    "PhysicsFixedJoint": None,
+}
+"""Joints with the one move they leave."""
+GENERIC, ROD = "PhysicsJoint", "PhysicsDistanceJoint"
 BODY, DRIVE = "PhysicsRigidBodyAPI", "PhysicsDriveAPI"
 PHYSX_MIMIC, NEWTON_MIMIC = "PhysxMimicJointAPI", "NewtonMimicAPI"
 EQUALITY = "MjcEquality"
@@ -87,7 +95,6 @@ class _Reader:
         bodies = [path for path, each in self.prims.items() if _is_body(each)]
         self.names = _short(bodies)
         self.joints: dict[str, FramedJoint] = {}
-        self.axes: dict[str, Sequence[Axis]] = {}
         self.rods: list[tuple[str, Element, tuple[str, str], tuple[Place, Place], float]] = []
         self.moves: dict[str, list[Move]] = {}
 
@@ -200,11 +207,7 @@ class _Reader:
             graph.tree.notes.append(f"{element} is switched off and joins nothing (jointEnabled)")
             return
         (first, f), (second, g) = self._end(element, 0), self._end(element, 1)
-        if first == second:
-            raise element.fault(
-                f"joins {first or 'the world'!r} with itself, expected two bodies; correct"
-                " physics:body0 or physics:body1"
-            )
+        element.require_two(first or "the world", second or "the world")
         links = first or graph.add_world(), second or graph.add_world()
         if {*links} <= graph.fixed:
             graph.tree.count("joints of what stands still")
@@ -217,30 +220,26 @@ class _Reader:
         if element.tag == ROD:
             self._add_rod(name, element, links, (f, g))
             return
-        axes = axes_of(element)
-        if sum(3 if each.kind == "ball" else 1 for each in axes) == 6:
+        freedoms = freedoms_of(element, name)
+        if sum(UNKNOWNS[each.kind] for each in freedoms) == 6:
             graph.tree.notes.append(f"{element} holds nothing: none of its axes is locked")
             return
         apis = element.attributes["apis"]
-        open_ = [f"{x.key}" for x in axes if x.key and f"LimitAPI:{x.key}" not in apis]
+        open_ = [x.key for x in freedoms if x.key and f"LimitAPI:{x.key}" not in apis]
         if element.tag == GENERIC and open_:
             graph.tree.notes.append(
                 f"{element} leaves {', '.join(open_)} free, which have no PhysicsLimitAPI; Newton"
                 " locks them"
             )
-        if len(turns := [each.key for each in axes if each.kind == "hinge"]) == 2:
+        if len(turns := [each.key for each in freedoms if each.kind == "hinge"]) == 2:
             graph.tree.notes.append(
                 f"{element} turns about {' and then '.join(turns)}, a universal joint as in Newton;"
                 " in PhysX no axis comes first, which is another joint for large turns"
             )
         closes = element.flag("physics:excludeFromArticulation", default=False)
         closes = closes or EQUALITY in apis
-        freedoms = [
-            Freedom(f"{name}{each.end}", each.kind, each.axis, self._limited(element, each))
-            for each in axes
-        ]
+        freedoms = [replace(each, limit=self._limit(element, each)) for each in freedoms]
         self.joints[name] = FramedJoint(name, element, links, (f, g), freedoms, closes)
-        self.axes[name] = axes
 
     def _end(self, element: Element, side: int) -> tuple[str, Place]:
         """Return the body of a joint, empty for the world, and the joint's frame in it [m]."""
@@ -300,11 +299,10 @@ class _Reader:
         """Return the unit of a coordinate [rad or m]."""
         return math.radians(1.0) if kind == "hinge" else self.metre
 
-    def _limited(self, element: Element, freedom: Axis) -> Element:
-        """Return the element of a move with its limits and motor, as <limit> of URDF has them."""
+    def _limit(self, element: Element, freedom: FramedFreedom) -> Limit:
         if freedom.kind == "ball":
-            return element
-        lower, upper = freedom.bounds
+            return NO_LIMIT
+        lower, upper = bounds_of(freedom.key)
         keys = {
             "lower": lower,
             "upper": upper,
@@ -320,10 +318,10 @@ class _Reader:
                 said[name] = repr(element.number(key) * (force if name == "effort" else unit))
         if float(said["lower"]) > float(said["upper"]):
             raise element.fault(
-                f"{freedom.bounds[0]}: is above {freedom.bounds[1]}, expected the lower one;"
+                f"{lower}: is above {upper}, expected the lower one;"
                 " exchange them, or write a PhysicsFixedJoint if it is locked"
             )
-        return replace(element, children=[Element(element.file, "limit", said, element.line)])
+        return limit_of(element, said)
 
     def _couple(self) -> None:
         """Add mimic joints, and find the motors."""
@@ -343,9 +341,9 @@ class _Reader:
                 self.graph.tree.actuated.add(move.name)
         self.graph.tree.actuated -= followers
 
-    def _axes(self) -> Iterator[tuple[FramedJoint, Move, Axis]]:
+    def _axes(self) -> Iterator[tuple[FramedJoint, Move, FramedFreedom]]:
         for joint in self.joints.values():
-            for move, axis in zip(self.moves[joint.name], self.axes[joint.name], strict=True):
+            for move, axis in zip(self.moves[joint.name], joint.freedoms, strict=True):
                 yield joint, move, axis
 
     def _mimics(self, joint: FramedJoint) -> Iterator[tuple[Move, float, float]]:
@@ -473,3 +471,62 @@ def _require_spelt(element: Element, known: Sequence[str]) -> None:
         name = key.removeprefix("physics:")
         if name != key and name not in known and similar(name, known, CLOSE):
             raise element.fault(f"found the property {key!r}; {remedy(name, known)}")
+
+
+def freedoms_of(element: Element, name: str) -> list[FramedFreedom]:
+    """Return the moves that a joint leaves.
+
+    Raises:
+        CaseError: no joint leaves them, or limits make no sense.
+    """
+    if element.tag == GENERIC:
+        return _generic(element, name)
+    kind = TYPES[element.tag]
+    if kind is None:
+        return []
+    letter = element.choice("physics:axis", (*AXES,), "X")
+    key = {"hinge": "angular", "slide": "linear"}.get(kind, "")
+    return [FramedFreedom(name, kind, AXES[letter], element, key=key)]
+
+
+def bounds_of(key: str) -> tuple[str, str]:
+    """Return the names of the limits of a move."""
+    if key in ("angular", "linear"):
+        return "physics:lowerLimit", "physics:upperLimit"
+    return f"limit:{key}:physics:low", f"limit:{key}:physics:high"
+
+
+def _generic(element: Element, name: str) -> list[FramedFreedom]:
+    """Return the moves of a joint whose limits lock axes."""
+    apis = element.attributes["apis"].split()
+    found: list[FramedFreedom] = []
+    for prefix, kind in (("trans", "slide"), ("rot", "hinge")):
+        for letter, axis in AXES.items():
+            key = f"{prefix}{letter}"
+            low, high = bounds_of(key)
+            limited = f"PhysicsLimitAPI:{key}" in apis
+            if not limited and (low in element.attributes or high in element.attributes):
+                raise element.fault(
+                    f"limit:{key}: found without the schema PhysicsLimitAPI:{key}, so that programs"
+                    " do not read it alike; apply the schema, or remove the limit"
+                )
+            bounds = [element.attributes.get(each, "inf") for each in (low, high)]
+            if limited and "inf" not in bounds and "-inf" not in bounds:
+                least, most = element.number(low), element.number(high)
+                if least > most or least == most == 0.0:
+                    continue
+                if least == most:
+                    raise element.fault(
+                        f"{low}: found {least:g} for both limits, which lock the joint out of its"
+                        " frames, expected low above high for a lock; move the frame"
+                    )
+            found.append(FramedFreedom(f"{name}.{key}", cast("Kind", kind), axis, element, key=key))
+    if "PhysicsLimitAPI:distance" in apis:
+        raise element.fault(
+            "limits a distance, which acts at its ends alone; write a"
+            " PhysicsDistanceJoint, or leave it out by --without " + element.attributes["name"]
+        )
+    slides = [each for each in found if each.kind == "slide"]
+    if len(found) - len(slides) == 3:
+        found = [*slides, FramedFreedom(f"{name}.rot", "ball", X, element)]
+    return [replace(found[0], name=name)] if len(found) == 1 else found
