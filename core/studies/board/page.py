@@ -5,7 +5,7 @@ and the settings.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from ...harness.labels import number
 from ...report.figures import Figure, Style, floored, ticked_axis
@@ -14,28 +14,32 @@ from ...report.sections import Diagram, Report, Section
 from .results import Board, Row, Run, TruthFacts
 
 COLUMNS = (
-    "integrator",
-    "engine",
+    "stepper",
     "settings",
     "outcome",
-    "step [s]",
     "error [m]",
     "gap [m]",
     "energy [J]",
     "reaction [N]",
-    "cost [s/s]",
     "order",
     "floor [m]",
+    "step [s]",
+    "cost [s/s]",
     "since",
 )
-LABELS = 4
+LABELS = 3
+OPEN = (
+    "Redundant rows leave open two or more directions of the force in each joint: no engine's"
+    " forces are compared."
+)
 NOTES = (
     "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
     " Gap: largest opening of a loop. Energy: of motion, weight and springs, minus the truth's at"
     " the same time; what loads and dampers take is in both.",
     "Reaction: largest error of the force in a joint, without directions that redundant rows leave"
     " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Drake,"
-    " Simbody), or of all joints but rods (Exudyn).",
+    " Simbody), or of all joints but rods (Exudyn). It holds the error of the motion: where a peak"
+    " of force passes a sample too late, it is as large as the peak, with any engine.",
     "Errors and costs are of the shortest step. Cost: wall time for a simulated second, in one"
     " run and process. The machine also does other things: costs within a factor of two are"
     " alike. Where the loop over the steps is in Python, its time is in the cost.",
@@ -66,20 +70,30 @@ def report(board: Board) -> Report:
 
 
 def _history(rows: Sequence[Row]) -> list[Section]:
-    """Return the section on rows that changed, if any did."""
-    cells, changed = list[list[str]](), [row for row in rows if row.past]
-    for row in changed:
-        ends = [(each.until, each) for each in row.past]
-        for until, each in [*ends, ("now", row)]:
-            error = number(each.error) if each.error is not None else each.state
-            settings = ", ".join(f"{name} {value}" for name, value in each.settings.items())
-            cells.append([row.case, row.name, each.since, until, each.version, settings, error])
+    """Return the section on rows that changed, the newest changes first, if any did."""
+    cells = list[list[str]]()
+    for row in rows:
+        for old, new in pairwise([*row.past, row]):
+            pairs = [
+                ("version", old.version, new.version),
+                ("outcome", old.state, new.state),
+                *(
+                    (name, *(each.settings.get(name, "default") for each in (old, new)))
+                    for name in {**old.settings, **new.settings}
+                ),
+            ]
+            found = [f"{name} {one} → {two}" for name, one, two in pairs if one != two]
+            factor = f"{new.error / old.error:.3g}" if old.error and new.error else "–"
+            errors = [number(each.error) for each in (old, new)]
+            change = ", ".join(found) or "error alone"
+            cells.append([new.since, row.case, row.name, change, *errors, factor])
+    cells.sort(key=lambda each: each[0], reverse=True)
     verdict = [
         "Rows whose version, settings, outcome or error changed since the first board of this"
         " history: errors by more than a tenth, and by more than round-off."
     ]
-    heads = ("case", "row", "since", "until", "version", "settings", "error [m]")
-    return [Section("History", verdict, [], heads, 6, cells)] if changed else []
+    heads = ("date", "case", "stepper", "change", "error before [m]", "after [m]", "factor")
+    return [Section("History", verdict, [], heads, 4, cells)] if cells else []
 
 
 def _rows(board: Board, truth: TruthFacts) -> list[Row]:
@@ -98,19 +112,27 @@ def _section(truth: TruthFacts, rows: Sequence[Row]) -> Section:
         f"Truth: {truth.method}. Halving its steps moves a point by {number(truth.error)} m, and"
         f" changes energy minus work by {number(truth.energy)} J.",
         *([truth.message] if truth.message else []),
+        *([] if truth.forces else [OPEN]),
         *_alike(rows),
     ]
+    cells, links = list[list[str]](), list[str]()
+    for group, each in groupby(rows, key=lambda row: row.group):
+        both = [*each]
+        cells += [[group], *(_cells(row, truth) for row in both)]
+        links += ["", *(f"{row.folder}/run.py" if row.folder else "" for row in both)]
     diagram = [Diagram(_plot(truth.case), _figure(measured, styles), styles)] if measured else []
-    return Section(
-        truth.case,
-        verdict,
-        [],
-        COLUMNS,
-        LABELS,
-        [_cells(row) for row in rows],
-        diagram,
-        [f"{row.folder}/run.py" if row.folder else "" for row in rows],
-    )
+    notes = _messages(rows)
+    return Section(truth.case, verdict, notes, COLUMNS, LABELS, cells, diagram, links)
+
+
+def _messages(rows: Sequence[Row]) -> list[str]:
+    """Return what rows say, once each; the remedy stands once, with the settings."""
+    found = dict[str, list[str]]()
+    for row in rows:
+        if row.message:
+            text = f"{row.state}: {row.message.partition(';')[0]}"
+            found.setdefault(text, []).append(row.name)
+    return [f"{'; '.join(names)}: {text}." for text, names in found.items()]
 
 
 def _alike(rows: Sequence[Row]) -> list[str]:
@@ -134,20 +156,21 @@ def _best(rows: Iterable[Row]) -> list[Row]:
     return [*found.values()]
 
 
-def _cells(row: Row) -> list[str]:
-    last = row.measured[-1] if row.measured else Run()
+def _cells(row: Row, truth: TruthFacts) -> list[str]:
+    last, reaction = (row.measured[-1] if row.measured else Run()), "–"
+    if row.measured:
+        missing = "not given" if truth.forces else "open"
+        reaction = missing if last.reaction is None else number(last.reaction)
     return [
-        row.group,
         f"{row.engine} {row.integrator}",
         row.column,
-        # the remedy stands once, below
-        f"{row.state}: {row.message.partition(';')[0]}" if row.message else row.state,
-        number(last.step) if last.step else "own" if last.accuracy else "–",
+        row.state,
         *(number(each) for each in (last.error, last.gap, last.energy)),
-        "not given" if row.measured and last.reaction is None else number(last.reaction),
-        number(last.cost),
+        reaction,
         "–" if row.order is None else f"{row.order:.2f}",
         number(row.floor),
+        number(last.step) if last.step else "own" if last.accuracy else "–",
+        number(last.cost),
         row.since,
     ]
 
@@ -178,7 +201,10 @@ def _missing(rows: Sequence[Row]) -> list[str]:
 
 
 def _settings(rows: Sequence[Row]) -> Section:
-    named = {(row.engine, row.integrator, row.column): row for row in rows}
+    # a row of the best settings that shows the defaults, because they are nearer, has no settings
+    named = {f"{row.engine} {row.integrator}": row for row in rows}
+    named |= {f"{row.engine} {row.integrator}": row for row in rows if row.settings}
+    heads = ("stepper", "version", "precision", "loop over steps", "closed loops", "best", "by")
     return Section(
         "Settings and measures",
         [
@@ -187,32 +213,18 @@ def _settings(rows: Sequence[Row]) -> Section:
             *_missing(rows),
         ],
         NOTES,
-        (
-            "engine",
-            "version",
-            "integrator",
-            "precision",
-            "settings",
-            "loop over steps",
-            "closed loops",
-            "values",
-            "by",
-            "on",
-        ),
-        10,
+        heads,
+        len(heads),
         [
             [
-                row.engine,
+                name,
                 row.version,
-                row.integrator,
                 row.precision,
-                row.column,
                 row.loop,
                 row.ties,
-                ", ".join(f"{name} {value}" for name, value in row.settings.items()) or "–",
-                row.by or "–",
-                row.on or "–",
+                ", ".join(f"{name} {value}" for name, value in row.settings.items()) or "default",
+                f"{row.by} {row.on}".strip() or "–",
             ]
-            for row in named.values()
+            for name, row in named.items()
         ],
     )

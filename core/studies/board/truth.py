@@ -105,6 +105,10 @@ def truth_of(case: Case) -> Truth:
     points = len(mechanism.points) + sum(
         not mechanism.is_fixed(body) for joint in mechanism.joints for body in joint.bodies
     )
+    forces = found.forces([joint.name for joint in mechanism.joints]).joints
+    reactions = np.stack(
+        [_determined(forces[joint.name], found.samples) for joint in mechanism.joints], axis=1
+    )
     facts = TruthFacts(
         case=case.name,
         source=case.source,
@@ -116,13 +120,12 @@ def truth_of(case: Case) -> Truth:
         redundant=found.redundant,
         method=found.method,
         points=points,
+        forces=bool(np.isfinite(reactions).any()),
         seconds=perf_counter() - begin,
         message=found.message,
     )
-    forces = found.forces([joint.name for joint in mechanism.joints]).joints
-    reactions = [_determined(forces[joint.name], found.samples) for joint in mechanism.joints]
     energy = _energy(mechanism, frames)
-    return Truth(case, found.times, frames, energy, np.stack(reactions, axis=1), facts)
+    return Truth(case, found.times, frames, energy, reactions, facts)
 
 
 def _determined(reaction: Reaction, samples: Any) -> Array:
