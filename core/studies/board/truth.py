@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...algebra import quat, rotation_less_identity
 from ...case.case import TIME, Case
 from ...errors import KincheckError
 from ...forces import Reaction
@@ -97,7 +98,8 @@ def truth_of(case: Case) -> Truth:
     for name, body in found.motion.bodies.items():
         assert body.v is not None
         r, p, v = (each[found.samples] for each in (body.r, body.p, body.v))
-        rotation = _rotations(p)
+        rows = np.array([[*row] for row in rotation_less_identity(quat(p.T))])
+        rotation = np.eye(3) + np.moveaxis(rows, 2, 0)
         turned = rotation @ rotation[0].T
         w = np.einsum("nij,nj->ni", rotation, v[:, 3:])
         arm = turned @ r[0]
@@ -143,15 +145,6 @@ def _determined(reaction: Reaction, samples: Any) -> Array:
 def _csv(heads: Sequence[str], rows: Array) -> str:
     quoted = ",".join(f'"{name}"' for name in heads)
     return "\n".join([quoted, *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n"
-
-
-def _rotations(p: Array) -> Array:
-    """Return the rotations of Euler parameters, shape (n, 3, 3)."""
-    e0, e = p[:, 0, None, None], p[:, 1:]
-    across = np.cross(e[:, None, :], np.eye(3))  # rows e x unit: the transpose of the cross product
-    outer = e[:, :, None] * e[:, None, :]
-    inner = (e**2).sum(axis=1)[:, None, None]
-    return (e0**2 - inner) * np.eye(3) + 2.0 * outer + 2.0 * e0 * across.transpose(0, 2, 1)
 
 
 def _energy(mechanism: Mechanism, frames: Mapping[str, Frames]) -> Array:
