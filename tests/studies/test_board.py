@@ -175,6 +175,7 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
         assert json.loads((folder / "row.json").read_text("utf-8")) == row
         assert f'href="{row["folder"]}/run.py"' in page
         assert "kincheck." not in (folder / "run.py").read_text("utf-8")
+    assert page.count('scope="rowgroup"') == len({row["group"] for row in rows.values()})
     assert "://" not in page.replace("http://www.w3.org", "")
 
 

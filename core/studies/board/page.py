@@ -29,17 +29,17 @@ COLUMNS = (
 )
 LABELS = 3
 OPEN = (
-    "Redundant rows leave open two or more directions of the force in each joint: no engine's"
-    " forces are compared."
+    "Redundant rows leave two directions of the force in each joint open: no forces are compared."
 )
+CAPTION = "Left is faster, down is more accurate; each point halves the step of the one before."
 NOTES = (
     "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
     " Gap: largest opening of a loop. Energy: of motion, weight and springs, minus the truth's at"
     " the same time; what loads and dampers take is in both.",
     "Reaction: largest error of the force in a joint, without directions that redundant rows leave"
-    " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Drake,"
-    " Simbody), or of all joints but rods (Exudyn). It holds the error of the motion: where a peak"
-    " of force passes a sample too late, it is as large as the peak, with any engine.",
+    " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Simbody;"
+    " Drake, without balls), or of all joints but rods (Exudyn). Where a peak of force passes a"
+    " sample too late, the error is as large as the peak, with any engine.",
     "Errors and costs are of the shortest step. Cost: wall time for a simulated second, in one"
     " run and process. The machine also does other things: costs within a factor of two are"
     " alike. Where the loop over the steps is in Python, its time is in the cost.",
@@ -70,7 +70,6 @@ def report(board: Board) -> Report:
 
 
 def _history(rows: Sequence[Row]) -> list[Section]:
-    """Return the section on rows that changed, the newest changes first, if any did."""
     cells = list[list[str]]()
     for row in rows:
         for old, new in pairwise([*row.past, row]):
@@ -97,7 +96,6 @@ def _history(rows: Sequence[Row]) -> list[Section]:
 
 
 def _rows(board: Board, truth: TruthFacts) -> list[Row]:
-    """Return the rows of a case, those of one kind of integrator together."""
     groups = [*dict.fromkeys(row.group for row in board.rows)]
     mine = [row for row in board.rows if row.case == truth.case]
     return sorted(mine, key=lambda row: groups.index(row.group))
@@ -120,9 +118,10 @@ def _section(truth: TruthFacts, rows: Sequence[Row]) -> Section:
         both = [*each]
         cells += [[group], *(_cells(row, truth) for row in both)]
         links += ["", *(f"{row.folder}/run.py" if row.folder else "" for row in both)]
-    diagram = [Diagram(_plot(truth.case), _figure(measured, styles), styles)] if measured else []
+    plot = Plot(truth.case, f"{truth.case}: error against cost, both log axes", CAPTION)
+    diagrams = [Diagram(plot, _figure(measured, styles), styles)] if measured else []
     notes = _messages(rows)
-    return Section(truth.case, verdict, notes, COLUMNS, LABELS, cells, diagram, links)
+    return Section(truth.case, verdict, notes, COLUMNS, LABELS, cells, diagrams, links)
 
 
 def _messages(rows: Sequence[Row]) -> list[str]:
@@ -136,7 +135,6 @@ def _messages(rows: Sequence[Row]) -> list[str]:
 
 
 def _alike(rows: Sequence[Row]) -> list[str]:
-    """Return a sentence on each kind of integrator whose engines share their error."""
     found = list[str]()
     for group, each in groupby(rows, key=lambda row: row.group):
         best = _best(each)
@@ -175,11 +173,6 @@ def _cells(row: Row, truth: TruthFacts) -> list[str]:
     ]
 
 
-def _plot(case: str) -> Plot:
-    caption = "Left is faster, down is more accurate; each point halves the step of the one before."
-    return Plot(case, f"{case}: error against cost, both log axes", caption)
-
-
 def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
     traces, costs = list[Figure](), list[float]()
     for row, style in zip(rows, styles, strict=True):
@@ -194,23 +187,18 @@ def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
     return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
-def _missing(rows: Sequence[Row]) -> list[str]:
-    """Return why engines are not run, a sentence each."""
-    messages = {row.engine: row.message for row in rows if row.state == "unavailable"}
-    return [f"Not run: {engine}: {message}." for engine, message in messages.items()]
-
-
 def _settings(rows: Sequence[Row]) -> Section:
     # a row of the best settings that shows the defaults, because they are nearer, has no settings
     named = {f"{row.engine} {row.integrator}": row for row in rows}
     named |= {f"{row.engine} {row.integrator}": row for row in rows if row.settings}
+    missing = {row.engine: row.message for row in rows if row.state == "unavailable"}
     heads = ("stepper", "version", "precision", "loop over steps", "closed loops", "best", "by")
     return Section(
         "Settings and measures",
         [
             "Default: nothing but integrator and step is set. Best: the best known settings, kept"
             " in settings.toml of the board; whoever knows better ones changes that file.",
-            *_missing(rows),
+            *(f"Not run: {engine}: {message}." for engine, message in missing.items()),
         ],
         NOTES,
         heads,
