@@ -77,7 +77,7 @@ STEPPERS = {
     "mjx": ("mjcf", _MUJOCO, "steppers/mjx.py"),
     "mujoco-warp": ("mjcf", _MUJOCO, "steppers/warp.py"),
     "newton": ("mjcf", "steppers/newton.py"),
-    "genesis": ("mjcf", _MUJOCO, "steppers/genesis.py"),
+    "genesis": ("mjcf", "steppers/genesis.py"),
 }
 """Steppers of free motion, by engine: format of the model that they read, and the parts of a script
 without kincheck. Where no format is named, the script builds the model.

@@ -7,15 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import loads, require, state_of
+
 
 def version() -> str:
     """Return the version of DART."""
     return str(import_module("dartpy").__version__)
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     dart: Any = import_module("dartpy")
+    require(model, "DART", chains=False, rods=False)
     parts, skeleton = dart.dynamics, dart.dynamics.Skeleton("mechanism")
     nodes: dict[str, Any] = {"ground": None}
     origin = {"ground": np.zeros(3)}
@@ -27,8 +30,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
 
     for body in model["bodies"]:
         node, before = nodes[body["parent"]], origin[body["parent"]]
-        if len(body["moves"]) != 1:
-            raise NotImplementedError("DART has no massless links between the joints of a chain")
         (move,) = body["moves"]
         kind = {"hinge": "Revolute", "slide": "Prismatic", "ball": "Ball"}[move["kind"]]
         given = getattr(parts, f"{kind}JointProperties")()
@@ -46,8 +47,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     world.addSkeleton(skeleton)
     skeleton.setVelocities(np.concatenate([body["rates"] for body in model["bodies"]]))
     for tie in model["ties"]:
-        if tie["length"]:
-            raise NotImplementedError("DART has no constraint of a distance")
         ends = [nodes[name] for name in tie["bodies"] if name != "ground"]
         made = dart.constraint.BallJointConstraint(*ends, np.array(tie["points"][0]))
         if "error_reduction" in settings:
@@ -62,10 +61,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             if node is None:
                 continue
             pose = node.getWorldTransform()
-            R, w = pose.rotation(), node.getAngularVelocity()
-            arm = R @ origin[name]
-            v = node.getLinearVelocity() - np.cross(w, arm)
-            found[name] = pose.translation() - arm, R, w, v
+            turning = pose.rotation(), node.getAngularVelocity()
+            at = origin[name], pose.translation()
+            found[name] = state_of(*at, *turning, node.getLinearVelocity())
         return found
 
     def advance(sample: int) -> None:

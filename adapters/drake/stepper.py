@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import state_of
+
 
 def version() -> str:
     """Return the version of Drake."""
@@ -16,7 +18,7 @@ def version() -> str:
     return version_of("drake")
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     parts: Any = import_module("pydrake.multibody.plant")
     tree: Any = import_module("pydrake.multibody.tree")
@@ -118,9 +120,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             name, at = body["name"], bodies[body["name"]]
             pose = plant.EvalBodyPoseInWorld(simulator.get_context(), at)
             twist = plant.EvalBodySpatialVelocityInWorld(simulator.get_context(), at)
-            R, w = pose.rotation().matrix(), twist.rotational()
-            arm = R @ origin[name]
-            found[name] = pose.translation() - arm, R, w, twist.translational() - np.cross(w, arm)
+            turning = pose.rotation().matrix(), twist.rotational()
+            at = origin[name], pose.translation()
+            found[name] = state_of(*at, *turning, twist.translational())
         return found
 
     def reactions(sample: int) -> Any:
@@ -130,6 +132,8 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         every, ends = port.Eval(simulator.get_context()), iter(moves)
         for body in model["bodies"]:
             last = [next(ends) for _ in body["moves"]][-1]
+            if body["moves"][-1]["kind"] == "ball":  # Drake gives no forces of constraints
+                continue
             frame = last.frame_on_child().CalcPoseInWorld(simulator.get_context())
             force = frame.rotation() @ every[int(last.index())].translational()
             found[body["joint"]] = force if body["second"] else -force

@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import state_of
+
 
 def version() -> str:
     """Return the version of Exudyn."""
     return str(import_module("exudyn").__version__)
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     exu: Any = import_module("exudyn")
     items: Any = import_module("exudyn.itemInterface")
@@ -134,8 +136,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             if abs(rows[0][near, 0] - times[sample]) > 0.5 * effort["step"]:
                 raise RuntimeError(f"Exudyn ends at {rows[0][-1, 0]:.6g} s")
             x, turned, w, v = (each[near, 1:] for each in rows)
-            R = turned.reshape(3, 3)
-            found[name] = x - R @ c, R, w, v - np.cross(w, R @ c)
+            found[name] = state_of(c, x, turned.reshape(3, 3), w, v)
         return found
 
     def reactions(sample: int) -> Any:

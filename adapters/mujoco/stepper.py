@@ -11,11 +11,10 @@ def version() -> str:
     return str(import_module("mujoco").__version__)
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     mujoco: Any = import_module("mujoco")
     m, d = loaded(model, settings, effort)
-    m.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings['integrator'].upper()}")
     # otherwise a diverged motion would start again from the design
     m.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     seen = mujoco.MjData(m)
@@ -25,8 +24,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         mujoco.mj_step(m, d, effort["steps"])
 
     def states(sample: int) -> Any:
-        seen.qpos[:], seen.qvel[:] = d.qpos, d.qvel
-        return body_states(m, seen, model)
+        return body_states(m, seen, model, d.qpos, d.qvel)
 
     def reactions(sample: int) -> Any:
         return tie_forces(m, seen, model)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import loads, require, state_of
+
 
 def version() -> str:
     """Return the version of Pinocchio."""
@@ -16,9 +18,10 @@ def version() -> str:
     return str(found.__version__)
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     pin: Any = import_module("pinocchio")
+    require(model, "Pinocchio", rods=False)
     m, at, origin = pin.Model(), {"ground": 0}, {"ground": np.zeros(3)}
     m.gravity.linear = np.array(model["gravity"])
     kinds = {
@@ -42,8 +45,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         m.appendBodyToJoint(parent, pin.Inertia(body["mass"], c - before, I), pin.SE3.Identity())
     ties, data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
     for tie in model["ties"]:
-        if tie["length"]:
-            raise NotImplementedError("Pinocchio has no constraint of a distance")
         ends: list[Any] = []
         for body, P in zip(tie["bodies"], tie["points"], strict=True):
             ends += [at[body], pin.SE3(np.eye(3), np.array(P) - origin[body])]
@@ -70,12 +71,10 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         found: Any = {}
         for body in model["bodies"]:
             name = body["name"]
-            here, twist = (
-                seen.oMi[at[name]],
-                pin.getVelocity(m, seen, at[name], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED),
-            )
-            R, arm, w = here.rotation.copy(), here.rotation @ origin[name], twist.angular.copy()
-            found[name] = here.translation - arm, R, w, twist.linear - np.cross(w, arm)
+            pose = seen.oMi[at[name]].copy()
+            twist = pin.getVelocity(m, seen, at[name], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            turning = pose.rotation, twist.angular.copy()
+            found[name] = state_of(origin[name], pose.translation, *turning, twist.linear)
         return found
 
     def forces(q: Any, v: Any) -> Any:

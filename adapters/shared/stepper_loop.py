@@ -18,6 +18,27 @@ State = tuple[Any, Any, Any, Any]
 STILL: State = (np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
+def state_of(point: Any, x: Any, R: Any, w: Any, v: Any) -> State:
+    """Return a body's state from those of a point of it, given globally at design."""
+    arm = R @ np.array(point)
+    return x - arm, R, w, v - np.cross(w, arm)
+
+
+def rotation(w: float, *xyz: float) -> Any:
+    """Return the rotation of a unit quaternion, its real part first."""
+    x, y, z = xyz
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return (w * w - np.dot(xyz, xyz)) * np.eye(3) + 2 * np.outer(xyz, xyz) + 2 * w * across
+
+
+def require(model: Any, engine: str, *, chains: bool = True, rods: bool = True) -> None:
+    """Raise if a model has chains or rods that an engine lacks."""
+    if not chains and any(len(body["moves"]) != 1 for body in model["bodies"]):
+        raise NotImplementedError(f"{engine} has no massless links between the joints of a chain")
+    if not rods and any(tie["length"] for tie in model["ties"]):
+        raise NotImplementedError(f"{engine} has no constraint of a distance")
+
+
 def place(states: Mapping[str, State], body: str, point: Any) -> tuple[Any, Any]:
     """Return position and velocity of a point of a body, given globally at design."""
     x, R, w, v = states.get(body, STILL)
@@ -86,7 +107,7 @@ def reaction(model: Any, forces: Mapping[str, Any], truth: Any) -> float:
 def run(stepper: Any, model: Any, settings: Any, effort: Any, truth: Any) -> dict[str, Any]:
     """Return the largest errors of a run, and its time by simulated second."""
     times, points, energies, reactions = truth
-    advance, states, *given = stepper(model, settings, effort, times, loads)
+    advance, states, *given = stepper(model, settings, effort, times)
     largest, spent, message, k = np.zeros(4), 0.0, "", 0
     for k in range(len(times)):
         begin = time.perf_counter()

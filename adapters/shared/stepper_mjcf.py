@@ -11,6 +11,7 @@ def loaded(model: Any, settings: Any, effort: Any) -> tuple[Any, Any]:
     mujoco: Any = import_module("mujoco")
     m = mujoco.MjModel.from_xml_path(model["file"])
     m.opt.timestep = effort["step"]
+    m.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings['integrator'].upper()}")
     m.opt.iterations = settings.get("iterations", m.opt.iterations)
     m.opt.tolerance = settings.get("tolerance", m.opt.tolerance)
     if "time_constant" in settings:
@@ -26,9 +27,10 @@ def loaded(model: Any, settings: Any, effort: Any) -> tuple[Any, Any]:
     return m, d
 
 
-def body_states(m: Any, seen: Any, model: Any) -> Any:
-    """Return the states of the bodies at the positions and velocities of the data."""
+def body_states(m: Any, seen: Any, model: Any, qpos: Any, qvel: Any) -> Any:
+    """Return the states of the bodies at positions and velocities, which the data then has."""
     mujoco: Any = import_module("mujoco")
+    seen.qpos[:], seen.qvel[:] = qpos, qvel
     mujoco.mj_fwdPosition(m, seen)
     mujoco.mj_fwdVelocity(m, seen)
     found: Any = {}

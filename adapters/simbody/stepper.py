@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import require, state_of
+
 
 def version() -> str:
     """Return the version of OpenSim."""
@@ -15,9 +17,10 @@ def version() -> str:
     return f"OpenSim {found.GetVersion()}"
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     o: Any = import_module("opensim")
+    require(model, "OpenSim", chains=False)
     made = o.Model()
     joints: list[Any] = []
     bodies, origin = {"ground": made.getGround()}, {"ground": np.zeros(3)}
@@ -41,8 +44,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         return vector([x, y, z])
 
     for number, body in enumerate(model["bodies"]):
-        if len(body["moves"]) != 1:
-            raise NotImplementedError("OpenSim has no massless links between the joints of a chain")
         (move,) = body["moves"]
         P, own = np.array(move["point"]), np.array(body["inertia"])
         six = own[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
@@ -116,8 +117,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             rows = pose.R()
             R = np.array([[rows.get(i, j) for j in range(3)] for i in range(3)])
             w, v = (twist.get(k).to_numpy() for k in range(2))
-            arm = R @ origin[name]
-            found[name] = pose.p().to_numpy() - arm, R, w, v - np.cross(w, arm)
+            found[name] = state_of(origin[name], pose.p().to_numpy(), R, w, v)
         return found
 
     def reactions(sample: int) -> Any:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import rotation
+
 
 def version() -> str:
     """Return the version of Genesis."""
@@ -15,7 +17,7 @@ def version() -> str:
     return str(genesis.__version__)
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     genesis: Any = import_module("genesis")
     if model["springs"] or model["loads"] or any(tie["length"] for tie in model["ties"]):
@@ -44,7 +46,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
     scene.step()  # it compiles
     scene.reset()
     entity.set_dofs_velocity(np.concatenate([rates[name] for name in order]))
-    {body["name"]: np.array(body["center"]) for body in model["bodies"]}
 
     def advance(sample: int) -> None:
         for _ in range(effort["steps"]):
@@ -54,10 +55,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         found: Any = {}
         for name in order:
             link = entity.get_link(name)
-            w, x, y, z = (float(each) for each in link.get_quat())
-            u = np.array([x, y, z])
-            across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-            R = (w * w - u @ u) * np.eye(3) + 2 * np.outer(u, u) + 2 * w * across
+            R = rotation(*map(float, link.get_quat()))
             place, v, spin = (
                 np.array(each.cpu(), float)
                 for each in (link.get_pos(), link.get_vel(), link.get_ang())

@@ -5,8 +5,6 @@ from importlib import import_module
 from importlib.metadata import version as version_of
 from typing import Any
 
-import numpy as np
-
 from ..shared.stepper_mjcf import body_states, loaded
 
 
@@ -18,12 +16,10 @@ def version() -> str:
     return version_of("mujoco-mjx")
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
-    mujoco: Any = import_module("mujoco")
     mjx, jax = import_module("mujoco.mjx"), import_module("jax")
     m, seen = loaded(model, settings, effort)
-    m.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings['integrator'].upper()}")
     device = mjx.put_model(m)
     d = mjx.put_data(m, seen)
 
@@ -40,7 +36,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         d = jax.block_until_ready(compiled(d))
 
     def states(sample: int) -> Any:
-        seen.qpos[:], seen.qvel[:] = np.array(d.qpos), np.array(d.qvel)
-        return body_states(m, seen, model)
+        return body_states(m, seen, model, d.qpos, d.qvel)
 
     return advance, states

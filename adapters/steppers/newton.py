@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import loads, require, rotation
+
 
 def version() -> str:
     """Return the version of Newton."""
@@ -16,17 +18,16 @@ def version() -> str:
     return version_of("newton")
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     newton, warp = import_module("newton"), import_module("warp")
+    require(model, "Newton", chains=False)
     builder = newton.ModelBuilder(gravity=tuple(model["gravity"]))
     links, still = {"ground": -1}, warp.quat_identity()
     center = {body["name"]: np.array(body["center"]) for body in model["bodies"]}
     kinds = {"hinge": builder.add_joint_revolute, "slide": builder.add_joint_prismatic}
     joints = list[Any]()
     for body in model["bodies"]:
-        if len(body["moves"]) != 1:
-            raise NotImplementedError("a link between the joints of a chain has no mass")
         (move,) = body["moves"]
         links[body["name"]] = builder.add_link(
             mass=body["mass"],
@@ -82,9 +83,7 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             if link < 0:
                 continue
             x, y, z, w = q[link, 3:]
-            u = np.array([x, y, z])
-            across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-            R = (w * w - u @ u) * np.eye(3) + 2 * np.outer(u, u) + 2 * w * across
+            R = rotation(w, x, y, z)
             v, spin = qd[link, :3], qd[link, 3:]
             found[name] = q[link, :3], R, spin, v - np.cross(spin, R @ center[name])
         return found

@@ -3,24 +3,24 @@ constraint for each tie.
 """
 
 from importlib import import_module
+from importlib.metadata import version as version_of
 from typing import Any
 
 import numpy as np
 
+from ..shared.stepper_loop import loads, require, state_of
+
 
 def version() -> str:
     """Return the version of PyBullet."""
-    found: Any = import_module("pybullet")
-    return f"API {found.getAPIVersion()}"
+    import_module("pybullet")
+    return version_of("pybullet")
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     pb: Any = import_module("pybullet")
-    if any(len(body["moves"]) != 1 for body in model["bodies"]):
-        raise NotImplementedError("PyBullet has no massless links between the joints of a chain")
-    if any(tie["length"] for tie in model["ties"]):
-        raise NotImplementedError("PyBullet has no constraint of a distance")
+    require(model, "PyBullet", chains=False, rods=False)
     if pb.isConnected():
         pb.disconnect()
     pb.connect(pb.DIRECT)
@@ -31,7 +31,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         pb.setPhysicsEngineParameter(**names)
     robot = pb.loadURDF(model["file"], useFixedBase=True, flags=pb.URDF_USE_INERTIA_FROM_FILE)
     links = {pb.getJointInfo(robot, k)[12].decode(): k for k in range(pb.getNumJoints(robot))}
-    origin = {body["name"]: np.array(body["moves"][0]["point"]) for body in model["bodies"]}
     for link in (-1, *links.values()):
         pb.changeDynamics(robot, link, linearDamping=0, angularDamping=0, maxJointVelocity=1e9)
     for body in model["bodies"]:
@@ -72,10 +71,8 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
         for name, link in links.items():
             state = pb.getLinkState(robot, link, 1, 1)
             R = np.array(pb.getMatrixFromQuaternion(state[5])).reshape(3, 3)
-            v, w = np.array(state[6]), np.array(state[7])
-            arm = R @ center[name]
-            x = np.array(state[4]) - R @ origin[name]
-            found[name] = x, R, w, v - np.cross(w, arm)
+            x, v, w = (np.array(state[k]) for k in (0, 6, 7))
+            found[name] = state_of(center[name], x, R, w, v)
         return found
 
     def advance(sample: int) -> None:
@@ -89,7 +86,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
             pb.stepSimulation()
 
     def reactions(sample: int) -> Any:
-        found: Any = {}  # of the last step
+        # impulses of the last step over its time, on the second body: Bullet's rows are the first
+        # body's velocity less the second's, times -1
+        found: Any = {}
         for tie, each in zip(model["ties"], made, strict=True):
             force = np.array(pb.getConstraintState(each))
             found[tie["joint"]] = found.get(tie["joint"], 0.0) + force

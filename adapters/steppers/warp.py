@@ -14,12 +14,11 @@ def version() -> str:
     return version_of("mujoco-warp")
 
 
-def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> Any:
+def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     """Return functions to advance to a sample, and to read the bodies' states there."""
     mujoco: Any = import_module("mujoco")
     warp, engine = import_module("warp"), import_module("mujoco_warp")
     m, seen = loaded(model, settings, effort)
-    m.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings['integrator'].upper()}")
     mujoco.mj_forward(m, seen)
     with warp.ScopedDevice("cpu"):
         device = engine.put_model(m)
@@ -32,7 +31,6 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any, loads: Any) -> A
                 engine.step(device, d)
 
     def states(sample: int) -> Any:
-        seen.qpos[:], seen.qvel[:] = d.qpos.numpy()[0], d.qvel.numpy()[0]
-        return body_states(m, seen, model)
+        return body_states(m, seen, model, d.qpos.numpy()[0], d.qvel.numpy()[0])
 
     return advance, states

@@ -148,6 +148,7 @@ class Section:
         columns: headings; the first `labels` of them head words, the others numbers.
         diagrams: diagrams above the table, only on the page; those with the same styles side by
             side.
+        rows: cells; a row of one cell is a heading of those below it.
         links: file that belongs to each row, beside the page; empty for none.
     """
 

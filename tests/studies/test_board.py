@@ -16,7 +16,8 @@ from kincheck import adapters
 from kincheck.core.case.case import Free
 from kincheck.core.cli.main import main
 from kincheck.core.extras import python_of
-from kincheck.core.studies.board.results import Row, Run
+from kincheck.core.studies.board.page import report
+from kincheck.core.studies.board.results import Board, Row, Run, TruthFacts
 from kincheck.core.studies.board.run import better, order_and_floor
 from kincheck.core.studies.board.truth import truth_of
 from msgspec.structs import replace as replace_row
@@ -101,13 +102,24 @@ def test_drake_without_loops_is_also_continuous(tmp_path):
     assert "no constraints" in found["free_four_bar", "runge_kutta3"]["message"]
 
 
-def test_error_of_simbody_follows_its_accuracy(tmp_path):
-    pytest.importorskip("opensim", exc_type=ImportError)
+def short_strut(tmp_path):  # rod, spring, damper; a ball in the tree
     strut = tmp_path / "strut.toml"
     text = (Path(kincheck.__path__[0]) / "cases" / "mcpherson_strut_loaded.toml").read_text("utf-8")
     text = text.replace("duration = 0.5", "duration = 0.1").replace("samples = 101", "samples = 6")
-    strut.write_text(re.sub(r"\[reference\]\n.*\n", "", text), "utf-8")  # rod, spring, damper
-    row, other = measured(tmp_path, "--engine", "simbody", "--case", str(strut))
+    strut.write_text(re.sub(r"\[reference\]\n.*\n", "", text), "utf-8")
+    return strut
+
+
+def test_joint_forces_of_drake_leave_balls_out(tmp_path):
+    pytest.importorskip("pydrake.multibody.plant", exc_type=ImportError)
+    *_, row = measured(tmp_path, "--engine", "drake", "--case", str(short_strut(tmp_path)))
+    *_, longer, shorter = (run["reaction"] for run in row["runs"])
+    assert shorter == pytest.approx(0.5 * longer, rel=0.1)
+
+
+def test_error_of_simbody_follows_its_accuracy(tmp_path):
+    pytest.importorskip("opensim", exc_type=ImportError)
+    row, other = measured(tmp_path, "--engine", "simbody", "--case", str(short_strut(tmp_path)))
     assert errors(other)[-1] < 1e-8
     found = errors(row)
     assert found == sorted(found, reverse=True)
@@ -148,6 +160,8 @@ def test_joint_forces_of_engines_are_the_truths(rows):
 def test_undetermined_joint_forces_are_left_open():
     truth = truth_of(replace(kincheck.load("bricard"), free=Free(0.01, 2)))
     assert np.isfinite(truth.reactions).all()
+    assert truth.facts.forces
+    assert not truth_of(replace(kincheck.load("bennett"), free=Free(0.01, 2))).facts.forces
     assert np.abs(truth.reactions[..., 3:]).max() > 0.1
     head, *values = truth.tables([], 1)["reactions.csv"].splitlines()
     assert len(values) == 1
@@ -161,6 +175,7 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
         assert json.loads((folder / "row.json").read_text("utf-8")) == row
         assert f'href="{row["folder"]}/run.py"' in page
         assert "kincheck." not in (folder / "run.py").read_text("utf-8")
+    assert page.count('scope="rowgroup"') == len({row["group"] for row in rows.values()})
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
@@ -188,7 +203,9 @@ def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
     (before,) = three["past"]
     assert (before["since"], before["until"]) == ("2025-01-01", three["since"])
     assert before["error"] == wrong
-    assert "History" in page.read_text("utf-8")
+    text = page.read_text("utf-8")
+    for change in ("version 3.9 → ", "error alone", '<td class="number">2</td>'):
+        assert change in text
     # the same again, and a board with other steps
     assert main(["board", *given, "--out", str(file.parent)]) == 0
     assert len(json.loads(file.read_text("utf-8"))["rows"][2]["past"]) == 1
@@ -248,9 +265,45 @@ def test_truth_of_a_turned_body_follows_its_points():
     assert (lost < 0.0).all()
 
 
+GIVEN = {"case": "a", "engine": "b", "integrator": "c", "group": "d", "loop": "", "ties": ""}
+
+
+def page_of(rows, **truth):
+    """Return the sections of a page on given rows, by title."""
+    numbers = dict.fromkeys(("duration", "error", "energy", "seconds"), 1.0)
+    counts = dict.fromkeys(("samples", "freedoms", "redundant", "points"), 1)
+    facts = TruthFacts(case="a", source="", method="", **numbers, **counts, **truth)
+    board = Board(kincheck="", started="", processor="", platform="", truths=[facts], rows=rows)
+    return {section.title: section for section in report(board).sections}
+
+
+def test_page_groups_rows_and_says_messages_once():
+    reason = "no rods; pip install it"
+    bad = Row(**GIVEN, column="default", state="unsupported", message=reason, folder="f")
+    good = Row(**GIVEN, column="best", state="measured", runs=[Run(error=1.0)])
+    section = page_of([bad, replace_row(bad, column="best"), replace_row(good, group="e")])["a"]
+    assert [row[0] for row in section.rows] == ["d", "b c", "b c", "e", "b c"]
+    assert [*section.links] == ["", "f/run.py", "f/run.py", "", ""]
+    assert section.notes == ["b c, default; b c, best: unsupported: no rods."]
+
+
+@pytest.mark.parametrize(("forces", "cell"), [(True, "not given"), (False, "open")])
+def test_page_says_why_forces_are_missing(forces, cell):
+    row = Row(**GIVEN, column="best", state="measured", runs=[Run(error=1.0)])
+    section = page_of([row], forces=forces)["a"]
+    assert section.rows[1][section.columns.index("reaction [N]")] == cell
+    assert forces != any("forces are compared" in each for each in section.verdict)
+
+
+def test_page_keeps_best_settings_where_defaults_are_nearer():
+    row = Row(**GIVEN, column="best", state="measured", settings={"mu": 0.1}, by="me", on="today")
+    nearer = replace_row(row, settings={}, case="other")
+    ((*_, best, by),) = page_of([row, nearer])["Settings and measures"].rows
+    assert (best, by) == ("mu 0.1", "me today")
+
+
 def test_best_is_best_by_error():
-    given = {"case": "a", "engine": "b", "integrator": "c", "group": "d", "loop": "", "ties": ""}
-    default = Row(**given, column="default", state="measured", runs=[Run(error=3e-4)])
+    default = Row(**GIVEN, column="default", state="measured", runs=[Run(error=3e-4)])
     row = replace_row(default, column="best", settings={"mu": 0.1})
     worse, nearer = (replace_row(row, runs=[Run(error=each)]) for each in (4e-4, 2e-4))
     found = better(default, worse)
@@ -332,6 +385,10 @@ def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
     one = errors(rows["mujoco", "Euler", "best"])
     # rounding to float32 shifts the phase
     assert errors(best)[-1] == pytest.approx(one[-1], rel=0.06)
+    assert best["version"][0].isdigit()
+    if engine == "pybullet":  # forces of the step, of first order
+        *_, longer, shorter = (run["reaction"] for run in best["runs"])
+        assert shorter == pytest.approx(0.5 * longer, rel=0.1)
 
 
 def test_urdf_of_the_board_is_the_model(site):

@@ -5,7 +5,7 @@ and the settings.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from ...errors import number_of
 from ...harness.labels import number
@@ -15,28 +15,32 @@ from ...report.sections import Diagram, Report, Section
 from .results import Board, Row, Run, TruthFacts
 
 COLUMNS = (
-    "integrator",
-    "engine",
+    "stepper",
     "settings",
     "outcome",
-    "step [s]",
     "error [m]",
     "gap [m]",
     "energy [J]",
     "reaction [N]",
-    "cost [s/s]",
     "order",
     "floor [m]",
+    "step [s]",
+    "cost [s/s]",
     "since",
 )
-LABELS = 4
+LABELS = 3
+OPEN = (
+    "Redundant rows leave two directions of the force in each joint open: no forces are compared."
+)
+CAPTION = "Left is faster, down is more accurate; each point halves the step of the one before."
 NOTES = (
     "Error: largest distance of a point of a joint or of the case from the truth, over the samples."
     " Gap: largest opening of a loop. Energy: of motion, weight and springs, minus the truth's at"
     " the same time; what loads and dampers take is in both.",
     "Reaction: largest error of the force in a joint, without directions that redundant rows leave"
-    " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Drake,"
-    " Simbody), or of all joints but rods (Exudyn).",
+    " open. Engines give those of closed loops (MuJoCo, Pinocchio, PyBullet), of the tree (Simbody;"
+    " Drake, without balls), or of all joints but rods (Exudyn). Where a peak of force passes a"
+    " sample too late, the error is as large as the peak, with any engine.",
     "Errors and costs are of the shortest step. Cost: wall time for a simulated second, in one"
     " run and process. The machine also does other things: costs within a factor of two are"
     " alike. Where the loop over the steps is in Python, its time is in the cost.",
@@ -67,24 +71,32 @@ def report(board: Board) -> Report:
 
 
 def _history(rows: Sequence[Row]) -> list[Section]:
-    """Return the section on rows that changed, if any did."""
-    cells, changed = list[list[str]](), [row for row in rows if row.past]
-    for row in changed:
-        ends = [(each.until, each) for each in row.past]
-        for until, each in [*ends, ("now", row)]:
-            error = number(each.error) if each.error is not None else each.state
-            settings = ", ".join(f"{name} {value}" for name, value in each.settings.items())
-            cells.append([row.case, row.name, each.since, until, each.version, settings, error])
+    cells = list[list[str]]()
+    for row in rows:
+        for old, new in pairwise([*row.past, row]):
+            pairs = [
+                ("version", old.version, new.version),
+                ("outcome", old.state, new.state),
+                *(
+                    (name, *(each.settings.get(name, "default") for each in (old, new)))
+                    for name in {**old.settings, **new.settings}
+                ),
+            ]
+            found = [f"{name} {one} → {two}" for name, one, two in pairs if one != two]
+            factor = f"{new.error / old.error:.3g}" if old.error and new.error else "–"
+            errors = [number(each.error) for each in (old, new)]
+            change = ", ".join(found) or "error alone"
+            cells.append([new.since, row.case, row.name, change, *errors, factor])
+    cells.sort(key=lambda each: each[0], reverse=True)
     verdict = [
         "Rows whose version, settings, outcome or error changed since the first board of this"
         " history: errors by more than a tenth, and by more than round-off."
     ]
-    heads = ("case", "row", "since", "until", "version", "settings", "error [m]")
-    return [Section("History", verdict, [], heads, 6, cells)] if changed else []
+    heads = ("date", "case", "stepper", "change", "error before [m]", "after [m]", "factor")
+    return [Section("History", verdict, [], heads, 4, cells)] if cells else []
 
 
 def _rows(board: Board, truth: TruthFacts) -> list[Row]:
-    """Return the rows of a case, those of one kind of integrator together."""
     groups = [*dict.fromkeys(row.group for row in board.rows)]
     mine = [row for row in board.rows if row.case == truth.case]
     return sorted(mine, key=lambda row: groups.index(row.group))
@@ -99,23 +111,31 @@ def _section(truth: TruthFacts, rows: Sequence[Row]) -> Section:
         f"Truth: {truth.method}. Halving its steps moves a point by {number(truth.error)} m, and"
         f" changes energy minus work by {number(truth.energy)} J.",
         *([truth.message] if truth.message else []),
+        *([] if truth.forces else [OPEN]),
         *_alike(rows),
     ]
-    diagram = [Diagram(_plot(truth.case), _figure(measured, styles), styles)] if measured else []
-    return Section(
-        truth.case,
-        verdict,
-        [],
-        COLUMNS,
-        LABELS,
-        [_cells(row) for row in rows],
-        diagram,
-        [f"{row.folder}/run.py" if row.folder else "" for row in rows],
-    )
+    cells, links = list[list[str]](), list[str]()
+    for group, each in groupby(rows, key=lambda row: row.group):
+        both = [*each]
+        cells += [[group], *(_cells(row, truth) for row in both)]
+        links += ["", *(f"{row.folder}/run.py" if row.folder else "" for row in both)]
+    plot = Plot(truth.case, f"{truth.case}: error against cost, both log axes", CAPTION)
+    diagrams = [Diagram(plot, _figure(measured, styles), styles)] if measured else []
+    notes = _messages(rows)
+    return Section(truth.case, verdict, notes, COLUMNS, LABELS, cells, diagrams, links)
+
+
+def _messages(rows: Sequence[Row]) -> list[str]:
+    """Return what rows say, once each; the remedy stands once, with the settings."""
+    found = dict[str, list[str]]()
+    for row in rows:
+        if row.message:
+            text = f"{row.state}: {row.message.partition(';')[0]}"
+            found.setdefault(text, []).append(row.name)
+    return [f"{'; '.join(names)}: {text}." for text, names in found.items()]
 
 
 def _alike(rows: Sequence[Row]) -> list[str]:
-    """Return a sentence on each kind of integrator whose engines share their error."""
     found = list[str]()
     for group, each in groupby(rows, key=lambda row: row.group):
         best = _best(each)
@@ -135,27 +155,23 @@ def _best(rows: Iterable[Row]) -> list[Row]:
     return [*found.values()]
 
 
-def _cells(row: Row) -> list[str]:
-    last = row.measured[-1] if row.measured else Run()
+def _cells(row: Row, truth: TruthFacts) -> list[str]:
+    last, reaction = (row.measured[-1] if row.measured else Run()), "–"
+    if row.measured:
+        missing = "not given" if truth.forces else "open"
+        reaction = missing if last.reaction is None else number(last.reaction)
     return [
-        row.group,
         f"{row.engine} {row.integrator}",
         row.column,
-        # the remedy stands once, below
-        f"{row.state}: {row.message.partition(';')[0]}" if row.message else row.state,
-        number(last.step) if last.step else "own" if last.accuracy else "–",
+        row.state,
         *(number(each) for each in (last.error, last.gap, last.energy)),
-        "not given" if row.measured and last.reaction is None else number(last.reaction),
-        number(last.cost),
+        reaction,
         "–" if row.order is None else f"{row.order:.2f}",
         number(row.floor),
+        number(last.step) if last.step else "own" if last.accuracy else "–",
+        number(last.cost),
         row.since,
     ]
-
-
-def _plot(case: str) -> Plot:
-    caption = "Left is faster, down is more accurate; each point halves the step of the one before."
-    return Plot(case, f"{case}: error against cost, both log axes", caption)
 
 
 def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
@@ -172,48 +188,32 @@ def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
     return floored({"data": traces, "layout": layout}, "largest position error [m]")
 
 
-def _missing(rows: Sequence[Row]) -> list[str]:
-    """Return why engines are not run, a sentence each."""
-    messages = {row.engine: row.message for row in rows if row.state == "unavailable"}
-    return [f"Not run: {engine}: {message}." for engine, message in messages.items()]
-
-
 def _settings(rows: Sequence[Row]) -> Section:
-    named = {(row.engine, row.integrator, row.column): row for row in rows}
+    # a row of the best settings that shows the defaults, because they are nearer, has no settings
+    named = {f"{row.engine} {row.integrator}": row for row in rows}
+    named |= {f"{row.engine} {row.integrator}": row for row in rows if row.settings}
+    missing = {row.engine: row.message for row in rows if row.state == "unavailable"}
+    heads = ("stepper", "version", "precision", "loop over steps", "closed loops", "best", "by")
     return Section(
         "Settings and measures",
         [
             "Default: nothing but integrator and step is set. Best: the best known settings, kept"
             " in settings.toml of the board; whoever knows better ones changes that file.",
-            *_missing(rows),
+            *(f"Not run: {engine}: {message}." for engine, message in missing.items()),
         ],
         NOTES,
-        (
-            "engine",
-            "version",
-            "integrator",
-            "precision",
-            "settings",
-            "loop over steps",
-            "closed loops",
-            "values",
-            "by",
-            "on",
-        ),
-        10,
+        heads,
+        len(heads),
         [
             [
-                row.engine,
+                name,
                 row.version,
-                row.integrator,
                 row.precision,
-                row.column,
                 row.loop,
                 row.ties,
-                ", ".join(f"{name} {value}" for name, value in row.settings.items()) or "–",
-                row.by or "–",
-                row.on or "–",
+                ", ".join(f"{name} {value}" for name, value in row.settings.items()) or "default",
+                f"{row.by} {row.on}".strip() or "–",
             ]
-            for row in named.values()
+            for name, row in named.items()
         ],
     )

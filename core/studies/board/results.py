@@ -183,6 +183,7 @@ class TruthFacts(msgspec.Struct, frozen=True, kw_only=True):
         error: change of a point when all steps are halved [m].
         energy: change of the energy less the work of loads [J].
         points: number of compared points.
+        forces: whether the force in any joint is determined, but for one direction at most.
         seconds: wall time to make it [s].
         message: why it ends early, or empty.
     """
@@ -197,6 +198,7 @@ class TruthFacts(msgspec.Struct, frozen=True, kw_only=True):
     redundant: int
     method: str
     points: int
+    forces: bool = True
     seconds: float
     message: str = ""
 

@@ -28,6 +28,8 @@ HALVINGS = 3
 FLOOR = 0.5
 # Errors within a hundredth of each other are alike: solvers end at their own tolerances.
 ALIKE = 0.99
+# What a stepper and its rows have in common.
+SHARED = ("engine", "integrator", "group", "loop", "ties", "precision")
 
 Files = Callable[[str, Truth], Mapping[str, str]]
 """Function from engine and truth to the files of a reproducer: model.json and run.py."""
@@ -110,17 +112,12 @@ def rows_of(
         for column, settings in stepper.columns.items():
             row = Row(
                 case=truth.case.name,
-                engine=stepper.engine,
-                integrator=stepper.integrator,
-                group=stepper.group,
+                **{name: getattr(stepper, name) for name in SHARED},
                 design_order=stepper.order,
                 column=column,
                 settings=dict(settings),
                 by=stepper.by if settings else "",
                 on=str(stepper.date) if settings else "",
-                loop=stepper.loop,
-                ties=stepper.ties,
-                precision=stepper.precision,
                 state="unsupported",
             )
             try:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...algebra import quat, rotation_less_identity
 from ...case.case import TIME, Case
 from ...errors import KincheckError
 from ...forces import Reaction
@@ -97,13 +98,18 @@ def truth_of(case: Case) -> Truth:
     for name, body in found.motion.bodies.items():
         assert body.v is not None
         r, p, v = (each[found.samples] for each in (body.r, body.p, body.v))
-        rotation = _rotations(p)
+        rows = np.array([[*row] for row in rotation_less_identity(quat(p.T))])
+        rotation = np.eye(3) + np.moveaxis(rows, 2, 0)
         turned = rotation @ rotation[0].T
         w = np.einsum("nij,nj->ni", rotation, v[:, 3:])
         arm = turned @ r[0]
         frames[name] = Frames(r - arm, turned, w, v[:, :3] - np.cross(w, arm))
     points = len(mechanism.points) + sum(
         not mechanism.is_fixed(body) for joint in mechanism.joints for body in joint.bodies
+    )
+    forces = found.forces([joint.name for joint in mechanism.joints]).joints
+    reactions = np.stack(
+        [_determined(forces[joint.name], found.samples) for joint in mechanism.joints], axis=1
     )
     facts = TruthFacts(
         case=case.name,
@@ -116,13 +122,12 @@ def truth_of(case: Case) -> Truth:
         redundant=found.redundant,
         method=found.method,
         points=points,
+        forces=bool(np.isfinite(reactions).any()),
         seconds=perf_counter() - begin,
         message=found.message,
     )
-    forces = found.forces([joint.name for joint in mechanism.joints]).joints
-    reactions = [_determined(forces[joint.name], found.samples) for joint in mechanism.joints]
     energy = _energy(mechanism, frames)
-    return Truth(case, found.times, frames, energy, np.stack(reactions, axis=1), facts)
+    return Truth(case, found.times, frames, energy, reactions, facts)
 
 
 def _determined(reaction: Reaction, samples: Any) -> Array:
@@ -140,15 +145,6 @@ def _determined(reaction: Reaction, samples: Any) -> Array:
 def _csv(heads: Sequence[str], rows: Array) -> str:
     quoted = ",".join(f'"{name}"' for name in heads)
     return "\n".join([quoted, *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n"
-
-
-def _rotations(p: Array) -> Array:
-    """Return the rotations of Euler parameters, shape (n, 3, 3)."""
-    e0, e = p[:, 0, None, None], p[:, 1:]
-    across = np.cross(e[:, None, :], np.eye(3))  # rows e x unit: the transpose of the cross product
-    outer = e[:, :, None] * e[:, None, :]
-    inner = (e**2).sum(axis=1)[:, None, None]
-    return (e0**2 - inner) * np.eye(3) + 2.0 * outer + 2.0 * e0 * across.transpose(0, 2, 1)
 
 
 def _energy(mechanism: Mechanism, frames: Mapping[str, Frames]) -> Array:
