@@ -202,7 +202,7 @@ def test_the_command_line(tmp_path, car, capsys):
     assert main([*command, "--reference", str(file), *stated[:2]]) == 2
     assert "--map" in capsys.readouterr().err
     assert main([*command, "--citation", "rig"]) == 2
-    assert "Give --reference FILE" in capsys.readouterr().err
+    assert "--citation: for a measured curve" in capsys.readouterr().err
     assert main([*command, "mcpherson_strut", "--reference", str(file)]) == 2
     assert "one by one" in capsys.readouterr().err
 
