@@ -64,3 +64,14 @@ def locked(axes):
             f"float limit:{axis}:physics:high = -1",
         )
     ]
+
+
+def written(folder, *prims, name="m.usda", **more):
+    """Write a stage into a folder, and return its file."""
+    file = folder / name
+    file.write_text(stage(*prims, **more))
+    return file
+
+
+ARM = (body("a"), body("b"), joint("Revolute", "j", "", "a"))
+"""A body on a hinge, and a free one."""
