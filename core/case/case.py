@@ -42,8 +42,9 @@ class Hardpoint:
         shim: derivatives of toe, camber and, with a steering axis of two points, caster at design
             by x, y and z of the table [rad/m], shape (2 or 3, 3), if the joint is moved and the
             links keep their lengths; None for no such joint.
-        level: how far the row, moved along x, y or z of the table alone, leaves no bump steer at
-            design, to first order [m], shape (3,); None for rows that are not an end of a tie rod.
+        no_bump_steer: how far the row moves along x, y or z of the table alone to leave no bump
+            steer at design, to first order [m], shape (3,); None for rows that are not an end of a
+            tie rod.
     """
 
     name: str
@@ -52,7 +53,7 @@ class Hardpoint:
     axes: Sequence[tuple[int, float]]
     moves: Mapping[str, Array]
     shim: Array | None = None
-    level: Array | None = None
+    no_bump_steer: Array | None = None
 
 
 SLOW = 2.0**60

@@ -118,13 +118,15 @@ def test_tie_rod_moves_leave_no_bump_steer(tmp_path, name):
 
     write_table(tmp_path, name, 0.01, -0.03, {})
     ends = {each.roles[0]: each for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
-    found = {role: each.level for role, each in ends.items() if each.level is not None}
+    found = {
+        role: each.no_bump_steer for role, each in ends.items() if each.no_bump_steer is not None
+    }
     assert found.keys() == {*RODS[name][-1]}
-    for role, level in found.items():
+    for role, moves in found.items():
         for k, sign in enumerate((-1.0, -1.0, 1.0)):
             up, down = (bump_steer({role: way * STEP * np.eye(3)[k]}) for way in (1, -1))
             slope = sign * (up - down) / (2.0 * STEP)
-            assert level[k] * slope == pytest.approx(-bump_steer({}), rel=1e-6), (role, k)
+            assert moves[k] * slope == pytest.approx(-bump_steer({}), rel=1e-6), (role, k)
 
 
 def test_explain_prints_shims_in_degrees(tmp_path, capsys):
@@ -133,9 +135,10 @@ def test_explain_prints_shims_in_degrees(tmp_path, capsys):
     assert main(["explain", str(tmp_path / "car.csv"), "--samples", "2"]) == 0
     printed = capsys.readouterr().out
     assert "shims of 1 mm at design" in printed
-    ends = {each.name: each.level for each in load(tmp_path / "car.csv").hardpoints}
+    ends = {each.name: each.no_bump_steer for each in load(tmp_path / "car.csv").hardpoints}
     for name in ("tierod_inner", "tierod_outer"):
-        assert f"first order: {name} z {1e3 * ends[name][2]:+.3g} mm in the table" in printed
+        rows = [line.split() for line in printed.splitlines() if line.startswith(f"{name} ")]
+        assert [name, *(f"{1e3 * x:+.1f}" for x in ends[name]), "mm"] in rows
     (row,) = [line for line in printed.splitlines() if line.startswith("uca_outer  ")]
     degrees = math.degrees(1e-3 * load(tmp_path / "car.csv").hardpoints[2].shim[1][1])
     assert f"{degrees:+.4f}" in row.split()

@@ -167,8 +167,8 @@ class Diagnosis(msgspec.Struct, frozen=True):
         shims: derivatives of toe, camber and caster at design by x, y and z of each joint of a
             table that is moved while the links keep their lengths and the wheel its height [rad/m],
             by row.
-        level: by how much each end of a tie rod, moved along x, y or z of the table alone, leaves
-            no bump steer at design, to first order [m], by row; null where it has no effect.
+        no_bump_steer: how far each end of a tie rod moves along x, y or z of the table alone to
+            leave no bump steer at design, to first order [m], by row; null where it has no effect.
         moves: places of the case that follow each hardpoint, direction or length, by its name.
         signs: sign conventions of the outputs; empty without.
         not_derived: outputs of more than the pose, without budget and sensitivities.
@@ -197,7 +197,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     sensitivities: list[Sensitivity]
     binding: list[str]
     shims: dict[str, list[list[float]]]
-    level: dict[str, list[float | None]]
+    no_bump_steer: dict[str, list[float | None]]
     moves: dict[str, list[str]]
     signs: str
     not_derived: list[str]
@@ -282,10 +282,10 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         sensitivities=sensitivities(case, swept, design, variables) if swept and derived else [],
         binding=binding(swept, variables) if swept and derived else [],
         shims={each.name: each.shim.tolist() for each in case.hardpoints if each.shim is not None},
-        level={
-            each.name: [float(x) if np.isfinite(x) else None for x in each.level]
+        no_bump_steer={
+            each.name: [float(x) if np.isfinite(x) else None for x in each.no_bump_steer]
             for each in case.hardpoints
-            if each.level is not None
+            if each.no_bump_steer is not None
         },
         moves={each.name: each.places for each in variables},
         signs=case.signs,

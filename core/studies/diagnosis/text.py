@@ -222,11 +222,12 @@ def _shims(found: Diagnosis) -> Iterator[Text | Table]:
         numbers = [1e-3 * math.degrees(each) for row in rows for each in row]
         table.add_row(name, *(f"{0.0 + round(each, 4):+.4f}" for each in numbers), "deg")
     yield table
-    for name, (*_, up) in found.level.items():
-        if up is not None:
-            yield Text(
-                f"no bump steer at design, to first order: {name} z {1e3 * up:+.3g} mm in the table"
-            )
+    if found.no_bump_steer:
+        yield _head("no bump steer at design, to first order, if one of these moves in the table")
+        table = columns("along", ">x", ">y", ">z", "")
+        for name, moves in found.no_bump_steer.items():
+            table.add_row(name, *("–" if x is None else f"{1e3 * x:+.1f}" for x in moves), "mm")
+        yield table
 
 
 def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:

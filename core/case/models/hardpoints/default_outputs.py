@@ -101,7 +101,7 @@ def vehicle_of(
     )
 
 
-def _length(file: Path, option: str, text: str | None, range_: tuple[float, float]) -> float | None:
+def _length(file: Path, option: str, text: str | None, limits: tuple[float, float]) -> float | None:
     """Return the length stated by an option [m]."""
     if text is None:
         return None
@@ -113,14 +113,14 @@ def _length(file: Path, option: str, text: str | None, range_: tuple[float, floa
             f"--{option}",
             f"found {shown(text)}, expected a length; say --{option} 0.3 or 300mm",
         ) from None
-    _require_within(file, f"--{option}", found, range_)
+    _require_within(file, f"--{option}", found, limits)
     return found
 
 
 def _require_within(
-    file: Path, where: str, size: float | None, range_: tuple[float, float]
+    file: Path, where: str, size: float | None, limits: tuple[float, float]
 ) -> None:
-    least, most = range_
+    least, most = limits
     if size is not None and not least <= size <= most:
         raise fault(
             file,
@@ -281,7 +281,7 @@ def hardpoints_of(
     axes: Axes,
     mechanism_at: Callable[[Mapping[str, Vector]], Mechanism],
     shims: Mapping[str, Array],
-    levels: Mapping[str, Array],
+    no_bump_steer: Mapping[str, Array],
 ) -> tuple[Hardpoint, ...]:
     """Return a hardpoint for each row that fills a role.
 
@@ -294,7 +294,7 @@ def hardpoints_of(
         axes: of the table.
         mechanism_at: makes the mechanism from positions by role.
         shims: derivatives of toe, camber and caster by role and axes of the case.
-        levels: moves without bump steer, by role and axes of the case.
+        no_bump_steer: moves of the tie rod's ends that leave none, by role and axes of the case.
     """
     rows = list(dict.fromkeys(named.values()))
     by_table = np.zeros((len(rows), 3, 3 * len(rows)))
@@ -318,10 +318,10 @@ def hardpoints_of(
         own = {place: each[:, 3 * row : 3 * row + 3] for place, each in slopes.items()}
         moves = {place: each for place, each in own.items() if each.any()}
         along, signs = zip(*axes, strict=True)
-        shim = level = None
+        shim = moved = None
         if turned := [shims[role] for role in roles if role in shims]:
             shim = np.sum(turned, axis=0)[:, along] * signs
-        if roles[0] in levels and len(roles) == 1:
-            level = levels[roles[0]][..., along] * signs
-        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim, level))
+        if roles[0] in no_bump_steer and len(roles) == 1:
+            moved = no_bump_steer[roles[0]][..., along] * signs
+        hardpoints.append(Hardpoint(name, roles, at[roles[0]], axes, moves, shim, moved))
     return tuple(hardpoints)

@@ -28,7 +28,7 @@ from ...units import plain
 from .axle import AxleMotion, mechanism_of, read_travels, sides_of
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
 from .rubber import of_chrono, with_file, with_rubber
-from .shims import level, shims
+from .shims import no_bump_steer, shims
 from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
     TEMPLATE_NAMES,
@@ -139,11 +139,12 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    turned, levels = (
-        each(template, at, vehicle.static_toe, vehicle.static_camber) for each in (shims, level)
+    turned, unsteered = (
+        each(template, at, vehicle.static_toe, vehicle.static_camber)
+        for each in (shims, no_bump_steer)
     )
     hardpoints = hardpoints_of(
-        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, levels
+        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, unsteered
     )
     case, sides = replace(case, hardpoints=hardpoints), sides_of(supplied.axle, side)
     rubber, left_out = of_chrono(table, template, named)

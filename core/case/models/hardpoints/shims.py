@@ -58,7 +58,7 @@ def shims(
     return found
 
 
-def level(
+def no_bump_steer(
     template: Template, at: Mapping[str, Vector], toe: float, camber: float
 ) -> dict[str, Array]:
     """Return by how much each end of the tie rod, moved alone in the table along x, y or z, leaves
