@@ -81,6 +81,7 @@ def test_without_a_radius_nothing_is_at_the_road():
             "",
             ["--wheel-radius", "300 m", "0.02 to 3 m", "say its unit: 300mm"],
         ),
+        ({"wheel_radius": "-0.3"}, "", ["found -0.3 m", "correct it"]),
         ({"wheelbase": "2600"}, "", ["--wheelbase", "0.1 to 20 m", "2600mm"]),
         ({"cg_height": "500"}, "", ["--cg-height", "0.005 to 6 m", "500mm"]),
         ({"rack_per_turn": "50"}, "", ["--rack-per-turn", "0.001 to 1 m", "50mm"]),

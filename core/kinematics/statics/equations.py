@@ -144,11 +144,11 @@ def with_free_coordinates(mechanism: Mechanism) -> Mechanism:
     rows = rows_at(Cartesian(found, frame.moving))
     first, chosen = len(rows) - len(candidates), list[Driver]()
     kept = rows[:first]
+    rank = len(independent_rows(kept, 0))
     for driver, row in zip(candidates, rows[first:], strict=True):
-        if len(independent_rows(wider := np.vstack([kept, row]), 0)) > len(
-            independent_rows(kept, 0)
-        ):
-            kept = wider
+        wider = np.vstack([kept, row])
+        if (of_wider := len(independent_rows(wider, 0))) > rank:
+            kept, rank = wider, of_wider
             chosen.append(driver)
     return replace(mechanism, drivers=[*mechanism.drivers, *chosen])
 

@@ -122,12 +122,9 @@ def _require_within(
 ) -> None:
     least, most = limits
     if size is not None and not least <= size <= most:
-        raise fault(
-            file,
-            where,
-            f"found {size:.6g} m, expected a length of {least:g} to {most:g} m; correct it, or say"
-            f" its unit: {size:.6g}mm",
-        )
+        unit = f", or say its unit: {size:.6g}mm" if least <= 1e-3 * size <= most else ""
+        problem = f"found {size:.6g} m, expected a length of {least:g} to {most:g} m"
+        raise fault(file, where, f"{problem}; correct it{unit}")
 
 
 def _share(file: Path, option: str, text: str | None) -> float | None:
