@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
+from ..caches import ByContent
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import held, require_finite, triple
 from ..joints import Distance
@@ -77,8 +78,8 @@ KINDS: Mapping[str, type] = {
 """Members of a mechanism, and the class of each."""
 
 
-@dataclass(frozen=True)
-class Mechanism:
+@dataclass(frozen=True, eq=False)
+class Mechanism(ByContent):
     """A named set of bodies, joints, points, drivers and loads.
 
     Attributes:

@@ -4,7 +4,7 @@ and programs are shared.
 
 import numpy as np
 import pytest
-from kincheck.core import Body, Point, solve
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import WORST
@@ -93,6 +93,31 @@ def test_components_built_alike_share_a_program():
     # the crank, the one with the point, all others
     assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]
     assert cascade.details["largest_component"] == 12
+
+
+def test_driven_components_alike_share_a_program():
+    names = [f"j{k}" for k in range(12)]
+    cranks = Mechanism(
+        "cranks",
+        [Body(f"body {name}") for name in names],
+        [
+            Revolute(name, "ground", f"body {name}", (k, 0.0, 0.0), (0.0, 1.0, 0.0))
+            for k, name in enumerate(names)
+        ],
+        [Point(f"tip {name}", f"body {name}", (k, 0.0, 1.0)) for k, name in enumerate(names)],
+        [JointAngle(f"motor {name}", name) for name in names],
+    )
+    lanes = ComponentLanes(cranks, Request(tuple(f"motor {name}" for name in names), ("tip j3",)))
+    assert len(lanes.kinds) == 12
+    assert len({id(kind.model) for kind in lanes.kinds}) == 2  # that with the point, and all others
+    path = Path(
+        {f"motor {name}": Ramp(0.1 * k) for k, name in enumerate(names)}, np.linspace(0.0, 3.0, 9)
+    )
+    found = solve_components(cranks, path, [f"tip {name}" for name in names], ())
+    for k, name in enumerate(names):
+        angle = 0.1 * k * path.times
+        tip = np.stack([k + np.sin(angle), np.zeros(9), np.cos(angle)], axis=1)
+        assert np.allclose(found.points[f"tip {name}"].position, tip, rtol=0.0, atol=1e-12)
 
 
 def test_a_chain_of_two_hundred_loops_closes_to_round_off():

@@ -305,6 +305,18 @@ def test_a_look_up_of_an_unknown_name_suggests_another(kind: str):
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
+def test_pickled_mechanism_has_its_fields_alone():
+    bodies = [Body("turned")]
+    mechanism = Mechanism(
+        "arm", bodies, [Revolute("pivot", "ground", "turned", (0, 0, 0), (0, 0, 1))]
+    )
+    packed = pickle.dumps(mechanism)
+    assert hash(mechanism) == hash(replace(mechanism))
+    assert mechanism.moving  # kept for the next question
+    assert pickle.dumps(mechanism) == packed  # programs on disk are found by it
+    assert pickle.loads(packed) == mechanism != replace(mechanism, name="leg")
+
+
 def test_look_ups_through_a_mechanism_are_told_too():
     mechanism = Mechanism("arm", [Body("turned")], [], [], [])
     for asked in (mechanism.is_fixed, mechanism.design_value):

@@ -6,7 +6,7 @@ world) and adds its own. `ComponentLanes` binds them to lanes, one sample a lane
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -39,6 +39,7 @@ from ..continuation.singular_poses import SOUND, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
 from ..formulation.constraints import frames
 from ..formulation.parameters import places
+from ..formulation.state_vectors import samples
 from ..structure.components import Component, Section, components, section
 from ..structure.degrees_of_freedom import counted
 from .sparse_lanes import SparseLanes
@@ -47,9 +48,10 @@ from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
 
 @dataclass(frozen=True, eq=False)
 class ComponentType:
-    """Components of one structure: one model, and numbers for each.
+    """Components of one structure and drive: one model, and numbers for each.
 
     Attributes:
+        drivers: of each; components of one structure that others drive have the same model.
         members: numbers of the components.
         fixed: values of the slots `Plan.fixed`, the same in all lanes, at the design position,
             shape (members, fixed).
@@ -57,6 +59,7 @@ class ComponentType:
     """
 
     model: Model
+    drivers: tuple[str, ...]
     members: tuple[int, ...]
     fixed: Array
     base: int
@@ -118,13 +121,11 @@ class ComponentLanes(Lanes):
         origins: dict[str, Vector] = {
             name: (origin.x, origin.y, origin.z) for name, origin in metres.items()
         }
-        driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
+        wanted = {*request.points, *(getattr(each, "point", "") for each in mechanism.drivers)}
         self.points: list[list[str]] = [[] for _ in self.parts]
         self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
         for point in mechanism.points:
-            if (
-                point.name in request.points or point.name in driven
-            ) and point.body in self.part_of:
+            if point.name in wanted and point.body in self.part_of:
                 self.points[self.part_of[point.body]].append(point.name)
         sections = [self._section(k, part, origins) for k, part in enumerate(self.parts)]
         alike: dict[object, list[int]] = {}
@@ -133,9 +134,9 @@ class ComponentLanes(Lanes):
         self.kinds: list[ComponentType] = []
         rows = 0
         for members in alike.values():
-            kind = self._kind([sections[k] for k in members], members, rows)
-            self.kinds.append(kind)
-            rows += len(members) * kind.model.kept
+            for kind in self._kinds([sections[k] for k in members], members, rows):
+                self.kinds.append(kind)
+                rows += len(kind.members) * kind.model.kept
         self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
         self.many = LANES if rows * LANES <= CACHED else LANES // 2
         self.details = self._details()
@@ -158,9 +159,8 @@ class ComponentLanes(Lanes):
         # from what is fixed now, and from what is ahead
         self._calls: list[list[Callable[[int], object]]] = [[], []]
         self._tables: list[Parts] = []  # calls know addresses, not arrays
-        for k, run in groupby(
-            range(len(self.parts)), key=lambda part: self.kinds.index(self.place[part][0])
-        ):
+        kind_of = {part: k for k, kind in enumerate(self.kinds) for part in kind.members}
+        for k, run in groupby(range(len(self.parts)), key=kind_of.__getitem__):
             parts, both = [*run], (self._fixed[k], self._ahead[k])
             members = np.array([self.place[part][1] for part in parts], dtype=np.int64)
             given = [
@@ -176,17 +176,20 @@ class ComponentLanes(Lanes):
 
     def _details(self) -> dict[str, Any]:
         unknowns, rows, redundant, sizes = 0, 0, list[str](), dict[str, dict[str, int]]()
+        alike: dict[Model, list[int]] = {}
         for kind in self.kinds:
-            account, like = kind.model.selection.account, self.parts[kind.members[0]].bodies[0]
-            unknowns += account.moving_coordinates * len(kind.members)
-            rows += account.rows * len(kind.members)
-            for part in (self.parts[k] for k in kind.members):
+            alike.setdefault(kind.model, []).extend(kind.members)
+        for model, members in alike.items():
+            account, like = model.selection.account, self.parts[members[0]].bodies[0]
+            unknowns += account.moving_coordinates * len(members)
+            rows += account.rows * len(members)
+            for part in (self.parts[k] for k in members):
                 # as they are called in a section
                 joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}
                 named = (name.partition(":") for name in account.redundant_rows)
                 redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
-            which = f"components like that of {like} ({len(kind.members)})"
-            sizes |= {f"{name}, {which}": size for name, size in kind.model.sizes.items()}
+            which = f"components like that of {like} ({len(members)})"
+            sizes |= {f"{name}, {which}": size for name, size in model.sizes.items()}
         return {
             **counted(self.mechanism, unknowns, rows, redundant).details,
             "components": len(self.parts),
@@ -201,9 +204,9 @@ class ComponentLanes(Lanes):
         wanted = [self.mechanism.body(name) for name in part.bodies if name in self.request.bodies]
         return section(part, self.unit, origins, points, wanted)
 
-    def _kind(
+    def _kinds(
         self, sections: Sequence[Section], members: Sequence[int], base: int
-    ) -> ComponentType:
+    ) -> Iterator[ComponentType]:
         first, values = sections[0], [places(each.mechanism) for each in sections]
         varied = tuple(
             place
@@ -235,9 +238,13 @@ class ComponentLanes(Lanes):
             )
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]
-        return ComponentType(
-            model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), base
-        )
+        fixed = np.ascontiguousarray(lanes[list(model.plan.fixed)].T)
+        driven: dict[tuple[str, ...], list[int]] = {}
+        for row, k in enumerate(members):
+            driven.setdefault(tuple(each.name for each in self.parts[k].drivers), []).append(row)
+        for names, own in driven.items():
+            yield ComponentType(model, names, tuple(members[row] for row in own), fixed[own], base)
+            base += len(own) * model.kept
 
     def body_rows(self, name: str) -> list[int]:
         """Return the rows of the world with the motion of a body, in the order of `PRESCRIBED`."""
@@ -307,16 +314,19 @@ class ComponentLanes(Lanes):
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`: by component type; types without drivers share one table."""
-        models, alone = (kind.model for kind in self.kinds), times[None]
-        return [each.samples(path, times) if each.request.drivers else alone for each in models]
+        alone = times[None]
+        return [
+            samples(self.mechanism, kind.drivers, self.unit, path, times) if kind.drivers else alone
+            for kind in self.kinds
+        ]
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
         """See `Lanes`."""
         count = tables[0].shape[1]
         self.last, self._times = count - 1, tables[0][0]
-        for table, samples in zip(tables, self._samples, strict=True):
-            samples[:, :count] = table
-            samples[:, count:] = table[:, count - 1 :]
+        for table, room in zip(tables, self._samples, strict=True):
+            room[:, :count] = table
+            room[:, count:] = table[:, count - 1 :]
         self.worst[:] = self._best
         groups = self._groups(count)
         for call in self._calls[0]:
@@ -401,12 +411,12 @@ class ComponentLanes(Lanes):
 
     def carry(self, lane: int) -> None:
         """See `Lanes`."""
-        for kind, fixed, samples, carried in zip(
+        for kind, fixed, sample, carried in zip(
             self.kinds, self._fixed, self._samples, self._carried, strict=True
         ):
             size, count = kind.model.kept, len(kind.members)
             solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)
-            tables = solved, samples[None, :, lane], fixed
+            tables = solved, sample[None, :, lane], fixed
             values = [
                 table[:, sources] for table, (sources, _) in zip(tables, carried, strict=True)
             ]

@@ -202,8 +202,9 @@ def section(
 ) -> Section:
     """Return the component with numbered names.
 
-    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ... They have no
-    masses: motion does not need them, and components that differ in masses share a program.
+    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., drivers d0, ..., points p0,
+    ... They have no masses: motion does not need them, and components that differ in masses share a
+    program.
 
     Args:
         origins: internal origin of every moving body, global [m].
@@ -225,11 +226,11 @@ def section(
         for point in points
     ]
     drivers: list[Driver] = []
-    for driver in component.drivers:
+    for k, driver in enumerate(component.drivers):
         if isinstance(driver, JointDriver):
-            drivers.append(replace(driver, joint=joint_names[driver.joint]))
+            drivers.append(replace(driver, name=f"d{k}", joint=joint_names[driver.joint]))
         elif isinstance(driver, PointCoordinate):
-            drivers.append(replace(driver, point=point_names[driver.point]))
+            drivers.append(replace(driver, name=f"d{k}", point=point_names[driver.point]))
     at: dict[str, str] = {}
     for name, body in names.items():
         found = next(

@@ -9,7 +9,7 @@ no help before that: its joints coincide at design, and its rows hold to round-o
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
@@ -44,6 +44,8 @@ CLEAR = 0.1
 # Tolerances that the digits of a file leave, relative to the size: six digits, and all.
 COARSEST, FINEST = 1e-5, 1e-12
 MOST_SHOWN = 12
+# Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
+AT_REST = 1e-6
 
 Value: TypeAlias = float | Place
 """Change of a move since the pose of the tree: a coordinate [rad or m]; of a ball or a free link,
@@ -70,10 +72,7 @@ class Pose:
     @cached_property
     def columns(self) -> Mapping[str, range]:
         """Unknowns of each move, by its name."""
-        found, count = dict[str, range](), 0
-        for name, move in self.tree.moves.items():
-            found[name] = range(count, count := count + UNKNOWNS[move.kind])
-        return found
+        return _columns((name, UNKNOWNS[move.kind]) for name, move in self.tree.moves.items())
 
     @property
     def unknowns(self) -> int:
@@ -187,6 +186,14 @@ class Pose:
         return Place(carried.point(place.at), carried.turn * place.turn)
 
 
+def _columns(counts: Iterable[tuple[str, int]]) -> dict[str, range]:
+    """Return the ranges of names one after the other, by how many each has."""
+    found, start = dict[str, range](), 0
+    for name, count in counts:
+        found[name] = range(start, start := start + count)
+    return found
+
+
 def _about(point: Vec3, moved: Place) -> Place:
     """Return a turn about a point and a shift."""
     return Place(point - Place(turn=moved.turn).direction(point) + moved.at, moved.turn)
@@ -206,6 +213,37 @@ class Start:
     given: tuple[str, ...]
     text: str
     closes: bool
+
+
+@dataclass(eq=False)
+class FreeMotions:
+    """Motions of moves joined by ties, or of one move alone.
+
+    Attributes:
+        columns: unknowns of each of these moves, by its name.
+        basis: orthonormal, shape (motions, unknowns).
+    """
+
+    columns: Mapping[str, range]
+    basis: Array
+
+    def of(self, move: str) -> Array:
+        """Return the part of a move's unknowns in the motions, shape (motions, unknowns)."""
+        return self.basis[:, [*self.columns[move]]]
+
+    def leave(self, rows: Array) -> None:
+        """Leave the motions on which rows over them vanish, shape (rows, motions).
+
+        Each independent row is turned to the first motion by a reflection, which is left out.
+        """
+        _, sizes, right = np.linalg.svd(rows, full_matrices=False)
+        right = right[sizes > AT_REST]
+        while len(right):
+            normal = right[0].copy()
+            normal[0] += math.copysign(1.0, normal[0])
+            normal /= np.linalg.norm(normal)
+            self.basis = (self.basis - 2.0 * np.outer(normal, normal @ self.basis))[1:]
+            right = (right - 2.0 * np.outer(right @ normal, normal))[1:, 1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +334,25 @@ class Closing:
                 found[columns[:3] if kind == "free" else columns[0]] = self.size
         return found
 
-    def null(self, rows: Array) -> Array:
+    def free(self, pose: Pose) -> list[FreeMotions]:
+        """Return the motions left by the rows, by sets of moves without a row in common."""
+        rows, columns = self.rows(pose)[1], pose.columns
+        part = np.arange(pose.unknowns)
+        for joined in (*map(list, columns.values()), *map(np.flatnonzero, rows)):
+            if len(labels := np.unique(part[joined])) > 1:
+                part[np.isin(part, labels)] = labels[0]
+        together: dict[int, list[str]] = {}
+        for name, unknowns in columns.items():
+            together.setdefault(int(part[unknowns[0]]), []).append(name)
+        found: list[FreeMotions] = []
+        for names in together.values():
+            unknowns = [k for name in names for k in columns[name]]
+            own = rows[:, unknowns]
+            basis = self._null(own[own.any(axis=1)]) if len(rows) else np.eye(len(unknowns))
+            found.append(FreeMotions(_columns((each, len(columns[each])) for each in names), basis))
+        return found
+
+    def _null(self, rows: Array) -> Array:
         """Return an orthonormal basis of the motions left by rows, shape (freedoms, n)."""
         lonely = _lonely(rows)
         given = {*lonely.values()}
@@ -393,16 +449,13 @@ class Assembled:
     """A model in its closed start.
 
     Attributes:
-        free: motions left by the ties, orthonormal, by the unknowns of `Pose`, shape (freedoms,
-            unknowns).
-        columns: unknowns of each move.
+        free: motions left by the ties, of moves joined by ties together.
         start: origin of the start, in words.
         notes: how it was closed.
     """
 
     tree: Tree
-    free: Array
-    columns: Mapping[str, range]
+    free: Sequence[FreeMotions]
     closing: Closing
     start: str
     notes: tuple[str, ...]
@@ -443,8 +496,8 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
     closed = Pose.of(pose.as_tree())
     # of the tree in this pose, whose changes since the zero pose it knows itself
     closing = replace(closing, ties=closed.tree.ties)
-    free = closing.null(closing.rows(closed)[1])
-    return Assembled(closed.tree, free, closed.columns, closing, start.text, tuple(notes))
+    free = closing.free(closed)
+    return Assembled(closed.tree, free, closing, start.text, tuple(notes))
 
 
 def _nearest_closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:

@@ -20,7 +20,7 @@ from ...io.document import decimal, fault, interval, measure, shown, unknown_nam
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...units import ANGLES, LENGTHS
-from .assembly import Assembled, Pose, Start, Value
+from .assembly import AT_REST, Assembled, Pose, Start, Value
 from .element import Element
 from .place import ORIGIN, Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
@@ -30,8 +30,6 @@ KEYFRAME = "keyframe:"
 SAMPLES = 41
 # A range of more turns without a unit is more likely in degrees than in radians.
 MANY_TURNS = 2.0
-# Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
-AT_REST = 1e-6
 # A move that has less of them may have it by the file's digits alone, which lead the mechanism
 # anywhere when it is held. It is held if no other one can be.
 CLEARLY = 0.01
@@ -274,21 +272,22 @@ class Freedom:
         Args:
             spins: by ball or free move, the axis about which its rod turns freely, shape (3,).
         """
-        self._columns, self._free = model.columns, model.free
+        self._parts = [replace(each) for each in model.free]
+        self._part_of = {move: part for part in self._parts for move in part.columns}
         for name, axis in spins.items():
-            turning = [*self._columns[name]][-3:]
-            self._leave(axis[None] @ self._free[:, turning].T)
-        self.dof, self.taken = len(self._free), 0
+            part = self._part_of[name]
+            part.leave(axis[None] @ part.of(name)[:, -3:].T)
+        self.dof, self.taken = self.left, 0
 
     @property
     def left(self) -> int:
         """Number of motions left."""
-        return len(self._free)
+        return sum(len(each.basis) for each in self._parts)
 
     def sizes(self, move: str) -> Array:
         """Return how much of a move's unknowns the motions have, the most first."""
-        rows = self._free[:, [*self._columns[move]]]
-        return np.linalg.svd(rows, full_matrices=False)[1] if rows.size else np.zeros(0)
+        own = self._part_of[move].of(move)
+        return np.linalg.svd(own, full_matrices=False)[1] if own.size else np.zeros(0)
 
     def count(self, move: str) -> int:
         """Return how many of a move's motions are left."""
@@ -296,27 +295,14 @@ class Freedom:
 
     def can_hold(self, move: str, clearly: float) -> bool:
         """Return whether each of a move's unknowns can be held: it has more than this."""
-        sizes = self.sizes(move)
-        return len(sizes) == len(self._columns[move]) and bool(sizes[-1] > clearly)
+        sizes, wanted = self.sizes(move), len(self._part_of[move].columns[move])
+        return len(sizes) == wanted and bool(sizes[-1] > clearly)
 
     def take(self, move: str) -> None:
         """Drive or hold a move."""
-        self.taken += len(self._columns[move])
-        self._leave(self._free[:, [*self._columns[move]]].T)
-
-    def _leave(self, rows: Array) -> None:
-        """Leave the motions on which rows over them vanish, shape (rows, motions).
-
-        Each independent row is turned to the first motion by a reflection, which is left out.
-        """
-        _, sizes, right = np.linalg.svd(rows, full_matrices=False)
-        right = right[sizes > AT_REST]
-        while len(right):
-            normal = right[0].copy()
-            normal[0] += math.copysign(1.0, normal[0])
-            normal /= np.linalg.norm(normal)
-            self._free = (self._free - 2.0 * np.outer(normal, normal @ self._free))[1:]
-            right = (right - 2.0 * np.outer(right @ normal, normal))[1:, 1:]
+        part = self._part_of[move]
+        self.taken += len(part.columns[move])
+        part.leave(part.of(move).T)
 
 
 def choose_held(
@@ -394,7 +380,9 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
             "the model has no freedom in its start, expected one that moves; give another model or"
             " another start by --start",
         )
-    what = f"{count} driven or held" if count else "nothing said of what drives it"
+    what = f"{count} driven or held"
+    if not count:
+        what = f"nothing said of what drives it ({_motors(tree, dof)})"
     advice: list[str] = []
     if not driving.driven:
         advice.append("--drive JOINT:START:STOP for the one that moves")
@@ -416,6 +404,20 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
         f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}, expected as many of"
         f" either; say {' and '.join(advice)}{_to_hold(_candidates(tree, driving), freedom)}",
     )
+
+
+def _motors(tree: Tree, dof: int) -> str:
+    """Return in words why the motors of a file do not drive it."""
+    names = [name for name in tree.joints if name in tree.actuated]
+    if not names:
+        return "the file marks no motors"
+    which = f"its motors, of {shortened(names, MOST_MOTORS)},"
+    endless = [name for name in names if not tree.joints[name].limit.is_range]
+    if endless:
+        return f"{which} have no limits at {shortened(endless, MOST_MOTORS)}"
+    if len(names) != dof:
+        return f"{which} move {len(names)} of them"
+    return f"{which} do without --hold-rest"
 
 
 def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:

@@ -168,8 +168,8 @@ class _Reader:
                 moved = motor
                 if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
                     moved = next(tendon.only("joint"), motor)
-                joint = {moved.attributes.get("joint", "")} & tree.moves.keys()
-                tree.add_motor(f"actuator: {motor.tag}", joint)
+                named = {moved.attributes.get(key, "") for key in ("joint", "jointinparent")}
+                tree.add_motor(f"actuator: {motor.tag}", named & tree.moves.keys())
         ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
         tree.motors[RANGES] = sum(ranges)
         if tree.masses:
