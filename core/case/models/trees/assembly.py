@@ -20,7 +20,6 @@ from ....algebra import ZERO, Vec3, X, Y, Z, cross
 from ....errors import CaseError, shortened
 from ....mechanism.mechanism import GROUND
 from ....trajectory import Array
-from ...io.document import fault
 from .place import ORIGIN, Place, rotation_vector, turn_about, turn_by
 from .tree import UNKNOWNS, Closure, Coupling, Move, Strut, Tie, Tree
 
@@ -292,9 +291,14 @@ class Closing:
         """Largest gap of an assembly [m or rad]."""
         return max(ADDED_UP * self.tolerance, CLOSED * self.size)
 
+    def gaps(self, pose: Pose) -> list[tuple[float, Tie]]:
+        """Return the ties with their residuals [m or rad], the largest first."""
+        found = [(float(np.abs(_residual(each, pose)).max()), each) for each in self.ties]
+        return sorted(found, key=lambda each: -each[0])
+
     def gap(self, pose: Pose) -> float:
         """Return the largest residual [m or rad]."""
-        return max((_gap(each, pose) for each in self.ties), default=0.0)
+        return self.gaps(pose)[0][0] if self.ties else 0.0
 
     def apart(self, pose: Pose) -> float:
         """Return the largest gap of closures [m], angles at arms of the size; offsets of coupled
@@ -306,10 +310,6 @@ class Closing:
                 residual = np.abs(_residual(each, pose))
                 found = max(found, *residual[:3], *(self.size * residual[3:]))
         return found
-
-    def widest(self, pose: Pose) -> Tie:
-        """Return the tie with the largest residual."""
-        return max(self.ties, key=lambda each: _gap(each, pose))
 
     def rows(self, pose: Pose) -> tuple[Array, Array]:
         """Return residuals and their derivatives, lengths over the size: (rows,), (rows, n)."""
@@ -392,10 +392,6 @@ def _lonely(rows: Array) -> Mapping[int, int]:
                     if len(owners[other]) == 1:
                         waiting.append(other)
     return found
-
-
-def _gap(tie: Tie, pose: Pose) -> float:
-    return float(np.abs(_residual(tie, pose)).max())
 
 
 def _residual(tie: Tie, pose: Pose) -> Array:
@@ -482,17 +478,17 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
     if opened > CLOSED * closing.size:
         # who gives some moves' values leaves the others to the assembly
         if start.closes and (apart := closing.apart(pose)) > FAR * closing.size:
-            raise closing.widest(pose).element.fault(
+            raise closing.gaps(pose)[0][1].element.fault(
                 f"is open in the start ({start.text}) by {apart:.4g} m, expected"
                 f" {FAR * closing.size:.3g} m at most, a tenth of the model's size; give a start"
                 " that is nearer by --start keyframe:NAME, or values of some joints by --start"
                 " JOINT=VALUE ..., from which the nearest closed pose is taken however far it is"
             )
         pose = _nearest_closed(closing, pose, ((*start.given, *driven), start.given, ()))
-        left = closing.gap(pose)
-        if left > closing.limit:
-            raise _open(closing, start, pose, opened, left)
-        notes.append(_note(closing, start, pose, opened, left))
+        left = closing.gaps(pose)
+        if left[0][0] > closing.limit:
+            raise _open(closing, start, opened, left)
+        notes.append(_note(closing, start, pose, left[0][0]))
     closed = Pose.of(pose.as_tree())
     # of the tree in this pose, whose changes since the zero pose it knows itself
     closing = replace(closing, ties=closed.tree.ties)
@@ -540,29 +536,30 @@ def _descend(closing: Closing, pose: Pose, moving: Array) -> Pose:
     return best
 
 
-def _open(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> CaseError:
+def _open(
+    closing: Closing, start: Start, opened: float, left: Sequence[tuple[float, Tie]]
+) -> CaseError:
     """Return the error of a model that does not close."""
-    gaps = sorted(((_gap(each, pose), each.name) for each in closing.ties), reverse=True)
-    texts = [f"{name} by {gap:.2g}" for gap, name in gaps if gap > closing.limit]
-    return fault(
-        pose.tree.file,
-        str(closing.widest(pose).element),
+    texts = [f"{tie.name} by {gap:.2g}" for gap, tie in left if gap > closing.limit]
+    gap, widest = left[0]
+    return widest.element.fault(
         f"is open: the start ({start.text}) by {opened:.4g} m or rad, and the nearest pose that was"
-        f" found by {left:.4g}, expected {closing.tolerance:.3g} m at most ({closing.why}); still"
+        f" found by {gap:.4g}, expected {closing.tolerance:.3g} m at most ({closing.why}); still"
         f" open are {shortened(texts, MOST_SHOWN)}; give a start that can be closed by --start,"
         " another tolerance by --closure, or correct the model",
     )
 
 
-def _note(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> str:
+def _note(closing: Closing, start: Start, pose: Pose, left: float) -> str:
     """Return the note on the assembly: the gap, and how far each move went."""
     moved = sorted(_movements(start.pose, pose), key=lambda each: -each[0])
     texts = [text for size, text in moved if size > 1e-3 * moved[0][0]]
     kept = f", of which {left:.2g} m are left, within {closing.why}" * (
         left > CLOSED * closing.size
     )
+    opened, widest = closing.gaps(start.pose)[0]
     return (
-        f"the start ({start.text}) is assembled: {closing.widest(start.pose).element} was open by"
+        f"the start ({start.text}) is assembled: {widest.element} was open by"
         f" {opened:.3g} m or rad{kept};"
         f" {f'moved were {shortened(texts, MOST_SHOWN)}' if texts else 'no joint moved'}"
     )

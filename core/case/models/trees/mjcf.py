@@ -16,7 +16,6 @@ from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
 from ...io.document import shown
 from .element import Element, significant_digits, words
-from .limits import Limit, limit_of
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     DYNAMIC,
@@ -40,10 +39,12 @@ from .tree import (
     Closure,
     Coupling,
     Kind,
+    Limit,
     Move,
     Spring,
     Strut,
     Tree,
+    limit_of,
 )
 
 # What these hold is for looks, actuators and measurements.
