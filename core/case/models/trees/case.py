@@ -34,7 +34,7 @@ from ....mechanism.motions import Absolute, Driver, JointAngle, JointDisplacemen
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
-from ...io.document import SMALLEST, explained, fault, usable
+from ...io.document import SMALLEST, explained, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
@@ -192,8 +192,7 @@ class _Parts:
                 case = within_digits(case, closing.tolerance, closing.why, [*tree.joints])
             dof = degrees_of_freedom(case.mechanism)
         if dof != len(drivers):
-            raise fault(
-                tree.file,
+            raise tree.fault(
                 "",
                 f"its joints and equalities leave {len(drivers)} freedoms within"
                 f" {closing.tolerance:.2g} m ({closing.why}), but {dof} as exact ones, expected as"

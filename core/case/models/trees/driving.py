@@ -16,7 +16,7 @@ import numpy as np
 from ....algebra import quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ....trajectory import Array
-from ...io.document import decimal, fault, interval, measure, shown, unknown_name, usable
+from ...io.document import decimal, interval, measure, shown, unknown_name, usable
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...units import ANGLES, LENGTHS
@@ -46,13 +46,13 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
         CaseError: there is no such keyframe or move, one is given twice, or its numbers are not
             those of the move.
     """
-    file, values = tree.file, dict(Pose.of(tree).value_of)
+    values = dict(Pose.of(tree).value_of)
     given: list[str] = []
     text = ", ".join(said) if said else tree.zero
     said = [own for each in said for own in tree.starts.get(each.removeprefix(KEYFRAME), [each])]
     keyframes = [each for each in said if each.startswith(KEYFRAME)]
     if len(keyframes) > 1:
-        raise fault(file, "--start", f"found {len(keyframes)} keyframes, expected one; name one")
+        raise tree.fault("--start", f"found {len(keyframes)} keyframes, expected one; name one")
     if keyframes:
         values |= _keyframe(tree, keyframes[0].removeprefix(KEYFRAME))
     for each in said:
@@ -61,11 +61,11 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
         name, sign, value = each.rpartition("=")
         if not sign:
             form = f"{KEYFRAME}NAME or JOINT=VALUE [rad or m, as qpos]"
-            raise fault(file, "--start", f"found {shown(each)}, expected {form}; say the value")
+            raise tree.fault("--start", f"found {shown(each)}, expected {form}; say the value")
         if name not in tree.moves:
-            raise unknown_name(file, "--start", name, tree.moves, "a joint")
+            raise unknown_name(tree.file, "--start", name, tree.moves, "a joint")
         if name in given:
-            raise fault(file, "--start", f"found {shown(name)} twice; give one value")
+            raise tree.fault("--start", f"found {shown(name)} twice; give one value")
         values[name] = _value(tree, tree.moves[name], value.split(","))
         given.append(name)
     return Start(Pose(tree, [*values.values()]), tuple(given), text, tree.closes and not given)
@@ -73,8 +73,7 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
 
 def _keyframe(tree: Tree, name: str) -> dict[str, Value]:
     if name not in tree.keyframes:
-        raise fault(
-            tree.file,
+        raise tree.fault(
             "--start",
             f"found {shown(KEYFRAME + name)}, expected a keyframe of the model, by name or by"
             f" number from 0; {remedy(name, [*tree.keyframes, *tree.starts])}",
@@ -102,7 +101,7 @@ def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = N
 
     def error(problem: str) -> CaseError:
         problem = f"{problem}; correct it"
-        return key.fault(f"qpos: {problem}") if key else fault(tree.file, "--start", problem)
+        return key.fault(f"qpos: {problem}") if key else tree.fault("--start", problem)
 
     expected = COORDINATES[move.kind]
     try:
@@ -157,22 +156,18 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     Raises:
         CaseError: they name an unknown move, name one twice, or give different samples.
     """
-
-    def error(option: str, problem: str) -> CaseError:
-        return fault(tree.file, option, problem)
-
     driven: dict[str, Array] = {}
     given: dict[str, int] = {}
     for text in supplied.drive:
         name, values, samples = _swept(tree, text)
         if name in driven:
-            raise error("--drive", f"found {name!r} twice; give one range")
+            raise tree.fault("--drive", f"found {name!r} twice; give one range")
         driven[name] = values
         if samples is not None:
             given[name] = samples
     if len({*given.values()}) > 1:
         counts = ", ".join(f"{count} of {name!r}" for name, count in given.items())
-        raise error(
+        raise tree.fault(
             "--drive",
             f"found {counts} samples, expected as many of each; all joints move together",
         )
@@ -182,7 +177,7 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     fixed: list[str] = []
     for name in dict.fromkeys(supplied.hold):
         if name in driven:
-            raise error(
+            raise tree.fault(
                 "--hold", f"found {name!r}, which is driven, expected another joint; leave it out"
             )
         if name in tree.joints and tree.joints[name].is_axial:
@@ -201,22 +196,23 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
         "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates, rad or m unless"
         f" a unit is given, 2 to {MOST_SAMPLES} samples"
     )
-
-    def error(problem: str) -> CaseError:
-        return fault(tree.file, "--drive", problem)
-
     parts = text.split(":")
     named = {":".join(parts[:k]): parts[k:] for k in range(max(1, len(parts) - 3), len(parts) + 1)}
     name = next((name for name in named if name in tree.joints), None)
     if name is None:
         axial = [name for name, move in tree.joints.items() if move.is_axial]
-        raise error(f"found {shown(text)}, expected {form}; {remedy(next(iter(named)), axial)}")
+        raise tree.fault(
+            "--drive", f"found {shown(text)}, expected {form}; {remedy(next(iter(named)), axial)}"
+        )
     if not tree.joints[name].is_axial:
-        raise error(f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those")
+        raise tree.fault(
+            "--drive", f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those"
+        )
     numbers = named[name]
     if len(numbers) < 2:
-        raise error(
-            f"found {shown(text)}, expected {form}; say from where to where: {name}:START:STOP"
+        raise tree.fault(
+            "--drive",
+            f"found {shown(text)}, expected {form}; say from where to where: {name}:START:STOP",
         )
     turns, samples, unit = tree.joints[name].kind == "hinge", None, ""
     try:
@@ -228,14 +224,15 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
         start = stop = math.nan
     count = SAMPLES if samples is None else samples
     if not (math.isfinite(stop - start) and start != stop and 1 < count <= MOST_SAMPLES):
-        raise error(f"found {shown(text)}, expected {form}; correct the numbers")
+        raise tree.fault("--drive", f"found {shown(text)}, expected {form}; correct the numbers")
     if turns and not unit and (count_of := abs(stop - start) / math.tau) > MANY_TURNS:
         samples_of = "".join(f":{each}" for each in numbers[2:])
         ends = ":".join(numbers[:2])
-        raise error(
+        raise tree.fault(
+            "--drive",
             f"{name} would turn {count_of:.3g} times from {start:g} to {stop:g} rad; write"
             f" {name}:{ends}deg{samples_of} for degrees, or {name}:{ends}rad{samples_of} if radians"
-            " are meant"
+            " are meant",
         )
     return name, np.linspace(start, stop, count), samples
 
@@ -321,8 +318,7 @@ def choose_held(
         for name in names:
             if not freedom.count(free.get(name, name)):
                 advice = "name another" if option == "--drive" else "leave it out"
-                raise fault(
-                    tree.file,
+                raise tree.fault(
                     option,
                     f"found {name!r}, which an equality of the file locks, expected a joint that"
                     f" moves; {advice}, or start elsewhere by --start",
@@ -347,8 +343,7 @@ def choose_held(
         raise _undriven(tree, driving, freedom)
     passive = [each for each in driving.held if each not in (*named, *tree.actuated)]
     if len(passive) > MOST_HELD:
-        raise fault(
-            tree.file,
+        raise tree.fault(
             "--hold-rest",
             f"would hold {len(passive)} joints without a motor, of {freedom.dof} freedoms: does the"
             " file lack loops? If they are meant to stand still, name them: --hold"
@@ -374,8 +369,7 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
     """Return the error of a model whose degrees of freedom differ from the driven ones."""
     dof, count = freedom.dof, freedom.taken
     if dof == 0:
-        return fault(
-            tree.file,
+        return tree.fault(
             "",
             "the model has no freedom in its start, expected one that moves; give another model or"
             " another start by --start",
@@ -398,8 +392,7 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
         advice.append(
             f"others for {freedom.left + count - dof} that depend on each other by the equalities"
         )
-    return fault(
-        tree.file,
+    return tree.fault(
         "",
         f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}, expected as many of"
         f" either; say {' and '.join(advice)}{_to_hold(_candidates(tree, driving), freedom)}",

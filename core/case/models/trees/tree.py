@@ -18,9 +18,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ....algebra import ZERO, Vec3, X, Y, Z
+from ....errors import CaseError
 from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
-from ...io.document import LARGEST, decimal, shown
+from ...io.document import LARGEST, decimal, fault, shown
 from .element import Element, Names
 from .place import ORIGIN, Place
 
@@ -331,6 +332,10 @@ class Tree:
     def joints(self) -> Mapping[str, Move]:
         """The moves of links that something holds."""
         return {name: move for name, move in self.moves.items() if move.kind != "free"}
+
+    def fault(self, option: str, problem: str) -> CaseError:
+        """Return the error to raise: 'FILE: OPTION: PROBLEM'."""
+        return fault(self.file, option, problem)
 
     def count(self, what: str) -> None:
         """Count one more omitted item."""
