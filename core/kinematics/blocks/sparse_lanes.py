@@ -43,7 +43,7 @@ from ..formulation.acceptance_criteria import (
     slope_between,
 )
 from ..formulation.constraints import measured
-from ..formulation.formulation import row_names
+from ..formulation.relative import row_names
 from ..formulation.state_vectors import turns
 from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
 from ..structure.sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError

@@ -87,7 +87,7 @@ class System:
             to compile so many operations than they ever run.
 
     Attributes:
-        conditions: see `Formulation`.
+        conditions: see `Cartesian`.
         unknowns: n.
         names: by vector of the state, its numbers in a state.
         rows, columns: of the entries of the Jacobian.

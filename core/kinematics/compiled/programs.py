@@ -30,13 +30,12 @@ from ..formulation.constraints import Frames, Style, constraints, frames
 from ..formulation.formulation import (
     GROUND_ACCELERATION,
     Acceleration,
-    Formulation,
     State,
     motion_of_frame,
     motion_of_point,
 )
 from ..formulation.parameters import every_place, placed
-from ..formulation.relative import Relative
+from ..formulation.relative import Formulation, Relative
 from ..formulation.state_vectors import turns
 from ..structure.components import Section, select_section
 from ..structure.degrees_of_freedom import Selection, select_rows

@@ -17,7 +17,8 @@ from ...mechanism.motions import Driver, JointAngle, Path
 from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...trajectory import Array
 from .constraints import Frames
-from .formulation import Configuration, Formulation
+from .formulation import Configuration
+from .relative import Formulation
 
 
 def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:

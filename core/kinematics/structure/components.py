@@ -23,8 +23,8 @@ from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector, exten
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, unit_near
-from ..formulation.formulation import Formulation
 from ..formulation.parameters import places
+from ..formulation.relative import Formulation
 from ..formulation.state_vectors import jacobian
 from .degrees_of_freedom import Selection, counted, selected
 from .redundancy import independent_rows

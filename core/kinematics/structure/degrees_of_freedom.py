@@ -32,7 +32,7 @@ from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, frames, measured
-from ..formulation.formulation import Formulation, row_names
+from ..formulation.relative import Formulation, row_names
 from ..formulation.state_vectors import jacobian
 from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
