@@ -30,7 +30,7 @@ def ready(mechanism):
 
 def test_a_wrong_branch_is_no_solution():
     lanes = SparseLanes(CRANK, Request(("turn",), ()))
-    lanes.accept(1e-12)
+    lanes.stand_at(lanes.design, 1e-12)
     lanes.depart(0.0, turning(0.0))
     # half a turn about x: the axes are parallel, but opposite
     over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])

@@ -8,20 +8,26 @@ are constants of its program; others are read from slots of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cache
-from typing import Any, cast
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Scalar, Vec3
+from ...algebra import Scalar
 from ...program import Tape, Traced, program
 from ...program.straight_line import Bytecode, bytecode, repeated
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Constraint, Relation
+from ..formulation.constraints import (
+    Constraint,
+    Relation,
+    coordinates_of,
+    renamed,
+    structure,
+    with_numbers,
+)
 from .request import RATE, Layout
 
 Indices = NDArray[np.intp]
@@ -48,6 +54,15 @@ class Elements:
     tables: Mapping[str, Bytecode]
     sizes: Mapping[str, Mapping[str, int]]
     geometry: Array
+
+
+class _Member(NamedTuple):
+    """A constraint, the same with names of its own, the numbers of that, and its first row."""
+
+    c: Constraint | Relation
+    alone: Constraint | Relation
+    numbers: Sequence[Scalar]
+    row: int
 
 
 @dataclass
@@ -80,12 +95,17 @@ def linked(formulation: Cartesian, layout: Layout, width: int) -> Elements:
         width: lanes of a vector.
     """
     writer = _Writer(formulation, layout)
-    first, kinds = 0, dict[Any, list[tuple[Constraint | Relation, int]]]()
+    first, kinds = 0, dict[Hashable, list[_Member]]()
     for c in formulation.constraints:
-        kinds.setdefault(_kind(c, formulation), []).append((c, first))
+        # as the only constraint of a mechanism
+        names = [f"x{k}" for k in range(len(coordinates_of(c)))]
+        sides = {} if isinstance(c, Relation) else {c.i: "i", c.j: "j"}
+        moving = {body: side for body, side in sides.items() if body in formulation.columns}
+        alone, numbers = renamed(c, "", moving, names), list[Scalar]()
+        kinds.setdefault(structure(alone, numbers), []).append(_Member(c, alone, numbers, first))
         first += 1 if isinstance(c, Relation) else c.primitive.n
     for members in kinds.values():
-        writer.add([c for c, _ in members], np.array([row for _, row in members]))
+        writer.add(members)
     writer.retract()
     return writer.finished(width)
 
@@ -102,20 +122,17 @@ class _Writer:
         self.rows, self.columns = list[Indices](), list[Indices]()
         self.written: dict[str, list[tuple[Any, Indices]]] = {ROWS: [], GAMMA: [], RETRACT: []}
 
-    def add(self, members: Sequence[Constraint | Relation], first: Indices) -> None:
-        """Add the constraints of one kind, with their first rows."""
-        whole, kind = self.formulation, _Kind(Tape(), [])
-        lifted = self._lifted(members, kind)
-        sides = (
-            [each for each in ("i", "j") if each in (lifted.i, lifted.j)]
-            if isinstance(lifted, Constraint)
-            else []
-        )
-        bodies = [[getattr(c, side) for c in members] for side in sides]
-        own = Cartesian(
-            [lifted], sides, tuple(lifted.weights) if isinstance(lifted, Relation) else ()
-        )
-        named = [_coordinates(c) for c in members]
+    def add(self, members: Sequence[_Member]) -> None:
+        """Add the constraints of one kind."""
+        whole, kind, alone = self.formulation, _Kind(Tape(), []), members[0].alone
+        first = np.array([each.row for each in members])
+        # numbers that differ become inputs
+        every = zip(*(each.numbers for each in members), strict=True)
+        lifted = with_numbers(alone, iter([self._number(each, kind) for each in every]))
+        sides = [each for each in "ij" if each == getattr(alone, each, "")]
+        bodies = [[getattr(each.c, side) for each in members] for side in sides]
+        own = Cartesian([lifted], sides, coordinates_of(alone))
+        named = [coordinates_of(each.c) for each in members]
         state = {
             f"{label} {side}": kind.vector([self.layout.vectors[f"{label} {b}"] for b in each])
             for side, each in zip(sides, bodies, strict=True)
@@ -184,23 +201,6 @@ class _Writer:
         slots = [np.array(each) for each in kind.sources] + [each for _, each in out]
         self.written[name].append((traced, np.array(slots, np.intp)))
 
-    def _lifted(self, members: Sequence[Constraint | Relation], kind: _Kind) -> Any:
-        """Return one constraint for all: numbers that differ become inputs."""
-        every = zip(*(list(_leaves(_content(c))) for c in members), strict=True)
-        numbers = iter([self._number(each, kind) for each in every])
-        first = members[0]
-        content = _rebuilt(_content(first), numbers)
-        if isinstance(first, Relation):
-            weights = {f"x{k}": w for k, w in enumerate(content[0])}
-            return replace(first, weights=weights, curve=content[1], drive=content[2])
-        moving = self.formulation.columns
-        sides = (
-            side if body in moving else ""
-            for side, body in zip("ij", (first.i, first.j), strict=True)
-        )
-        i, j = sides
-        return Constraint("", content, i, j, "x" if first.coordinate else "")
-
     def _number(self, each: Sequence[Scalar], kind: _Kind) -> Scalar:
         first = each[0]
         if isinstance(first, float | int) and all(x == first for x in each):
@@ -240,72 +240,3 @@ class _Writer:
             sizes,
             np.array(self.geometry),
         )
-
-
-def _content(c: Constraint | Relation) -> Any:
-    """Return what of a constraint holds its numbers."""
-    if isinstance(c, Relation):
-        return tuple(c.weights.values()), tuple(c.curve), c.drive
-    return c.primitive
-
-
-def _coordinates(c: Constraint | Relation) -> tuple[str, ...]:
-    if isinstance(c, Relation):
-        return tuple(c.weights)
-    return (c.coordinate,) if c.coordinate else ()
-
-
-def _kind(c: Constraint | Relation, formulation: Cartesian) -> Any:
-    """Return a key, equal for constraints of one kind."""
-    moving = formulation.columns
-    sides = () if isinstance(c, Relation) else (c.i in moving, c.j in moving)
-    return sides, len(_coordinates(c)), _signature(_content(c))
-
-
-def _signature(value: Any) -> Any:
-    """Return all of a value but its numbers; whether a vector is zero is part of it."""
-    if _is_number(value):
-        return Traced if isinstance(value, Traced) else float
-    if isinstance(value, Vec3):
-        return Vec3, any(isinstance(x, Traced) or x != 0.0 for x in value)
-    parts = _parts(value)
-    return value if parts is None else (type(value), *map(_signature, parts))
-
-
-def _leaves(value: Any) -> Iterator[Scalar]:
-    """Yield the numbers of a value."""
-    if _is_number(value):
-        yield value
-    for part in _parts(value) or ():
-        yield from _leaves(part)
-
-
-def _rebuilt(value: Any, numbers: Iterator[Scalar]) -> Any:
-    """Return a value with other numbers, in the order of `_leaves`."""
-    if _is_number(value):
-        return next(numbers)
-    parts = _parts(value)
-    if parts is None:
-        return value
-    new = [_rebuilt(part, numbers) for part in parts]
-    if isinstance(value, tuple):
-        return tuple(new)
-    return replace(value, **dict(zip(_names(value.__class__) or (), new, strict=True)))
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Traced | float | int) and not isinstance(value, bool)
-
-
-def _parts(value: Any) -> list[Any] | None:
-    """Return the parts of a tuple or of a data class; None of anything else."""
-    if isinstance(value, tuple):
-        return [*cast("tuple[Any, ...]", value)]
-    names = _names(value.__class__)
-    return None if names is None else [getattr(value, name) for name in names]
-
-
-@cache
-def _names(kind: Any) -> tuple[str, ...] | None:
-    """Return the names of the fields of a data class; None of another type."""
-    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else None

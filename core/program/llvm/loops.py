@@ -307,7 +307,7 @@ declare i64 @llvm.smax.i64(i64, i64)
 
 
 def _test(width: int) -> str:
-    """Return lines that find the accepted lanes, `%passed`."""
+    """Return lines to find the accepted lanes, `%passed`."""
     vector = f"<{width} x double>"
     return f"""%margin_at = getelementptr {vector}, ptr %lane, i64 %plan_margin
   %margin = load {vector}, ptr %margin_at, align 8

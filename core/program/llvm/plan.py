@@ -42,9 +42,7 @@ FIELDS = [*NUMBERS, *PROGRAMS, *(field for name in TABLES for field in (name, f"
 
 
 def function(head: str, body: str) -> str:
-    """Return a function of a plan: the fields that its body names as "%plan_..." are read at its
-    entry.
-    """
+    """Return a function of a plan; fields named "%plan_..." in its body are read at its entry."""
     named = set(re.findall(r"%plan_(\w+)", body))
     kinds = {"tolerance": "double", **dict.fromkeys((*TABLES, *PROGRAMS), "ptr")}
     fields = [f"{kinds.get(name, 'i64')} plan_{name}" if name in named else "" for name in FIELDS]
@@ -57,7 +55,7 @@ entry:
 
 
 def fields_of(name: str, fields: Sequence[str]) -> str:
-    """Return lines that read fields of a struct, each a kind and a name; empty ones are left out.
+    """Return lines to read fields of a struct, each a kind and a name; empty ones are left out.
 
     Each field takes eight bytes.
     """
@@ -70,7 +68,7 @@ def fields_of(name: str, fields: Sequence[str]) -> str:
 
 
 def call(prefix: str, program: str) -> str:
-    """Return lines that call a program, given the address of its call."""
+    """Return lines to call a program, given the address of its call."""
     return f"""%{prefix}_code = load ptr, ptr {program}, align 8
   %{prefix}_table_at = getelementptr ptr, ptr {program}, i64 1
   %{prefix}_table = load ptr, ptr %{prefix}_table_at, align 8
@@ -102,7 +100,7 @@ end:
 
 
 def each_slot(name: str, arguments: str, body: str, columns: int = 1) -> str:
-    """Return a loop over `%slot`, which the rows of a table name in their first column."""
+    """Return a loop over `%slot`, named in the first column of a table."""
     place = f"""%place_at = mul i64 %row, {columns}
   %place = getelementptr i64, ptr %table, i64 %place_at
   %bytes = load i64, ptr %place, align 8
@@ -136,7 +134,7 @@ def each_pair(name: str, arguments: str, body: str) -> str:
 
 
 def all_lanes(width: int, name: str) -> str:
-    """Return lines that make a vector `%name_all` of equal numbers."""
+    """Return lines for a vector `%name_all` of equal numbers."""
     vector, zeros = f"<{width} x double>", f"<{width} x i32> zeroinitializer"
     return f"""%{name}_one = insertelement {vector} poison, double %{name}, i64 0
   %{name}_all = shufflevector {vector} %{name}_one, {vector} poison, {zeros}"""
@@ -144,7 +142,7 @@ def all_lanes(width: int, name: str) -> str:
 
 SIGN = """%sign_at = getelementptr double, ptr %place, i64 1
   %sign = load double, ptr %sign_at, align 8"""
-"""Lines that read the sign of a row of the table "worst"."""
+"""Lines to read the sign of a row of the table "worst"."""
 
 
 def rows(width: int) -> str:
