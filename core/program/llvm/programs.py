@@ -58,10 +58,6 @@ class Lines:
         """The lines, indented."""
         return "\n  ".join(self.lines)
 
-    def sum(self, a: str | int, b: str | int) -> str:
-        """Return the sum of two integers."""
-        return self.let(f"add i64 {a}, {b}")
-
     def number(self, pointer: str, index: str | int) -> str:
         """Return the address of a number in an array."""
         return self.let(f"getelementptr double, ptr {pointer}, i64 {index}")
