@@ -8,17 +8,16 @@ are constants of its program; others are read from slots of their own.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Scalar
-from ...program import Tape, Traced, program
+from ...program import Program, Tape, Traced, program
 from ...program.straight_line import Bytecode, bytecode, repeated
-from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import (
     Constraint,
@@ -36,24 +35,6 @@ GEOMETRY = "geometry"
 """The vector of the numbers that differ within a kind."""
 AFTER = "after "
 """Before the names of the vectors of a state: after the step."""
-
-
-@dataclass(frozen=True, eq=False)
-class Elements:
-    """The programs of all elements as tables.
-
-    Attributes:
-        rows, columns: of the entries of the Jacobian.
-        tables: of phi, nu and entries; of gamma; of the state after a step.
-        sizes: operations and flops of each.
-        geometry: values of the vector `GEOMETRY`.
-    """
-
-    rows: Indices
-    columns: Indices
-    tables: Mapping[str, Bytecode]
-    sizes: Mapping[str, Mapping[str, int]]
-    geometry: Array
 
 
 class _Member(NamedTuple):
@@ -86,43 +67,60 @@ class _Kind:
         return [self.read(each) for each in zip(*slots, strict=True)]
 
 
-def linked(formulation: Cartesian, layout: Layout, width: int) -> Elements:
-    """Return the equations of a formulation as elements.
+class Elements:
+    """The equations of a formulation as elements.
 
     Args:
         formulation: of joints that take numbers known later: those of the library.
         layout: of the slots; more are added to it.
         width: lanes of a vector.
+
+    Attributes:
+        rows, columns: of the entries of the Jacobian.
+        tables: of phi, nu and entries; of gamma; of the state after a step.
+        sizes: operations and flops of each.
+        geometry: values of the vector `GEOMETRY`.
     """
-    writer = _Writer(formulation, layout)
-    first, kinds = 0, dict[Hashable, list[_Member]]()
-    for c in formulation.constraints:
-        # as the only constraint of a mechanism
-        names = [f"x{k}" for k in range(len(coordinates_of(c)))]
-        sides = {} if isinstance(c, Relation) else {c.i: "i", c.j: "j"}
-        moving = {body: side for body, side in sides.items() if body in formulation.columns}
-        alone, numbers = renamed(c, "", moving, names), list[Scalar]()
-        kinds.setdefault(structure(alone, numbers), []).append(_Member(c, alone, numbers, first))
-        first += 1 if isinstance(c, Relation) else c.primitive.n
-    for members in kinds.values():
-        writer.add(members)
-    writer.retract()
-    return writer.finished(width)
 
-
-class _Writer:
-    def __init__(self, formulation: Cartesian, layout: Layout) -> None:
-        self.formulation, self.layout, self.geometry = formulation, layout, list[float]()
-        self.rates = layout.vector(RATE, formulation.unknowns)
-        self.step = layout.vector("step", formulation.unknowns)
+    def __init__(self, formulation: Cartesian, layout: Layout, width: int) -> None:
+        self.formulation, self.layout, self._geometry = formulation, layout, list[float]()
+        self._rates = layout.vector(RATE, formulation.unknowns)
+        self._step = layout.vector("step", formulation.unknowns)
         n = len(formulation.owners)
-        self.of_row = {
+        self._of_row = {
             name: np.array(layout.vector(name, n), np.intp) for name in ("phi", "nu", "gamma")
         }
-        self.rows, self.columns = list[Indices](), list[Indices]()
-        self.written: dict[str, list[tuple[Any, Indices]]] = {ROWS: [], GAMMA: [], RETRACT: []}
+        self._at = list[tuple[Indices, Indices]]()
+        self._written: dict[str, list[tuple[Program, Indices]]] = {ROWS: [], GAMMA: [], RETRACT: []}
+        first, kinds = 0, dict[Hashable, list[_Member]]()
+        for c in formulation.constraints:
+            # as the only constraint of a mechanism
+            names = [f"x{k}" for k in range(len(coordinates_of(c)))]
+            sides = {} if isinstance(c, Relation) else {c.i: "i", c.j: "j"}
+            moving = {body: side for body, side in sides.items() if body in formulation.columns}
+            alone, numbers = renamed(c, "", moving, names), list[Scalar]()
+            kinds.setdefault(structure(alone, numbers), []).append(
+                _Member(c, alone, numbers, first)
+            )
+            first += c.n
+        for members in kinds.values():
+            self._add(members)
+        self._retract()
+        rows, columns = zip(*self._at, strict=True)
+        self.rows, self.columns = np.concatenate(rows), np.concatenate(columns)
+        self.geometry = np.array(self._geometry)
+        last = np.array(layout.vector(GEOMETRY, len(self.geometry)), np.intp)
+        self.tables, self.sizes = dict[str, Bytecode](), dict[str, dict[str, int]]()
+        for name, parts in self._written.items():
+            size = self.sizes[name] = {"operations": 0, "flops": 0}
+            for traced, places in parts:
+                places[places < 0] = last[-1 - places[places < 0]]
+                for label, each in traced.size.items():
+                    size[label] += each * places.shape[1]
+            found = [(bytecode(traced, len(places), 1), places) for traced, places in parts]
+            self.tables[name] = repeated(found, len(layout.slots), width)
 
-    def add(self, members: Sequence[_Member]) -> None:
+    def _add(self, members: Sequence[_Member]) -> None:
         """Add the constraints of one kind."""
         whole, kind, alone = self.formulation, _Kind(Tape(), []), members[0].alone
         first = np.array([each.row for each in members])
@@ -152,22 +150,21 @@ class _Writer:
         taken = range(len(entries), len(entries) + m * len(matrix))
         places = np.array([self.layout.scalar(f"entries.{k}") for k in taken], np.intp)
         entries += places.tolist()
-        self.rows += [first + k for k, _, _ in matrix]
-        self.columns += [np.array(columns[j], np.intp) for _, j, _ in matrix]
+        self._at += [(first + k, np.array(columns[j], np.intp)) for k, j, _ in matrix]
         values = {name: getattr(own, name)(at) for name in ("phi", "nu")}
         out = [
-            (x, self.of_row[name][first + k])
+            (x, self._of_row[name][first + k])
             for name, each in values.items()
             for k, x in enumerate(each)
         ]
         of_entries = places.reshape(len(matrix), m)
         out += [(x, each) for (_, _, x), each in zip(matrix, of_entries, strict=True)]
         self._write(ROWS, kind, out)
-        rates = [kind.read([self.rates[j] for j in each]) for each in columns]
+        rates = [kind.read([self._rates[j] for j in each]) for each in columns]
         gamma = enumerate(own.gamma(at, rates))
-        self._write(GAMMA, kind, [(x, self.of_row["gamma"][first + k]) for k, x in gamma])
+        self._write(GAMMA, kind, [(x, self._of_row["gamma"][first + k]) for k, x in gamma])
 
-    def retract(self) -> None:
+    def _retract(self) -> None:
         """Add the steps of all bodies and coordinates."""
         whole, vectors = self.formulation, self.layout.vectors
         for name, value in whole.design.items():
@@ -182,7 +179,7 @@ class _Writer:
             (local,) = (*own.bodies, *own.coordinates)
             slots = {label: [vectors[f"{label} {name}"] for name in names] for label in labels}
             state = {f"{label} {local}": kind.vector(slots[label]) for label in labels}
-            step = [kind.read([self.step[k + at] for at in names.values()]) for k in range(size)]
+            step = [kind.read([self._step[k + at] for at in names.values()]) for k in range(size)]
             after = own.retract(own.configuration(state), step)
             self._write(
                 RETRACT,
@@ -199,7 +196,7 @@ class _Writer:
         inputs = len(kind.sources)
         traced = program(name, kind.tape, {inputs + k: x for k, (x, _) in enumerate(out)})
         slots = [np.array(each) for each in kind.sources] + [each for _, each in out]
-        self.written[name].append((traced, np.array(slots, np.intp)))
+        self._written[name].append((traced, np.array(slots, np.intp)))
 
     def _number(self, each: Sequence[Scalar], kind: _Kind) -> Scalar:
         first = each[0]
@@ -212,31 +209,6 @@ class _Writer:
                 assert op == "input", op
                 slots.append(int(slot))
             else:
-                self.geometry.append(float(x))
-                slots.append(-len(self.geometry))  # its slot comes last
+                self._geometry.append(float(x))
+                slots.append(-len(self._geometry))  # its slot comes last
         return kind.read(slots)
-
-    def finished(self, width: int) -> Elements:
-        """Return the elements with all tables."""
-        geometry = np.array(self.layout.vector(GEOMETRY, len(self.geometry)), np.intp)
-        slots, tables, sizes = len(self.layout.slots), dict[str, Bytecode](), dict[str, Any]()
-        for name, parts in self.written.items():
-            size = {"operations": 0, "flops": 0}
-            for _, places in parts:
-                places[places < 0] = geometry[-1 - places[places < 0]]
-            for traced, places in parts:
-                for label, each in traced.size.items():
-                    size[label] += each * places.shape[1]
-            sizes[name] = size
-            tables[name] = repeated(
-                [(bytecode(traced, len(places), 1), places) for traced, places in parts],
-                slots,
-                width,
-            )
-        return Elements(
-            np.concatenate(self.rows),
-            np.concatenate(self.columns),
-            tables,
-            sizes,
-            np.array(self.geometry),
-        )

@@ -92,7 +92,7 @@ class Cartesian:
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
         """For every row, its joint or driver and its primitive."""
-        return [name for c in self.constraints for name in [_named(c)] * _count(c)]
+        return [name for c in self.constraints for name in [_named(c)] * c.n]
 
     @property
     def conditions(self) -> Sequence[Condition]:
@@ -100,7 +100,7 @@ class Cartesian:
         far, found, first = self._from_ground, list[Condition](), 0
         for _, group in groupby(self.constraints, key=_condition):
             members = [*group]
-            rows = range(first, first := first + sum(map(_count, members)))
+            rows = range(first, first := first + sum(c.n for c in members))
             pairs = [c for c in members if isinstance(c, Constraint)]
             remote = max((far.get(c.i, 0) + far.get(c.j, 0) for c in pairs), default=0)
             steady = all(
@@ -300,10 +300,6 @@ def _condition(c: Constraint | Relation) -> tuple[object, ...]:
 def _values(c: Relation, at: Configuration) -> list[Scalar]:
     """Return the coordinates of a relation."""
     return [at.state[f"x {name}"][0] for name in c.weights]
-
-
-def _count(c: Constraint | Relation) -> int:
-    return 1 if isinstance(c, Relation) else c.primitive.n
 
 
 def _pair(c: Constraint, at: Configuration) -> tuple[Pose, Pose]:

@@ -43,6 +43,11 @@ class Constraint:
     j: str
     coordinate: str = ""
 
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return self.primitive.n
+
 
 @dataclass(frozen=True)
 class Frames:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 from ...algebra import ZERO, Quat, Scalar, Vec3, cross, rotation_less_identity, vec
 from ...primitives.base import Drive, Pose, Twist
@@ -110,6 +110,7 @@ class Relation:
             added to the sum; empty for a linear row.
     """
 
+    n: ClassVar[int] = 1
     owner: str
     weights: Mapping[str, Scalar]
     drive: Drive = field(default_factory=Drive)
