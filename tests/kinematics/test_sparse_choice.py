@@ -41,11 +41,11 @@ def pin_meeting(crank, ground, rod, rocker, angle):
     d = np.array([ground, 0.0]) - pin
     square = (d * d).sum(axis=-1)
     along = 0.5 * (square + rod**2 - rocker**2) / square
-    off = np.sqrt(rod**2 / square - along**2)
+    off = np.sqrt(np.maximum(rod**2 / square - along**2, 0.0))
     return pin, pin + along[:, None] * d + off[:, None] * np.stack([-d[:, 1], d[:, 0]], axis=-1)
 
 
-def four_bar(sizes, start, ends):
+def four_bar(sizes, start, ends, cranks=CRANKS):
     """A four-bar on the driven crank of a ring, its rod on hinges or on universals: three rows or
     one more than are needed.
     """
@@ -61,7 +61,7 @@ def four_bar(sizes, start, ends):
             Universal("pin", "crank0", "rod", pin, (X, Z)),
             Universal("end", "rod", "rocker", meet, (Z, X)),
         ]
-    whole = ring(CRANKS)
+    whole = ring(cranks)
     bodies = [*whole.bodies, Body("rod"), Body("rocker")]
     return replace(
         whole,
