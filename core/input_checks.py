@@ -52,6 +52,13 @@ def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
         )
 
 
+def finite_numbers(who: str, value: Any, count: int, expected: str) -> Any:
+    """Return so many finite numbers as a tuple, see `triple`."""
+    found = held(who, value, count, expected)
+    require_finite(who, found, expected)
+    return found
+
+
 def _of_later(number: Any) -> bool:
     return hasattr(number, "__neg__") and not isinstance(number, Complex | np.ndarray)
 

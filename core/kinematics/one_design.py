@@ -35,6 +35,7 @@ from .compiled.compiled_model import is_builtin
 from .compiled.request import Request
 from .compiled.routes import Route, recent_route, start_of
 from .continuation.sweep import follow
+from .forces.wanted import wanted_forces
 from .formulation.constraints import Style, frames
 from .structure.degrees_of_freedom import require_driven
 
@@ -263,8 +264,6 @@ def solve(
     )
     moved = partial(driving, mechanism, path, driver, np.array(values, dtype=float))
     if forces is not False:
-        from .forces.wanted import wanted_forces  # most motions are without forces
-
         names = None if forces is True else forces
         request = replace(request, forces=wanted_forces(mechanism, names))
     return prepare(mechanism, request, path)(tol).along(moved)

@@ -324,13 +324,17 @@ def with_free_coordinates(mechanism: Mechanism) -> Mechanism:
     far as joints have any.
     """
     driven = {(x.joint, x.freedom) for x in mechanism.drivers if isinstance(x, JointDriver)}
-    names = {each.name for each in mechanism.drivers}
-    candidates = [
-        cls(joint.name if joint.name not in names else f"{joint.name}.{cls.freedom}", joint.name)
-        for joint in mechanism.joints
-        for cls in (JointAngle, JointDisplacement)
-        if cls.freedom in joint.freedoms and (joint.name, cls.freedom) not in driven
-    ]
+    names, candidates = {each.name for each in mechanism.drivers}, list[Driver]()
+    for joint in mechanism.joints:
+        kinds = [
+            each
+            for each in (JointAngle, JointDisplacement)
+            if each.freedom in joint.freedoms and (joint.name, each.freedom) not in driven
+        ]
+        whole = joint.name not in names and len(kinds) == 1
+        for each in kinds:
+            name = joint.name if whole else f"{joint.name}.{each.freedom}"
+            candidates.append(each(name, joint.name))
     every = replace(mechanism, drivers=[*mechanism.drivers, *candidates])
     rows = rows_at(Cartesian.of(every, frames(every), named=angles(every)))
     first, chosen = len(rows) - len(candidates), list[Driver]()
