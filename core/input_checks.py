@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Complex
 from typing import Any, cast
 
@@ -112,6 +112,26 @@ def require_positive(who: str, what: str, number: Any) -> None:
     """Raise SolveError unless a number is positive and finite."""
     if not (finite(number) and number > 0):
         raise SolveError(f"{who}: {what} is {number!r}, expected a positive number")
+
+
+def require_known(
+    who: str,
+    what: str,
+    names: Iterable[Any],
+    known: Iterable[Any],
+    first: Callable[[], None] | None = None,
+) -> None:
+    """Raise SolveError unless all names are of known members.
+
+    Args:
+        first: called before, for what is a better explanation.
+    """
+    there = [each.name for each in known]
+    for name in names:
+        if name not in there:
+            if first is not None:
+                first()
+            raise no_such(who, what, name, there)
 
 
 def no_such(who: str, what: str, name: Any, known: Sequence[str]) -> SolveError:

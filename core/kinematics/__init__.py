@@ -74,7 +74,15 @@ if TYPE_CHECKING:
         describe_screws,
         freeing,
     )
-    from .followed import DOUBTFUL, agreement, in_doubt, near_design
+    from .followed import (
+        DOUBTFUL,
+        agreement,
+        followed_angle,
+        followed_attitude,
+        follower,
+        in_doubt,
+        near_design,
+    )
     from .forces.reactions import forces_of, motion_defects, with_forces
     from .formulation.acceptance_criteria import (
         LONGEST_TURN,
@@ -89,7 +97,7 @@ if TYPE_CHECKING:
     from .free_dynamics import FreeMotion, free_motion
     from .free_poses import FreePoses, Poses, Walked
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
-    from .one_design import Solver, followed_angle, followed_attitude, follower, solve
+    from .one_design import Solver, solve
     from .replay import (
         TURN,
         Needed,
@@ -123,7 +131,9 @@ _NAMES = {
     "diagnosis.rank": (
         "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws freeing"
     ),
-    "followed": "DOUBTFUL agreement in_doubt near_design",
+    "followed": (
+        "DOUBTFUL agreement followed_angle followed_attitude follower in_doubt near_design"
+    ),
     "forces.reactions": "forces_of motion_defects with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
@@ -132,7 +142,7 @@ _NAMES = {
     "free_dynamics": "FreeMotion free_motion",
     "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
-    "one_design": "Solver followed_angle followed_attitude follower solve",
+    "one_design": "Solver solve",
     "replay": (
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces replayed"
         " residuals"

@@ -21,9 +21,10 @@ from .compiled.compiled_model import Model, compile_model
 from .compiled.request import FORCE_SIGMA, SIGMA
 from .compiled.routes import Route
 from .design_batch import Variants, solve_variants, variant_of
+from .followed import follower
 from .forces.reactions import forces_of
 from .forces.wanted import WantedForces
-from .one_design import ONE_PROGRAM, follower, motion_only, prepare
+from .one_design import ONE_PROGRAM, motion_only, prepare
 
 
 @dataclass(frozen=True, eq=False)

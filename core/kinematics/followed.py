@@ -10,7 +10,6 @@ sign is continuous, so that rotations beyond half a turn differ from those the o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias, cast
 
@@ -27,9 +26,8 @@ from ..trajectory import Array, Trajectory
 from .compiled.request import Request
 from .compiled.routes import start_of
 from .forces.reactions import TURN, Follow, expected_change, joint_angle
+from .one_design import prepare
 
-Prepare: TypeAlias = Callable[[Mechanism, Request, Path], Callable[[float], Trajectory]]
-"""Makes a mechanism ready to be solved along a path, to a tolerance."""
 Indices: TypeAlias = NDArray[np.intp]
 
 # Way of the drivers between two samples [rad, or half the mechanism's size]: as far as turns are
@@ -110,24 +108,21 @@ def near_design(mechanism: Mechanism, path: Path) -> bool:
     return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
 
 
-def followed(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     """Return values at the samples of a path, turns counted on the way from the design; NaN if a
     sample is not reached or its turns are in doubt.
 
     None if the native solver has no solution of the mechanism.
-
-    Args:
-        prepare: makes the mechanism ready for a path.
     """
     # motions of other classes may change, or have no hash
-    return (_recent if path.is_builtin else _finer)(prepare, mechanism, path, what)
+    return (_recent if path.is_builtin else _finer)(mechanism, path, what)
 
 
-def _finer(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+def _finer(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     found: Array | None = None
     for part in PARTS:
         try:
-            found, sure = _followed(prepare, mechanism, path, what, part)
+            found, sure = _followed(mechanism, path, what, part)
         except SolveError:
             return None
         if sure:
@@ -138,38 +133,34 @@ def _finer(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -
 _recent = keep_last(32)(_finer)
 
 
-def _followed(
-    prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed, part: float
-) -> tuple[Array, bool]:
+def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> tuple[Array, bool]:
     """Return the values by further samples, and whether no number of turns is in doubt."""
     start = start_of(mechanism, path)
     times = _divided(mechanism, path, _sorted(path, start.time), part)
     # the samples first: they decide where the motion starts
     fine = replace(path, times=np.concatenate([path.times, times]))
-    motion = _motion(prepare, mechanism, fine, what)
+    motion = _motion(mechanism, fine, what)
     taken = motion.details.get("start", {"time": 0.0, "lead": {}})
     at_start, sure = what.at_design, True
     if any(taken["lead"].values()):
         lead = path.lead_in(taken["time"])
         lead = replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
-        led = _motion(prepare, mechanism, lead, what)
+        led = _motion(mechanism, lead, what)
         values, sure = _counted(what, mechanism, lead.times, led, 0.0, at_start)
         at_start = np.asarray(values[-1])
     found, certain = _counted(what, mechanism, fine.times, motion, taken["time"], at_start)
     return found[: len(path.times)], sure and certain
 
 
-def _motion(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
+def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
     """Return the motion of all bodies, which others ask for next, or if it is long of its own."""
     bodies = tuple(body.name for body in mechanism.moving)
     if len(bodies) * len(path.times) > MOST_POSES:
         bodies = what.bodies(mechanism)
-    return (_recent_motion if path.is_builtin else _solved)(prepare, mechanism, path, bodies)
+    return (_recent_motion if path.is_builtin else _solved)(mechanism, path, bodies)
 
 
-def _solved(
-    prepare: Prepare, mechanism: Mechanism, path: Path, bodies: tuple[str, ...]
-) -> Trajectory:
+def _solved(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajectory:
     return prepare(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
 
 
@@ -221,22 +212,20 @@ def in_doubt(x: Array, v: Array, times: Array) -> bool:
     return bool((np.abs(expected_change(v, t) - np.diff(x, axis=0)) > DOUBT).any())
 
 
-def followed_angle(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Array | None:
+def followed_angle(mechanism: Mechanism, path: Path, joint: str) -> Array | None:
     """Return a joint's angle [rad] at the samples of a path, zero at design, turns counted on the
     way from there; shape (n,). See `followed`.
     """
-    return followed(prepare, mechanism, path, _OfJoint(joint))
+    return followed(mechanism, path, _OfJoint(joint))
 
 
-def follower(
-    prepare: Prepare, mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]
-) -> Follow:
+def follower(mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]) -> Follow:
     """Return the function that corrects the turns of angles at the solved samples of a path."""
 
     def follow(joint: str, angle: Array, rate: Array) -> Array:
         if near_design(mechanism, path) and not in_doubt(angle, rate, path.times[solved]):
             return angle
-        if (found := followed_angle(prepare, mechanism, path, joint)) is None:
+        if (found := followed_angle(mechanism, path, joint)) is None:
             return angle
         return angle + TURN * np.round((found[solved] - angle) / TURN)
 
@@ -285,13 +274,11 @@ DOUBTFUL = float(np.cos(0.5 * DOUBT))
 """Agreement less than this, of either sign, might be another number of turns."""
 
 
-def followed_attitude(
-    prepare: Prepare, mechanism: Mechanism, path: Path, body: str
-) -> Array | None:
+def followed_attitude(mechanism: Mechanism, path: Path, body: str) -> Array | None:
     """Return Euler parameters of a moving body's rotation since design at the samples of a path,
     their sign continuous on the way from there; global axes, shape (n, 4). See `followed`.
     """
-    return followed(prepare, mechanism, path, _OfBody(body))
+    return followed(mechanism, path, _OfBody(body))
 
 
 def agreement(change: Quat, rate: Array, dt: Array) -> Array:

@@ -26,11 +26,10 @@ from ..caches import keep_last
 from ..driving import Driving
 from ..errors import SolveError
 from ..failures import FailureKind
-from ..input_checks import finite, names_of, no_such, real, require_kind
+from ..input_checks import finite, names_of, real, require_kind, require_known
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
-from . import followed
 from .compiled.compiled_model import is_builtin
 from .compiled.request import Request
 from .compiled.routes import Route, recent_route, start_of
@@ -62,6 +61,7 @@ def by_motion(mechanism: Mechanism, request: Request, path: Path, motion: Solver
     if wanted is None:
         return motion
     # most motions are asked for without forces: they need not wait for the import
+    from .followed import follower
     from .forces.reactions import with_forces
 
     names = {*wanted.joints, *wanted.drivers, *wanted.elements}
@@ -128,11 +128,6 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
         make = (_recent_blocks if known else by_blocks)(mechanism, motion_only(mechanism, request))
         return by_motion(mechanism, request, path, make(path))
     return by_program(mechanism, request, path, lambda each: recent_route(mechanism, each, path))
-
-
-followed_angle = partial(followed.followed_angle, prepare)
-followed_attitude = partial(followed.followed_attitude, prepare)
-follower = partial(followed.follower, prepare)
 
 
 def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
@@ -311,17 +306,11 @@ def asked(
     problem = _problem(driver, values, motions, rate, order, tol)
     if problem:
         raise SolveError(f"{who}: {problem}")
-    for what, names, known in (
-        ("driver", (driver, *motions), mechanism.drivers),
-        ("point", wanted, mechanism.points),
-        ("body", bodies, mechanism.bodies),
-    ):
-        there = [each.name for each in known]
-        for name in names:
-            if name not in there:
-                # a mechanism that nothing drives is the better explanation
-                require_driven(mechanism)
-                raise no_such(who, what, name, there)
+    # a mechanism that nothing drives is the better explanation
+    driven = partial(require_driven, mechanism)
+    require_known(who, "driver", (driver, *motions), mechanism.drivers, driven)
+    require_known(who, "point", wanted, mechanism.points, driven)
+    require_known(who, "body", bodies, mechanism.bodies, driven)
     design = {name: value for name in (driver, *motions) if (value := mechanism.design_value(name))}
     with np.errstate(over="ignore"):
         times = (values - design.get(driver, 0.0)) / rate

@@ -83,21 +83,6 @@ def inertia_matrix(inertia: Inertia) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
 
 
-def checked_mass(body: str, mass: Any) -> float:
-    """Return a mass [kg].
-
-    Raises:
-        MechanismError: it is negative or not finite.
-    """
-    mass = plain(mass)
-    if not finite(mass) or mass < 0.0:
-        raise MechanismError(
-            f"body {body!r}: mass is {mass!r}, expected a number of kg, zero or more",
-            f"bodies.{body}.mass",
-        )
-    return float(mass)
-
-
 def checked_inertia(body: str, inertia: Any, unit: str = str(INERTIA)) -> Inertia:
     """Return the inertia about the centre of mass, in the unit it is given in.
 
@@ -169,7 +154,13 @@ class Body:
         object.__setattr__(self, "euler_parameters", p)
         if self.mass == 0.0 and self.center_of_mass is None and self.inertia is None:
             return
-        object.__setattr__(self, "mass", checked_mass(self.name, self.mass))
+        mass = plain(self.mass)
+        if not finite(mass) or mass < 0.0:
+            raise MechanismError(
+                f"{who}: mass is {mass!r}, expected a number of kg, zero or more",
+                f"bodies.{self.name}.mass",
+            )
+        object.__setattr__(self, "mass", float(mass))
         center = self.origin if self.center_of_mass is None else self.center_of_mass
         center = finite_numbers(f"{who}: center_of_mass", center, 3, Kind.POSITION.value)
         object.__setattr__(self, "center_of_mass", center)

@@ -120,7 +120,12 @@ class Mechanism:
                         f"{who} has {each!r}, expected {one}; check the order of the arguments"
                     )
             object.__setattr__(self, what, members)
-            _unique(what, [each.name for each in getattr(self, what)])
+            twice = [name for name, k in Counter(x.name for x in members).items() if k > 1]
+            if twice:
+                raise MechanismError(
+                    f"{what}: the name {min(twice)!r} is used more than once; names must be unique",
+                    what,
+                )
         if any(body.name == GROUND for body in self.bodies):
             raise MechanismError(
                 f"body {GROUND!r} exists by itself; give the fixed body another name or leave"
@@ -503,14 +508,6 @@ def coordinates(mechanism: Mechanism) -> dict[str, Driver]:
         if len(joint.freedoms) == 1:
             found[joint.name] = found[f"{joint.name}.{joint.freedoms[0]}"]
     return found | {each.name: each for each in mechanism.drivers}
-
-
-def _unique(what: str, names: Sequence[str]) -> None:
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
-        raise MechanismError(
-            f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what
-        )
 
 
 def with_equivalents(mechanism: Mechanism, known: Collection[type[Joint]]) -> Mechanism:

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ...dataset import Dataset, Variable
 from ...errors import SolveError, number_of
-from ...input_checks import names_of, no_such, require_kind, require_positive
+from ...input_checks import names_of, require_kind, require_known, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...tabular import Tabular
@@ -149,9 +150,8 @@ def trace(
             design position, or an argument is invalid.
     """
     require_kind("trace", "mechanism", mechanism, Mechanism)
-    if driver not in (drivers := [each.name for each in mechanism.drivers]):
-        require_driven(mechanism)
-        raise no_such("trace", "driver", driver, drivers)
+    driven = partial(require_driven, mechanism)
+    require_known("trace", "driver", [driver], mechanism.drivers, driven)
     if direction not in (1, -1):
         raise SolveError(
             f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it"
@@ -159,11 +159,9 @@ def trace(
         )
     for name, given in (("length", length), ("longest", longest), ("tol", tol)):
         require_positive("trace", name, given)
-    there = [point.name for point in mechanism.points]
-    wanted = names_of("trace", "points", there if points is None else points)
-    for name in wanted:
-        if name not in there:
-            raise no_such("trace", "point", name, there)
+    every = [point.name for point in mechanism.points]
+    wanted = names_of("trace", "points", every if points is None else points)
+    require_known("trace", "point", wanted, mechanism.points)
     request = Request((driver,), wanted, order=0, style=Style(style), compiled=False)
     model = recent_model(mechanism, request)
     system = system_of(model)

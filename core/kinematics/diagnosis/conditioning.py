@@ -200,8 +200,9 @@ def conditioning(
             frame,
             {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies},
         )
+        state = state_of(formulation, mechanism, frame, pose, change)
         configuration = formulation.configuration(
-            _floats(state_of(formulation, mechanism, frame, pose, change))
+            {name: tuple(map(float, vector)) for name, vector in state.items()}
         )
         matrix = jacobian(formulation, configuration)
         matrices.append(matrix)
@@ -278,7 +279,3 @@ def _is_length(formulation: Cartesian, rows: Array) -> NDArray[np.bool_]:
     slides = [k for name, k in formulation.coordinates.items() if name.endswith(".translation")]
     shifts = [k + axis for k in first for axis in range(3)] + slides
     return np.abs(rows[:, shifts]).max(axis=1) > 0.0
-
-
-def _floats(state: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
-    return {name: tuple(map(float, vector)) for name, vector in state.items()}

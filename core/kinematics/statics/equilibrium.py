@@ -270,19 +270,18 @@ class StaticModel:
             for name, values in loads.items():
                 executor.put(vectors[f"{LOAD}{name}"], share * np.asarray(values).T)
             for name, values in travel.items():
-                values = self._drive(name, share * values)
-                executor.put(vectors[f"{DRIVE}{name}"][: len(values)], values)
+                slots, values = vectors[f"{DRIVE}{name}"], share * values
+                if self.mechanism.driver(name).turns:
+                    halves = np.cos(0.5 * values), np.sin(0.5 * values)
+                    executor.put(slots, np.array([values, *halves]))
+                else:  # cosine and sine are of no angle
+                    executor.put(slots[:1], values[None] / self.equations.frame.unit)
 
         share, _, iterations = self._walk(executor, put, determinant)
         executor.run("compliance")
         if "tangent" in kept:
             executor.run("tangent")
         return share, iterations, executor.get([k for name in kept for k in vectors[name]])
-
-    def _drive(self, name: str, values: Array) -> Array:
-        if self.mechanism.driver(name).turns:
-            return np.array([values, np.cos(0.5 * values), np.sin(0.5 * values)])
-        return values[None] / self.equations.frame.unit  # cosine and sine are of no angle
 
     def _walk(
         self, executor: Executor, put: Callable[[Array], None], start: float
