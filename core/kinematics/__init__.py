@@ -96,8 +96,9 @@ if TYPE_CHECKING:
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
     from .free_dynamics import FreeMotion, free_motion
     from .free_poses import FreePoses, Poses, Walked
+    from .motion_solver import Solver
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
-    from .one_design import Solver, solve
+    from .one_design import solve
     from .replay import (
         TURN,
         Needed,
@@ -142,7 +143,8 @@ _NAMES = {
     "free_dynamics": "FreeMotion free_motion",
     "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
-    "one_design": "Solver solve",
+    "motion_solver": "Solver",
+    "one_design": "solve",
     "replay": (
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces replayed"
         " residuals"

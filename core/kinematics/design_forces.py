@@ -24,7 +24,8 @@ from .design_batch import Variants, solve_variants, variant_of
 from .followed import follower
 from .forces.reactions import forces_of
 from .forces.wanted import WantedForces
-from .one_design import ONE_PROGRAM, motion_only, prepare
+from .motion_solver import ONE_PROGRAM
+from .one_design import motion_only, prepare
 
 
 @dataclass(frozen=True, eq=False)

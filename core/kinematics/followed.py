@@ -26,7 +26,7 @@ from ..trajectory import Array, Trajectory
 from .compiled.request import Request
 from .compiled.routes import start_of
 from .forces.reactions import TURN, Follow, expected_change, joint_angle
-from .one_design import prepare
+from .motion_solver import prepare_motion
 
 Indices: TypeAlias = NDArray[np.intp]
 
@@ -161,7 +161,7 @@ def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
 
 
 def _solved(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajectory:
-    return prepare(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
+    return prepare_motion(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
 
 
 _recent_motion = keep_last(2)(_solved)

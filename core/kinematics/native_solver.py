@@ -22,7 +22,8 @@ from .continuation.walk import marcher
 from .design_batch import RECYCLED, Variants, solve_variants
 from .forces.wanted import WantedForces, wanted_forces
 from .formulation.constraints import Style
-from .one_design import Solver, by_blocks, by_motion, by_program, motion_only, prepare, start_notes
+from .motion_solver import Solver, by_blocks
+from .one_design import by_motion, by_program, motion_only, prepare, start_notes
 
 if TYPE_CHECKING:
     from .design_forces import ForcesOfDesigns

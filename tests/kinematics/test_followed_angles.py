@@ -141,7 +141,7 @@ def test_angles_of_a_path_are_followed_at_once(monkeypatch):
         asked.append(len(request.bodies))
         return prepare_one(mechanism, request, path)
 
-    monkeypatch.setattr(followed, "prepare", prepare)
+    monkeypatch.setattr(followed, "prepare_motion", prepare)
     path = Path({"turn": Ramp(7.5)}, np.array([1.0]))
     first, second = (followed_angle(shafts(), path, joint) for joint in "ab")
     assert asked == [2]
