@@ -16,10 +16,9 @@ from kincheck.core.harness.engine import Floor
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.report.sections import page
 from kincheck.core.studies.bench import engines, precision, rounds
-from kincheck.core.studies.bench.diagrams import precision_diagram
 from kincheck.core.studies.bench.engines import Bench
 from kincheck.core.studies.bench.processes import STAGES
-from kincheck.core.studies.bench.report import report
+from kincheck.core.studies.bench.report import precision_diagram, report
 from kincheck.core.studies.paper import formulation
 
 from ..report.page import Page
