@@ -111,9 +111,9 @@ class Stress(msgspec.Struct, frozen=True, kw_only=True):
     seed: int
     samples: int
     abouts: dict[str, str]
-    cells: list[Cell]
-    findings: list[Finding]
-    proofs: list[Proofs]
-    acceptances: list[Acceptance]
+    cells: list[Cell] = []
+    findings: list[Finding] = []
+    proofs: list[Proofs] = []
+    acceptances: list[Acceptance] = []
     seconds: dict[str, float]
     unfinished: dict[str, str] = {}

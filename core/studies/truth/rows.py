@@ -93,6 +93,11 @@ def spun(w: Real, q: Real) -> Real:
     return np.concatenate([-inner(w, q[:, 1:])[:, None], vector], axis=1)
 
 
+def about(h: Real, angle: Real) -> Real:
+    """Return the quaternion of a turn about a unit vector, shape (4, n)."""
+    return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
+
+
 def nearest_turn(angles: Real, near: Real) -> Real:
     """Return angles with the full turns that bring them nearest to given ones [rad]."""
     return angles + 2.0 * PI * np.rint((near - angles) / (2.0 * PI))
