@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..studies.bench.engines import Bench
     from ..studies.stress.families import Family
-    from ..studies.stress.results import Stress
+    from ..studies.stress.run import Stress
 
 
 SEED = 943745

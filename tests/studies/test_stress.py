@@ -26,8 +26,13 @@ from kincheck.core.studies.stress.reduction import judge as judge_file
 from kincheck.core.studies.stress.reduction import rounded
 from kincheck.core.studies.stress.report import report
 from kincheck.core.studies.stress.run import specimen, specimens, stress
-from kincheck.core.studies.stress.solving import interpreted, once
-from kincheck.core.studies.stress.verdicts import Verdict, judged, refused_description
+from kincheck.core.studies.stress.verdicts import (
+    Verdict,
+    interpreted,
+    judged,
+    once,
+    refused_description,
+)
 from kincheck.core.studies.truth.forces import known_forces
 from kincheck.core.studies.truth.motion import Reach, followed
 

@@ -18,7 +18,7 @@ from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
 from kincheck.core.studies.stress.reduction import fewer_samples, reduced, rounded
 from kincheck.core.studies.stress.report import headline, markdown, report
-from kincheck.core.studies.stress.results import Cell, Finding, Stress
+from kincheck.core.studies.stress.run import Cell, Finding, Stress
 from kincheck.core.studies.stress.verdicts import Verdict
 from kincheck.core.trajectory import PointMotion
 

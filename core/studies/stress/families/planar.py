@@ -15,8 +15,7 @@ from ....algebra import triple
 from ....case.case import Case
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
-from ...truth.motion import Motion, Truth, chunks, closed, closed_poses
-from ...truth.path import System
+from ...truth.motion import Motion, System, Truth, chunks, closed, closed_poses
 from ...truth.rows import extended
 from .base import TOL, Rng, Specimen, direction, family, power, sign, swept
 from .linkages import (
