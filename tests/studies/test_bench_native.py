@@ -150,19 +150,8 @@ def test_costs_are_measured_with_residuals_and_errors():
 
 def test_growth_is_that_of_the_largest():
     timed = [(1, 1.0), (100, 2.0), (1000, 9.0), (10000, 200.0)]
-    sizes = [
-        size.Size(
-            mechanism="",
-            loops=n,
-            bodies=0,
-            engine="",
-            mode="",
-            loop="",
-            message="",
-            us_per_sample=rounds.spread([t]),
-        )
-        for n, t in timed
-    ]
+    of = dict.fromkeys(("mechanism", "engine", "mode", "loop", "message"), "")
+    sizes = [size.Size(**of, loops=n, bodies=0, us_per_sample=rounds.spread([t])) for n, t in timed]
     assert size.growth(sizes) == pytest.approx((100, 10000, 1.0))
     assert size.growth(sizes[:2]) == pytest.approx((1, 100, np.log10(2.0) / 2.0))
     assert size.growth(sizes[:1]) is None

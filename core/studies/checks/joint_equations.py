@@ -17,9 +17,9 @@ from ...joints import AxialJoint, Kind
 from ...kinematics import Style
 from ...primitives.base import NoFormError
 from ...trajectory import Array
-from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated
+from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated, worst
 from .joint_loops import coordinate
-from .manifold import NEAR, STEP, Specimen, min_norm, newton, rank, smallest, times
+from .manifold import NEAR, STEP, Motion, Specimen, min_norm, newton, rank, smallest, times
 from .traced_joint import COLUMNS, POSES, Place, TracedJoint, execute, precise, turned
 
 INDEPENDENT = Limit(0.0, "rows must be independent")
@@ -99,7 +99,7 @@ def _outside(rows: Array, space: Array) -> Array:
 
 def right_sides(s: Specimen) -> Iterator[Finding]:
     """Check rows . v = nu and rows . a = gamma along motions admitted by phi."""
-    _, velocity, acceleration = _defects(s.traced, s.state, s.rate, s.acceleration)
+    _, velocity, acceleration = _defects(s.traced, s.motion)
     remedy = "rows . v must be nu where phi stays zero; a joint has nu = 0"
     yield judged("nu", velocity, AMPLIFIED, s.traced.names, remedy=remedy)
     remedy = (
@@ -109,15 +109,14 @@ def right_sides(s: Specimen) -> Iterator[Finding]:
     yield judged("gamma", acceleration, AMPLIFIED, s.traced.names, remedy=remedy)
 
 
-def _defects(
-    t: TracedJoint, state: Array, rate: Array, acceleration: Array, units: Any = 1.0
-) -> tuple[Array, Array, Array]:
+def _defects(t: TracedJoint, motion: Motion, units: Any = 1.0) -> tuple[Array, Array, Array]:
     """Return the defects of a motion in position, velocity and acceleration, by row and pose,
     relative to the size of the row.
 
     Args:
         units: units of the equations' columns in those of the rates, shape (columns, 1).
     """
+    state, rate, acceleration = motion
     jacobian = t.rows(state) * np.reshape(units, (1, 1, -1))
     size = np.linalg.norm(jacobian, axis=2).T
     size = np.where(size > 0.0, size, 1.0)
@@ -281,12 +280,12 @@ def axis_lengths(s: Specimen) -> Iterator[Finding]:
     longer = s.joint.mapped({Kind.DIRECTION: lambda axis: tuple(137.0 * x for x in axis)})
     long = TracedJoint(replace(s.joint, **longer), s.place)
     remedy = "a direction may have any length: use unit() or triad()"
-    met = _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
+    met = _same("axis lengths", s, long, s.motion, remedy)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     apart = np.abs(s.traced.phi(off) - long.phi(off))
     where = "where it is not met"
     unmet = judged("axis lengths", apart, ROUND_OFF, s.traced.names, where, remedy)
-    yield max(met, unmet, key=lambda each: each.badness)
+    yield worst(met, unmet)
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:
@@ -295,7 +294,7 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
         "a length that is not declared so is not scaled: declare it by position(), positions() or"
         " length()"
     )
-    worst: list[Finding] = []
+    found: list[Finding] = []
     slides = [k for k, name in enumerate(s.traced.coordinates) if name.endswith(".translation")]
     for factor in FACTORS:
         large = TracedJoint(s.joint.scaled(factor), s.place.scaled(factor))
@@ -303,14 +302,14 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
         state[[0, 1, 2, 7, 8, 9, *(POSES + k for k in slides)]] *= factor * s.place.unit
         units[[0, 1, 2, 6, 7, 8, *(2 * COLUMNS + k for k in slides)]] *= factor * s.place.unit
         motion, text = (state, s.rate, s.acceleration), f"worst at x {factor:g}"
-        worst.append(_same("size", s, large, motion, remedy, units, text))
-    yield max(worst, key=lambda each: each.badness)
+        found.append(_same("size", s, large, motion, remedy, units, text))
+    yield worst(*found)
     shifted = s.joint.mapped({Kind.POSITION: lambda point: tuple(x + AWAY for x in point)})
     (a, b), unit = s.place.origins, s.place.unit
     away = Place((tuple(x + AWAY for x in a), tuple(x + AWAY for x in b)), unit)
     remedy = "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself"
     far = TracedJoint(replace(s.joint, **shifted), away)
-    yield _same("place", s, far, (s.state, s.rate, s.acceleration), remedy)
+    yield _same("place", s, far, s.motion, remedy)
 
 
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
@@ -339,14 +338,14 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     ]
     remedy = "mixed() must name the joint's own coordinates, body j relative to body i"
     named = judged("mixed style", np.array(off), AMPLIFIED, mixed.coordinates, remedy=remedy)
-    yield max(met, named, key=lambda each: each.badness)
+    yield worst(met, named)
 
 
 def _same(
     check: str,
     s: Specimen,
     other: TracedJoint,
-    motion: tuple[Array, Array, Array],
+    motion: Motion,
     remedy: str,
     units: Any = 1.0,
     message: str = "",
@@ -354,8 +353,8 @@ def _same(
     """Check that a motion of the specimen satisfies other equations too, and that these leave the
     same number of freedoms.
     """
-    worst = np.max(_defects(other, *motion, units), axis=0)
+    largest = np.max(_defects(other, motion, units), axis=0)
     mine = rank(s.exact) - len(s.traced.coordinates)
     theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)
-    figures = np.vstack([worst, np.abs(theirs - mine)])
+    figures = np.vstack([largest, np.abs(theirs - mine)])
     return judged(check, figures, AMPLIFIED, [*other.names, "rank"], message, remedy)
