@@ -41,6 +41,7 @@ from .joint_equations import (
     convergence,
     cost,
     derivatives,
+    driver,
     exchange,
     freedoms,
     intended_branch,
@@ -50,7 +51,7 @@ from .joint_equations import (
     round_off,
     size_and_place,
 )
-from .joint_loops import driver, loops
+from .joint_loops import loops
 from .manifold import Specimen, branches, moved_specimen
 from .traced_joint import BODIES, Place
 

@@ -17,7 +17,7 @@ from ...case.quantity import with_markers
 from ...joints import Attachment, Joint, Revolute
 from ...joints.base import directions, position, require_perpendicular, unit
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
-from .loaded_probe import loaded
+from .joint_loops import loaded
 
 
 @dataclass(frozen=True)
