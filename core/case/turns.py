@@ -24,8 +24,8 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import Array
 from .measures import JointAngle, Orientation
+from .pose_measures import angular_velocity, floats, signed
 from .quantity import Quantity
-from .rotation import angular_velocity, floats, signed
 
 
 def counted(

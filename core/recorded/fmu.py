@@ -30,7 +30,7 @@ from ..trajectory import Array
 from ..unit_text import value_text
 from .engine import RecordedEngine
 from .meaning import MAP, Accuracy, Meaning, Reader, Use, inputs_of, unit_of
-from .recording import Column, Head, Recording
+from .readers import Column, Head, Recording
 from .samples import samples_of
 from .sweep import as_is
 

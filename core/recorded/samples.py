@@ -30,7 +30,7 @@ from ..primitives.base import Pose as Placed
 from ..primitives.base import Twist
 from ..trajectory import Array, BodyMotion, PointMotion
 from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
-from .recording import Column, Recording
+from .readers import Column, Recording
 
 # Two steps may be equal by chance.
 FEWEST = 3

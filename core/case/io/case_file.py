@@ -13,13 +13,14 @@ from ...errors import CaseError, MechanismError, SolveError, unknown
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
-from .compliance import read_resting, read_rig
 from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown, toml_table
 from .mechanism_sections import (
     free_lines,
     mechanism_lines,
     read_free,
     read_mechanism,
+    read_resting,
+    read_rig,
     read_sweep,
     sweep_lines,
     values_in_file,

@@ -19,8 +19,7 @@ from ...mechanism.motions import Motion
 from ..measures import Measure, key_of
 from ..quantity import own_keys
 from ..suspension import SuspensionOutput
-from .compliance import RestingKeys, RigKeys
-from .mechanism_sections import DRIVERS
+from .mechanism_sections import DRIVERS, RestingKeys, RigKeys
 from .schema import (
     COORDINATE,
     SCHEMA,

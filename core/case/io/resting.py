@@ -15,8 +15,7 @@ from ...kinematics import Equilibria, StaticModel, with_free_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import JointDriver, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
-from ..case import TIME, Case, Sweep, pace, size
-from ..compliance import Resting
+from ..case import TIME, Case, Resting, Sweep, pace, size
 from ..measures import DriverEffort, JointAngle, JointDisplacement
 from ..quantity import with_markers
 from .outputs import default, largest_load

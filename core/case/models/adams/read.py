@@ -14,13 +14,21 @@ from ...closing import within_digits
 from ...io.document import explained, fault
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, WITHOUT, Supplied
-from .assembly import ADDED_UP, CLOSED, WEAK, assembled, size_of, tolerance_of
-from .constraints import coordinates_of, joint_of, read_couplers, read_links
+from .constraints import (
+    ADDED_UP,
+    CLOSED,
+    WEAK,
+    assembled,
+    coordinates_of,
+    joint_of,
+    read_couplers,
+    read_links,
+    size_of,
+    tolerance_of,
+)
 from .dataset import Dataset, read_dataset
-from .drives import read_drives, read_motions
-from .forces import read_forces
-from .model import Model
-from .parts import Units, read_bodies, read_markers, read_places, read_units
+from .functions import read_drives, read_forces, read_motions
+from .model import Model, Units, read_bodies, read_markers, read_places, read_units
 
 _LONGEST_TITLE, _MOST_NAMED = 80, 12
 

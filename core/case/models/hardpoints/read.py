@@ -25,8 +25,17 @@ from ...notes import SUSPENSIONS
 from ...quantity import with_markers
 from ...suspension import Side
 from ...units import plain
-from .axle import AxleMotion, mechanism_of, read_travels, sides_of
-from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
+from .design import (
+    AxleMotion,
+    far_out,
+    hardpoints_of,
+    mechanism_of,
+    read_travels,
+    sides_of,
+    vehicle_of,
+    with_axis,
+    with_suspension_outputs,
+)
 from .rubber import of_chrono, with_file, with_rubber
 from .shims import no_bump_steer, shims
 from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner

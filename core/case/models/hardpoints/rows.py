@@ -33,7 +33,7 @@ from ...io.table import (
     trimmed,
 )
 from ...units import LENGTHS
-from .matlab import plain_lines
+from .programs import plain_lines
 from .table import (
     Hardpoint,
     HardpointTable,
