@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import re
 import statistics
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -113,7 +113,7 @@ def tolerance_of(dataset: Dataset, size: float) -> tuple[float, str]:
     """
     placed = (
         statement.values.get(name, "")
-        for statement in (*dataset.of("PART"), *dataset.of("MARKER"))
+        for statement in dataset.of("PART", "MARKER")
         for name in _PLACED
     )
     numbers = re.findall(r"[\d.]+", " ".join(placed))
@@ -124,34 +124,28 @@ def tolerance_of(dataset: Dataset, size: float) -> tuple[float, str]:
     return limit, f"the file's digits, {digits}: {limit:.2g} m"
 
 
-def size_of(markers: Collection[Marker], places: Places) -> float:
+def size_of(model: Model) -> float:
     """Return the largest extent of the markers along an axis [m]."""
-    points = [each.place.seen_from(places[each.part]).origin for each in markers]
+    points = [model.frame(each).origin for each in model.markers.values()]
     extent = float(np.ptp(np.array(points), axis=0).max()) if points else 0.0
     return extent if extent > 1e-9 else 1.0
 
 
-def assembled(
-    dataset: Dataset,
-    links: Sequence[Link],
-    places: Places,
-    moving: Collection[int],
-    size: float,
-    tolerance: float,
-) -> tuple[dict[int, Frame], str]:
-    """Return the frames of parts with both markers of each link together, and a note on how far
-    they were apart; an empty one if they agreed.
+def assembled(model: Model, links: Sequence[Link], size: float, tolerance: float) -> Model:
+    """Return the dataset with both markers of each link together, with a note on how far they were
+    apart unless they agreed.
 
     Raises:
         CaseError: axes point in opposite directions, the markers are too far apart, or cannot be
             brought together.
     """
+    gaps: dict[str, tuple[float, float]] = {}
     for link in links:
-        _require_same_sense(link, places)
-    gaps = {link.statement.name: _gap(link, places) for link in links}
+        _require_same_sense(link, model.places)
+        gaps[link.statement.name] = _gap(link, model.places)
     opened = {name: gap for name, gap in gaps.items() if max(gap[0], size * gap[1]) > CLOSED * size}
     if not opened:
-        return {**places}, ""
+        return model
     for link in links:
         shift, turn = gaps[link.statement.name]
         if shift > FAR * size or turn > FAR:
@@ -160,15 +154,7 @@ def assembled(
                 f" expected {FAR * size:.3g} m and {math.degrees(FAR):.2g} degrees at most; Adams"
                 " assembles them first: save the dataset after its assembly, or correct a marker"
             )
-    weak = max(WEAK, ADDED_UP * tolerance / size)
-    columns = {part: 6 * k for k, part in enumerate(sorted(moving))}
-    free = np.ones(6 * len(columns))
-    for part, first in columns.items():
-        exact = dataset.statements["PART"][part].values.get("EXACT", "").upper()
-        held = {word.strip() for word in re.split(r"[:,\x1f]", exact)}
-        free[first : first + 3] = [letter not in held for letter in "XYZ"]
-        free[first + 3 : first + 6] = held.isdisjoint(("PSI", "THETA", "PHI"))
-    found = _closed(links, places, columns, free, size, weak)
+    found = _closed(model, links, size, max(WEAK, ADDED_UP * tolerance / size))
     for link in links:
         shift, turn = _gap(link, found)
         if max(shift, size * turn) > max(ADDED_UP * tolerance, CLOSED * ADDED_UP * size):
@@ -179,7 +165,8 @@ def assembled(
             )
     told = sorted(opened.items(), key=lambda each: -max(each[1][0], size * each[1][1]))
     moves = shortened([f"{name} by {_apart(*gap)}" for name, gap in told], MOST_TOLD)
-    return found, f"markers that were apart at the start are assembled: {moves}"
+    model.note(f"markers that were apart at the start are assembled: {moves}")
+    return replace(model, places=found)
 
 
 def _apart(shift: float, turn: float) -> str:
@@ -257,21 +244,20 @@ def _rows(
             yield _residual(row, i, j, link.length) / unit, slope
 
 
-def _closed(
-    links: Sequence[Link],
-    places: Places,
-    columns: Mapping[int, int],
-    free: Array,
-    size: float,
-    weak: float,
-) -> dict[int, Frame]:
+def _closed(model: Model, links: Sequence[Link], size: float, weak: float) -> dict[int, Frame]:
     """Return the frames of the nearest assembly found.
 
     Args:
-        columns: first unknown of each part.
-        free: one for the unknowns that may change, else zero.
         weak: singular values below this are of rows redundant within the digits.
     """
+    places = model.places
+    columns = {part: 6 * k for k, part in enumerate(sorted({*places} - {model.ground}))}
+    free = np.ones(6 * len(columns))
+    for part, first in columns.items():
+        exact = model.dataset.statements["PART"][part].values.get("EXACT", "").upper()
+        held = {word.strip() for word in re.split(r"[:,\x1f]", exact)}
+        free[first : first + 3] = [letter not in held for letter in "XYZ"]
+        free[first + 3 : first + 6] = held.isdisjoint(("PSI", "THETA", "PHI"))
     found, best, least = {**places}, {**places}, math.inf
     for _ in range(MOST_STEPS):
         residuals, slopes = map(np.array, zip(*_rows(links, found, columns, size), strict=True))
@@ -313,7 +299,7 @@ def read_links(model: Model) -> list[Link]:
         CaseError: a marker is missing, or the type or function is not read.
     """
     found: list[Link] = []
-    for each in (*model.dataset.of("JOINT"), *model.dataset.of("JPRIM")):
+    for each in model.dataset.of("JOINT", "JPRIM"):
         kind = each.choice(*_TYPES, "RACKPIN")
         if not kind:
             raise each.fault(f"found no type, expected one of {', '.join(_TYPES)}; state it")
@@ -410,7 +396,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
         found.append(_coupler(each, pair, weights))
         off = sum(w * one.value for w, one in zip(weights, pair, strict=True))
         if abs(off) > _ROUNDED * sum(map(abs, weights)):
-            model.dataset.notes.append(
+            model.note(
                 f"{each.name}: the scaled sum of its joints' coordinates is {off:.6g} at the start,"
                 " and stays so: joints are coupled from the start"
             )
@@ -502,7 +488,7 @@ def _rack(statement: Statement, model: Model, driven: Sequence[Coordinate]) -> C
         )
     for body, each in ((model.body(pinion), one), (model.body(rack), other)):
         speed = speed if body == each.joint.j else -speed
-    model.dataset.notes.append(
+    model.note(
         f"{statement.name}: the rack rolls on the side of the pinion where {rack} lies, whatever"
         " the sign of PD"
     )

@@ -31,7 +31,7 @@ from ...io.document import decimal, fault, shown, unknown_name
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from .dataset import Statement
-from .model import Coordinate, Marker, Model, coordinates
+from .model import Coordinate, Model, coordinates
 
 # Where a function is tried: a linear one is known from three points, and right at the others.
 _TRIED = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, -1.3), (-2.1, 0.4), (13.7, 3.9))
@@ -92,7 +92,7 @@ def read_forces(model: Model, driven: Sequence[Coordinate]) -> list[ForceElement
         CaseError: a force is not linear in the length or angle of its own markers and its rate.
     """
     found: list[ForceElement] = []
-    for each in (*model.dataset.of("SFORCE"), *model.dataset.of("SPRINGDAMPER")):
+    for each in model.dataset.of("SFORCE", "SPRINGDAMPER"):
         i, j = model.ends(each)
         kind = each.choice("TRANSLATIONAL", "ROTATIONAL")
         if not kind or "ACTIONONLY" in each.flags:
@@ -120,44 +120,33 @@ def read_forces(model: Model, driven: Sequence[Coordinate]) -> list[ForceElement
                 f" {each.kind}/{each.id}"
             )
         free = constant / stiffness if stiffness else 0.0
+        units = model.units
+        unit = units.force * units.length if turns else units.force / units.length
+        numbers = stiffness * unit, damping * unit * units.time
         try:
-            make = _torsion if turns else _spring
-            found.append(make(model, each, (i, j), (stiffness, damping, free), driven))
+            if turns:
+                joint, angle = _turning(model, each, driven, free)
+                angle = angle if stiffness else 0.0
+                found.append(TorsionSpringDamper(each.name, joint, *numbers, angle))
+            else:
+                ends = coordinates(model.frame(j).origin), coordinates(model.frame(i).origin)
+                length = units.length * free if stiffness else None
+                # a positive SFORCE pushes I and J apart
+                pair = model.body(j), model.body(i)
+                found.append(SpringDamper(each.name, *pair, ends, *numbers, length))
         except MechanismError as error:
             leave = f"--without {each.kind}/{each.id}"
             raise each.fault(f"{error}; or leave it out by {leave}") from None
     return found
 
 
-def _spring(
-    model: Model,
-    statement: Statement,
-    ends: tuple[Marker, Marker],
-    numbers: tuple[float, float, float],
-    _: Sequence[Coordinate],
-) -> ForceElement:
-    """Return a spring between two markers; a positive SFORCE pushes them apart."""
-    (i, j), (stiffness, damping, free) = ends, numbers
-    units = model.units
-    per_length = units.force / units.length
-    points = coordinates(model.frame(j).origin), coordinates(model.frame(i).origin)
-    return SpringDamper(
-        *(statement.name, model.body(j), model.body(i), points),
-        stiffness * per_length,
-        damping * per_length * units.time,
-        units.length * free if stiffness else None,
-    )
-
-
-def _torsion(
-    model: Model,
-    statement: Statement,
-    ends: tuple[Marker, Marker],
-    numbers: tuple[float, float, float],
-    driven: Sequence[Coordinate],
-) -> ForceElement:
-    """Return a torsion spring about the joint between the parts of two markers."""
-    (i, j), (stiffness, damping, free) = ends, numbers
+def _turning(
+    model: Model, statement: Statement, driven: Sequence[Coordinate], free: float
+) -> tuple[str, float]:
+    """Return the joint between the parts of two markers that turns about their z axis, and its free
+    angle [rad].
+    """
+    i, j = model.ends(statement)
     model.require_x(statement, i, j)
     axis, bodies = model.frame(j).z, [model.body(j), model.body(i)]
     for each in driven:
@@ -167,12 +156,7 @@ def _torsion(
         if abs(along) < 1.0 - _PARALLEL:
             continue
         sense = math.copysign(1.0, along) * (1.0 if [*each.joint.bodies] == bodies else -1.0)
-        torque = model.units.force * model.units.length
-        return TorsionSpringDamper(
-            *(statement.name, each.joint.name, stiffness * torque),
-            damping * torque * model.units.time,
-            sense * (free - model.turn(i, j)) if stiffness else 0.0,
-        )
+        return each.joint.name, sense * (free - model.turn(i, j))
     raise statement.fault(
         f"found no joint that turns {' against '.join(bodies)} about the z axis of {j}, expected"
         f" one; leave it out by --without {statement.kind}/{statement.id}"
@@ -231,12 +215,12 @@ def read_motions(
             if not recorded:
                 raise
             note = f"{each.name}: its function is not read; it follows the recording"
-            model.dataset.notes.append(note)
+            model.note(note)
             drives.append(drive)
             continue
         begins = float(motion.at(np.zeros(1))[0][0])
         if abs(begins) > _THERE:
-            model.dataset.notes.append(
+            model.note(
                 f"{each.name} begins {begins:.6g} {'rad' if drive.driver.turns else 'm'} from where"
                 " its markers stand: parts start there, and the motion is the one of the function"
             )
@@ -275,8 +259,7 @@ def _motion(statement: Statement, start: float, unit: float, second: float) -> F
 
 def _of_joint(model: Model, statement: Statement, driven: Sequence[Coordinate]) -> Coordinate:
     """Return the coordinate of the joint of a motion."""
-    joint = model.dataset.one_id(statement, "JOINT")
-    name = model.dataset.member(statement, "JOINT", "JOINT", joint).name
+    name = model.dataset.member(statement, "JOINT", "JOINT").name
     kind = statement.choice("TRANSLATION", "ROTATION").lower()
     own = [each for each in driven if each.joint.name == name]
     chosen = [each for each in own if kind in ("", each.freedom)]
@@ -373,10 +356,10 @@ def read_drives(
     if supplied.recorded and (rest or not all(each.motion for each in moved)):
         if any(each.motion for each in moved):
             note = "freedoms are left without a motion that is read: all follow the recording"
-            model.dataset.notes.append(note)
+            model.note(note)
         drives = [replace(each, motion=None) for each in drives]
     if left:
-        model.dataset.notes.append(
+        model.note(
             f"{left} freedom{'s' * (left > 1)} of {_bodies(mechanism)} of no joint that could be"
             " driven: no engine follows the recording, which is judged by its joints and loads"
         )

@@ -175,11 +175,11 @@ def read_markers(dataset: Dataset, units: Units) -> dict[int, Marker]:
     found: dict[int, Marker] = {}
     for each in dataset.of("MARKER"):
         if "PART" in each.values and "FLOATING" not in each.flags:
-            part = dataset.member(each, "PART", "PART", dataset.one_id(each, "PART")).id
+            part = dataset.member(each, "PART", "PART").id
             found[each.id] = Marker(part, _frame(each, "QP", "ZP", "XP", units.length), each)
     for marker in [*found.values()]:
         if "RM" in marker.statement.values:
-            other = found.get(dataset.one_id(marker.statement, "RM"))
+            other = found.get(marker.statement.id_of("RM"))
             if other is None or other.part != marker.part or "RM" in other.statement.values:
                 raise marker.statement.fault(
                     "RM: found no marker of the part that is stated in its frame, expected one;"
@@ -234,72 +234,6 @@ def rotations() -> Any:
     return import_module("scipy.spatial.transform").Rotation
 
 
-def body_name(part: int, ground: int) -> str:
-    """Return the name of a part's body."""
-    return GROUND if part == ground else f"PART_{part}"
-
-
-def read_bodies(
-    dataset: Dataset, units: Units, places: Places, ground: int, markers: Mapping[int, Marker]
-) -> list[Body]:
-    """Return the bodies of all parts but the ground, with their masses.
-
-    Raises:
-        CaseError: a marker is missing or elsewhere, or no rigid body has such a mass.
-    """
-    found: list[Body] = []
-    for part in dataset.of("PART"):
-        if part.id == ground:
-            continue
-        place = places[part.id]
-        x, y, z, w = rotations().from_matrix(place.axes).as_quat(canonical=True).tolist()
-        body = Body(body_name(part.id, ground), coordinates(place.origin), (w, x, y, z))
-        with explained(dataset.file, part.label):
-            found.append(_weighed(body, part, units, place, markers))
-    return found
-
-
-def _weighed(
-    body: Body, part: Statement, units: Units, place: Frame, markers: Mapping[int, Marker]
-) -> Body:
-    mass = units.mass * part.one("MASS", 0.0)
-    own = {name: _own_marker(part, name, markers) for name in ("CM", "IM") if name in part.values}
-    center = own.get("CM")
-    if mass and center is None:
-        raise part.fault("found MASS without CM, expected the marker of its centre; add CM = ...")
-    if center is None:
-        return body
-    at = center.place.seen_from(place)
-    body = replace(body, mass=mass, center_of_mass=coordinates(at.origin))
-    if not mass or "IP" not in part.values:
-        return body
-    numbers = part.numbers("IP")
-    if len(numbers) not in (3, 6):
-        raise part.fault(f"IP: found {len(numbers)} numbers, expected 3 or 6; correct it")
-    if not any(numbers):
-        return body
-    # products are positive integrals, about the inertia marker and along its axes
-    xx, yy, zz, xy, xz, yz = [*numbers, 0.0, 0.0, 0.0][:6]
-    about = own.get("IM", center).place.seen_from(place)
-    moments = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
-    turned = units.mass * units.length**2 * about.axes @ moments @ about.axes.T
-    arm = at.origin - about.origin
-    turned = turned - mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    i = [float(x) for x in turned.ravel()]
-    return replace(body, inertia=(i[0], i[4], i[8], i[1], i[5], i[2]))
-
-
-def _own_marker(part: Statement, name: str, markers: Mapping[int, Marker]) -> Marker:
-    (wanted, *_) = part.ids(name)
-    marker = markers.get(wanted)
-    if marker is None or marker.part != part.id:
-        where = "there is none" if marker is None else f"which is on PART/{marker.part}"
-        raise part.fault(
-            f"{name} = {wanted}: found {where}, expected a marker of the part itself; correct it"
-        )
-    return marker
-
-
 @dataclass(frozen=True, eq=False)
 class Model:
     """Parts and markers of a dataset.
@@ -314,13 +248,17 @@ class Model:
     ground: int
     markers: Mapping[int, Marker]
 
+    def note(self, text: str) -> None:
+        """Note an assumption."""
+        self.dataset.notes.append(text)
+
     def frame(self, marker: Marker) -> Frame:
         """Return the frame of a marker, global."""
         return marker.place.seen_from(self.places[marker.part])
 
     def body(self, marker: Marker) -> str:
         """Return the name of a marker's body."""
-        return body_name(marker.part, self.ground)
+        return GROUND if marker.part == self.ground else f"PART_{marker.part}"
 
     def marker(self, owner: Statement, name: str, wanted: int | None = None) -> Marker:
         """Return the marker of an argument, or of an identifier in it.
@@ -328,14 +266,13 @@ class Model:
         Raises:
             CaseError: it is missing, or on no part.
         """
-        wanted = self.dataset.one_id(owner, name) if wanted is None else wanted
-        self.dataset.member(owner, name, "MARKER", wanted)
-        if wanted not in self.markers:
+        found = self.dataset.member(owner, name, "MARKER", wanted).id
+        if found not in self.markers:
             raise owner.fault(
-                f"{name} = {wanted}: found a floating marker or one on no part, expected one that"
+                f"{name} = {found}: found a floating marker or one on no part, expected one that"
                 " is fixed on a part; name another"
             )
-        return self.markers[wanted]
+        return self.markers[found]
 
     def ends(self, owner: Statement) -> tuple[Marker, Marker]:
         """Return the markers I and J; see `marker`."""
@@ -383,3 +320,60 @@ class Coordinate:
     def axis(self) -> Array:
         """The axis of its joint, of length one, shape (3,)."""
         return np.array(self.joint.axis) / np.linalg.norm(self.joint.axis)
+
+
+def read_bodies(model: Model) -> list[Body]:
+    """Return the bodies of all parts but the ground, with their masses.
+
+    Raises:
+        CaseError: a marker is missing or elsewhere, or no rigid body has such a mass.
+    """
+    found: list[Body] = []
+    for part in model.dataset.of("PART"):
+        if part.id == model.ground:
+            continue
+        place = model.places[part.id]
+        x, y, z, w = rotations().from_matrix(place.axes).as_quat(canonical=True).tolist()
+        body = Body(part.name, coordinates(place.origin), (w, x, y, z))
+        with explained(part.file, part.label):
+            found.append(_weighed(body, part, model))
+    return found
+
+
+def _weighed(body: Body, part: Statement, model: Model) -> Body:
+    units, place = model.units, model.places[part.id]
+    mass = units.mass * part.one("MASS", 0.0)
+    own: dict[str, Marker] = {}
+    for name in ("CM", "IM"):
+        if name not in part.values:
+            continue
+        (wanted, *_) = part.ids(name)
+        marker = model.markers.get(wanted)
+        if marker is None or marker.part != part.id:
+            where = "there is none" if marker is None else f"which is on PART/{marker.part}"
+            expected = "expected a marker of the part itself; correct it"
+            raise part.fault(f"{name} = {wanted}: found {where}, {expected}")
+        own[name] = marker
+    center = own.get("CM")
+    if mass and center is None:
+        raise part.fault("found MASS without CM, expected the marker of its centre; add CM = ...")
+    if center is None:
+        return body
+    at = center.place.seen_from(place)
+    body = replace(body, mass=mass, center_of_mass=coordinates(at.origin))
+    if not mass or "IP" not in part.values:
+        return body
+    numbers = part.numbers("IP")
+    if len(numbers) not in (3, 6):
+        raise part.fault(f"IP: found {len(numbers)} numbers, expected 3 or 6; correct it")
+    if not any(numbers):
+        return body
+    # products are positive integrals, about the inertia marker and along its axes
+    xx, yy, zz, xy, xz, yz = [*numbers, 0.0, 0.0, 0.0][:6]
+    about = own.get("IM", center).place.seen_from(place)
+    moments = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+    turned = units.mass * units.length**2 * about.axes @ moments @ about.axes.T
+    arm = at.origin - about.origin
+    turned = turned - mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    i = [float(x) for x in turned.ravel()]
+    return replace(body, inertia=(i[0], i[4], i[8], i[1], i[5], i[2]))
