@@ -18,15 +18,15 @@ from ..algebra import ZERO, Vec3, quat, triple, vec
 from ..errors import MechanismError, SolveError
 from ..forces import Forces
 from ..jet import Jet
-from ..joints.base import triad, unit
+from ..joints.base import triad
 from ..mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from ..mechanism.mechanism import GROUND, Mechanism, Point, Vector
 from ..mechanism.motions import JointDriver, PointCoordinate
 from ..primitives.base import Pose
 from ..trajectory import Array
 from .case import HELD_BUT
-from .pose_measures import JointAngle, JointDisplacement, Measure, place_on
-from .quantity import HIDDEN, MARKER, Output, Quantity
+from .pose_measures import COORDINATES, Measure, coordinate_of, place_on
+from .quantity import AXES, HIDDEN, MARKER, Axis, Quantity
 
 NEWTON, NEWTON_METRE = "N", "N m"
 
@@ -34,7 +34,6 @@ NEWTON, NEWTON_METRE = "N", "N m"
 # A coordinate that moves by less than this part of the driver's does not determine the motion
 # there [rad or m by rad or m]: the effort at it would have lost all digits.
 DEAD_CENTRE = 1e-9
-_COORDINATES: Mapping[str, Any] = {"rotation": JointAngle, "translation": JointDisplacement}
 
 
 class Frame(StrEnum):
@@ -45,14 +44,6 @@ class Frame(StrEnum):
     GLOBAL = "global"
     BODY = "body"
     JOINT = "joint"
-
-
-class Axis(StrEnum):
-    """A global axis."""
-
-    X = "x"
-    Y = "y"
-    Z = "z"
 
 
 @dataclass(frozen=True)
@@ -237,8 +228,7 @@ class _JointReaction(ForceMeasure):
     def along(self) -> Vector:
         """The direction, global unit vector [-]."""
         if self.component is not None:
-            x, y, z = (float(axis == self.component) for axis in Axis)
-            return x, y, z
+            return AXES[self.component]
         direction = self.direction or (0.0, 0.0, 0.0)
         length = math.hypot(*direction)
         x, y, z = (component / length for component in direction)
@@ -341,7 +331,7 @@ class DriverEffort(ForceMeasure):
         super().check(mechanism)
         if self.at is not None:
             joint = mechanism.joint(self.at)
-            if not _COORDINATES.keys() & {*joint.freedoms}:
+            if not COORDINATES.keys() & {*joint.freedoms}:
                 raise MechanismError(
                     f"joint {self.at!r} is {joint.type} and has no rotation or translation for an"
                     " effort; name another joint",
@@ -354,13 +344,9 @@ class DriverEffort(ForceMeasure):
         if self.at is None:
             return replace(self, turns=driver.turns)
         joint = mechanism.joint(self.at)
-        there = next(each for each in _COORDINATES if each in joint.freedoms)
-        if isinstance(driver, JointDriver):
-            own: Quantity = _COORDINATES[driver.freedom](self.name, 0, 0, "", joint=driver.joint)
-        else:
-            x, y, z = unit(driver.direction)
-            own = Output(self.name, driver.point, (x, y, z), False, 0.0, 0.0, "")
-        rates = _COORDINATES[there](self.name, 0, 0, "", joint=self.at), own
+        there = next(each for each in COORDINATES if each in joint.freedoms)
+        own = coordinate_of(driver, relative=False)
+        rates = COORDINATES[there](self.name, 0.0, 0.0, "", joint=self.at), own
         alone = (self.driver,) if len(mechanism.drivers) > 1 else ()
         return replace(self, turns=there == "rotation", rates=rates, alone=alone)
 

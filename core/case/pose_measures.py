@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 from ..algebra import Vec3, X, Y, cross, quat, triple, vec
 from ..errors import MechanismError, unknown
 from ..jet import Jet, arctan2, doubles, norm, sqrt
-from ..joints.base import triad
+from ..joints.base import triad, unit
 from ..mechanism.mechanism import GROUND, Mechanism, Point, Vector
+from ..mechanism.motions import JointDriver, PointCoordinate
 from ..trajectory import Array
-from .quantity import MARKER, TypedQuantity, own_keys
+from .quantity import MARKER, Output, Quantity, TypedQuantity, own_keys
 
 # Below this square of |e| = sin(angle / 2) a series is exact in double precision, and a quotient by
 # |e| loses digits.
@@ -356,6 +357,25 @@ class JointDisplacement(_JointCoordinate):
         first, tip, second = (at[name] for name in self.points)
         gone = ((tip - first) @ (second - first)) / length(design, *self.points[:2])
         return self._from_design(gone)
+
+
+COORDINATES: Mapping[str, type[JointAngle | JointDisplacement]] = {
+    cls.freedom: cls for cls in (JointAngle, JointDisplacement)
+}
+"""Measures of a joint's coordinates, by their freedom."""
+
+
+def coordinate_of(driver: PointCoordinate | JointDriver, *, relative: bool = True) -> Quantity:
+    """Return the coordinate of a driver, without a tolerance.
+
+    Args:
+        relative: whether that of a point is measured from the design position.
+    """
+    if isinstance(driver, JointDriver):
+        cls = COORDINATES[driver.freedom]
+        return cls(driver.name, 0.0, 0.0, "", joint=driver.joint)
+    along = triple(unit(driver.direction))
+    return Output(driver.name, driver.point, along, relative, 0.0, 0.0, "")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, fields, replace
+from enum import StrEnum
 from functools import reduce
 from operator import add
 from typing import Any, ClassVar, Protocol, cast
@@ -18,6 +19,18 @@ from ..trajectory import MARKER as MARKER
 
 ORDERS = 3
 """Orders of an output of the pose alone: value, velocity and acceleration."""
+
+
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""Global axes by name."""
+
+
+class Axis(StrEnum):
+    """Name of an axis, global or of a convention."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
 
 
 class Quantity(Protocol):

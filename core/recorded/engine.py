@@ -15,7 +15,7 @@ import string
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,7 @@ class RecordedEngine:
     name: str
     samples: Samples
     resampled: Resampled
-    accuracy: Accuracy
+    accuracy: Accuracy = field(default_factory=Accuracy)
     mode = RECORDED
     loop = "none"
     in_process = untimed = True
@@ -402,5 +402,5 @@ def read_answer(name: str, case: Case, file: Path) -> Reported:
     solved = np.atleast_1d(np.isfinite(values).any(axis=0))
     lost = number_of(int((~solved).sum()), "sample")
     message = "" if solved.all() else f"{name} gives no values at {lost}"
-    engine = RecordedEngine(name, samples, as_is(case), Accuracy({}, {}))
+    engine = RecordedEngine(name, samples, as_is(case))
     return engine.report(case, solved, message)

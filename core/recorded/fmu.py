@@ -29,7 +29,7 @@ from ..harness.trajectory_check import Reported
 from ..trajectory import Array
 from ..unit_text import value_text
 from .engine import RecordedEngine
-from .meaning import MAP, Accuracy, Meaning, Reader, Use, inputs_of, unit_of
+from .meaning import MAP, Meaning, Reader, Use, inputs_of, unit_of
 from .readers import Column, Head, Recording
 from .samples import samples_of
 from .sweep import as_is
@@ -127,7 +127,7 @@ class FmuEngine:
         }
         recording = Recording(self.file, columns, self.tool, notes=notes)
         samples = samples_of(case, recording, Meaning(outputs, {}), whole=True)
-        return RecordedEngine(self.name, samples, as_is(case), Accuracy({}, {})).report(case)
+        return RecordedEngine(self.name, samples, as_is(case)).report(case)
 
     def _notes(self, case: Case, driven: Sequence[str]) -> list[str]:
         """Return notes on inputs at their start values, and drivers without an input."""

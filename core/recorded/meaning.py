@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import product
 from operator import mul
 from pathlib import Path
@@ -189,13 +189,6 @@ def inputs_of(case: Case) -> dict[str, str]:
     return units
 
 
-def targets_of(case: Case) -> dict[str, str]:
-    """Return the possible names of a column, with their SI units."""
-    joints = case.mechanism.joints if case.mechanism.has_loads else ()
-    reactions = {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
-    return inputs_of(case) | reactions | known_columns(case.outputs)
-
-
 @dataclass
 class Reader:
     """Reads the meaning of the columns of a file for a case, by the texts of --map."""
@@ -203,10 +196,14 @@ class Reader:
     file: Path
     case: Case
     heads: Sequence[Head]
-    targets: Mapping[str, str] = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.targets = targets_of(self.case)
+    @cached_property
+    def targets(self) -> Mapping[str, str]:
+        """The possible names of a column, with their SI units."""
+        case = self.case
+        joints = case.mechanism.joints if case.mechanism.has_loads else ()
+        reactions = {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
+        return inputs_of(case) | reactions | known_columns(case.outputs)
 
     def read(self, texts: Sequence[str]) -> Meaning:
         """Return the meaning.
@@ -448,8 +445,8 @@ class Accuracy:
         sizes: in SI.
     """
 
-    shares: Mapping[str, float]
-    sizes: Mapping[str, float]
+    shares: Mapping[str, float] = field(default_factory=dict[str, float])
+    sizes: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def of_rows(self, quantity: str, largest: float) -> float:
         """Return the accuracy of a quantity of bodies [m, m/s or m/s^2]."""

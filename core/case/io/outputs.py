@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import CaseError
 from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism
 from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
 from ..measures import (
     Component,
@@ -24,7 +24,7 @@ from ..measures import (
     Orientation,
     key_of,
 )
-from ..quantity import own_keys, with_markers
+from ..quantity import AXES, own_keys, with_markers
 from ..suspension import AxleOutput, PerTravel, Rate, Side, SuspensionOutput, Vehicle
 from ..suspension.base import WheelOutput
 from ..units import Convert, FileUnits
@@ -32,8 +32,6 @@ from .document import Section, explained, shown, toml_table
 from .reference_samples import DERIVATIVES
 from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
 from .suspension_section import SuspensionTable, check_point, direction, wheels_of
-
-AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.

@@ -7,6 +7,7 @@ A column without a unit is in metres or radians.
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,23 +40,8 @@ from .schema import MOST_SAMPLES
 from .table import required_unit, split_head, unit_of_head
 
 MAP = "--map"
-# Names for an output or a driver, in normal form. Names of sums and changes (track, total toe) are
-# no names of outputs.
-_ALSO: Mapping[str, Sequence[str]] = {
-    "toe": ("toe_angle", "toe_in"),
-    "camber": ("camber_angle",),
-    "caster": ("caster_angle", "castor", "castor_angle"),
-    "kingpin_inclination": ("kpi", "kpi_angle", "kingpin_angle", "kingpin_inclination_angle"),
-    "roll_center_height": ("rc_height", "roll_center", "roll_center_z", "rch"),
-    "scrub_radius": ("scrub",),
-    "mechanical_trail": ("trail", "caster_trail", "castor_trail"),
-    "stroke": (
-        *("travel", "wheel_travel", "bump", "bump_travel", "jounce", "wheel_stroke", "wheel_lift"),
-        *("vertical_travel", "wheel_displacement", "vertical_displacement", "wheel_center_travel"),
-    ),
-    "rack_travel": ("rack", "rack_displacement", "rack_stroke", "rack_disp", "steering_rack"),
-}
-_OUTPUTS = {other: name for name, others in _ALSO.items() for other in others}
+_WRITTEN = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+_OUTPUTS = {other: name for name, others in tomllib.loads(_WRITTEN).items() for other in others}
 _SIDES = {
     side: re.compile(rf"^(?:{words})_(?=..)|_(?:{words})$")
     for side, words in (("left", "left|l|fl|rl|lf"), ("right", "right|r|fr|rr|rf"))

@@ -15,9 +15,8 @@ import numpy as np
 
 from ...case.case import Case
 from ...case.io.outputs import default
-from ...case.joint_probe import AXES
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
-from ...case.quantity import with_markers
+from ...case.quantity import AXES, with_markers
 from ...errors import SolveError
 from ...forces import Reaction
 from ...joints import AxialJoint, Joint

@@ -24,10 +24,10 @@ from ....mechanism.motions import Driver, JointDisplacement, Motion, PointCoordi
 from ....trajectory import Array
 from ...case import Case, Hardpoint, Quantity, Sweep, size
 from ...io.document import decimal, fault, interval, measure, shown, unknown_name
-from ...io.outputs import AXES, default, with_all_coordinates, with_slopes
+from ...io.outputs import default, with_all_coordinates, with_slopes
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
-from ...quantity import with_markers
+from ...quantity import AXES, with_markers
 from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place

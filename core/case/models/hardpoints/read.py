@@ -40,6 +40,7 @@ from .rubber import of_chrono, with_file, with_rubber
 from .shims import no_bump_steer, shims
 from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
+    NAMES,
     TEMPLATE_NAMES,
     TEMPLATES,
     WHEEL_CENTER,
@@ -61,20 +62,8 @@ MOST_POINTS = 10_000
 LARGEST_NAMES = 100_000
 # Names as alike as this are taken for misspelt or abridged ones.
 LIKE = 0.75
-_OPPOSITES = (("upper", "lower"), ("front", "rear"), ("inner", "outer"), ("center", "contact"))
 _SPELLINGS: Mapping[str, str] = {
-    other: word
-    for word, others in (
-        ("upper", "upper upp up top u uca uwb"),
-        ("lower", "lower low lwr bottom bot l lca lwb"),
-        ("front", "front frnt fore fwd f"),
-        ("rear", "rear aft back r"),
-        ("inner", "inner inboard in inn chassis body rack i"),
-        ("outer", "outer outboard out outr upright knuckle hub o"),
-        ("center", "center centre cent ctr cntr"),
-        ("contact", "contact cont patch ground road"),
-    )
-    for other in others.split()
+    other: word for word, others in NAMES["spellings"].items() for other in others
 }
 
 
@@ -379,7 +368,7 @@ def _fits(role: str, name: str) -> bool:
     words, others = _words(role), _words(name)
     return bool(name) and all(
         not (words & kind and others & kind) or words & kind == others & kind
-        for kind in map(frozenset, _OPPOSITES)
+        for kind in map(frozenset, NAMES["opposites"].items())
     )
 
 
