@@ -26,7 +26,7 @@ AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (
 
 
 class Axis(StrEnum):
-    """Name of an axis, global or of a convention."""
+    """A global axis."""
 
     X = "x"
     Y = "y"

@@ -23,7 +23,6 @@ import numpy as np
 from ...algebra import Vec3, cross
 from ...jet import Jet, arctan2, doubles, norm, sqrt
 from ...trajectory import Array
-from ..quantity import Axis
 from .base import Attitude, Change, Rate, WheelOutput
 from .corner import Axle, Convention, Corner, Reaction, angle_in_view, distance, velocity
 
@@ -33,6 +32,14 @@ class Place(StrEnum):
 
     WHEEL_CENTER = "wheel_center"
     CONTACT = "contact"
+
+
+class AxisName(StrEnum):
+    """An axis of the convention."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
 
 
 @dataclass(frozen=True)
@@ -181,16 +188,16 @@ class WheelDisplacement(Change):
     positive = "x forward, y left, z up (ISO 8855); x forward, y right, z down (SAE J670)"
     reads = ("wheel_center",)
 
-    component: Axis = Axis.Z
+    component: AxisName = AxisName.Z
 
     @property
     def sense(self) -> str:
         """Direction of the axis."""
         iso = self.vehicle.convention is Convention.ISO_8855
         ways = {
-            Axis.X: "forward",
-            Axis.Y: "left" if iso else "right",
-            Axis.Z: "up" if iso else "down",
+            AxisName.X: "forward",
+            AxisName.Y: "left" if iso else "right",
+            AxisName.Z: "up" if iso else "down",
         }
         return f"positive: {ways[self.component]}"
 
@@ -198,10 +205,10 @@ class WheelDisplacement(Change):
         """Return the coordinate [m]."""
         x, y, z = corner.center
         up = self.vehicle.convention.up
-        shifts: dict[Axis, Jet] = {
-            Axis.X: x,
-            Axis.Y: up * self.vehicle.side.left * y,
-            Axis.Z: up * z,
+        shifts: dict[AxisName, Jet] = {
+            AxisName.X: x,
+            AxisName.Y: up * self.vehicle.side.left * y,
+            AxisName.Z: up * z,
         }
         return shifts[self.component]
 
