@@ -341,7 +341,7 @@ class Case:
             CaseError: there is no such row.
         """
         rows = {each.name: each for each in self.hardpoints}
-        found: dict[str, Array] = {}
+        found = dict[str, Array]()
         values = places(self.mechanism)
         for name, given in offsets.items():
             if name not in rows:

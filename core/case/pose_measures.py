@@ -443,7 +443,7 @@ class Angle(Measure):
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
         reach, names = reach_of(mechanism), iter(self.points)
-        found: list[Point] = []
+        found = list[Point]()
         for body, along in zip(self.bodies, self.directions, strict=True):
             place, d = place_on(mechanism, body), vec(along)
             tip = place + (reach / math.sqrt(d @ d)) * d

@@ -157,7 +157,9 @@ class RecordedEngine:
             turns = (native.position - position) / output.period
             position = position + output.period * np.round(np.nan_to_num(turns))
         uncertainty = {
-            quantity: half + self._driven(output.name, quantity) + self._stated(output, quantity, x)
+            quantity: half
+            + self._driven(output.name, quantity)
+            + self.accuracy.of_output(output, quantity, x)
             for quantity, x, half in zip(QUANTITIES, values, halves, strict=True)
             if x is not None
         }
@@ -192,14 +194,9 @@ class RecordedEngine:
                     half += np.nan_to_num(change)
         return [found.position, found.velocity, found.acceleration], halves
 
-    def _stated(self, output: Quantity, quantity: str, values: Array) -> float:
-        """Return the stated accuracy of an output."""
-        largest = float(np.abs(np.nan_to_num(values)).max(initial=0.0))
-        return self.accuracy.of_output(output.name, quantity, output.unit, largest)
-
     @property
     def _columns(self) -> dict[str, Stated]:
-        found: dict[str, Stated] = {}
+        found = dict[str, Stated]()
         for name, use in self.samples.meaning.numbers.items():
             column = self.samples.recording.columns[use.column]
             recording = self.samples.recording
@@ -384,7 +381,7 @@ def read_answer(name: str, case: Case, file: Path) -> Reported:
     Raises:
         CaseError: the table cannot be read, or has another number of rows than samples.
     """
-    meanings: list[Meaning] = []
+    meanings = list[Meaning]()
 
     def choose(heads: Sequence[Head]) -> list[int]:
         found = Reader(file, case, heads).read([])

@@ -116,7 +116,7 @@ def explained(
     ]
     off = [each for each in every if not each.fits(each.values - each.true)]
     held = {each.output.name: each.held for each in every}
-    known: dict[str, list[tuple[str, str]]] = {}
+    known = dict[str, list[tuple[str, str]]]()
     for each in off:
         name = each.output.name
         others = {key: other for key, other in held.items() if key != name}
@@ -245,7 +245,7 @@ class _Change:
         None if unknown.
         """
         curves = self.curves(factor * self.sweep.values + zero)
-        rest: list[tuple[_Off, float, float, Array, Array]] = []
+        rest = list[tuple[_Off, float, float, Array, Array]]()
         for each in self.off:
             curve = curves.get(each.output.name)
             if curve is None or curve.velocity is None or not np.isfinite(curve.position).all():

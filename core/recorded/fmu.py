@@ -133,7 +133,7 @@ class FmuEngine:
         """Return notes on inputs at their start values, and drivers without an input."""
         taken = {self._uses[name].column for name in driven}
         left = [v.head.name for k, v in enumerate(self.variables) if v.free and k not in taken]
-        notes: list[str] = []
+        notes = list[str]()
         if left:
             listed = shortened(left, MOST_NAMED)
             notes.append(f"{self.name}: inputs without a driver keep their start values: {listed}")
@@ -321,7 +321,7 @@ def _variables(root: Element) -> list[Variable]:
         for kind in types.children
         for real in ([kind] if kind.tag == "Float64Type" else kind.only("Real"))
     }
-    found: list[Variable] = []
+    found = list[Variable]()
     for each in (v for variables in root.only("ModelVariables") for v in variables.children):
         kinds = [each] if each.tag in _REALS else [e for e in each.children if e.tag in _REALS]
         own = each.attributes

@@ -53,8 +53,8 @@ def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
     angles = driven_angles(case, samples)
     found = replayed(case.mechanism, samples.motions, samples.moved, angles)
     allowed = _tolerances(case, samples, accuracy)
-    largest: dict[str, float] = {}
-    faults: list[str] = []
+    largest = dict[str, float]()
+    faults = list[str]()
     for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
         worst = found.worst(quantity, allowed[quantity])
         if worst is None:
@@ -126,7 +126,7 @@ def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
     stated = replayed(case.mechanism, samples.motions, angles=angles).position
     limit = _LESS * float(np.nanmax(np.abs(stated)))
     meaning = samples.meaning
-    changes: dict[str, Meaning] = {}
+    changes = dict[str, Meaning]()
     for count in {len(pose.groups["attitude"]) for pose in meaning.bodies.values()}:
         for reading in readings(count):
             bodies = {
@@ -139,7 +139,7 @@ def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
     for unit, factor in _FACTORS.items():
         changes[f"positions in {unit}, not m,"] = _scaled(meaning, factor)
         changes[f"positions in m, not {unit},"] = _scaled(meaning, 1.0 / factor)
-    found: list[str] = []
+    found = list[str]()
     for words, change in changes.items():
         if change == meaning:
             continue
@@ -214,7 +214,7 @@ class _Judge:
         self.needed = self._at(motions, self.there)
 
     def _at(self, motions: Mapping[str, BodyMotion], rows: Rows) -> Needed:
-        at: dict[str, BodyMotion] = {}
+        at = dict[str, BodyMotion]()
         for name, m in motions.items():
             assert m.v is not None
             assert m.a is not None
@@ -228,8 +228,8 @@ class _Judge:
             share: tolerance beside the digits, of the largest force, or of this at the mechanism's
                 extent [m].
         """
-        largest: dict[str, float] = {}
-        faults: list[str] = []
+        largest = dict[str, float]()
+        faults = list[str]()
         for what, unit, values, half in self._differences(self.needed, self.there):
             known = np.abs(np.nan_to_num(values))
             if not known.size:
@@ -250,7 +250,7 @@ class _Judge:
         """Return names, units, differences and their digits: free forces by body, then recorded
         reactions by joint.
         """
-        found: list[tuple[str, str, Array, Array]] = []
+        found = list[tuple[str, str, Array, Array]]()
         for name, each in needed.free.items():
             worst = np.take_along_axis(each, np.abs(each).argmax(axis=1)[:, None], axis=1)[:, 0]
             found.append((name, "N", worst, np.zeros(len(rows))))

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..algebra import Quat, Vec3, X, Y, Z, quat
-from ..case.case import TIME, Case
+from ..case.case import TIME, Case, Quantity
 from ..case.io.document import decimal, fault, shown, unknown_name
 from ..case.io.reference_samples import DERIVATIVES, known_columns
 from ..case.io.table import read_unit, required_unit
@@ -212,8 +212,8 @@ class Reader:
             CaseError: a text has another form, a name is unknown or twice, or no column means
                 anything.
         """
-        numbers: dict[str, Use] = {}
-        bodies: dict[str, Pose] = {}
+        numbers = dict[str, Use]()
+        bodies = dict[str, Pose]()
         event = ""
         prefixes = {body.name: body.name for body in self.case.mechanism.moving}
         for text in texts:
@@ -250,7 +250,7 @@ class Reader:
 
     def _named(self, stated: Collection[str], taken: Collection[int]) -> dict[str, Use]:
         """Return the columns with names of quantities, but for capitals and separators."""
-        found: dict[str, Use] = {}
+        found = dict[str, Use]()
         names = {_normal(name): name for name in self.targets}
         for k, head in enumerate(self.heads):
             # Adams names the abscissa time.TIME
@@ -301,7 +301,7 @@ class Reader:
 
     def _pose(self, text: str) -> Pose:
         prefix, colon, rest = text.partition(":")
-        groups: dict[str, tuple[Use, ...]] = {}
+        groups = dict[str, tuple[Use, ...]]()
         reading, turned = Reading("123"), list[str]()
         frame: tuple[float, ...] | None = ()
         for part in (rest if colon else text).split(","):
@@ -452,11 +452,12 @@ class Accuracy:
         """Return the accuracy of a quantity of bodies [m, m/s or m/s^2]."""
         return self.shares.get(quantity, 0.0) * largest + self.sizes.get(quantity, 0.0)
 
-    def of_output(self, name: str, quantity: str, unit: str, largest: float) -> float:
-        """Return the accuracy of an output [unit, per s or s^2]."""
-        own = name if quantity == "position" else f"{name}.{quantity}"
+    def of_output(self, output: Quantity, quantity: str, values: Array) -> float:
+        """Return the accuracy of an output with these values [unit, per s or s^2]."""
+        largest = float(np.abs(np.nan_to_num(values)).max(initial=0.0))
+        own = output.name if quantity == "position" else f"{output.name}.{quantity}"
         shares = max(self.shares.get(own, 0.0), self.shares.get(quantity, 0.0))
-        size = self.sizes.get(quantity, 0.0) if unit == "m" else 0.0
+        size = self.sizes.get(quantity, 0.0) if output.unit == "m" else 0.0
         return shares * largest + max(self.sizes.get(own, 0.0), size)
 
 
@@ -467,8 +468,8 @@ def read_accuracy(file: Path, case: Case, texts: Sequence[str]) -> Accuracy:
         CaseError: a text has another form, or names neither a quantity nor an output.
     """
     units = known_columns(case.outputs) | _ROW_UNITS
-    shares: dict[str, float] = {}
-    sizes: dict[str, float] = {}
+    shares = dict[str, float]()
+    sizes = dict[str, float]()
     for text in texts:
         name, _, right = (part.strip() for part in text.partition("="))
         if name not in units:

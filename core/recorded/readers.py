@@ -99,22 +99,14 @@ _INT8, _INT32, _UINT32 = 1, 5, 6
 _NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
 
 
-def of_mat(file: Path, choose: Choose, data: bytes, largest: int, less: str) -> Recording:
-    """Read a MAT-file.
-
-    Args:
-        largest: most bytes of its contents when unpacked.
-        less: what to do with a larger one.
-
-    Raises:
-        CaseError: it is of another version, damaged, or too large.
-    """
+def _of_mat(file: Path, choose: Choose) -> Recording:
+    data = read_bytes(file, LARGEST_FILE, LESS)
     if data.startswith(_V73):
         raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
     try:
         # scipy tells the level so
-        if data[:4].count(0) == 0 and _unpacked(data, largest) > largest:
-            raise fault(file, "", f"found more than {largest} bytes when unpacked; {less}")
+        if data[:4].count(0) == 0 and _unpacked(data) > LARGEST_FILE:
+            raise fault(file, "", f"found more than {LARGEST_FILE} bytes when unpacked; {LESS}")
         scipy_io: Any = import_module("scipy.io")  # slow to import
         found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
         modelica = "Aclass" in found and "dataInfo" in found
@@ -130,7 +122,7 @@ def of_mat(file: Path, choose: Choose, data: bytes, largest: int, less: str) -> 
     return Recording(file, columns, "Modelica" if modelica else "MATLAB")
 
 
-def _unpacked(data: bytes, largest: int) -> int:
+def _unpacked(data: bytes) -> int:
     """Return the size of the compressed elements of level 5, unpacked to just above the largest.
 
     Raises:
@@ -140,9 +132,9 @@ def _unpacked(data: bytes, largest: int) -> int:
     order = "<" if data[126:128] == b"IM" else ">"
     for kind, part in _elements(data[_HEAD:], order):
         if kind == _COMPRESSED:
-            part = zlib.decompressobj().decompress(part, largest + 1 - total)
+            part = zlib.decompressobj().decompress(part, LARGEST_FILE + 1 - total)
             total += len(part)
-            if total > largest:
+            if total > LARGEST_FILE:
                 break
             for inner, each in _elements(part, order):
                 _require_sound_matrix(inner, each, order, 0)
@@ -219,7 +211,7 @@ def _of_modelica(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
 
 def _of_matlab(found: Mapping[str, Any]) -> Iterator[tuple[Head, Any]]:
     """Yield columns of matrices and of the fields of structs, those of one length."""
-    tables: dict[str, Any] = {}
+    tables = dict[str, Any]()
     for name, each in found.items():
         if name.startswith("__"):
             continue
@@ -281,7 +273,7 @@ def read_recording(
     if analysis is not None:
         raise fault(file, "--analysis", "found for a file without analyses; leave it out")
     if suffix == ".mat":
-        return of_mat(file, choose, read_bytes(file, LARGEST_FILE, LESS), LARGEST_FILE, LESS)
+        return _of_mat(file, choose)
     return _of_table(file, choose, sheet)
 
 
@@ -291,7 +283,7 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
     samples = samples_of(table, chosen, remarks=True, gaps=True)
-    columns: dict[int, Column] = {}
+    columns = dict[int, Column]()
     for k, values, printed, text in zip(
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
@@ -386,7 +378,7 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
 
 def _heads(analysis: Element) -> Mapping[int, Head]:
     """Return the heads of components by their ids."""
-    found: dict[int, Head] = {}
+    found = dict[int, Head]()
     for entity in (each for map_ in analysis.only("StepMap") for each in map_.only("Entity")):
         name = entity.attributes.get("name", "")
         part = (

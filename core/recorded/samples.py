@@ -97,8 +97,8 @@ def samples_of(
         notes += _assumed(recording, meaning)
         kept = replace(recording, columns=_kept(case, recording, meaning, notes))
     numbers = {name: si_values(kept, use) for name, use in meaning.numbers.items()}
-    motions: dict[str, BodyMotion] = {}
-    moved: dict[str, list[BodyMotion]] = {}
+    motions = dict[str, BodyMotion]()
+    moved = dict[str, list[BodyMotion]]()
     for name, pose in meaning.bodies.items():
         body = case.mechanism.body(name)
         columns = {
@@ -317,7 +317,7 @@ def jet_of(
     Args:
         mechanism: with the markers of the quantity.
     """
-    at: dict[str, Vec3] = {}
+    at = dict[str, Vec3]()
     for name in measure.points:
         motion = point_motion(mechanism, motions, name, count)
         if motion is None:

@@ -155,7 +155,7 @@ def _keys(cls: type[Described]) -> str:
     """Return the keys of a type. Optional keys are in brackets; keys of motions and forces have
     units.
     """
-    names: list[str] = []
+    names = list[str]()
     for each in own_fields(cls):
         measure, dimension = each.metadata.get("measure"), dimension_of(each)
         unit = dimension.of("length", "angle") if dimension else measure and measure.value

@@ -70,7 +70,7 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
             values that no such part can have.
     """
     bodies = [_body(name, section, units) for name, section in root.at("bodies").each()]
-    points: list[Point] = []
+    points = list[Point]()
     for name, section in root.at("points").each():
         point = section.typed(PointKeys)
         points.append(Point(name, point.body, units.place(point.position)))
@@ -95,7 +95,7 @@ def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> l
     """Return the bushings of joints, [joints.NAME.bushings.X]; bodies and point are by default the
     joint's.
     """
-    found: list[Bushing] = []
+    found = list[Bushing]()
     for joint in joints:
         table = root.at("joints").at(joint.name)
         if table.value is None:
@@ -103,10 +103,7 @@ def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> l
         given = table.at("bushings")
         for own, section in given.each() if given.value is not None else ():
             keys: Any = section.typed(bushing_keys())
-            numbers = {
-                each.name: units.in_si(each, getattr(keys, each.name))
-                for each in own_fields(Bushing)
-            }
+            numbers = _in_si(Bushing, keys, units)
             places = joint.points_on()
             if numbers["point"] is None and not places:
                 raise section.at("point").fault("missing, expected a point [x, y, z]; add it")
@@ -155,15 +152,18 @@ def _built(
             "missing, expected a number; add the key 'stiffness', or a curve"
         )
     keys: Any = section.typed(keys_of(cls))
-    given: dict[str, Any] = {
-        each.name: units.in_si(each, getattr(keys, each.name), driver) for each in own_fields(cls)
-    }
+    given = _in_si(cls, keys, units, driver)
     if hasattr(keys, "joints"):
         given["joints"] = keys.joints
     given |= zip("ij", getattr(keys, "bodies", ()), strict=False)
     make: Any = cls  # type checkers would take the classes of the conditions
     with explained(section.file, section.key, units.length, section.value):
         return make(*name, **given)
+
+
+def _in_si(cls: Any, keys: Any, units: FileUnits, driver: Unit | None = None) -> dict[str, Any]:
+    own = own_fields(cls)
+    return {each.name: units.in_si(each, getattr(keys, each.name), driver) for each in own}
 
 
 def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]]:
@@ -181,7 +181,7 @@ def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]
         parts.append(_built(section, section.class_of("coupler", Coupler.registry), units, name))
         sections[name] = section
     freedoms = {part.name: part.freedoms for part in parts if isinstance(part, Joint)}
-    couplers: list[Coupler] = []
+    couplers = list[Coupler]()
     for part in parts:
         if isinstance(part, Polynomial | LinearCoupler):
             if "freedoms" not in sections[part.name].table:
@@ -204,7 +204,7 @@ def _drivers(section: Section, units: FileUnits, *, free: bool) -> list[Driver]:
     found: list[Driver] = [
         _built(each, each.class_of("driver", DRIVERS), units, name) for name, each in section.each()
     ]
-    driven: dict[tuple[str, str], str] = {}
+    driven = dict[tuple[str, str], str]()
     for each in found:
         if not isinstance(each, JointDriver):
             continue

@@ -155,10 +155,10 @@ def with_all_motions(case: Case, at_design: Mapping[str, float] | None = None) -
     return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))
 
 
-def read_outputs(
-    root: Section, table: SuspensionTable | None, case: Case, units: FileUnits
-) -> tuple[Quantity, ...]:
-    """Return the outputs that the file names.
+def read_output(
+    name: str, section: Section, table: SuspensionTable | None, case: Case, units: FileUnits
+) -> Quantity:
+    """Return an output that the file names.
 
     Args:
         table: the table [suspension], if there is one.
@@ -168,14 +168,6 @@ def read_outputs(
         CaseError: an unknown type, key or name, a missing input of the type, or an output that this
             joint or wheel does not have.
     """
-    return tuple(
-        _output(name, section, table, case, units) for name, section in root.at("outputs").each()
-    )
-
-
-def _output(
-    name: str, section: Section, table: SuspensionTable | None, case: Case, units: FileUnits
-) -> Quantity:
     if name.endswith((*DERIVATIVES, PER_TRAVEL)):
         raise section.fault(
             "a name with this ending is a derivative in reference tables; give the output another"
@@ -317,7 +309,7 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
         size: size of the mechanism [m]. If a pose error changes an output by d, it changes the
             slope by about d / size.
     """
-    both: list[Quantity] = []
+    both = list[Quantity]()
     for output in outputs:
         both.append(output)
         if isinstance(output, SuspensionOutput) and not isinstance(output, AxleOutput):

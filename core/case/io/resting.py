@@ -50,7 +50,7 @@ def at_rest(case: Case, resting: Resting) -> Case:
     unstable = [
         f"the resting pose is unstable: {way}" for way in dict.fromkeys(found.unstable) if way
     ]
-    motions: dict[str, Motion] = {}
+    motions = dict[str, Motion]()
     if not travel:
         motions = {name: Ramp(float(x[0])) for name, x in values.items()}
         at = Sweep(TIME, np.ones(1), 0.0, motions=motions)

@@ -211,7 +211,7 @@ def find_decimal_sign(file: Path, cells: Sequence[tuple[str, str]], possible: st
     Raises:
         CaseError: the numbers have both signs, group thousands, or leave the sign open.
     """
-    first: dict[str, tuple[str, str]] = {}
+    first = dict[str, tuple[str, str]]()
     open_cell: tuple[str, str] | None = None
     decided, plain = False, False
     for where, text in cells:
@@ -285,7 +285,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Table]:
                     f"found no sheet {shown(wanted)}, expected one of the file;"
                     f" {remedy(wanted, names)}",
                 )
-            sheets: list[Table] = []
+            sheets = list[Table]()
             for name in names if wanted is None else [wanted]:
                 rows, formulas = _rows(file, written[name], most_rows)
                 if formulas:
@@ -366,7 +366,7 @@ def _too_much(data: bytes) -> str:
 
 def _rows(file: Path, sheet: Any, most: int) -> tuple[list[Row], bool]:
     """Return the rows with filled cells, and whether any cell is a formula."""
-    rows: list[Row] = []
+    rows = list[Row]()
     formulas = False
     read = 0
     sheet.reset_dimensions()  # the dimensions in a workbook are often wrong

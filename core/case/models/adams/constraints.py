@@ -12,6 +12,7 @@ import re
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -139,7 +140,7 @@ def assembled(model: Model, links: Sequence[Link], size: float, tolerance: float
         CaseError: axes point in opposite directions, the markers are too far apart, or cannot be
             brought together.
     """
-    gaps: dict[str, tuple[float, float]] = {}
+    gaps = dict[str, tuple[float, float]]()
     for link in links:
         _require_same_sense(link, model.places)
         gaps[link.statement.name] = _gap(link, model.places)
@@ -298,7 +299,7 @@ def read_links(model: Model) -> list[Link]:
     Raises:
         CaseError: a marker is missing, or the type or function is not read.
     """
-    found: list[Link] = []
+    found = list[Link]()
     for each in model.dataset.of("JOINT", "JPRIM"):
         kind = each.choice(*_TYPES, "RACKPIN")
         if not kind:
@@ -326,41 +327,34 @@ def joint_of(model: Model, link: Link) -> Joint:
     bodies = model.body(link.j), model.body(link.i)
     one, other = model.frame(link.i), model.frame(link.j)
     point, axis = coordinates(one.origin), coordinates(other.z)
+    z, lead = coordinates(one.z), 0.0
+    if kind == "SCREW":
+        lead = model.units.length * link.statement.one("PITCH")
+    known: Mapping[str, tuple[Any, ...]] = {
+        "SPHERICAL": (Spherical, point),
+        "ATPOINT": (Spherical, point),
+        "FIXED": (Fixed, point),
+        "UNIVERSAL": (Universal, point, (axis, z)),
+        "HOOKE": (Universal, point, (coordinates(other.y), coordinates(one.x))),
+        # both z axes point away from the centre
+        "CONVEL": (ConstantVelocity, point, (coordinates(-other.z), z)),
+        "SCREW": (Screw, point, axis, lead),
+        "ORIENTATION": (OrientationLock,),
+        "PARALLEL_AXES": (ParallelAxes, axis),
+        "PERPENDICULAR": (PerpendicularAxes, (axis, z)),
+        "DISTANCE": (Distance, (coordinates(other.origin), point), link.length),
+    }
+    made: Any = known.get(kind) or (_AXIAL[kind], point, axis)
+    cls, *geometry = made
     with explained(link.statement.file, link.statement.label):
-        if cls := _AXIAL.get(kind):
-            return cls(name, *bodies, point, axis)
-        match kind:
-            case "SPHERICAL" | "ATPOINT":
-                return Spherical(name, *bodies, point)
-            case "FIXED":
-                return Fixed(name, *bodies, point)
-            case "UNIVERSAL":
-                return Universal(name, *bodies, point, (axis, coordinates(one.z)))
-            case "HOOKE":
-                pair = coordinates(other.y), coordinates(one.x)
-                return Universal(name, *bodies, point, pair)
-            case "CONVEL":  # both z axes point away from the centre
-                pair = coordinates(-other.z), coordinates(one.z)
-                return ConstantVelocity(name, *bodies, point, pair)
-            case "SCREW":
-                lead = model.units.length * link.statement.one("PITCH")
-                return Screw(name, *bodies, point, axis, lead)
-            case "ORIENTATION":
-                return OrientationLock(name, *bodies)
-            case "PARALLEL_AXES":
-                return ParallelAxes(name, *bodies, axis)
-            case "PERPENDICULAR":
-                return PerpendicularAxes(name, *bodies, (axis, coordinates(one.z)))
-            case _:
-                ends = coordinates(other.origin), coordinates(one.origin)
-                return Distance(name, *bodies, ends, link.length)
+        return cls(name, *bodies, *geometry)
 
 
 def coordinates_of(
     model: Model, links: Sequence[Link], joints: Mapping[str, Joint]
 ) -> list[Coordinate]:
     """Return the coordinates of all joints, to be driven."""
-    found: list[Coordinate] = []
+    found = list[Coordinate]()
     for link in links:
         joint = joints[link.statement.name]
         if not isinstance(joint, AxialJoint) or link.kind == "PLANAR":
@@ -379,7 +373,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
     Raises:
         CaseError: a joint has no such coordinate, or the geometry does not say how they couple.
     """
-    found: list[Coupler] = []
+    found = list[Coupler]()
     for each in model.dataset.of("COUPLER"):
         pair = _coupled(each, driven)
         scales = each.numbers("SCALES") if "SCALES" in each.values else []
@@ -415,7 +409,7 @@ def _coupled(statement: Statement, driven: Sequence[Coordinate]) -> list[Coordin
     types = statement.values.get("TYPE", "").upper().replace(",", ":").split(":")
     if not 2 <= len(names) <= 2 + (statement.kind == "COUPLER"):
         raise statement.fault(f"JOINTS: found {len(names)}, expected two; correct it")
-    found: list[Coordinate] = []
+    found = list[Coordinate]()
     for k, name in enumerate(names):
         wanted = {"T": "translation", "R": "rotation"}.get(
             types[k].strip()[:1] if types[k:] else ""
@@ -452,7 +446,7 @@ def _gear_weights(
     """Return weights with which both gears have one velocity along z of the marker CV."""
     marker = model.marker(statement, "CV")
     contact, carrier = model.frame(marker), model.body(marker)
-    found: list[float] = []
+    found = list[float]()
     for one in pair:
         arm = contact.origin - np.array(one.joint.point)
         speed = np.cross(one.axis, arm) if one.turns else one.axis

@@ -184,7 +184,7 @@ class Statement:
 
 def _in_call(text: str) -> bool:
     """Return whether the end of a text is among the arguments of a function."""
-    stack: list[bool] = []
+    stack = list[bool]()
     for k, letter in enumerate(text):
         if letter == "(":
             stack.append(text[:k].rstrip()[-1:].isalnum())
@@ -250,8 +250,8 @@ def read_dataset(file: Path, text: str, without: Collection[str]) -> Dataset:
     """
     title, lines = _title(file, text)
     wanted = {name.upper() for name in without}
-    used: set[str] = set()
-    found: dict[str, dict[int, Statement]] = {}
+    used = set[str]()
+    found = dict[str, dict[int, Statement]]()
     left_out = Counter[str]()
     for count, (line, statement) in enumerate(_joined(file, lines)):
         if count > MOST_STATEMENTS:
@@ -379,8 +379,8 @@ def full_name(word: str, known: Collection[str]) -> str:
 def _arguments(bare: Statement, rest: str) -> Statement:
     """Return the statement with the arguments of its text."""
     known = ARGUMENTS[bare.kind].split()
-    values: dict[str, str] = {}
-    flags: list[str] = []
+    values = dict[str, str]()
+    flags = list[str]()
     current = ""
     for part in _parts(rest):
         separator, text = part[:1], part[1:]

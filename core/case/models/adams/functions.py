@@ -52,7 +52,7 @@ def linear(
     Raises:
         CaseError: it measures something else, or is not linear.
     """
-    measured: list[tuple[float, float]] = []
+    measured = list[tuple[float, float]]()
 
     def measure(value: float) -> Callable[..., float]:
         def of(i: float, j: float, *_: float) -> float:
@@ -91,7 +91,7 @@ def read_forces(model: Model, driven: Sequence[Coordinate]) -> list[ForceElement
     Raises:
         CaseError: a force is not linear in the length or angle of its own markers and its rate.
     """
-    found: list[ForceElement] = []
+    found = list[ForceElement]()
     for each in model.dataset.of("SFORCE", "SPRINGDAMPER"):
         i, j = model.ends(each)
         kind = each.choice("TRANSLATIONAL", "ROTATIONAL")
@@ -201,8 +201,8 @@ def read_motions(
     Raises:
         CaseError: a motion is not of a joint's coordinate, or its function is not read.
     """
-    drives: list[Drive] = []
-    points: list[Point] = []
+    drives = list[Drive]()
+    points = list[Point]()
     for each in model.dataset.of("MOTION"):
         if "JOINT" in each.values:
             drive = Drive.of(each.name, _of_joint(model, each, driven))
@@ -419,7 +419,7 @@ def _independent(
     if len(joints):
         _, sizes, right = np.linalg.svd(joints, full_matrices=True)
         free = right[int((sizes > weak * sizes[0]).sum()) :]
-    taken: list[int] = []
+    taken = list[int]()
     for k, row in enumerate(rows):
         along = free @ row
         if np.linalg.norm(along) > _AT_REST:

@@ -72,8 +72,8 @@ def read_units(dataset: Dataset) -> Units:
         raise statement.fault(
             f"found SYSTEM = {system}, expected one of Adams; {remedy(system, _SYSTEMS)}"
         )
-    sizes: list[float] = []
-    assumed: list[str] = []
+    sizes = list[float]()
+    assumed = list[str]()
     for (what, text), name in zip(_UNITS.items(), _SYSTEMS[system].split(), strict=True):
         words = text.split()
         known = dict(zip(words[::2], map(float, words[1::2]), strict=True))
@@ -172,7 +172,7 @@ def read_markers(dataset: Dataset, units: Units) -> dict[int, Marker]:
     Raises:
         CaseError: numbers are wrong, or there is no such part.
     """
-    found: dict[int, Marker] = {}
+    found = dict[int, Marker]()
     for each in dataset.of("MARKER"):
         if "PART" in each.values and "FLOATING" not in each.flags:
             part = dataset.member(each, "PART", "PART").id
@@ -328,7 +328,7 @@ def read_bodies(model: Model) -> list[Body]:
     Raises:
         CaseError: a marker is missing or elsewhere, or no rigid body has such a mass.
     """
-    found: list[Body] = []
+    found = list[Body]()
     for part in model.dataset.of("PART"):
         if part.id == model.ground:
             continue
@@ -343,7 +343,7 @@ def read_bodies(model: Model) -> list[Body]:
 def _weighed(body: Body, part: Statement, model: Model) -> Body:
     units, place = model.units, model.places[part.id]
     mass = units.mass * part.one("MASS", 0.0)
-    own: dict[str, Marker] = {}
+    own = dict[str, Marker]()
     for name in ("CM", "IM"):
         if name not in part.values:
             continue

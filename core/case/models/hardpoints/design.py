@@ -170,9 +170,9 @@ def mechanism_of(
         raise fault(file, "--rack", f"{problem}, expected one of them; leave it out")
     racked = bool(template.steered) and (said is not None or travels.rack is not None)
     sides = sides_of(said, side)
-    joints: list[Joint] = []
-    points: list[Point] = []
-    drivers: list[Driver] = []
+    joints = list[Joint]()
+    points = list[Point]()
+    drivers = list[Driver]()
     for prefix, left in sides.items():
         places = {role: (x, left * y, z) for role, (x, y, z) in at.items()}
         for joint in template.joints(places):
@@ -351,8 +351,8 @@ def with_suspension_outputs(
         steered: whether the rack moves during the wheel's travel.
     """
     extent, types = size(case), SuspensionOutput.registry
-    outputs: list[Quantity] = []
-    watched: list[str] = []
+    outputs = list[Quantity]()
+    watched = list[str]()
 
     def add(name: str, kind: str, wheel: Vehicle, **own: Any) -> None:
         outputs.append(types[kind](name, wheel, *default(extent, types[kind].measure), **own))
@@ -482,7 +482,7 @@ def hardpoints_of(
         place: np.array([np.broadcast_to(derivatives(x), by_table.shape[2]) for x in value])
         for place, value in found.items()
     }
-    hardpoints: list[Hardpoint] = []
+    hardpoints = list[Hardpoint]()
     for row, name in enumerate(rows):
         roles = tuple(role for role, filled in named.items() if filled == name)
         own = {place: each[:, 3 * row : 3 * row + 3] for place, each in slopes.items()}

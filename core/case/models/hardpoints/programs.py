@@ -34,8 +34,8 @@ Lines = list[tuple[str, str]]
 def plain_lines(text: str) -> Lines:
     """Return places and texts of the assignments of a script, one for each point or number."""
     found: Lines = []
-    names: list[list[str]] = []
-    matrices: list[list[list[str]]] = []
+    names = list[list[str]]()
+    matrices = list[list[list[str]]]()
     for where, statement, tokens in _statements(text):
         head = statement.partition("=")[0]
         start = next((k for k, each in enumerate(tokens) if each[0] == "="), 0) + 1
@@ -61,7 +61,7 @@ def plain_lines(text: str) -> Lines:
 
 def _statements(text: str) -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
     """Yield place, text and tokens of each statement; a sign is its own kind."""
-    tokens: list[tuple[str, str]] = []
+    tokens = list[tuple[str, str]]()
     depth, start, line = 0, 0, 1
     for each in [*_TOKEN.finditer(text + "\n")]:
         kind, token = str(each.lastgroup), each[0]
@@ -171,7 +171,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
     Raises:
         CaseError: there is no such block, or one of its rows is incomplete.
     """
-    points: dict[str, Hardpoint] = {}
+    points = dict[str, Hardpoint]()
     unit: str | None = None
     section, sections, right = "", dict[str, int](), 0
     inner, variants = "", dict[str, list[str]]()
@@ -311,8 +311,8 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
             f"found {shown(template)}, expected the name of a suspension template; correct the"
             " value",
         )
-    points: dict[str, Hardpoint] = {}
-    left_out: list[str] = []
+    points = dict[str, Hardpoint]()
+    left_out = list[str]()
     beside = dict[str, dict[str, Any]]()
     soft = any(isinstance(x, dict) and "Bushing Data" in x for x in tables.values())
     toe, camber = (math.radians(number(file, key, tables.pop(key, 0.0))) for key in (TOE, CAMBER))
@@ -322,7 +322,7 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         if not isinstance(content, dict):
             left_out.append(section)
             continue
-        others: list[str] = []
+        others = list[str]()
         beside[section] = cast("dict[str, Any]", content)
         for key, value in cast("dict[str, Any]", content).items():
             name = f"{section}/{key}"
@@ -376,7 +376,7 @@ def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
     Raises:
         CaseError: there are several axles with points, none, no TRACK, or an invalid point.
     """
-    sections: dict[str, dict[str, tuple[str, str]]] = {}
+    sections = dict[str, dict[str, tuple[str, str]]]()
     section = ""
     for k, line in enumerate(text.splitlines(), 1):
         row = re.split(r";|//", line)[0].strip()

@@ -279,7 +279,7 @@ def _filled(
     own = supplied.names
     new = own is not None and not own.exists()
     named = _points_by_role(table)
-    filled: dict[str, str] = {}
+    filled = dict[str, str]()
     if own is not None and not new:
         filled |= _read_own_names(
             own, [role.name for role in (*template.roles, *template.optional)], table.points
@@ -299,8 +299,11 @@ def _filled(
             filled[role.name] = found[0]
     missing = [role for role in template.roles if role.name not in filled]
     unused = {compact(name): name for name in table.points if name not in filled.values()}
-    near = {role.name: _nearest(role, unused) for role in missing}
-    told: list[str] = []
+    near = dict[str, str]()
+    for role in missing:
+        close = (found for each in role.names if (found := similar(each, unused, LIKE)))
+        near[role.name] = unused.get(next(close, ""), "")
+    told = list[str]()
     distinct = len({*near.values()}) == len(near)
     sure = distinct and all(_fits(role, name) for role, name in near.items())
     if missing and sure and not supplied.ask_names:
@@ -313,7 +316,7 @@ def _filled(
         told.append(f"{own}: written, with the names of the points by role")
     if not missing:
         return filled, told
-    lines: list[str] = []
+    lines = list[str]()
     for role in missing:
         name = near[role.name]
         where = table.points[name].where if name else ""
@@ -332,8 +335,8 @@ def _filled(
 
 def _points_by_role(table: HardpointTable) -> Callable[[Role], list[str]]:
     """Return what gives the points with a name of a role, or else with one and their side."""
-    by_compact_name: dict[str, list[str]] = {}
-    by_side_name: dict[str, list[str]] = {}
+    by_compact_name = dict[str, list[str]]()
+    by_side_name = dict[str, list[str]]()
     sides = [side for _, side in map(side_of, table.points)]
     wheel = table.side or ("right" if "left" not in sides else "left")
     for name in table.points:
@@ -355,12 +358,6 @@ def _fills(table: HardpointTable, template: Template) -> bool:
     named = _points_by_role(table)
     found = [named(role) for role in template.roles]
     return all(len(each) == 1 for each in found) and len({each[0] for each in found}) == len(found)
-
-
-def _nearest(role: Role, unused: Mapping[str, str]) -> str:
-    """Return the name of the point most like a name of a role; empty without one."""
-    close = [found for each in role.names if (found := similar(each, unused, LIKE))]
-    return unused[close[0]] if close else ""
 
 
 def _fits(role: str, name: str) -> bool:

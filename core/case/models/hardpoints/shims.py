@@ -42,7 +42,7 @@ def shims(
         return {}
     x, y, z = _spin(places, toe, camber)
     moved = dict.fromkeys(role for *_, movers in held for role in movers)
-    found: dict[str, Array] = {}
+    found = dict[str, Array]()
     for role in moved:
         right = np.array([movers.get(role, 0.0) * n for _, n, movers in held])
         solved = np.asarray(np.linalg.solve(_rows(held, places), right), float)

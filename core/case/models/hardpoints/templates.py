@@ -90,7 +90,7 @@ class Template:
 
     def joints(self, at: Mapping[str, Vector]) -> list[Joint]:
         """Return the joints for the places of the roles; they name the bodies."""
-        joints: list[Joint] = []
+        joints = list[Joint]()
         for name, (kind, i, j, role, *other) in self.joint_rows.items():
             if "bar" in (i, j) and not at.keys() >= {*self.twists["bar_twist"]}:
                 continue
@@ -210,13 +210,13 @@ def _read_templates() -> dict[str, Template]:
     common = written.pop("common")
 
     def roles(rows: Mapping[str, list[str]]) -> list[Role]:
-        found: list[Role] = []
+        found = list[Role]()
         for name, row in rows.items():
             meaning, *also = row or common["roles"][name]
             found.append(Role(name, meaning, (*also, *_further_names(name))))
         return found
 
-    templates: dict[str, Template] = {}
+    templates = dict[str, Template]()
     for name, own in written.items():
         like: dict[str, Any] = written.get(own.get("like"), {})
         both = {key: {**like.get(key, {}), **own.get(key, {})} for key in ("roles", "sample")}
