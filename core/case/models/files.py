@@ -165,7 +165,7 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
             from .trees.mjcf import whole_mjcf
 
             root = whole_mjcf(file, root)
-    omitted = list[tuple[str, Element]]()
+    omitted: list[tuple[str, Element]] = []
     tree = read(file, root.pruned(without, omitted))
     tree.without = {name for name, _ in omitted}
     if omitted:
