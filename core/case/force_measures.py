@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from ..primitives.base import Pose
 from ..trajectory import Array
 from .case import HELD_BUT
 from .pose_measures import COORDINATES, Measure, coordinate_of, place_on
-from .quantity import AXES, HIDDEN, MARKER, Axis, Quantity
+from .quantity import AXES, FACT, HIDDEN, MARKER, Axis, Quantity
 
 NEWTON, NEWTON_METRE = "N", "N m"
 
@@ -51,17 +51,20 @@ class ForceMeasure(Measure):
     """Base of the measures of forces; each reads one joint, driver or force element.
 
     Attributes:
+        of_key: the key that names it.
         turns: whether the value is a torque or moment.
     """
 
     measure = NEWTON
 
-    turns: bool = field(default=False, kw_only=True, metadata=HIDDEN)
+    of_key: ClassVar[str]
+
+    turns: bool = field(default=False, kw_only=True, metadata=FACT)
 
     @property
-    @abstractmethod
     def read(self) -> str:
         """Name of the joint, driver or force element."""
+        return getattr(self, self.of_key)
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -123,21 +126,17 @@ class ForceMeasure(Measure):
 
 @dataclass(frozen=True)
 class _JointReaction(ForceMeasure):
+    of_key = "joint"
+
     joint: str
     component: Axis | None = None
     direction: Vector | None = None
     frame: Frame = Frame.GLOBAL
     about: str | None = None
-    bodies: tuple[str, str] = field(default=("", ""), kw_only=True, metadata=HIDDEN)
+    bodies: tuple[str, str] = field(default=("", ""), kw_only=True, metadata=FACT)
     tip: Vector | None = field(default=None, kw_only=True, metadata=HIDDEN)
     now: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
     arm: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """All keys and the unit, without what belongs to samples."""
-        hidden = ("tip", "now", "arm")
-        return {key: value for key, value in super().facts.items() if key not in hidden}
 
     def check(self, mechanism: Mechanism) -> None:
         super().check(mechanism)
@@ -217,10 +216,6 @@ class _JointReaction(ForceMeasure):
         arm = places[0] - places[-1] if self.about is not None else None
         return replace(self, now=now, arm=arm)
 
-    @property
-    def read(self) -> str:
-        return self.joint
-
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         return _joint_place(mechanism, self.joint)
 
@@ -293,7 +288,7 @@ class JointMoment(_JointReaction):
     measure = NEWTON_METRE
     positive = "moment about the joint's point on the second body"
 
-    turns: bool = field(default=True, kw_only=True, metadata=HIDDEN)
+    turns: bool = field(default=True, kw_only=True, metadata=FACT)
 
 
 @dataclass(frozen=True)
@@ -305,6 +300,7 @@ class DriverEffort(ForceMeasure):
 
     type = "driver_effort"
     positive = "along the driver's coordinate, so that effort times rate is the power put in"
+    of_key = "driver"
 
     driver: str
     at: str | None = None
@@ -315,9 +311,7 @@ class DriverEffort(ForceMeasure):
     @property
     def facts(self) -> Mapping[str, Any]:
         """All keys and the unit; the driver whose motion alone counts, if there are others."""
-        hidden = ("rates", "alone", "ratio")
-        found = {key: value for key, value in super().facts.items() if key not in hidden}
-        return found | ({HELD_BUT: [*self.alone]} if self.alone else {})
+        return {**super().facts, **({HELD_BUT: [*self.alone]} if self.alone else {})}
 
     @property
     def sense(self) -> str:
@@ -375,11 +369,6 @@ class DriverEffort(ForceMeasure):
             still = np.abs(there) <= DEAD_CENTRE * np.abs(own)
             return replace(self, ratio=np.where(still, np.nan, own / there))
 
-    @property
-    def read(self) -> str:
-        """Name of the driver."""
-        return self.driver
-
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         """Return the driven body, and the driven point or a place of the joint."""
         driver = mechanism.driver(self.driver)
@@ -418,6 +407,7 @@ class ElementForce(ForceMeasure):
 
     type = "element_force"
     positive = "tension of a spring; torque on the joint's second body of a torsional one"
+    of_key = "force"
 
     force: str
 
@@ -426,10 +416,6 @@ class ElementForce(ForceMeasure):
         turns = isinstance(element, TorsionSpringDamper | Torque)
         turns |= isinstance(element, Bushing) and element.turns_only
         return replace(self, turns=turns)
-
-    @property
-    def read(self) -> str:
-        return self.force
 
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         element = mechanism.force(self.force)

@@ -92,7 +92,10 @@ class Quantity(Protocol):
 
 
 HIDDEN: Mapping[str, Any] = {"hidden": True}
-"""Metadata of a field that the table of an output in a case file does not give."""
+FACT: Mapping[str, Any] = {"hidden": True, "fact": True}
+"""Metadata of a field that the table of an output in a case file does not give; it is a fact of the
+output, or none.
+"""
 
 
 class PoseQuantity:
@@ -156,8 +159,11 @@ class TypedQuantity(PoseQuantity, ABC):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Properties for readers of results."""
-        names = [each.name for each in fields(cast("Any", self))]
-        own = {name: getattr(self, name) for name in names if name not in ("vehicle", "other")}
+        own = {
+            each.name: getattr(self, each.name)
+            for each in fields(cast("Any", self))
+            if each.metadata.get("fact", not each.metadata.get("hidden"))
+        }
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
     @abstractmethod

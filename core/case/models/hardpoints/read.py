@@ -37,7 +37,7 @@ from .design import (
     with_suspension_outputs,
 )
 from .rubber import of_chrono, with_file, with_rubber
-from .shims import no_bump_steer, shims
+from .shims import shims
 from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
     NAMES,
@@ -137,10 +137,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    turned, unsteered = (
-        each(template, at, vehicle.static_toe, vehicle.static_camber)
-        for each in (shims, no_bump_steer)
-    )
+    turned, unsteered = shims(template, at, vehicle.static_toe, vehicle.static_camber)
     hardpoints = hardpoints_of(
         named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, unsteered
     )
