@@ -16,9 +16,9 @@ import numpy as np
 
 from ...case.case import Case, Series
 from ...case.io.outputs import default
-from ...case.joint_probe import AXES, alternatives
+from ...case.joint_probe import alternatives
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
-from ...case.quantity import with_markers
+from ...case.quantity import AXES, with_markers
 from ...errors import MechanismError, SolveError
 from ...forces import Reaction
 from ...harness.compare import output_series
