@@ -16,7 +16,7 @@ import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,8 +37,9 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
 from ..shared.exudyn_joints import JOINTS
-from ..shared.force_solution import Dynamics, Element, elastic_force, left_out_of, places, reacting
+from ..shared.force_solution import Element, elastic_force, left_out_of, places, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
+from ..shared.projection_model import Dynamics
 from .rows import NO_ROTATION, Rows, turned
 
 COMPUTED_BY = {
@@ -133,7 +134,7 @@ class Loads:
         return Twister(each, value, rows.marker(joint.i, place.point), torques)
 
     def dynamics(self, model: Any, J: Array, v: Array, a: Array) -> Dynamics:
-        """Return the forces; see `force_solution.ForceModel`.
+        """Return the forces; see `ProjectionModel`.
 
         Args:
             model: the model in Exudyn; see `exudyn.ExudynModel`.
@@ -505,7 +506,7 @@ class ExudynModel:
         )
         return position, velocity, acceleration
 
-    computed_by = COMPUTED_BY
+    computed_by: ClassVar[Mapping[str, str]] = COMPUTED_BY
 
     def dynamics(self, v: Array, a: Array) -> Dynamics:
         assert self.loads is not None

@@ -22,8 +22,7 @@ from ...core.kinematics import start_of
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array
 from ..shared.equivalents import own_frame
-from ..shared.pose_solver import Sample
-from ..shared.projection import Walk
+from ..shared.projection import Sample, Walk
 from .mujoco import MuJoCo, MuJoCoModel
 
 # solref and solimp of every equality: MuJoCo's own, and nearly rigid.

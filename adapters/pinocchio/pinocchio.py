@@ -36,9 +36,10 @@ from ..shared.simulation import (
     TiedTree,
     start_of,
 )
-from ..shared.tree_forces import Mass, mass_properties
+from ..shared.tree_forces import mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Chain, Closure, Link, Relation, relations
+from ..shared.tree_simulator import Mass
 
 
 class Pinocchio(TreeEngine):

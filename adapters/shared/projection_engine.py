@@ -29,9 +29,8 @@ from ...core.mechanism.motions import JointAngle, JointDisplacement, PointCoordi
 from ...core.trajectory import Trajectory
 from .equilibrium import Rest, Walk, equilibria
 from .equivalents import in_own_frame, own_frame
-from .force_solution import ForceModel
-from .pose_solver import ProjectionModel
 from .projection import EFFORTS, solve_by_projection, without_counterpart
+from .projection_model import ProjectionModel
 
 # Rounds of calls; the fastest round counts, so that interruptions do not matter. A round is long
 # against the clock's resolution.
@@ -190,7 +189,7 @@ class ProjectionEngine(ABC):
 
         def solve(case: Case, group: Sequence[int]) -> tuple[Mapping[int, Rest], Forces, str]:
             model = self.build(case)
-            if not (case.forces and isinstance(model, ForceModel)):
+            if not case.forces:
                 raise UnsupportedError(f"{self.title} gives no forces of case {case.name!r}")
             return Walk(model, self.known(case)).solve(group)
 

@@ -32,11 +32,11 @@ from ...core.kinematics import start_of as where_from
 from ...core.mechanism.mechanism import Vector
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
-from .constraints import CLOSURES
+from .constraints import closing, closure_text
 from .equivalents import fits, jointed
-from .pose_solver import ProjectionModel
 from .projection import Walk
 from .projection_engine import ProjectionEngine
+from .projection_model import ProjectionModel
 from .tree_model import TreeModel
 from .tree_plan import Closure, relations
 
@@ -378,10 +378,9 @@ class TiedTree(TreeModel):
     def tie(self, name: str, tie: Tie, joint: Any = None) -> None:
         """Add a tie under the name of its joint."""
         self.ties.append(tie)
-        closure = CLOSURES[tie.by]
-        self.closures[name] = f"{self.has}, {closure.text}"
-        frames = map(self.add_frame, tie.bodies, tie.points)
-        self.conditions += closure.conditions(joint, *frames)
+        self.closures[name] = f"{self.has}, {closure_text(tie.by)}"
+        i, j = map(self.add_frame, tie.bodies, tie.points)
+        self.conditions += closing(tie.by, joint, i, j)
 
 
 class SteppedTree(TiedTree):

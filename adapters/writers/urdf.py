@@ -30,13 +30,14 @@ from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.trajectory import Array, BodyMotion
 from ..shared.constraints import (
     CLOSURES,
+    BodyFrame,
     Coincident,
     Condition,
     Difference,
     Direction,
     Dot,
-    Frame,
     Length,
+    closing,
 )
 from ..shared.poses import displacements, link_coordinates
 from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
@@ -284,10 +285,10 @@ class _Model:
         """Add the conditions of a cut joint."""
         joint = closure.joint
         frames = [
-            cast(Frame, _End(link, self.arm(link, P)))
+            cast(BodyFrame, _End(link, self.arm(link, P)))
             for link, P in zip(closure.ends, closure.points, strict=True)
         ]
-        for condition in CLOSURES[closure.by].conditions(joint, *frames):
+        for condition in closing(closure.by, joint, *frames):
             self.constraints += (
                 {"joint": joint.name, **written} for written in _as_data(condition)
             )
