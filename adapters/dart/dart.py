@@ -205,7 +205,8 @@ class DartWorld(SteppedTree, DartModel):
         self.world.setTimeStep(h)
         skeleton.setPositions(q)
         skeleton.setVelocities(v)
-        for motor, velocity in zip(self.motors, driven.tolist(), strict=True):
+        rates = self.mean_rates(q, driven, h).tolist()
+        for motor, velocity in zip(self.motors, rates, strict=True):
             motor.setCommand(0, velocity)
         self.world.step(False)
         return np.array(skeleton.getPositions()), np.array(skeleton.getVelocities())

@@ -213,7 +213,6 @@ class DrakePlant(SteppedTree, DrakeModel):
         gap = float(np.ptp(times)) / max(len(times) - 1, 1)
         DrakeModel.__init__(self, case, (gap or 1.0) / steps)
         self.set_off(case, steps)
-        self.rates = [self.coordinate(body)[1] for body, _ in self.driven]
         self.efforts = self.plant.get_applied_generalized_force_input_port()
 
     def carry(self, chain: Chain) -> None:
@@ -265,7 +264,8 @@ class DrakePlant(SteppedTree, DrakeModel):
     def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
         plant, context = self.plant, self.context
         forces = np.zeros_like(v)
-        forces[self.rates] = ARMATURE * (driven - v[self.rates]) / h
+        change = self.mean_rates(q, driven, h) - v[self.driven_v]
+        forces[self.driven_v] = ARMATURE * change / h
         plant.SetPositions(context, q)
         plant.SetVelocities(context, v)
         self.efforts.FixValue(context, forces)

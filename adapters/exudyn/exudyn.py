@@ -12,7 +12,6 @@ follows any number of turns, and acts by two torques that the adapter sets.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -40,7 +39,7 @@ from ..shared.exudyn_joints import JOINTS
 from ..shared.force_solution import Element, elastic_force, left_out_of, places, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
 from ..shared.projection_model import Dynamics
-from .rows import NO_ROTATION, Rows, turned
+from .rows import NO_ROTATION, Rows, System, turned
 
 COMPUTED_BY = {
     "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
@@ -67,8 +66,8 @@ class Twister:
 class Loads:
     """The loads of a case in an Exudyn system, added before the system is assembled."""
 
-    def __init__(self, rows: Rows, case: Case, kinds: Any) -> None:
-        self.rows, self.mbs, self.items, self.kinds = rows, rows.mbs, rows.items, kinds
+    def __init__(self, rows: Rows, case: Case) -> None:
+        self.rows, self.mbs, self.items, self.kinds = rows, rows.mbs, rows.items, rows.kinds
         self.case, self.mechanism = case, case.mechanism
         self.springs: dict[str, int] = {}
         self.twisters: list[Twister] = []
@@ -293,7 +292,13 @@ class Exudyn(ProjectionEngine):
         """
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
-        _container, mbs, settings, solver = _least()
+        # the smallest model has one free coordinate
+        least = System()
+        node = least.mbs.AddNode(least.items.Node1D())
+        least.mbs.AddObject(least.items.ObjectMass1D(nodeNumber=node, mass=1.0))
+        least.mbs.Assemble()
+        mbs, settings, solver = least.mbs, least.settings(), least.exu.MainSolverStatic()
+        solver.InitializeSolver(mbs, settings)
         residual = (
             lambda: model.solver.ComputeAlgebraicEquations(model.mbs),
             lambda: solver.ComputeAlgebraicEquations(mbs),
@@ -309,21 +314,6 @@ class Exudyn(ProjectionEngine):
             "ComputeAlgebraicEquations (rates)": (*residual[:2], 2),
         }
         return floor_of(self.name, solved, model.unknowns, pose, once)
-
-
-def _least() -> tuple[Any, Any, Any, Any]:
-    """Return container, system, settings and solver of the smallest model, one free coordinate."""
-    exu: Any = importlib.import_module("exudyn")
-    items: Any = importlib.import_module("exudyn.itemInterface")
-    exu.config.printToConsole = False
-    container = exu.SystemContainer()
-    mbs = container.AddSystem()
-    mbs.AddObject(items.ObjectMass1D(nodeNumber=mbs.AddNode(items.Node1D()), mass=1.0))
-    mbs.Assemble()
-    settings, solver = exu.SimulationSettings(), exu.MainSolverStatic()
-    settings.solution.file.write = False
-    solver.InitializeSolver(mbs, settings)
-    return container, mbs, settings, solver
 
 
 def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:
@@ -352,20 +342,13 @@ class ExudynModel:
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        exu: Any = importlib.import_module("exudyn")
-        # the harness reports results; Exudyn's banners would mix with them
-        exu.config.printToConsole = False
-        self.container: Any = exu.SystemContainer()  # owns the system, and must live as long as it
-        self.mbs: Any = self.container.AddSystem()
-        items: Any = importlib.import_module("exudyn.itemInterface")
-        rows = Rows(self.mbs, items, case.mechanism, loaded=bool(case.forces))
-        kinds = exu.OutputVariableType
-        self.loads = Loads(rows, case, kinds) if case.forces else None
+        system = self.system = System()
+        self.mbs = system.mbs
+        rows = Rows(system, case.mechanism, loaded=bool(case.forces))
+        self.loads = Loads(rows, case) if case.forces else None
         self.mbs.Assemble()
-
-        self.settings: Any = exu.SimulationSettings()
-        self.settings.solution.file.write = False
-        self.solver: Any = exu.MainSolverStatic()
+        self.settings = system.settings()
+        self.solver: Any = system.exu.MainSolverStatic()
         if not self.solver.InitializeSolver(self.mbs, self.settings):
             raise SolveError(
                 f"case {case.name!r}: Exudyn does not initialise its solver:"
@@ -382,8 +365,8 @@ class ExudynModel:
 
         # rows by values: drivers, then shared unknowns
         self.followed = np.zeros((len(self.kept), rows.values))
-        for each in rows.following:
-            self.followed[each.row, each.value] = each.weight
+        for row, value, weight in rows.following:
+            self.followed[row, value] = weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
         # rows that follow a polynomial: row, index of its unknown, polynomial
         drivers = len(case.mechanism.drivers)
@@ -399,6 +382,7 @@ class ExudynModel:
         ]
         self.wanted = [(number, position - origin) for (number, origin), position in points]
         self.ground = rows.ground
+        kinds = system.kinds
         self.rotation = kinds.RotationMatrix
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
         self.details = {"rows": len(self.target)}

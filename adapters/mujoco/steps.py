@@ -180,7 +180,7 @@ class _Steps:
             n = self.count(abs(until - t))
             if self.how.kind == "projecting":
                 self.project(driven[..., k])
-            else:
+            elif n:  # samples may be repeated
                 self.step(leg, t, until, n)
             if self.warned:
                 raise SimulationEndedError(f"MuJoCo warns: {self.warned[0]}")

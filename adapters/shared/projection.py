@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -160,6 +160,7 @@ class Walk:
         self.driven = {float(t): samples[..., k] for k, t in enumerate(self.path.times)}
         self.size = size(case) / frame.unit
         self.lost = LOST  # failure of the last pose that was not found
+        self.ended, self.failures = list[str](), list[FailureKind]()
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
@@ -373,33 +374,41 @@ class Walk:
         """Return the kind of a failure at the start."""
         return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
 
+    def reached(self, origin: Sample) -> Iterator[tuple[int, Sample]]:
+        """Yield the samples reached from a pose, outwards; `ended` and `failures` have the ends."""
+        path, times = self.path, self.path.times
+        step = (
+            float(np.abs(np.diff(times)).max()) if len(times) > 1 else abs(float(times[0])) or 1.0
+        )
+        for side in outwards(times, origin.t):
+            at = origin
+            last: float | None = None
+            for k in side:
+                at, reached = self.advance(path, at, float(times[k]), step)
+                if not reached:
+                    self.ended.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
+                    self.failures.append(self.lost.kind)
+                    break
+                last = float(times[k])
+                yield int(k), at
+
     def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:
         path, points = self.path, self.case.points
-        times, n = path.times, len(path.times)
+        self.ended, self.failures = list[str](), list[FailureKind]()
+        n = len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
         samples = dict[int, Sample]()
-        solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
-        failures = list[FailureKind]()
+        solved = np.zeros(n, dtype=np.bool_)
         origin, message = self.start(path, begin)
         if origin is None:
-            messages.append(message)
-            failures.append(self.kind_at_start)
+            self.ended.append(message)
+            self.failures.append(self.kind_at_start)
         else:
-            step = float(np.abs(np.diff(times)).max()) if n > 1 else abs(float(times[0])) or 1.0
-            for side in outwards(times, origin.t):
-                at = origin
-                last: float | None = None
-                for k in side:
-                    at, reached = self.advance(path, at, float(times[k]), step)
-                    if not reached:
-                        messages.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
-                        failures.append(self.lost.kind)
-                        break
-                    last = float(times[k])
-                    motion[:, k] = at.rows
-                    iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
-                    samples[int(k)] = at
+            for k, at in self.reached(origin):
+                motion[:, k] = at.rows
+                iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
+                samples[k] = at
         unit = self.frame.unit
         position, velocity, acceleration = (
             self.frame.back(motion[0]),
@@ -421,17 +430,17 @@ class Walk:
         forces = None
         if self.case.forces:
             forces = solved_forces(self.model, self.case, samples, unit)
-            messages += filter(None, [forces.message])
+            self.ended += filter(None, [forces.message])
             facts["forces"] = {**forces.account(), "computed_by": dict(self.model.computed_by)}
         return Trajectory(
             moves,
             solved,
             iterations,
             largest_found(unit * residual[solved]),
-            "; ".join(messages),
+            "; ".join(self.ended),
             facts,
             forces=forces,
-            failures=failures,
+            failures=self.failures,
         )
 
 

@@ -357,10 +357,32 @@ class SimbodyModel(TreeModel):
         body, point = handle
         speed = body.findStationVelocityInGround(self.state, point).to_numpy()
         turn = body.getAngularVelocityInGround(self.state).to_numpy()
-        bias = self.matter.calcBiasForFrameJacobian(*self._place(handle))
-        bias = np.concatenate((bias.get(1).to_numpy(), bias.get(0).to_numpy()))
+        bias = self._bias(handle)
         acceleration = bias + self.slope(handle) @ self.a if self.a.any() else bias
         return np.concatenate((speed, turn)), acceleration
+
+    def _bias(self, handle: tuple[Any, Any]) -> Array:
+        bias = self.matter.calcBiasForFrameJacobian(*self._place(handle))
+        return np.concatenate((bias.get(1).to_numpy(), bias.get(0).to_numpy()))
+
+    # driven points need no rotation, which takes much of the time of a pose
+
+    def observe(self) -> None:
+        if self.tied:
+            super().observe()
+            return
+        self.place()
+        for frame in self.moving:
+            frame.position, frame.jacobian = self.position(frame.handle), self.slope(frame.handle)
+
+    def observe_rates(self, v: Array) -> None:
+        if self.tied:
+            super().observe_rates(v)
+            return
+        self.v = v
+        self.rate(v, np.zeros_like(v))
+        for frame in self.moving:
+            frame.acceleration = self._bias(frame.handle)
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.rate(v, a)
