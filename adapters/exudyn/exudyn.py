@@ -281,16 +281,12 @@ class Exudyn(ProjectionEngine):
         """Return Exudyn's system of the case."""
         return ExudynModel(case)
 
-    def build(self, case: Case) -> ExudynModel:
-        """Return Exudyn's system of the case in the scaled frame, at the design position."""
-        return self.model_of(self.own(case))
-
     def floor(self, case: Case) -> Floor:
         """Return the floor from the static solver's residual and Jacobian.
 
         Accelerations need two rates of the rows for a difference.
         """
-        model = self.build(case)
+        model = self.model_of(self.own(case))
         solved = self.solve(model, case, 1e-12)
         # the smallest model has one free coordinate
         least = System()

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,6 @@ import numpy as np
 from ...core.case.case import Case, size
 from ...core.errors import SolveError
 from ...core.failures import FailureKind, PoseFailure
-from ...core.joints import Joint
 from ...core.kinematics import (
     LONGEST_TURN,
     ROUNDING,
@@ -30,7 +29,7 @@ from ...core.kinematics import (
     solve_from_start,
     start_of,
 )
-from ...core.mechanism.motions import Driver, Path, outwards
+from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .equivalents import GLOBAL, OwnFrame
 from .force_solution import solved_forces
@@ -54,26 +53,6 @@ SMALLEST_STEP = 2.0**-20
 # fails there. Closer to a singular pose than the root of round-off, rounding would choose the
 # assembly.
 FOLD = 8.0 * SMALLEST_STEP
-
-
-def without_counterpart(
-    case: Case, simulator: str, joints: Collection[type[Joint]], drivers: Collection[type[Driver]]
-) -> str | None:
-    """Return a message on the first joint or driver that has none of these exact types, or None.
-
-    A subclass may have another meaning.
-    """
-    for what, known in (
-        *((joint, joints) for joint in case.mechanism.joints),
-        *((d, drivers) for d in case.mechanism.drivers),
-    ):
-        if type(what) not in known:
-            who = str(what) if isinstance(what, Joint) else f"driver {what.name!r} ({what.type})"
-            return (
-                f"{who} has no counterpart in {simulator} here; known:"
-                f" {', '.join(each.type for each in known)}"
-            )
-    return None
 
 
 def solve_by_projection(

@@ -263,6 +263,10 @@ class Simulation:
         """Return the version of the simulator, or None if the import fails."""
         return self.projection().version()
 
+    def unsupported(self, case: Case) -> str | None:
+        """Return a message on the joint or driver that is not supported here, or None."""
+        return self.projection().unsupported(case)
+
     def floor(self, case: Case) -> None:
         """Return None: the bound on steps in Python is that of projection."""
 

@@ -251,13 +251,12 @@ class TreeEngine(ProjectionEngine):
     def model_of(self, case: Case) -> TreeModel:
         """Return the simulator's model of the unscaled case, at the design position."""
 
-    def build(self, case: Case) -> TreeModel:
-        """Return the simulator's model of the case in the scaled frame, at the design position."""
-        return self.model_of(self.own(case))
-
     def floor(self, case: Case) -> Floor:
         """Return the floor from all simulator calls for a pose and its rates."""
-        model, least = self.build(case), self.model_of(replace(case, mechanism=LEAST, outputs=()))
+        model, least = (
+            self.model_of(self.own(case)),
+            self.model_of(replace(case, mechanism=LEAST, outputs=())),
+        )
         solved = self.solve(model, case, 1e-12)
         n, wanted = len(model.moving), len(model.wanted)
         # the same Python on the smallest model
