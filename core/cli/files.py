@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..case.io.escape import file_name
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..options import (
     ONE_CASE,
     argument,
@@ -117,8 +117,7 @@ def keep_texts(
         problems += failed
         if not failed:
             print(file, file=sys.stderr if json == "-" else sys.stdout)
-    if problems:
-        raise KincheckError("\n".join(problems))
+    refuse(problems)
 
 
 @options
@@ -139,11 +138,11 @@ class Import(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable, to_standard_output, write
+        from ..case.io.atomic_files import to_standard_output, write
         from ..case.io.case_file import case_text
         from ..case.io.schema import SCHEMA_FILE
 
-        require_writable([("--out", self.out)])
+        refuse(self.unwritable())
         files, supplied = return_cases(self.case, self.supplied)
         if len(files) != 1:
             raise KincheckError(
@@ -213,12 +212,11 @@ class Same(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..case.models.files import require_used
-        from ..report.terminal import page, with_json
+        from ..report.terminal import with_json
         from ..studies.same import compare
 
-        require_writable([("--json", self.json)])
+        refuse(self.unwritable())
         for name in self.converted_by:
             if name in NO_CONVERTERS:
                 raise KincheckError(
@@ -241,8 +239,7 @@ class Same(Command):
             with with_json(_unread(names, str(error)), self.json):
                 raise
         found = [compare(first, other, given) for other in others]
-        with with_json(_report(found), self.json):
-            console = page(self.json)
+        with with_json(_report(found), self.json) as console:
             for each in found:
                 several = f"{' and '.join(each.files)}: " if len(found) > 1 else ""
                 console.print(f"{several}{each.text}", soft_wrap=True)

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..options import argument, destination, json_file, option, options, switch, verbosity, whole
 from ..report.progress import complain
 from .parser import Command
@@ -52,7 +52,6 @@ class ListRuns(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..history.queries import read
         from ..history.store import Store
 
@@ -60,7 +59,7 @@ class ListRuns(Command):
             raise KincheckError(
                 f"history: no file is given. Give --history FILE, or set {HISTORY}."
             )
-        require_writable([("--plot", self.plot), ("--export", self.export)], self.history)
+        refuse(self.unwritable())
         with Store(Path(self.history), writable=bool(self.remove)) as store:
             for run in self.remove:
                 store.remove(run)
@@ -229,10 +228,9 @@ class ReportChanges(Command):
         from ..history.store import Store
         from ..report.regressions import print_regressions, to_markdown
         from ..report.terminal import deliver
-        from .destinations import Destinations
 
-        if problems := Destinations.of(self).problems(OUT, self.history):
-            raise KincheckError("\n".join(problems))
+        refuse(self.unwritable(*OUT))
+        problems = list[str]()
         with ExitStack() as open_files:
             store = (
                 open_files.enter_context(Store(Path(self.history), writable=False))

@@ -11,7 +11,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..extras import how_to_install
 from ..options import (
     argument,
@@ -103,7 +103,7 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
 
     if not any(name in os.environ for name in THREADS):
         return _with_one_thread(options.command, THREADS)
-    problems = _destinations(options, bench_engines.NAME)
+    problems = options.unwritable(*_files(bench_engines.NAME))
     unread: dict[str, str] = {}
     names = registry.cases() if [*options.cases] == ["all"] else options.cases
     cases = {name: found for name in names for found in registry.find_cases([name], unread)}
@@ -119,8 +119,7 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
         name for name in options.engine if name not in (*registry.engines, *registry.simulations)
     ]
     engines += registry.find_engines(others, problems)  # errors of the user, with a message
-    if problems:
-        raise KincheckError("\n".join(problems))
+    refuse(problems)
     with (
         json_only() if options.json == "-" else nullcontext(),
         Meter("bench", quiet=options.quiet, every=1.0) as meter,
@@ -164,10 +163,8 @@ def _with_one_thread(command: str, variables: Sequence[str]) -> int:
     ).returncode
 
 
-def _destinations(options: BenchEngines | BenchFormulation, name: str) -> list[str]:
-    from .destinations import Destinations
-
-    return Destinations.of(options).problems([f"{name}.{kind}" for kind in ("json", "html")])
+def _files(name: str) -> list[str]:
+    return [f"{name}.{kind}" for kind in ("json", "html")]
 
 
 @options
@@ -190,8 +187,7 @@ class BenchFormulation(Command):
         from ..report import sections as bench
         from ..studies.paper import formulation as bench_formulation
 
-        if problems := _destinations(self, bench_formulation.NAME):
-            raise KincheckError("\n".join(problems))
+        refuse(self.unwritable(*_files(bench_formulation.NAME)))
         found = bench_formulation.measure(registry.case(STRUT), self.seed, bench_formulation.STATES)
         bench.deliver(bench_formulation.report(found), found, out=self.out, json=self.json)
         return Status.WITHIN
@@ -216,8 +212,8 @@ class BenchCompliance(Command):
         from ..studies.bench.compliance import lines, measure
 
         found = measure(registry.find_case(self.case, driven=False), self.rounds)
-        with with_json(found, self.json):
-            print(*lines(found), sep="\n", file=sys.stderr if self.json == "-" else sys.stdout)
+        with with_json(found, self.json) as console:
+            print(*lines(found), sep="\n", file=console.file)
         return Status.WITHIN
 
 
@@ -301,7 +297,7 @@ class StressEngines(Command):
         from ..studies.stress.families import FAMILIES
         from ..studies.stress.report import idle, markdown, report
         from ..studies.stress.verdicts import BAD
-        from . import destinations as delivery
+        from .destinations import json_only
 
         if self.list:
             if found := given(
@@ -320,8 +316,7 @@ class StressEngines(Command):
                 problems.append(
                     f"--replay judges files, which belong to no family. Leave out {found}."
                 )
-            if problems:
-                raise KincheckError("\n".join(problems))
+            refuse(problems)
             return _replay(self, registry, engines)
         if self.tol is not None:
             problems.append(
@@ -330,10 +325,8 @@ class StressEngines(Command):
             )
         wanted = dict.fromkeys(self.family or FAMILIES)
         problems += [unknown("family", name, FAMILIES) for name in wanted if name not in FAMILIES]
-        problems += delivery.Destinations.of(self).problems(FILES)
-        if problems:
-            raise KincheckError("\n".join(problems))
-        with delivery.json_only() if self.json == "-" else nullcontext():
+        refuse([*problems, *self.unwritable(*FILES)])
+        with json_only() if self.json == "-" else nullcontext():
             found = _run(self, [FAMILIES[name] for name in wanted], engines, problems)
         made = report(found)
         problems += [
