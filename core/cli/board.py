@@ -34,13 +34,12 @@ class CompareSteppers(Command):
 
     about: ClassVar[str] = "measure how well engines step the free motion of closed loops"
     engine: tuple[str, ...] = option(
-        "engines to step with; default: all", metavar="NAME", several="together", default=()
+        "engines to step with; default: all", metavar="NAME", several="together"
     )
     case: tuple[str, ...] = option(
         "built-in cases or files with [free]; default: all built-in ones",
         metavar="NAME",
         several="together",
-        default=(),
     )
     out: Path = destination(
         "folder for the site: index.html, board.json, and a folder for each row",

@@ -111,7 +111,6 @@ class Trace(Command):
     driver: str | None = option(
         "driver whose value follows from the motion; default: the swept driver",
         metavar="NAME",
-        default=None,
     )
     length: float = option(
         "length in each direction [mechanism sizes and radians]; default %(default)s",
@@ -215,7 +214,6 @@ class ListAssemblies(Command):
         " design position",
         measured,
         "VALUE",
-        default=None,
     )
     samples: int = option(
         "number of random starts; default %(default)s", whole(1), "N", default=200

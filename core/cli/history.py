@@ -65,20 +65,23 @@ class ListRuns(Command):
                 store.remove(run)
                 print(f"run {run} is removed")
             chosen: dict[str, Any] = {"cases": self.case, "engines": self.engine}
-            _check_names(store, **chosen)
+            plans = [pair for row in store.runs() for pair in row.plan]
+            for place, (what, names) in enumerate((("case", self.case), ("engine", self.engine))):
+                known = sorted({pair[place] for pair in plans})
+                for name in names:
+                    if name not in known:
+                        raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
             history = read(store, last=self.last or None, **chosen)
             if self.case or self.engine:
                 _print_trends(history)
             else:
                 _print_runs(store, store.runs()[: self.last or None])
             if self.plot is not None:
-                from ..report.trends import write_plot
+                from ..case.io.atomic_files import write
+                from ..report.trends import page
 
-                write_plot(
-                    history,
-                    self.plot,
-                    title=f"{Path(self.history).name}: errors and times over the runs",
-                )
+                title = f"{Path(self.history).name}: errors and times over the runs"
+                write("--plot", self.plot, page(history, title).encode())
                 print(
                     f"{self.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
                     " runs"
@@ -90,15 +93,6 @@ class ListRuns(Command):
                 print(f"{self.export}: {count} rows")
             complain(store.damage)
             return Status.FAILED if store.damage else Status.WITHIN
-
-
-def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:
-    plans = [pair for row in store.runs() for pair in row.plan]
-    for what, place, names in (("case", 0, cases), ("engine", 1, engines)):
-        known = sorted({pair[place] for pair in plans})
-        for name in names:
-            if name not in known:
-                raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
 
 
 def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:

@@ -67,7 +67,6 @@ class MeasureCompliance(Isolated):
         " travel; may be repeated",
         metavar="NAME=A:B:N",
         several="repeated",
-        default=(),
     )
     bushings: Path | None = option(
         "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
@@ -75,14 +74,12 @@ class MeasureCompliance(Isolated):
         " [joints.NAME.bushings.X] as in case files",
         Path,
         "FILE",
-        default=None,
     )
     engine: tuple[str, ...] = option(
         "check the equilibria by these engines: each finds them by its own kinematics, gravity"
         " and rows, exudyn-static by its own solver, and gets a verdict against native",
         metavar="NAME",
         several="together",
-        default=(),
     )
     history: Path | None = destination(
         "store the records of native and of these engines in this file, as kincheck run does", Path

@@ -6,7 +6,7 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -102,7 +102,12 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
     from .destinations import json_only
 
     if not any(name in os.environ for name in THREADS):
-        return _with_one_thread(options.command, THREADS)
+        # Run the command again in a new process whose linear algebra uses one thread: libraries
+        # read the number when they are loaded. The native engine has one thread. With threads that
+        # wait for each other, the simulators' times would depend on the machine's load.
+        words = [sys.executable, "-P", "-c", _MAIN, *shlex.split(options.command)[1:]]
+        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
+        return subprocess.run(words, env=environment, check=False).returncode
     problems = options.unwritable(*_files(bench_engines.NAME))
     unread: dict[str, str] = {}
     names = registry.cases() if [*options.cases] == ["all"] else options.cases
@@ -115,9 +120,7 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
             [name for name in known if name in options.engine or not options.engine], problems, mode
         )
     ]
-    others = [
-        name for name in options.engine if name not in (*registry.engines, *registry.simulations)
-    ]
+    others = [name for name in options.engine if name not in registry.every_engine]
     engines += registry.find_engines(others, problems)  # errors of the user, with a message
     refuse(problems)
     with (
@@ -148,19 +151,6 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
         for name in sorted(missing)
     )
     return Status.FAILED if missing else Status.WITHIN
-
-
-def _with_one_thread(command: str, variables: Sequence[str]) -> int:
-    """Run the command again in a new process whose linear algebra uses one thread. Libraries read
-    the number of threads when they are loaded.
-
-    The native engine has one thread. With threads that wait for each other, the simulators' times
-    would depend on the machine's load.
-    """
-    environment = {**os.environ, **dict.fromkeys(variables, "1")}
-    return subprocess.run(
-        [sys.executable, "-P", "-c", _MAIN, *shlex.split(command)[1:]], env=environment, check=False
-    ).returncode
 
 
 def _files(name: str) -> list[str]:
@@ -253,39 +243,28 @@ class StressEngines(Command):
     """
 
     about: ClassVar[str] = "stress-test engines with random degenerate mechanisms"
-    family: tuple[str, ...] = option(
-        "default: all families", metavar="NAME", several="together", default=()
-    )
-    list: bool = switch("list the families", default=False)
+    family: tuple[str, ...] = option("default: all families", metavar="NAME", several="together")
+    list: bool = switch("list the families")
     samples: int | None = option(
         f"number of samples over all families; default {SAMPLES}",
         whole(1),
         "N",
-        default=None,
     )
-    seed: int | None = option(
-        "seed of the random mechanisms; default 0", whole(0), "S", default=None
-    )
-    engine: tuple[str, ...] = option(
-        "default: native", metavar="NAME", several="together", default=()
-    )
-    mode: str | None = option(MODE, choices=MODES, default=None)
+    seed: int | None = option("seed of the random mechanisms; default 0", whole(0), "S")
+    engine: tuple[str, ...] = option("default: native", metavar="NAME", several="together")
+    mode: str | None = option(MODE, choices=MODES)
     out: Path | None = destination(
         "write the tables there, and the smallest bad cases as reduced case files", Path, "DIR"
     )
     json: str | None = json_file()
     no_proofs: bool = switch(
         "skip the proof of a share of the reference motions, which needs python-flint",
-        default=False,
     )
-    replay: tuple[Path, ...] = option(
-        "judge case files instead", Path, "FILE", several="together", default=()
-    )
+    replay: tuple[Path, ...] = option("judge case files instead", Path, "FILE", several="together")
     tol: float | None = option(
         f"largest accepted constraint residual of replayed files; default {TOL:g}",
         positive,
         "X",
-        default=None,
     )
     quiet: bool = verbosity("print no progress")
 

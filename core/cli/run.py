@@ -398,12 +398,11 @@ def _with_cases(options: Run, registry: Registry) -> Run:
     """Return the options with the cases among the values of options that take several names:
     `run --engine native my_case.toml`.
     """
-    known = (*registry.engines, *registry.simulations)
     swallowed = [
         name
         for name in (*several(options.engines), *options.require)
         if isinstance(name, str)
-        and name not in known
+        and name not in registry.every_engine
         and not WHERE.fullmatch(name)
         and (name in registry.cases() or Path(name).suffix)
     ]

@@ -223,7 +223,11 @@ def error_figure(
     """
     traces: list[Figure] = []
     for style, values, _ in curves:
-        errors = taken(absolute_errors(values, standard), axis.kept, 1.0)
+        off = [
+            None if a is None or b is None else abs(a - b)
+            for a, b in zip(values, standard, strict=True)
+        ]
+        errors = taken(off, axis.kept, 1.0)
         # three digits suffice for an error, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
         curve = style.curve("driver", rounded, width=1.2, size=5)
@@ -286,14 +290,6 @@ def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
         "ticktext": ["exactly 0", *powers],
     }
     return axis, 10.0**first
-
-
-def absolute_errors(values: Values, standard: Values) -> list[float | None]:
-    """Return the distance from the standard at each sample; None if a value is unknown."""
-    return [
-        None if a is None or b is None else abs(a - b)
-        for a, b in zip(values, standard, strict=True)
-    ]
 
 
 TIMES = "time per sample [µs]"
