@@ -87,7 +87,8 @@ class CompareSteppers(Command):
         if not self.case:
             every = map(registry.case, registry.cases())
             cases = [case for case in every if case.free is not None]
-        problems = [*unread.values()]
+        refuse(unread.values())
+        problems = list[str]()
         make, file = registry.stepper_files, self.out / "board.json"
 
         def files(engine: str, truth: Truth) -> Mapping[str, str]:

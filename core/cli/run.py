@@ -422,6 +422,11 @@ def _cases(options: Run, registry: Registry, unread: dict[str, str]) -> list[Cas
     """Return the cases to solve; unreadable ones go to `unread`, or in Python raise."""
     from ..case.joint_probe import probes
 
+    if options.joints and options.reactions:
+        raise KincheckError(
+            "--reactions: the loops of --joints have no masses and no forces, so all reactions are"
+            " zero. Leave out one of both."
+        )
     named = several(options.cases) or ([] if options.joints else registry.cases())
     found = [*probes()] if options.joints else []
     supplied = replace(options.supplied, recorded=bool(options.recorded))
