@@ -102,19 +102,19 @@ def test_driven_components_alike_share_a_program():
         [Body(f"body {name}") for name in names],
         [
             Revolute(name, "ground", f"body {name}", (k, 0.0, 0.0), (0.0, 1.0, 0.0))
-            for k, name in enumerate(names)
+            for k, name in enumerate(names, 1)
         ],
-        [Point(f"tip {name}", f"body {name}", (k, 0.0, 1.0)) for k, name in enumerate(names)],
+        [Point(f"tip {name}", f"body {name}", (k, 0.0, 1.0)) for k, name in enumerate(names, 1)],
         [JointAngle(f"motor {name}", name) for name in names],
     )
     lanes = ComponentLanes(cranks, Request(tuple(f"motor {name}" for name in names), ("tip j3",)))
     assert len(lanes.kinds) == 12
     assert len({id(kind.model) for kind in lanes.kinds}) == 2  # that with the point, and all others
     path = Path(
-        {f"motor {name}": Ramp(0.1 * k) for k, name in enumerate(names)}, np.linspace(0.0, 3.0, 9)
+        {f"motor {name}": Ramp(0.1 * k) for k, name in enumerate(names, 1)}, np.linspace(0.0, 3.0, 9)
     )
     found = solve_components(cranks, path, [f"tip {name}" for name in names], ())
-    for k, name in enumerate(names):
+    for k, name in enumerate(names, 1):
         angle = 0.1 * k * path.times
         tip = np.stack([k + np.sin(angle), np.zeros(9), np.cos(angle)], axis=1)
         assert np.allclose(found.points[f"tip {name}"].position, tip, rtol=0.0, atol=1e-12)
@@ -140,7 +140,7 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
     for count in (LANES, 5):  # all that there are, or the last ones are as the last
         going, carrying = (ComponentLanes(chain(3), request) for _ in range(2))
         for lanes in (going, carrying):
-            lanes.accept(1e-12)
+            lanes.stand_at(lanes.design, 1e-12)
             lanes.depart(0.0, path)
             for first in (0.0, 0.1, 0.2):  # there and back again
                 assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
@@ -168,7 +168,7 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
         Request(("turn",), ("end",), compiled=compiled),
     )
     lanes, times = ComponentLanes(chain(3), request), np.linspace(0.005, 0.1, LANES)
-    lanes.accept(1e-12)
+    lanes.stand_at(lanes.design, 1e-12)
     lanes.depart(0.0, path)
     assert len(lanes.parts) == 4
     assert (lanes.attempt(times, path) > 0.0).all()
