@@ -109,3 +109,13 @@ def test_what_drives_a_model_is_not_left_out(tmp_path):
     assert {"ranges of joints (1)", "actuator: motor (1)"} < {
         *driven.split(LEFT_OUT)[1].split(", ")
     }
+
+
+def test_locked_joint_with_a_link_s_name_is_refused(tmp_path):
+    (file := tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="upper"><joint name="arm"/><body name="arm" pos="1 0 0">'
+        '<joint name="elbow" axis="0 1 0"/></body></body></worldbody>'
+        '<equality><joint joint1="arm" polycoef="0 0"/></equality></mujoco>'
+    )
+    with pytest.raises(CaseError, match="found 'arm', which an equality of the file locks"):
+        load(file, Supplied(drive=("arm:0:1",), hold=("elbow",)))

@@ -111,7 +111,8 @@ def test_driven_components_alike_share_a_program():
     assert len(lanes.kinds) == 12
     assert len({id(kind.model) for kind in lanes.kinds}) == 2  # that with the point, and all others
     path = Path(
-        {f"motor {name}": Ramp(0.1 * k) for k, name in enumerate(names, 1)}, np.linspace(0.0, 3.0, 9)
+        {f"motor {name}": Ramp(0.1 * k) for k, name in enumerate(names, 1)},
+        np.linspace(0.0, 3.0, 9),
     )
     found = solve_components(cranks, path, [f"tip {name}" for name in names], ())
     for k, name in enumerate(names, 1):

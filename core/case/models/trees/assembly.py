@@ -348,7 +348,7 @@ class Closing:
         for names in together.values():
             unknowns = [k for name in names for k in columns[name]]
             own = rows[:, unknowns]
-            basis = self._null(own[own.any(axis=1)]) if len(rows) else np.eye(len(unknowns))
+            basis = self._null(own[own.any(axis=1)])
             found.append(FreeMotions(_columns((each, len(columns[each])) for each in names), basis))
         return found
 

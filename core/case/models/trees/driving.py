@@ -313,10 +313,11 @@ def choose_held(
             hold many joints that no motor moves.
     """
     freedom, tree, named = Freedom(model, spins), model.tree, driving.held
-    free = {link: move.name for move in tree.moves.values() for link in (move.name, move.inner)}
+    # a joint may have the name of a link that another one moves
+    moves = {move.inner: name for name, move in tree.moves.items()} | {x: x for x in tree.moves}
     for option, names in (("--drive", driving.driven), ("--hold", driving.held + driving.fixed)):
         for name in names:
-            if not freedom.count(free.get(name, name)):
+            if not freedom.count(moves[name]):
                 advice = "name another" if option == "--drive" else "leave it out"
                 raise tree.fault(
                     option,
@@ -324,7 +325,7 @@ def choose_held(
                     f" moves; {advice}, or start elsewhere by --start",
                 )
     for name in (*driving.moves, *driving.fixed):
-        freedom.take(free[name] if name in tree.free else name)
+        freedom.take(moves[name])
     candidates = _candidates(tree, driving)
     if hold_rest and driving.driven:
         for clearly in (CLEARLY, AT_REST):

@@ -218,7 +218,10 @@ class _Hanging:
         for rod in graph.rods:
             self._mark_ends(rod.name, rod.links, rod.places, rod.element)
             self.closures.append(rod)
-        struts = [replace(each, name=self._mark_strut(each)) for each in graph.struts]
+        struts: list[Strut] = []
+        for strut in graph.struts:
+            struts.append(replace(strut, name=tree.names.new(strut.name)))
+            self._mark_ends(strut.name, strut.links, strut.places, strut.element)
         self._walk()
         for closure in self.closures:
             tree.tie(replace(closure, links=self._carriers(closure.links)))
@@ -251,17 +254,11 @@ class _Hanging:
         for end, link, place in zip(("parent", "child"), links, places, strict=True):
             self._mark(self.tree.names.new(f"{name}.{end}"), link, place, element)
 
-    def _mark_strut(self, strut: Strut) -> str:
-        """Mark the ends of a strut; return a name of its own."""
-        name = self.tree.names.new(strut.name)
-        self._mark_ends(strut.name, strut.links, strut.places, strut.element)
-        return name
-
     def _close(self, joint: Joint) -> None:
         """Add the closure of a loop, and the copy that its joint moves."""
         outer, inner = joint.links
-        place = self.graph.places[inner]
-        places = joint.frames or (place, place)
+        at = joint.frames[0] if joint.frames else self.graph.places[inner]
+        places = joint.frames or (at, at)
         moves, closure = joint.moves, joint.name
         ball = bool(moves) and moves[-1].kind == "ball"
         if ball:  # a common point leaves the same free
@@ -271,7 +268,6 @@ class _Hanging:
         if moves:
             closure = f"{joint.name}.closure"
             copy = self.tree.names.new(f"{joint.name}.copy")
-            at = joint.frames[0] if joint.frames else place
             self._add(_Part(copy, outer, at, joint.element, moves))
             outer = copy
         if joint.frames:

@@ -188,7 +188,11 @@ class _Reader:
             element, place, childclass = found
             match element.tag:
                 case "body":
-                    waiting.append(self._body(element, place, link, _class(element, childclass)))
+                    waiting.append(
+                        self._body(
+                            element, place, link, element.attributes.get("childclass", childclass)
+                        )
+                    )
                 case "site":
                     site = self.classes.complete(element, "site", childclass)
                     if (name := site.attributes.get("name")) is not None:
@@ -243,7 +247,10 @@ class _Reader:
             if element.tag != "frame":
                 yield element, at, within
                 continue
-            inner, own = at.then(self.compiler.place(element)), _class(element, within)
+            inner, own = (
+                at.then(self.compiler.place(element)),
+                element.attributes.get("childclass", within),
+            )
             waiting += [(each, inner, own) for each in reversed(element.children)]
 
     def _moves(self, body: Element, name: str, place: Place, childclass: str) -> Iterator[Move]:
@@ -514,10 +521,6 @@ class _Reader:
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z
         return found
-
-
-def _class(element: Element, childclass: str) -> str:
-    return element.attributes.get("childclass", childclass)
 
 
 def _coefficients(element: Element) -> tuple[float, ...]:

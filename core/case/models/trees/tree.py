@@ -191,6 +191,11 @@ class Coupling:
         return not (self.driving and any(self.coefficients[2:]))
 
     @property
+    def is_curve(self) -> bool:
+        """Whether it is between two moves."""
+        return len(self.driven) == len(self.driving) == len(self.moves) - 1
+
+    @property
     def moves(self) -> set[str]:
         """The moves it ties to one another, or locks."""
         return {*(self.weights if self.is_linear else (*self.driven, *self.driving))}
@@ -417,7 +422,8 @@ class Tree:
         """Add a tie; one between parts of the ground is counted.
 
         Raises:
-            CaseError: it ties a link to itself, or there are too many.
+            CaseError: it ties a link to itself, is a curve between sums of moves, or there are too
+                many.
         """
         _require_few(tie.element, MOST_TIES, len(self.ties) + 1, f"equalities; {_TAKE_OUT}")
         if isinstance(tie, Closure) and tie.links[0] == tie.links[1]:
@@ -427,6 +433,12 @@ class Tree:
             raise tie.element.fault(
                 f"joins {tie.links[0]!r} with itself, expected two bodies that move otherwise;"
                 " remove it"
+            )
+        if isinstance(tie, Coupling) and not (tie.is_linear or tie.is_curve):
+            own = tie.element.attributes.get("name") or tie.element.tag
+            raise tie.element.fault(
+                "polycoef: is a curve between sums of joints, expected one joint on either side, or"
+                f" a line; leave it out by --without {own}"
             )
         self.ties.append(tie)
 
