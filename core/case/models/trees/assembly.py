@@ -176,7 +176,7 @@ class Pose:
         )
 
     def ends(self, joining: Closure | Strut) -> tuple[Place, Place]:
-        """Return the present places of the frames of what joins two links."""
+        """Return the present places of both frames of a closure or strut."""
         first, second = map(self._end, joining.links, joining.places)
         return first, second
 
@@ -539,7 +539,7 @@ def _descend(closing: Closing, pose: Pose, moving: Array) -> Pose:
 def _open(
     closing: Closing, start: Start, opened: float, left: Sequence[tuple[float, Tie]]
 ) -> CaseError:
-    """Return the error of a model that does not close."""
+    """Return the error of an open model."""
     texts = [f"{tie.name} by {gap:.2g}" for gap, tie in left if gap > closing.limit]
     gap, widest = left[0]
     return widest.element.fault(

@@ -231,7 +231,7 @@ class _Hanging:
             self._couple(coupling)
 
     def _add(self, part: _Part) -> bool:
-        """Add a link; return false for one that is the world by another name."""
+        """Add a link; return false for the world by another name."""
         world = self.inside[WORLD]
         is_world = part.name in FIXED and part.place == ORIGIN and not part.moves
         if is_world and self.inside[part.outer] is world:

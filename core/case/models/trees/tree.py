@@ -335,7 +335,7 @@ class Tree:
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:
-        """The moves of links that something holds."""
+        """The moves of links held by something."""
         return {name: move for name, move in self.moves.items() if move.kind != "free"}
 
     def fault(self, option: str, problem: str) -> CaseError:
