@@ -468,12 +468,12 @@ def test_pinned_reference_digest_must_match(tmp_path):
     right = hashlib.sha256(CSV.encode()).hexdigest()
     text = BASE + '[reference]\nfile = "x.csv"\ndigest = "sha256:DIGEST"'
     assert load_case(write(tmp_path, text.replace("DIGEST", right))).origin.sha256 == right
-    complains(write(tmp_path, text.replace("DIGEST", "0" * 64)), ["reference.digest", right])
+    complains(write(tmp_path, text.replace("DIGEST", "0" * 64)), f"reference.digest ... {right}")
     complains(
-        write(tmp_path, text.replace("DIGEST", "12")), ["reference.digest", "64 hexadecimal digits"]
+        write(tmp_path, text.replace("DIGEST", "12")), "reference.digest ... 64 hexadecimal digits"
     )
     complains(
-        write(tmp_path, BASE + INLINE + f'digest = "sha256:{right}"'), ["reference.digest", "rows"]
+        write(tmp_path, BASE + INLINE + f'digest = "sha256:{right}"'), "reference.digest ... rows"
     )
 
 
@@ -481,7 +481,7 @@ def test_pinned_reference_digest_must_match(tmp_path):
 def test_a_citation_says_something(tmp_path, citation):
     complains(
         write(tmp_path, BASE + INLINE + f"citation = {citation}"),
-        ["reference.citation", "where the true values come from"],
+        "reference.citation ... where the true values come from",
     )
 
 
