@@ -39,7 +39,7 @@ from kincheck.core.mechanism.motions import Path as Way
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.program.ball_executor import precision
 
-from ..support.mechanisms import CRANK, ROD, four_bar, slider_crank
+from ..support.mechanisms import CRANK, ORIGIN, ROD, Z, four_bar, slider_crank
 
 flint = pytest.importorskip("flint")
 BITS = 200
@@ -131,12 +131,12 @@ def test_turns_of_coupled_joints_are_counted():
     """A worm: twelve turns of the shaft are one of the wheel, and the samples are most of half a
     turn apart.
     """
-    axis, along = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    axis, along = Z, (1.0, 0.0, 0.0)
     gears = Mechanism(
         "gears",
         [Body("shaft"), Body("wheel")],
         [
-            Revolute("first", "ground", "shaft", (0.0, 0.0, 0.0), axis),
+            Revolute("first", "ground", "shaft", ORIGIN, axis),
             Revolute("second", "ground", "wheel", (0.3, 0.0, 0.0), along),
         ],
         [Point("rim", "wheel", (0.3, 0.1, 0.0))],
@@ -202,8 +202,8 @@ def test_a_spurious_branch_is_not_proved():
     arm = Mechanism(
         "arm",
         [Body("arm")],
-        [Revolute("pivot", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
-        [Point("tip", "arm", (1.0, 0.0, 0.0)), Point("end", "arm", (0.0, 0.0, 1.0))],
+        [Revolute("pivot", "ground", "arm", ORIGIN, Z)],
+        [Point("tip", "arm", (1.0, 0.0, 0.0)), Point("end", "arm", Z)],
         [PointCoordinate("lift", "tip", (0.0, 1.0, 0.0))],
     )
     traced, pose, drives = _setup(arm, arm, 0.1)
@@ -219,12 +219,12 @@ def test_a_change_point_is_not_proved_and_says_so():
     """A parallelogram with all pivots on a line can go on as a parallelogram or as its crossed
     twin.
     """
-    y = (0.0, 0.0, 1.0)
+    y = Z
     flat = Mechanism(
         "parallelogram",
         [Body("a"), Body("b"), Body("c")],
         [
-            Revolute("A", "ground", "a", (0.0, 0.0, 0.0), y),
+            Revolute("A", "ground", "a", ORIGIN, y),
             Revolute("B", "a", "b", (0.0, 1.0, 0.0), y),
             Revolute("C", "b", "c", (2.0, 1.0, 0.0), y),
             Revolute("D", "ground", "c", (2.0, 0.0, 0.0), y),

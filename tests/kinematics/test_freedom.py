@@ -26,7 +26,7 @@ from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import account
 
-from ..support.mechanisms import CRANK, D0, ROD, four_bar, mcpherson, placed, slider_crank
+from ..support.mechanisms import CRANK, D0, ROD, Z, four_bar, mcpherson, placed, slider_crank
 
 
 def account_of(mechanism):
@@ -115,7 +115,7 @@ def test_redundant_rows_that_contradict_are_not_passed_over():
     """
     guided = [
         Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        Distance("rod", "ground", "slider", ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))),
+        Distance("rod", "ground", "slider", (Z, (0.0, 0.0, 0.0))),
     ]
     m = Mechanism("m", [Body("slider")], guided, [], [JointDisplacement("push", "guide")])
     assert account_of(m).redundant_rows == ("rod: Distance",)
@@ -204,7 +204,7 @@ def test_a_driver_at_its_dead_centre():
 
 def test_a_driver_across_the_motion():
     """A point of the slider cannot be driven across its guide."""
-    lifted = replace(slider_crank(), drivers=[PointCoordinate("lift", "end", (0.0, 0.0, 1.0))])
+    lifted = replace(slider_crank(), drivers=[PointCoordinate("lift", "end", Z)])
     with pytest.raises(SolveError, match="'lift'"):
         solve(lifted, "lift", [0.0])
 
@@ -214,7 +214,7 @@ def test_two_drivers_of_the_same_freedom():
     m = mechanism_of(
         Revolute("r", "ground", "a", A, X),
         Revolute("s", "ground", "b", A, X),
-        drivers=[JointAngle("turn", "r"), PointCoordinate("again", "tip", (0.0, 0.0, 1.0))],
+        drivers=[JointAngle("turn", "r"), PointCoordinate("again", "tip", Z)],
     )
     assert solve(m, "turn", [0.0, 0.1]).solved.all()
     same = replace(m, points=[Point("tip", "a", B)])
@@ -248,7 +248,7 @@ def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_w
 
 def test_drivers_that_repeat_each_other_are_named_and_no_others():
     axles = [
-        Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
+        Revolute(name, "ground", name, (x, 0.0, 0.0), Z)
         for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
     ]
     drivers = [JointAngle("first", "a"), JointAngle("second", "a"), JointAngle("sound", "b")]
