@@ -34,7 +34,6 @@ from .structure.degrees_of_freedom import require_driven
 if TYPE_CHECKING:
     from .blocks.component_lanes import ComponentLanes
     from .blocks.sparse_lanes import SparseLanes
-    from .structure.components import Component
 
 Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""
@@ -84,7 +83,7 @@ def by_blocks(
         except SolveError:
             require_driven(mechanism)  # which names what can still move
             raise
-        by_components = 0 < max((len(part.bodies) for part in parts), default=0) <= COMPONENT
+        by_components = 0 < max(map(len, parts), default=0) <= COMPONENT
     lanes = _lanes(mechanism, request, parts) if by_components else SparseLanes(mechanism, request)
 
     def along(path: Path) -> Solver:
@@ -95,7 +94,7 @@ def by_blocks(
 
 
 def _lanes(
-    mechanism: Mechanism, request: Request, parts: Sequence[Component] | None
+    mechanism: Mechanism, request: Request, parts: Sequence[tuple[str, ...]] | None
 ) -> ComponentLanes | SparseLanes:
     """Return the lanes of the components, or of a sparse system if one of them lacks rows.
 

@@ -92,7 +92,7 @@ def chosen(
 
     Args:
         matrix: Jacobian of all rows, the drivers' last.
-        conditions: see `Formulation`.
+        conditions: see `Cartesian`.
     """
     best = max(known, key=lambda rows: _sigma(matrix, rows))
     if _sigma(matrix, best) >= AS_GOOD * _sigma(matrix, range(len(matrix))):

@@ -25,7 +25,8 @@ from ...trajectory import Array
 from ..compiled.request import CONSISTENT
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Constraint, Frames, constraints_left_out, frames
-from ..formulation.formulation import Configuration, Formulation, State
+from ..formulation.formulation import Configuration, State
+from ..formulation.relative import Formulation
 from ..formulation.state_vectors import jacobian
 from ..structure.degrees_of_freedom import FreedomAccount, account
 from ..structure.redundancy import (

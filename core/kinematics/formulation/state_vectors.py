@@ -17,7 +17,8 @@ from ...mechanism.motions import Driver, JointAngle, Path
 from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...trajectory import Array
 from .constraints import Frames
-from .formulation import Configuration, Formulation, Rows, position_of
+from .formulation import Configuration, Rows, position_of
+from .relative import Formulation
 
 
 def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:

@@ -38,7 +38,8 @@ from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, frames, unit_near
-from ..formulation.formulation import Condition, Formulation
+from ..formulation.formulation import Condition
+from ..formulation.relative import Formulation
 from ..formulation.state_vectors import displaced, jacobian
 
 # Rows are of size one. At a feasible pose a redundant row leaves round-off (1e-15); the smallest

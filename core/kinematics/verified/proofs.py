@@ -27,7 +27,7 @@ from ..forces.reactions import Follow, ForceRows, with_forces
 from ..forces.wanted import WantedForces, wanted_forces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
-from ..formulation.formulation import row_names
+from ..formulation.relative import row_names
 from ..formulation.state_vectors import displaced, state_of
 from ..structure.degrees_of_freedom import select_rows
 from .exact import Reading, as_double, equations, exact_mechanism
