@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .dataset import Dataset, Variable
+from .dataset import AXIS, Dataset, Variable
 from .driving import Driving, in_words
 from .errors import MARKER as MARKER
 from .errors import UnknownNameError, number_of
@@ -208,7 +208,7 @@ def as_variables(
     along = {} if drive is None else drive.coords()
     count = _samples(points)
     points = {name: points[name] for name in shown(points)}
-    axes = {"point": Variable("point", [*points]), "axis": Variable("axis", ["x", "y", "z"])}
+    axes = {"point": Variable("point", [*points]), "axis": AXIS}
     variables = dict[str, Variable]()
     for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
         series = [getattr(each, quantity) for each in points.values()]

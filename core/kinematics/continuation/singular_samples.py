@@ -86,6 +86,11 @@ class Findings:
             found["uncertain_samples"] = sorted(self.uncertain)
         return found | ({"notes": [*self.notes]} if self.notes else {})
 
+    def add_failure(self, message: str, kind: FailureKind) -> None:
+        """Add the reason of missing samples."""
+        self.messages.append(message)
+        self.failures.append(kind)
+
     def add_pose(
         self,
         outcome: str,
@@ -158,12 +163,8 @@ def _scrutinised(route: Route, found: March, tol: float) -> Findings:
 
 class _Scrutiny:
     def __init__(self, followed: Followed) -> None:
-        self.followed, self.route, self.found, self.tol = (
-            followed,
-            followed.route,
-            followed.found,
-            followed.tol,
-        )
+        self.followed, self.route = followed, followed.route
+        self.found, self.tol = followed.found, followed.tol
         self.rows, self.times = self.route.model.rows, self.route.path.times
         self.limit, self.orders = AMPLIFIED * self.tol, self.route.model.orders
         self.findings = Findings()
@@ -234,12 +235,8 @@ class _Scrutiny:
         near = moved <= np.maximum(
             self.limit, WORSE * kept[rows["closure"].start, indices] / solved.sigma
         )
-        good = (
-            (solved.error[: self.orders].max(axis=0) <= self.limit)
-            & near
-            & (closure <= self.tol)
-            & (branch > 0.0)
-        )
+        good = (closure <= self.tol) & (branch > 0.0) & near
+        good &= solved.error[: self.orders].max(axis=0) <= self.limit
         for name, values in [*outputs.items(), ("closure", closure), ("leftover", leftover)]:
             kept[rows[name], indices[good]] = values[..., good]
         self.findings.retried += len(indices)
@@ -269,8 +266,7 @@ class _Scrutiny:
                 "reached once and not again, so near are residuals to the tolerance"
                 f" {self.tol:.3g}; allow more"
             )
-            self.findings.messages.append(f"refused at {places}: {why}")
-            self.findings.failures.append(FailureKind.UNREPEATABLE)
+            self.findings.add_failure(f"refused at {places}: {why}", FailureKind.UNREPEATABLE)
 
     def stuck(self) -> None:
         """Interpolate samples not reached from either side of a passage, or refuse them."""
@@ -348,8 +344,7 @@ class _Scrutiny:
                 f"rounding alone leaves {uncertain} by the tolerance {self.tol:.3g}; {sigma}, the"
                 " pose is regular; allow more"
             )
-        self.findings.messages.append(f"refused at {places}: {why}")
-        self.findings.failures.append(FailureKind.UNCERTAIN)
+        self.findings.add_failure(f"refused at {places}: {why}", FailureKind.UNCERTAIN)
 
     def passages(self) -> None:
         """Add the singular poses passed between samples."""
@@ -373,11 +368,8 @@ class _Scrutiny:
         self.findings.add_pose("crossed", path, time, singularity)
         if path.motions is self.route.path.motions:
             places = np.append(self.times, self.route.start)
-            low, high = (
-                path.where(float(side))
-                for side in (places[places <= time].max(), places[places >= time].min())
-            )
-            beside = f"between {low} and {high}, "
+            low, high = places[places <= time].max(), places[places >= time].min()
+            beside = f"between {path.where(float(low))} and {path.where(float(high))}, "
         else:
             beside = f"on the way to {self.route.begin.name}, "
         self.findings.notes.append(
@@ -406,8 +398,7 @@ class _Scrutiny:
                 message += (
                     f"; the pose is regular there, smallest singular value {nearest.sigma:.3g}"
                 )
-        self.findings.messages.append(message)
-        self.findings.failures.append(end.failure)
+        self.findings.add_failure(message, end.failure)
 
     def _where(self, time: float) -> str:
         return self.route.path.where(time)
