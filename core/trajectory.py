@@ -206,7 +206,7 @@ def as_variables(
         dims: of the samples, the last one "sample".
     """
     along = {} if drive is None else drive.coords()
-    count = _samples(points)
+    count = next((each.position.shape[-2] for each in points.values()), 0)
     points = {name: points[name] for name in shown(points)}
     axes = {"point": Variable("point", [*points]), "axis": AXIS}
     variables = dict[str, Variable]()
@@ -217,7 +217,3 @@ def as_variables(
             variables[quantity] = Variable((*dims, "point", "axis"), stacked, f"m{per_time}")
     numbered = {} if along else {"sample": Variable("sample", np.arange(count))}
     return {**along, **numbered, **axes}, variables, next(iter(along), "sample")
-
-
-def _samples(points: Mapping[str, PointMotion]) -> int:
-    return next((each.position.shape[-2] for each in points.values()), 0)
