@@ -2,6 +2,8 @@
 and programs are shared.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kincheck.core import Body, Point, solve
@@ -88,7 +90,14 @@ def test_components_iterate_no_more_than_is_asked_for():
 
 
 def test_components_built_alike_share_a_program():
-    cascade = ComponentLanes(chain(40), Request(("turn",), ("end",)))
+    """Whatever the numbers, those of outputs too."""
+    whole = chain(40)
+    bodies = [
+        replace(body, origin=(float(k), 0.1, 0.0)) for k, body in enumerate(whole.bodies[1:], 1)
+    ]
+    whole = replace(whole, bodies=[whole.bodies[0], *bodies])
+    every = tuple(body.name for body in whole.bodies)
+    cascade = ComponentLanes(whole, Request(("turn",), ("end",), every))
     assert len(cascade.parts) == 41
     # the crank, the one with the point, all others
     assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]
