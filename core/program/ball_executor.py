@@ -89,13 +89,4 @@ def evaluate(program: Program, inputs: Sequence[Ball]) -> dict[int, Ball]:
     Raises:
         UndecidedError: two balls compared by "larger" overlap.
     """
-    arb = flint().arb
-    values: list[Any] = []
-    for op, *rest in program.nodes:
-        if op == "input":
-            values.append(inputs[int(rest[0])])
-        elif op == "const":
-            values.append(arb(rest[0]))
-        else:
-            values.append(_OPERATIONS[op](*[values[int(k)] for k in rest]))
-    return {slot: values[k] for slot, k in program.outputs.items()}
+    return program.run(_OPERATIONS, inputs, flint().arb)

@@ -23,7 +23,7 @@ from kincheck.core import (
 )
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.formulation.parameters import placed
-from kincheck.core.studies.bench.ring import ring
+from kincheck.core.studies.bench.size import ring
 
 from .test_sparse_choice import four_bar, pin_meeting
 

@@ -22,11 +22,11 @@ from kincheck.core.kinematics import Method
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.one_design import ONE_PROGRAM
+from kincheck.core.kinematics.motion_solver import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.kinematics.structure.sparse_lu import Pattern
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
-from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+from kincheck.core.studies.bench.size import LEAN, pivot, ring
 from scipy.sparse import linalg
 
 from ..support.block_structures import (

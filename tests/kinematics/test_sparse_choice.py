@@ -20,7 +20,7 @@ from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.kinematics.structure.sparse_lu import Blocks
 from kincheck.core.mechanism.motions import Path, Ramp
-from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+from kincheck.core.studies.bench.size import LEAN, pivot, ring
 
 from ..support.block_structures import chain_of_hinges, solve_sparse
 

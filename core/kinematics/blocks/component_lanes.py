@@ -35,13 +35,13 @@ from ..compiled.request import (
     slots_of,
 )
 from ..compiled.solution import Columns
-from ..continuation.singular_poses import SOUND, Numbers
+from ..continuation.singular_poses import SOUND, Anchor, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
 from ..formulation.constraints import frames, structure
 from ..structure.components import Alike, components, described
 from ..structure.degrees_of_freedom import counted
 from .sparse_lanes import SparseLanes
-from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ from ..compiled.request import ACCEPT, MAX_ITERATIONS, Request
 from ..compiled.solution import Columns
 from ..compiled.step_programs import ABOUT
 from ..continuation.segments import BETTER, SEEN
-from ..continuation.singular_poses import SOUND, Numbers
+from ..continuation.singular_poses import SOUND, Anchor, Numbers
 from ..continuation.walk import failure_kind
 from ..formulation.acceptance_criteria import (
     AMPLIFIED,
@@ -47,7 +47,7 @@ from ..formulation.relative import row_names
 from ..formulation.state_vectors import turns
 from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
 from ..structure.sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
-from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
 POSES = 8
 """Poses evaluated together: samples that are so far from the last one are still predicted well."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -26,7 +26,7 @@ from ..compiled.solution import Columns, solution
 from ..continuation.singular_poses import (
     CONTINUED,
     NEARLY,
-    Numbers,
+    Anchor,
     Passage,
     interpolated,
     listed,
@@ -40,29 +40,6 @@ WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
 CLOSURES, SIGMAS, MARGINS = (WORST.index(name) for name in ("closure", SIGMA, MARGIN))
 """Rows of those."""
 Indices = NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class Anchor:
-    """The pose before the lanes, to be restored later.
-
-    Attributes:
-        time: of the pose [s].
-        pose: of all blocks, as the lanes keep it.
-        motions: the wanted motions there, shape (columns,); none if they were not taken along.
-        error: a bound of its error by its tests [units].
-    """
-
-    time: float
-    pose: Any
-    _numbers: Callable[[Any], Numbers]
-    motions: Array = field(default_factory=lambda: np.empty(0))
-    error: float = 0.0
-
-    @property
-    def numbers(self) -> Numbers:
-        """The numbers of all blocks."""
-        return self._numbers(self.pose)
 
 
 class Lanes(ABC):
@@ -363,7 +340,7 @@ class _Run:
         way: float,
         *,
         rates: bool = True,
-    ) -> Passage[Anchor] | None:
+    ) -> Passage | None:
         """Pass a time on a path, see `continuation.singular_poses.pass_over`."""
         lanes, tol = self.lanes, self.tol
 

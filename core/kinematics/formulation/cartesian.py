@@ -7,7 +7,7 @@ style. dpi is in global axes, or in body axes if the row style is; the poses are
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -54,12 +54,13 @@ class Cartesian:
         frame: Frames,
         drives: Mapping[str, Drive] | None = None,
         style: Style = Style.NATIVE,
+        named: Collection[str] = (),
     ) -> Cartesian:
-        """Return all constraints of a mechanism over its moving bodies.
+        """Return all constraints of a mechanism over its moving bodies; see `constraints`.
 
         Drivers without a drive hold their design value.
         """
-        return cls(constraints(mechanism, frame, drives or {}, style), frame.moving)
+        return cls(constraints(mechanism, frame, drives or {}, style, named), frame.moving)
 
     @cached_property
     def columns(self) -> Mapping[str, int]:
@@ -92,7 +93,18 @@ class Cartesian:
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
         """For every row, its joint or driver and its primitive."""
-        return [name for c in self.constraints for name in [_named(c)] * c.n]
+        return [*map(_named, self.of_rows)]
+
+    @cached_property
+    def of_rows(self) -> Sequence[Constraint | Relation]:
+        """The constraint of every row."""
+        return [c for c in self.constraints for _ in range(c.n)]
+
+    @cached_property
+    def measuring(self) -> Mapping[str, int]:
+        """Number of the row that measures a named coordinate."""
+        rows = enumerate(self.of_rows)
+        return {c.coordinate: k for k, c in rows if isinstance(c, Constraint) and c.coordinate}
 
     @property
     def conditions(self) -> Sequence[Condition]:
