@@ -309,7 +309,7 @@ def structure(value: Any, numbers: list[Scalar]) -> Hashable:
         return Traced if isinstance(value, Traced) else float
     names, parts = _parts(value)
     if parts is None:
-        return value
+        return value if isinstance(value, Hashable) else id(value)
     found = tuple(structure(part, numbers) for part in parts)
     if isinstance(value, Vec3):
         return Vec3, any(isinstance(x, Traced) or x != 0.0 for x in value)
