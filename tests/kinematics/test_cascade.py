@@ -107,18 +107,19 @@ def test_components_built_alike_share_a_program():
 
 @dataclass(frozen=True, kw_only=True)
 class Tilted(primitives.Spherical):
-    """Rows with a plain number and a list."""
+    """Rows with a plain number, and something beside it."""
 
     tilt: float
-    seen: list[float]
+    beside: object
 
     def phi(self, i, j):
-        self.seen.append(math.cos(self.tilt))
+        assert math.cos(self.tilt) > 0.0
         return super().phi(i, j)
 
 
 @pytest.mark.usefixtures("own_joint_types")
-def test_settings_of_own_joints_stay_plain_numbers():
+@pytest.mark.parametrize("beside", [tuple, list])
+def test_settings_of_own_joints_stay_plain_numbers(beside):
     @dataclass(frozen=True)
     class Ball(Spherical):
         type = "tilted_ball"
@@ -126,7 +127,7 @@ def test_settings_of_own_joints_stay_plain_numbers():
 
         def primitives(self, i, j):
             return [
-                Tilted(s_i=each.s_i, s_j=each.s_j, d0=each.d0, tilt=self.tilt, seen=[])
+                Tilted(s_i=each.s_i, s_j=each.s_j, d0=each.d0, tilt=self.tilt, beside=beside())
                 for each in super().primitives(i, j)
             ]
 
