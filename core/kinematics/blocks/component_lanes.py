@@ -225,7 +225,7 @@ class ComponentLanes(Lanes):
         """Return the columns of moving outputs with their rows of the world, and a column of the
         outputs at rest.
         """
-        every = Columns.of(self.request)
+        every = Columns(self.request)
         columns, rows, still = list[int](), list[int](), np.zeros((every.count, 1))
         points = map(self.mechanism.point, self.request.points)
         bodies = map(self.mechanism.body, self.request.bodies)

@@ -212,7 +212,7 @@ class SparseLanes(Lanes):
                 self._scale[at] = frame.unit / extent
         names = ["time", *(f"drive {name}.{k}" for name in request.drivers for k in range(5))]
         self._angles = [names.index(name) for name in turns(mechanism, request.drivers)]
-        self._vectors = [*Columns.of(request).by_vector]
+        self._vectors = [*Columns(request).by_vector]
         self.worst = np.zeros((len(WORST), POSES))
         self.here = self._closed()
         self.design = self.anchor(0.0)

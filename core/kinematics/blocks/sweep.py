@@ -265,7 +265,7 @@ class _Run:
     """
 
     def __init__(self, lanes: Lanes, tol: float, count: int = 0) -> None:
-        self.lanes, self.tol, self.columns = lanes, tol, Columns.of(lanes.request)
+        self.lanes, self.tol, self.columns = lanes, tol, Columns(lanes.request)
         self.table = np.full((self.columns.count, count), np.nan)
         self.worst = np.full((len(WORST), count), np.nan)
         self.refused = dict[int, float]()
