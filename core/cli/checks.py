@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..case.io.escape import file_name, visible
 from ..errors import KincheckError, refuse
@@ -38,7 +38,7 @@ class CheckJoint(Command):
     in every engine.
     """
 
-    about: ClassVar[str] = "check your own joint type, or a built-in one"
+    about = "check your own joint type, or a built-in one"
     joint: str = argument(
         "a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
         " built-in type, such as revolute",
@@ -80,7 +80,7 @@ class CheckEngine(Command):
     refusals, and repeated answers. Each pair is solved in a worker process.
     """
 
-    about: ClassVar[str] = "check your own engine"
+    about = "check your own engine"
     engine: str | Engine | None = argument(
         "the class, in a module of this folder or an installed one; or an engine's name",
         "MODULE:CLASS",
@@ -140,7 +140,7 @@ class ProveReferences(Command):
     do its work.
     """
 
-    about: ClassVar[str] = "prove the samples of cases to any number of digits"
+    about = "prove the samples of cases to any number of digits"
     case: tuple[str, ...] = argument(CASES, "CASE", "*")
     joint_type: tuple[str, ...] = joint_types()
     out: Path | None = destination(

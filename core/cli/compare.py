@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, refuse
@@ -42,7 +42,7 @@ class Compare(Command):
     reach all samples (what it reaches is compared), or the tool could not do its work.
     """
 
-    about: ClassVar[str] = "two hardpoint tables or more: differing points, and curves over curves"
+    about = "two hardpoint tables or more: differing points, and curves over curves"
     cases: Sequence[str | Path | Case] = argument(
         "hardpoint tables or suspension cases; the others are compared with the first", "CASE", "+"
     )

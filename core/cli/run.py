@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from os.path import exists
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
@@ -41,7 +41,7 @@ from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, WithRecordings,
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
-    from ..harness.record import Record, Results
+    from ..harness.record import Facts, Record, Results
     from ..history.runs import Keeping
     from .destinations import Trends
 
@@ -80,7 +80,7 @@ class Run(Isolated, WithRecordings):
     status if others are judged.
     """
 
-    about: ClassVar[str] = "solve cases with engines and judge the results"
+    about = "solve cases with engines and judge the results"
     cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
         CASES, "CASE", "*", default=()
     )
@@ -251,7 +251,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
         problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
     if options.bench is not None and options.out is None:
         problems.append("--bench adds to the report. Give --out DIR.")
-    tell = complain if options.command else _nothing
+    tell: Callable[[Iterable[str]], object] = complain if options.command else list
     unread: dict[str, str] = {}
     cases = _cases(options, registry, unread)
     if options.command:
@@ -287,8 +287,12 @@ def _planned(options: Run, registry: Registry) -> _Plan:
             problems += str(error).splitlines()
     engines = _engines(options, registry, problems)
     baseline = registry.baseline(engines)
-    if recorded and shared_options.undriven(cases[0]):
-        engines, baseline = [], None
+    if recorded:
+        from ..kinematics import degrees_of_freedom
+
+        mechanism = cases[0].mechanism
+        if degrees_of_freedom(mechanism) > len(mechanism.drivers):  # no engine can solve it
+            engines, baseline = [], None
     if options.fmu and options.jobs == 0:
         problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
     try:
@@ -319,10 +323,6 @@ def _planned(options: Run, registry: Registry) -> _Plan:
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engines else [],
     )
-
-
-def _nothing(lines: object) -> None:
-    pass
 
 
 def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
@@ -526,7 +526,7 @@ def _keeping(
     return found, []
 
 
-def _known(path: Path, facts: Mapping[str, Any]) -> bool:
+def _known(path: Path, facts: Facts) -> bool:
     """Return whether a history has a run that was asked for the same."""
     from ..history.queries import same
     from ..history.store import Store

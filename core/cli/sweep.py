@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, refuse, unknown
@@ -67,7 +67,7 @@ class Sweep(Command):
     status 130.
     """
 
-    about: ClassVar[str] = "solve many variants of a design"
+    about = "solve many variants of a design"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     variation: str | Path = option(
         "file that states what varies, and by how much (kincheck-vary/1)",

@@ -73,7 +73,34 @@ MOVED = 2e-5
 three digits shown, and rounding of 1e-15 m over it too."""
 
 
-class LiveTable:
+class LiveFile:
+    """A file that is open.
+
+    Attributes:
+        axis: of the sweep, as in reports.
+    """
+
+    kind: str
+    file: Path
+    case: Case
+    axis: Axis
+
+    def opening_of(self, engines: Sequence[str], **own: Any) -> Opening:
+        """Return what the openings of all files tell, and what this one does."""
+        own = {"unit": self.case.length_unit, **own}
+        return Opening(
+            kind=self.kind,
+            file=self.file.name,
+            source=self.case.source,
+            outputs=[*map(_live_output, self.case.outputs)],
+            axis=LiveAxis(self.axis.label, self.axis.values, self.axis.scale, self.axis.up),
+            engines=[*engines],
+            reference=_live_reference(self.case),
+            **own,
+        )
+
+
+class LiveTable(LiveFile):
     """A table of hardpoints, opened.
 
     Args:
@@ -116,8 +143,8 @@ class LiveTable:
         directions = ("forward", "left", "up"), ("rearward", "right", "down")
         axes = axes_of(self.table, self.supplied.axes)
         limits = self.variation.limits if self.variation else ()
-        return msgspec.structs.replace(
-            opening_of(self.kind, self.file, self.case, self.axis, engines),
+        return self.opening_of(
+            engines,
             unit=unit_of(self.table, self.supplied.units).name,
             axes=",".join(directions[sign < 0][k] for k, sign in axes),
             points=[
@@ -323,20 +350,6 @@ class LiveTable:
                     jet = counted(case.mechanism, case.sweep.path, each, moved, design)
                     values[each.name] = np.where(known, jet.x, np.nan)
         return values
-
-
-def opening_of(kind: str, file: Path, case: Case, axis: Axis, engines: Sequence[str]) -> Opening:
-    """Return what the openings of all files tell."""
-    return Opening(
-        kind=kind,
-        file=file.name,
-        source=case.source,
-        unit=case.length_unit,
-        outputs=[*map(_live_output, case.outputs)],
-        axis=LiveAxis(axis.label, axis.values, axis.scale, axis.up),
-        engines=[*engines],
-        reference=_live_reference(case),
-    )
 
 
 def drawn_frames(solved: NDArray[np.bool_], always: Sequence[int] = ()) -> list[int]:

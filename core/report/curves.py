@@ -8,10 +8,9 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
-from ..harness.record import OutputSeries, Record, Results
+from ..harness.record import Facts, OutputSeries, Record, Results
 from .axis import DRIVER_UNITS, in_table_units
 
 COLUMNS: Mapping[str, Kind] = {
@@ -76,7 +75,7 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
     The columns are the drivers and the outputs, behind the names of cases and engines where there
     are several. Rates of change per metre of travel stay per metre.
     """
-    facts: Mapping[str, Any] = results.run.get("cases", {})
+    facts: Facts = results.run.get("cases", {})
     if not facts or not all(each.get("units") for each in facts.values()):
         return None
     tables = list[tuple[str, str, dict[str, list[float | None]]]]()
@@ -100,7 +99,7 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
 
 
 def columns_of(
-    about: Mapping[str, Any], record: Record, outputs: Mapping[str, OutputSeries]
+    about: Facts, record: Record, outputs: Mapping[str, OutputSeries]
 ) -> dict[str, list[float | None]]:
     """Return the values of drivers and outputs in the units of the table, by their heads.
 
@@ -181,8 +180,8 @@ def _rows(
     results: Results, record: Record, engine: str, mode: str, output: str, series: OutputSeries
 ) -> Rows:
     driver, values = next(iter(record.driver.items()))
-    about: Mapping[str, Any] = results.run.get("cases", {}).get(record.case, {})
-    facts: Mapping[str, Any] = about.get("driver", {})
+    about: Facts = results.run.get("cases", {}).get(record.case, {})
+    facts: Facts = about.get("driver", {})
     head = record.case, engine, mode, output, series.unit
     unit = DRIVER_UNITS.get(facts.get("type", ""))
     unknown = [None] * len(values)
