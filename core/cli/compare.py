@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, refuse
+from ..errors import KincheckError, collected, refuse
 from ..options import (
     argument,
     destination,
@@ -143,10 +143,8 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
     cases: list[Case] = []
     problems: list[str] = []
     for each in given:
-        try:
+        with collected(problems):
             cases.append(registry.find_case(each, options.supplied))
-        except KincheckError as error:
-            problems.append(str(error))
     refuse(problems)
     several = len({case.name for case in cases}) < len(cases)
     first = cases[0].sweep

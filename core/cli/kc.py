@@ -142,8 +142,7 @@ class MeasureCompliance(Isolated):
         problems += views.failures(results)
         problems += lacking(checked, (), named) if checked else []
         refuse(problems)
-        bad = checked is not None and any(each.outcome.bad for each in checked.records)
-        return Status.DEVIATES if bad else Status.WITHIN
+        return Status.of(checked) if checked is not None else Status.WITHIN
 
     def _engines(self, registry: Registry, problems: list[str]) -> list[Engine]:
         """Return native and the named engines; none if nothing is to be checked or stored."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import MOST_NAMED, KincheckError, SolveError, refuse, shortened
+from ..errors import MOST_NAMED, KincheckError, SolveError, collected, refuse, shortened
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -218,11 +219,7 @@ class Run(Isolated, WithRecordings):
             return stopped
         if problems or plan.unread:
             return Status.FAILED
-        return (
-            Status.DEVIATES
-            if any(record.outcome.bad for record in results.records)
-            else Status.WITHIN
-        )
+        return Status.of(results)
 
 
 def _shown(options: Run) -> Callable[[Results, TextIO], None]:
@@ -263,7 +260,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
             f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
         )
     elif options.recorded:
-        try:
+        with collected(problems):
             cases[0], recorded = shared_options.recorded_engines(
                 options.recorded,
                 cases[0],
@@ -271,20 +268,16 @@ def _planned(options: Run, registry: Registry) -> _Plan:
                 analysis=options.analysis,
                 sheet=options.supplied.sheet,
             )
-        except KincheckError as error:
-            problems += str(error).splitlines()
     if not (options.reference or options.recorded or options.fmu):
         problems += filter(None, [options.curve.without_curve])
     if options.reference and not problems:
-        try:
+        with collected(problems):
             # a reference may name an unreadable case, which does not stop the others
             files = [*map(Path, several(options.reference))]
             cases, notes = judged(cases, files, options.curve, unused if unread else None)
             tell(notes)
             if notes and not options.command:
                 cases = [replace(cases[0], assembly=(*cases[0].assembly, *notes))]
-        except KincheckError as error:
-            problems += str(error).splitlines()
     engines = _engines(options, registry, problems)
     baseline = registry.baseline(engines)
     if recorded:
@@ -295,17 +288,12 @@ def _planned(options: Run, registry: Registry) -> _Plan:
             engines, baseline = [], None
     if options.fmu and options.jobs == 0:
         problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
-    try:
+    with collected(problems):
         foreign = shared_options.foreign_engines(options, cases, options.curve.columns)
         engines += [*foreign, *recorded]
-    except KincheckError as error:
-        problems += str(error).splitlines()
-    keys = [(engine.name, engine.mode) for engine in engines]
-    problems += [
-        f"engine {name}: found twice; rename one"
-        for name, mode in keys
-        if keys.count((name, mode)) > 1
-    ][:1]
+    keys = Counter((engine.name, engine.mode) for engine in engines)
+    twice = [name for (name, _), count in keys.items() if count > 1]
+    problems += [f"engine {name}: found twice; rename one" for name in twice[:1]]
     problems += options.unwritable(*REPORT)
     problems = problems or shared_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does

@@ -421,11 +421,7 @@ def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | No
     if engine is not None:
         problems += lacking(results, [], [engine.name]) + uncompared(results)
     complain(problems)
-    if problems:
-        return Status.FAILED
-    return (
-        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
-    )
+    return Status.FAILED if problems else Status.of(results)
 
 
 def checking_solver(options: Sweep, engine: Engine) -> Solver:

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import kincheck.adapters
 import kincheck.cases
 import kincheck.core
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.report.report import caveats, headline
@@ -117,7 +117,7 @@ def test_a_bad_built_in_case_is_a_message(kincheck_main, capsys, monkeypatch):
     assert status == 0
     monkeypatch.setattr(kincheck.cases, "load", load)
     capsys.readouterr()
-    assert main.main(["run", "crank"]) == 2
+    assert main(["run", "crank"]) == 2
     assert capsys.readouterr().err == "kincheck: crank.toml: sweep.steps = 0: expected at least 1\n"
 
 

@@ -7,7 +7,7 @@ import kincheck.adapters
 import kincheck.cases
 import kincheck.core
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.extras import how_to_install
 
 from ..support.fakes import Fake, crank, off, partial, raising
@@ -99,7 +99,7 @@ def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
     assert kincheck_main(*argv, engines=[RIGHT, Fake("other")]) == 0
     capsys.readouterr()
     monkeypatch.setattr(kincheck.adapters, "engine", load)
-    assert main.main([*argv, "--jobs", "0"]) == 1
+    assert main([*argv, "--jobs", "0"]) == 1
     records = json.loads(capsys.readouterr().out)["records"]
     assert [each["outcome"] for each in records] == ["pass", "error"]
     assert (
@@ -187,9 +187,9 @@ def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, s
 
 
 def test_status_of_help_and_no_command(capsys):
-    assert main.main([]) == 2
-    assert main.main(["--help"]) == 0
-    assert main.main(["run", "--help"]) == 0
+    assert main([]) == 2
+    assert main(["--help"]) == 0
+    assert main(["run", "--help"]) == 0
 
 
 @pytest.mark.parametrize(

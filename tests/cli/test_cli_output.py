@@ -8,7 +8,7 @@ import sys
 import xml.etree.ElementTree as ET
 
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.harness.execution import error_text
 from kincheck.core.harness.record import from_json
 from kincheck.core.harness.results_file import read_results
@@ -92,9 +92,7 @@ def test_contradictory_length_is_noted_in_results(tmp_path, capsys, length, told
     file, out = tmp_path / "rod.toml", tmp_path / "out"
     file.write_text(ROD.replace("LENGTH", length))
     assert (
-        main.main(
-            f"run {file} --engine native --out {out} --markdown {tmp_path / 'rod.md'}".split()
-        )
+        main(f"run {file} --engine native --out {out} --markdown {tmp_path / 'rod.md'}".split())
         == 2
     )
     note = (
@@ -124,12 +122,12 @@ def test_contradictory_length_is_noted_by_explain(tmp_path, capsys, length):
         ["explain", str(file)],
         f"sweep {file} --vary {vary} --out {out}".split(),
     ):
-        assert main.main(command) == 0
+        assert main(command) == 0
         assert (f"\nnote: {note}" in capsys.readouterr().out) is told
     assert (
         "Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()
     ) is told
-    assert main.main(f"run {file} --engine native --explain".split()) == 2
+    assert main(f"run {file} --engine native --explain".split()) == 2
     assert (f"\n  note: {note}" in capsys.readouterr().out) is told
 
 
@@ -139,7 +137,7 @@ def test_unsolvable_case_is_explained_beside_others(tmp_path, capsys):
     )
     (tmp_path / "rod.toml").write_text(ROD.replace("LENGTH", "1.0"))
     files = [str(tmp_path / f"{name}.toml") for name in ("far", "rod")]
-    assert main.main(["run", *files, "--engine", "native", "--explain"]) == 2
+    assert main(["run", *files, "--engine", "native", "--explain"]) == 2
     printed = capsys.readouterr().out
     assert (
         "\nfar: cannot be solved: mechanism 'far' does not close at the design position" in printed

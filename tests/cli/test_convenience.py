@@ -9,8 +9,8 @@ import sys
 import pytest
 from kincheck import cases
 from kincheck.core import Revolute
-from kincheck.core.cli import main
 from kincheck.core.cli.joint_loading import named_joint
+from kincheck.core.cli.main import main
 from kincheck.core.harness.provenance import truth_of
 from kincheck.core.options import whole
 from kincheck.core.report.terminal import Meter, columns, console
@@ -77,7 +77,7 @@ def test_quiet_and_verbose(kincheck_main, capsys):
     ],
 )
 def test_mistakes_name_the_command_and_the_remedy(line, said, capsys):
-    assert main.main(line.split()) == 2
+    assert main(line.split()) == 2
     found = capsys.readouterr().err
     assert said in found
     assert len(found.splitlines()) == 2
@@ -150,7 +150,7 @@ echo "${{COMPREPLY[@]}}"
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
     pytest.importorskip("shtab")
-    assert main.main(["completion", "bash"]) == 0
+    assert main(["completion", "bash"]) == 0
     (script := tmp_path / "script").write_text(capsys.readouterr().out)
     for words, expected in (
         ("kincheck exp", "export explain"),
@@ -173,7 +173,7 @@ def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
 def test_lists_fit_the_console_and_keep_every_word(argv, capsys, monkeypatch):
     def words(width):
         monkeypatch.setenv("COLUMNS", str(width))
-        assert main.main(argv) == 0
+        assert main(argv) == 0
         lines = capsys.readouterr().out.splitlines()
         assert max(map(len, lines)) <= width or width == 200
         return sorted(" ".join(lines).split())
@@ -245,10 +245,10 @@ half_width = 0.1
 
 def test_run_and_study_say_why_a_force_has_no_value(tmp_path, capsys):
     (case := tmp_path / "two_hinges.toml").write_text(UNDETERMINED)
-    main.main(f"run {case} --engine native -v".split())
+    main(f"run {case} --engine native -v".split())
     assert "hinge: samples without a value are null; rigid bodies do not" in capsys.readouterr().out
     (varied := tmp_path / "mass.toml").write_text(VARIED)
-    assert main.main(f"sweep {case} --vary {varied} --samples 4 -q".split()) == 0
+    assert main(f"sweep {case} --vary {varied} --samples 4 -q".split()) == 0
     out = capsys.readouterr().out
     assert "no variant has a value of hinge; kincheck run CASE --engine native --verbose" in out
     assert "None" not in out
@@ -270,7 +270,7 @@ def test_repr_of_case_is_one_line():
     ],
 )
 def test_check_joint_knows_the_names_of_built_in_joints(name, said, capsys):
-    assert main.main(["check-joint", name]) == 2
+    assert main(["check-joint", name]) == 2
     assert said in capsys.readouterr().err
 
 
