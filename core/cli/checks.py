@@ -101,7 +101,7 @@ class CheckEngine(Command):
             KincheckError: there is no such engine, or a member of the engine protocol is missing.
         """
         from ..harness.standard import STANDARD
-        from ..recorded.program import ProgramEngine
+        from ..recorded.engine import ProgramEngine
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine
 

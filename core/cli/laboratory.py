@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..studies.bench.engines import Bench
     from ..studies.stress.families import Family
-    from ..studies.stress.results import Stress
+    from ..studies.stress.run import Stress
 
 
 SEED = 943745
@@ -92,6 +92,8 @@ class BenchEngines(Command):
 
 
 def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -> int:
+    from msgspec.structs import replace
+
     from ..extras import THREADS
     from ..harness.record import Outcome
     from ..report.sections import deliver
@@ -139,7 +141,7 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
         if formulation:
             meter("formulation", 1.0)
             rows = bench_formulation.measure(registry.case(STRUT), SEED, bench_formulation.STATES)
-            found = bench_engines.with_formulation(found, rows)
+            found = replace(found, formulation=rows)
     deliver(report(found), found, out=options.out, json=options.json)
     missing = {
         entry.engine

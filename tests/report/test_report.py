@@ -16,7 +16,7 @@ from kincheck.core.harness.record import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
 from kincheck.core.report.sections import parted
-from kincheck.core.studies.bench.ring import ring
+from kincheck.core.studies.bench.size import ring
 from msgspec.structs import replace
 
 from ..kinematics.test_chain import chain

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...case.compliance import Load
+from ...case.case import Load
 from ...errors import number_of
 from ...harness.record import Record, Results
 from ...report.axis import ZERO
