@@ -161,7 +161,7 @@ class ProveReferences(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import written
+        from ..case.io.atomic_files import unwritable, written
         from ..harness.record import to_json
         from ..report.terminal import indented, page
         from ..studies.verified_reference import prove_case
@@ -169,8 +169,13 @@ class ProveReferences(Command):
         unread: dict[str, str] = {}
         cases = registry.find_cases(self.case or [*registry.cases()], unread)
         names = [f"{file_name(case.name)}.reference.json" for case in cases]
-        refuse([*unread.values(), *self.unwritable(*names)])
-        complete, problems = True, list[str]()
+        problems = [*unread.values(), *self.unwritable(*names)]
+        if self.out is not None and not problems:  # two cases of one file
+            problems += unwritable(
+                (case.name, self.out / name) for case, name in zip(cases, names, strict=True)
+            )
+        refuse(problems)
+        complete = True
         for case, name in zip(cases, names, strict=True):
             numbers = "decimal" if self.decimal else "double"
             found, errors = prove_case(case, digits=self.digits, numbers=numbers, tol=TOL)

@@ -203,7 +203,13 @@ class Sweep(Command):
             problems.append(
                 "--scheduler: the cluster decides the number of threads. Leave out --jobs."
             )
-        problems += replay_problems(self)
+        latin = self.sampling is Sampling.LATIN
+        if self.replay and latin and self.samples is None:
+            problems.append(
+                "--replay: a Latin hypercube depends on the number of variants. Give --samples."
+            )
+        if self.replay and not latin and self.samples is not None:
+            problems.append("--replay: seed and index identify a variant. Leave out --samples.")
         if self.replay and (self.store or self.scheduler):
             problems.append(
                 "--replay solves in this process and stores nothing. Leave out --store and"
@@ -378,20 +384,6 @@ def limited(options: Sweep, variation: Variation, whole: Case, case: Case) -> Va
             [f"limits of {', '.join(left_out)}: left out, as --output leaves out these outputs"]
         )
     return replace(variation, limits=tuple(kept.values()))
-
-
-def replay_problems(options: Sweep) -> list[str]:
-    """Return the problems of a replay: a Latin hypercube depends on the number of variants."""
-    if not options.replay:
-        return []
-    if options.sampling is Sampling.LATIN:
-        if options.samples is None:
-            return [
-                "--replay: a Latin hypercube depends on the number of variants. Give --samples."
-            ]
-    elif options.samples is not None:
-        return ["--replay: seed and index identify a variant. Leave out --samples."]
-    return []
 
 
 def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | None) -> int:

@@ -286,7 +286,12 @@ class LiveTable(LiveFile):
             designs.solve(_geometry(case), TOL)
             return designs
 
-        with _at_once():  # otherwise an edit in between waits for the compiler
+        at_once: AbstractContextManager[None] = nullcontext()
+        if available():
+            from ..program.llvm.jit import compiled_at_once
+
+            at_once = compiled_at_once()
+        with at_once:  # otherwise an edit in between waits for the compiler
             designs = prepared(path)
             self._held = {
                 alone: prepared(_in_parts(held_case(case, alone).sweep.path))
@@ -339,7 +344,12 @@ class LiveTable(LiveFile):
                 if alone in self._held:
                     fine = self._held[alone].solve(geometry, TOL)
                     held = replace(fine, kept=fine.kept[:, ::PARTS], solved=fine.solved[::PARTS])
-                    known = held.solved & _same_place(case, designs, found, held)
+                    off = [
+                        np.abs(designs.motion(found, name)[0] - designs.motion(held, name)[0])
+                        for name in names
+                    ]
+                    # at one place: not in another assembly
+                    known = held.solved & (np.max(off, axis=(0, 1)) <= SAME_POSE * size(case))
                 at = {
                     name: Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
                     for name in names
@@ -441,25 +451,6 @@ def _in_parts(path: Way) -> Way:
     samples = np.arange(len(path.times))
     parts = np.arange(PARTS * (len(samples) - 1) + 1) / PARTS
     return replace(path, times=np.interp(parts, samples, path.times))
-
-
-def _same_place(
-    case: Case, designs: PreparedDesigns, found: Variants, held: Variants
-) -> NDArray[np.bool_]:
-    """Return whether two solutions have the points at one place: not in another assembly."""
-    off = [
-        np.abs(designs.motion(found, name)[0] - designs.motion(held, name)[0]).max(axis=0)
-        for name in without_forces(case).points
-    ]
-    return np.max(off, axis=0) <= SAME_POSE * size(case)
-
-
-def _at_once() -> AbstractContextManager[None]:
-    if not available():
-        return nullcontext()
-    from ..program.llvm.jit import compiled_at_once
-
-    return compiled_at_once()
 
 
 def _by_place(sizes: Mapping[str, int], geometry: Array) -> dict[str, Array]:

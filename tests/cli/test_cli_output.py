@@ -25,9 +25,7 @@ def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
         os.write(1, b"from the file descriptor\n")
         return off("position", lambda p: p)(case)
 
-    assert (
-        kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
-    )
+    assert kincheck_main("run crank --json -", engines=[Fake("native", answer=chatty)]) == 0
     captured = capfd.readouterr()
     assert len(from_json(captured.out.encode()).records) == 1
     for text in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
@@ -158,7 +156,7 @@ def test_out_of_memory_names_the_limit(monkeypatch):
 
 def test_run_table_shows_every_outcome(kincheck_main, capsys):
     engines = [RIGHT, WRONG, PARTIAL, BROKEN, MISSING, UNABLE]
-    assert kincheck_main("run", "crank", engines=engines) == 1
+    assert kincheck_main("run crank", engines=engines) == 1
     captured = capsys.readouterr()
     rows = {line.split()[1]: line for line in captured.out.splitlines() if line.startswith("crank")}
     assert "pass" in rows["native"]
@@ -185,9 +183,7 @@ def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
     out = tmp_path / "made" / "here"
     assert (
         kincheck_main(
-            "run",
-            "crank",
-            "--out",
+            "run crank --out",
             out,
             "--json",
             tmp_path / "r.json",
@@ -211,7 +207,7 @@ def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
 def test_unwritable_destination_is_found_first(kincheck_main, capsys, tmp_path, option, name):
     (tmp_path / "file").write_text("here already")
     RIGHT.solves = 0
-    assert kincheck_main("run", "crank", option, tmp_path / name) == 2
+    assert kincheck_main("run crank", option, tmp_path / name) == 2
     captured = capsys.readouterr()
     assert captured.err.startswith(f"kincheck: {option} ")
     assert len(captured.err.splitlines()) == 1
@@ -238,7 +234,7 @@ def test_internal_defect_has_status_2(kincheck_main, capsys, monkeypatch):
 @pytest.mark.parametrize("option", ["--junit", "--markdown"])
 def test_standard_output_takes_json_alone(kincheck_main, capsys, option, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert kincheck_main("run", "crank", option, "-", engines=[RIGHT]) == 2
+    assert kincheck_main("run crank", option, "-", engines=[RIGHT]) == 2
     assert (
         f"{option} -: standard output takes the document of --json alone" in capsys.readouterr().err
     )

@@ -32,14 +32,14 @@ def test_whole_numbers_refuse_other_values(text):
 
 
 def test_a_pattern_names_all_cases_that_match(kincheck_main, capsys):
-    assert kincheck_main("run", "crank*", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank*", engines=[RIGHT]) == 0
     assert "2 pass" in capsys.readouterr().out
-    assert kincheck_main("run", "crank_?wo", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank_?wo", engines=[RIGHT]) == 0
     assert "1 pass" in capsys.readouterr().out
 
 
 def test_a_command_for_one_case_refuses_a_pattern_of_several(kincheck_main, capsys):
-    assert kincheck_main("explain", "cran*", engines=[RIGHT]) == 2
+    assert kincheck_main("explain cran*", engines=[RIGHT]) == 2
     said = capsys.readouterr().err
     assert "'cran*' matches 2 cases: crank, crank_two. Name one of them" in said
 
@@ -52,13 +52,13 @@ def test_a_pattern_names_files_too(kincheck_main, tmp_path, capsys):
 
 
 def test_quiet_and_verbose(kincheck_main, capsys):
-    assert kincheck_main("run", "crank", "-q", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank -q", engines=[RIGHT]) == 0
     assert capsys.readouterr() == ("1 pass\n", "")
-    assert kincheck_main("run", "crank", "-v", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank -v", engines=[RIGHT]) == 0
     out = capsys.readouterr().out
     assert re.search(r"crank +native +x +\S+ of \S+ +\S+ of", out)
     assert re.search(r"^case +engine +output +position +velocity", out, re.MULTILINE)
-    assert kincheck_main("list", "-q", engines=[RIGHT]) == 0
+    assert kincheck_main("list -q", engines=[RIGHT]) == 0
     assert capsys.readouterr().out.split() == ["crank", "crank_two", "native"]
 
 
@@ -103,7 +103,7 @@ def test_records_stand_below_their_case_on_a_narrow_console(
     kincheck_main, capsys, monkeypatch, width
 ):
     monkeypatch.setenv("COLUMNS", str(width))
-    assert kincheck_main("run", "crank", engines=[RIGHT, Fake("twin")]) == 0
+    assert kincheck_main("run crank", engines=[RIGHT, Fake("twin")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= width
     assert sum("crank" in line for line in lines) == (2 if width == 200 else 1)
@@ -188,10 +188,10 @@ def test_the_tables_of_every_output_and_of_its_history_fit(
     monkeypatch.setenv("COLUMNS", str(width))
     history = ("--history", tmp_path / "runs.sqlite")
     engines = [RIGHT, Fake("a-twin-with-a-long-name")]
-    assert kincheck_main("run", "crank", "--verbose", *history, engines=engines) == 0
+    assert kincheck_main("run crank --verbose", *history, engines=engines) == 0
     out = capsys.readouterr().out
     assert kincheck_main("history", *history, engines=engines) == 0
-    assert kincheck_main("history", "--case", "crank", *history, engines=engines) == 0
+    assert kincheck_main("history --case crank", *history, engines=engines) == 0
     assert max(map(len, (out + capsys.readouterr().out).splitlines())) <= width
     assert out.count("0.0e+00 of ") == 12  # two outputs of two engines, three orders each
 
