@@ -142,12 +142,7 @@ class Mechanism:
             who, key = str(coupler), f"joints.{coupler.name}.joints"
             for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
                 joint = self._require("joint", who, name, key)
-                if freedom not in joint.freedoms:
-                    raise MechanismError(
-                        f"{who}: joint {name!r} is {joint.type} and has no {freedom} to couple; "
-                        f"its freedoms: {', '.join(joint.freedoms) or 'none'}",
-                        key,
-                    )
+                _require_freedom(who, joint, freedom, f"{freedom} to couple", key)
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
                 who, key = f"driver {driver.name!r}", f"drivers.{driver.name}.point"
@@ -160,7 +155,9 @@ class Mechanism:
                     )
             elif isinstance(driver, JointDriver):
                 who, key = f"driver {driver.name!r}", f"drivers.{driver.name}.joint"
-                driver.check(self._require("joint", who, driver.joint, key))
+                joint, wanted = self._require("joint", who, driver.joint, key), driver.freedom
+                who = f"{who} ({driver.type})"
+                _require_freedom(who, joint, wanted, f"{wanted} to drive", key)
         self._check_loads()
 
     def __repr__(self) -> str:
@@ -214,7 +211,8 @@ class Mechanism:
         for force in self.forces:
             key = f"forces.{force.name}"
             if isinstance(force, TorsionSpringDamper):
-                force.check(self._require("joint", str(force), force.joint, f"{key}.joint"))
+                joint = self._require("joint", str(force), force.joint, f"{key}.joint")
+                _require_freedom(str(force), joint, "rotation", "rotation", f"{key}.joint")
                 continue
             key = f"{key}.{'body' if len(force.bodies) == 1 else 'bodies'}"
             for name in force.bodies:
@@ -486,6 +484,15 @@ class Mechanism:
     def moving(self) -> tuple[Body, ...]:
         """The bodies not fixed, in order."""
         return tuple(body for body in self.bodies if not body.fixed)
+
+
+def _require_freedom(who: str, joint: Joint, freedom: str, missing: str, key: str) -> None:
+    if freedom not in joint.freedoms:
+        raise MechanismError(
+            f"{who}: joint {joint.name!r} is {joint.type} and has no {missing}; its freedoms:"
+            f" {', '.join(joint.freedoms) or 'none'}",
+            key,
+        )
 
 
 def extent(points: Sequence[Sequence[float]]) -> float:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import MechanismError
 from ..input_checks import finite, finite_numbers, held, require_direction
-from ..joints.base import Joint, Kind
+from ..joints.base import Kind
 from ..trajectory import Array
 from .formula import jet_of
 
@@ -402,15 +402,6 @@ class JointDriver(Driver):
     freedom: ClassVar[str]
     joint: str
     relative: bool = True
-
-    def check(self, joint: Joint) -> None:
-        """Raise MechanismError unless the joint has the freedom this driver drives."""
-        if self.freedom not in joint.freedoms:
-            raise MechanismError(
-                f"driver {self.name!r} ({self.type}): joint {joint.name!r} is {joint.type} and has"
-                f" no {self.freedom} to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}",
-                f"drivers.{self.name}.joint",
-            )
 
 
 @dataclass(frozen=True)

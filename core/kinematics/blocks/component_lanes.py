@@ -36,7 +36,7 @@ from ..compiled.request import (
 )
 from ..compiled.solution import Columns
 from ..continuation.singular_poses import SOUND, Anchor, Numbers
-from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
+from ..formulation.acceptance_criteria import doubtful
 from ..formulation.constraints import frames, structure
 from ..structure.components import Alike, components, described
 from ..structure.degrees_of_freedom import counted
@@ -225,36 +225,28 @@ class ComponentLanes(Lanes):
         """Return the columns of moving outputs with their rows of the world, and a column of the
         outputs at rest.
         """
-        request = self.request
-        every = Columns.of(request)
+        every = Columns(self.request)
         columns, rows, still = list[int](), list[int](), np.zeros((every.count, 1))
-
-        def add(
-            name: str,
-            part: int | None,
-            own: str,
-            labels: Sequence[str],
-            at_rest: Mapping[str, Sequence[float]],
-        ) -> None:
+        points = map(self.mechanism.point, self.request.points)
+        bodies = map(self.mechanism.body, self.request.bodies)
+        wanted: list[tuple[str, str, Sequence[str], Mapping[str, Sequence[float]]]] = [
+            *((x.name, x.body, QUANTITIES, {"position": x.position}) for x in points),
+            *((x.name, x.name, BODY, {"r": x.origin, "p": x.euler_parameters}) for x in bodies),
+        ]
+        for name, body, labels, at_rest in wanted:
+            part = self.part_of.get(body)
             for label in labels:
-                place = every.by_vector[f"{label} {name}"]
+                place = every.by_vector.get(f"{label} {name}")
+                if place is None:  # of a higher order
+                    continue
                 if part is None:
                     still[place, 0] = at_rest.get(label, STILL)
                     continue
                 kind, member = self.place[part]
+                which = self.parts[part].bodies if labels is BODY else self.parts[part].points
+                own = f"{'b' if labels is BODY else 'p'}{which.index(name)}"
                 columns.extend(range(place.start, place.stop))
                 rows.extend(kind.rows(f"{label} {own}", member))
-
-        for name in request.points:
-            point = self.mechanism.point(name)
-            part = self.part_of.get(point.body)
-            own = "" if part is None else f"p{self.parts[part].points.index(name)}"
-            add(name, part, own, QUANTITIES[: request.order + 1], {"position": point.position})
-        for name in request.bodies:
-            body, part = self.mechanism.body(name), self.part_of.get(name)
-            own = "" if part is None else f"b{self.parts[part].bodies.index(name)}"
-            at_rest = {"r": body.origin, "p": body.euler_parameters}
-            add(name, part, own, BODY[: 2 * (request.order + 1)], at_rest)
         return np.array(columns, np.intp), np.array(rows, np.intp), still
 
     def accept_by(self, limits: Mapping[str, float]) -> None:
@@ -315,8 +307,7 @@ class ComponentLanes(Lanes):
         state = np.stack([self._state(k) for k in at.tolist()], axis=1)
         sample = self._whole.sampled(self._times[at], path)[0]
         errors = self._whole.error_bounds(state, sample)
-        limit, found = AMPLIFIED * self._tol, zip(at.tolist(), errors.tolist(), strict=True)
-        return {k: error for k, error in found if not error <= limit}  # or it is no number
+        return self.refused(at, errors, self._tol)
 
     @cached_property
     def _whole(self) -> SparseLanes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from graphlib import TopologicalSorter
 from typing import Any, cast
 
@@ -50,6 +50,7 @@ class Section:
         unit: length unit [m].
         given: moving bodies that are solved elsewhere.
         joints: types of the joints.
+        settings: what the joints are besides their geometry: of equal joints.
         constraints: of the joints.
         drivers: the constraint of each driver.
         points: body, position [m] and arm [units] of those whose motion is wanted.
@@ -60,6 +61,7 @@ class Section:
     bodies: tuple[str, ...]
     given: tuple[str, ...]
     joints: tuple[str, ...]
+    settings: tuple[str, ...]
     constraints: tuple[Constraint | Relation, ...]
     drivers: Mapping[str, Constraint]
     points: Mapping[str, tuple[str, Vector, Vec3]]
@@ -226,6 +228,7 @@ def described(
             tuple(own.values()),
             tuple(numbered.values())[len(own) :],
             tuple(joint.type for joint in held),
+            tuple(map(_settings, held)),
             tuple(
                 renamed(
                     c, f"j{n}", numbered, [f"j{n}{x[len(c.owner) :]}" for x in coordinates_of(c)]
@@ -247,6 +250,11 @@ def described(
         point_names = tuple(point.name for point in ends)
         found.append(Component(names, tuple(others), joint_names, point_names, section))
     return found
+
+
+def _settings(joint: Joint) -> str:
+    own = (each.name for each in fields(joint) if "kind" not in each.metadata)
+    return repr([getattr(joint, name) for name in own if name not in ("name", "i", "j")])
 
 
 def select_section(section: Section) -> Selection:
