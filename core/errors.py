@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager
 from itertools import islice
 
 from .failures import FailureKind
@@ -33,6 +34,15 @@ def refuse(problems: Iterable[str]) -> None:
     """Raise the problems as one KincheckError, if there are any."""
     if lines := [*problems]:
         raise KincheckError("\n".join(lines))
+
+
+@contextmanager
+def collected(problems: list[str]) -> Generator[None]:
+    """Add the lines of a KincheckError to the problems, and go on behind the block."""
+    try:
+        yield
+    except KincheckError as error:
+        problems += str(error).splitlines()
 
 
 class Phrase:

@@ -114,7 +114,7 @@ def in_folder(monkeypatch):
 
 @pytest.fixture
 def kincheck_main(monkeypatch):
-    """main() with the cases and engines of the test."""
+    """main() with the cases and engines of the test; its first argument may hold several words."""
 
     def main(*argv, engines=(NATIVE,), cases=None, jobs="0"):
         cases = {"crank": crank(), "crank_two": crank("crank_two")} if cases is None else cases
@@ -129,6 +129,8 @@ def kincheck_main(monkeypatch):
         monkeypatch.setattr(kincheck.cases, "summary", about.__getitem__)
         # in this process, to which fakes with answers of their own belong; isolation has a room of
         # its own
-        return cli.main([*map(str, argv), *(["--jobs", jobs] if argv[0] == "run" and jobs else [])])
+        first, *others = argv
+        words = [*first.split(), *map(str, others)]
+        return cli.main([*words, *(["--jobs", jobs] if words[0] == "run" and jobs else [])])
 
     return main

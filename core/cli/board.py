@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..errors import KincheckError, refuse
 from ..extras import ENVIRONMENTS
@@ -32,7 +32,7 @@ class CompareSteppers(Command):
     all of its work.
     """
 
-    about: ClassVar[str] = "measure how well engines step the free motion of closed loops"
+    about = "measure how well engines step the free motion of closed loops"
     engine: tuple[str, ...] = option(
         "engines to step with; default: all", metavar="NAME", several="together"
     )

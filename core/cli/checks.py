@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..case.io.escape import file_name, visible
 from ..errors import KincheckError, refuse
@@ -38,7 +38,7 @@ class CheckJoint(Command):
     in every engine.
     """
 
-    about: ClassVar[str] = "check your own joint type, or a built-in one"
+    about = "check your own joint type, or a built-in one"
     joint: str = argument(
         "a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
         " built-in type, such as revolute",
@@ -80,7 +80,7 @@ class CheckEngine(Command):
     refusals, and repeated answers. Each pair is solved in a worker process.
     """
 
-    about: ClassVar[str] = "check your own engine"
+    about = "check your own engine"
     engine: str | Engine | None = argument(
         "the class, in a module of this folder or an installed one; or an engine's name",
         "MODULE:CLASS",
@@ -140,7 +140,7 @@ class ProveReferences(Command):
     do its work.
     """
 
-    about: ClassVar[str] = "prove the samples of cases to any number of digits"
+    about = "prove the samples of cases to any number of digits"
     case: tuple[str, ...] = argument(CASES, "CASE", "*")
     joint_type: tuple[str, ...] = joint_types()
     out: Path | None = destination(
@@ -161,7 +161,7 @@ class ProveReferences(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import written
+        from ..case.io.atomic_files import unwritable, written
         from ..harness.record import to_json
         from ..report.terminal import indented, page
         from ..studies.verified_reference import prove_case
@@ -169,8 +169,13 @@ class ProveReferences(Command):
         unread: dict[str, str] = {}
         cases = registry.find_cases(self.case or [*registry.cases()], unread)
         names = [f"{file_name(case.name)}.reference.json" for case in cases]
-        refuse([*unread.values(), *self.unwritable(*names)])
-        complete, problems = True, list[str]()
+        problems = [*unread.values(), *self.unwritable(*names)]
+        if self.out is not None and not problems:  # two cases of one file
+            problems += unwritable(
+                (case.name, self.out / name) for case, name in zip(cases, names, strict=True)
+            )
+        refuse(problems)
+        complete = True
         for case, name in zip(cases, names, strict=True):
             numbers = "decimal" if self.decimal else "double"
             found, errors = prove_case(case, digits=self.digits, numbers=numbers, tol=TOL)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, refuse
+from ..errors import KincheckError, collected, refuse
 from ..options import (
     argument,
     destination,
@@ -42,7 +42,7 @@ class Compare(Command):
     reach all samples (what it reaches is compared), or the tool could not do its work.
     """
 
-    about: ClassVar[str] = "two hardpoint tables or more: differing points, and curves over curves"
+    about = "two hardpoint tables or more: differing points, and curves over curves"
     cases: Sequence[str | Path | Case] = argument(
         "hardpoint tables or suspension cases; the others are compared with the first", "CASE", "+"
     )
@@ -143,10 +143,8 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
     cases: list[Case] = []
     problems: list[str] = []
     for each in given:
-        try:
+        with collected(problems):
             cases.append(registry.find_case(each, options.supplied))
-        except KincheckError as error:
-            problems.append(str(error))
     refuse(problems)
     several = len({case.name for case in cases}) < len(cases)
     first = cases[0].sweep

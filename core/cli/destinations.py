@@ -123,23 +123,15 @@ def deliver(
             (file, partial(write_curves, results, kind=kind, long=bool(given.get("long"))))
             for kind, file in curves.items()
         ]
+
+    def write_page(path: Path) -> None:
+        from ..report.report import WITHOUT_TRENDS, write_report
+
+        past = None if history is None else history()
+        # a damaged history is a note in place of the trends
+        limits = [WITHOUT_TRENDS] if history is not None and past is None else []
+        write_report(results, path, history=past, precision=precision, limits=limits)
+
     if out is not None:
-        contents.append((out / "results.json", encoded))
-        contents.append(
-            (out / "report.html", lambda path: _write_page(results, path, precision, history))
-        )
+        contents += [(out / "results.json", encoded), (out / "report.html", write_page)]
     problems += terminal.deliver(contents, encoded, json, partial(show or print_table, results))
-
-
-def _write_page(
-    results: Results,
-    path: Path,
-    precision: Mapping[str, Sequence[Effort]] | None,
-    history: Callable[[], Trends] | None,
-) -> None:
-    """Write the report; for a damaged history, write a note in place of the trends."""
-    from ..report.report import WITHOUT_TRENDS, write_report
-
-    past = None if history is None else history()
-    limits = [WITHOUT_TRENDS] if history is not None and past is None else []
-    write_report(results, path, history=past, precision=precision, limits=limits)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..errors import refuse
 from ..options import (
@@ -30,7 +30,7 @@ class Doctor(Command):
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """
 
-    about: ClassVar[str] = "list installed and missing parts, and test the installation"
+    about = "list installed and missing parts, and test the installation"
     json: str | None = json_file("the findings")
     quiet: bool = verbosity("print only the verdict and the essential missing parts")
 

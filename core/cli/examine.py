@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, number_of, refuse, unknown
@@ -48,7 +48,7 @@ class Explain(Command):
     not do its work.
     """
 
-    about: ClassVar[str] = "diagnose a case: freedom, conditioning, tolerances"
+    about = "diagnose a case: freedom, conditioning, tolerances"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     samples: int = option(
         "number of samples of the sweep to examine; default %(default)s", whole(1), "N", default=41
@@ -106,7 +106,7 @@ class Trace(Command):
     before; 2 the tool could not do its work.
     """
 
-    about: ClassVar[str] = "follow a motion past lock-ups; find limit and branch points"
+    about = "follow a motion past lock-ups; find limit and branch points"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     driver: str | None = option(
         "driver whose value follows from the motion; default: the swept driver",
@@ -207,7 +207,7 @@ class ListAssemblies(Command):
     Exit status: 0 assemblies are found, 1 none is found, 2 the tool could not do its work.
     """
 
-    about: ClassVar[str] = "list assemblies of a mechanism, found from random starts"
+    about = "list assemblies of a mechanism, found from random starts"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     at: str | None = option(
         "value of the swept driver, such as 30mm or -20deg, in SI without a unit; default: the"
@@ -322,7 +322,7 @@ class MoveFreely(Command):
     integrated; 1 it ends before, at a change point; 2 the tool could not do its work.
     """
 
-    about: ClassVar[str] = "move a case without drivers, by its masses and loads, to round-off"
+    about = "move a case without drivers, by its masses and loads, to round-off"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     duration: float | None = option(
         "of the motion [s]; default: of [free]", positive, "T", default=None

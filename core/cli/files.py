@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.escape import file_name
 from ..case.io.reader_options import Supplied
@@ -55,7 +55,7 @@ class Export(Command):
     A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
 
-    about: ClassVar[str] = "write a mechanism for a simulator"
+    about = "write a mechanism for a simulator"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     to: str = destination(formats(), metavar="FORMAT", required=True)
     out: Path | None = destination(
@@ -127,7 +127,7 @@ class Import(Command):
     Numbers are in SI units and keep all their digits.
     """
 
-    about: ClassVar[str] = "write the case file of a model or a table of hardpoints"
+    about = "write the case file of a model or a table of hardpoints"
     case: tuple[str, ...] = argument(
         "model, table of hardpoints, or case file, as `run` reads it", "FILE", "*"
     )
@@ -188,8 +188,8 @@ class Same(Command):
     not read.
     """
 
-    about: ClassVar[str] = "compare files: the same mechanism, what is lost, or how it differs"
-    one_thread: ClassVar[bool] = True
+    about = "compare files: the same mechanism, what is lost, or how it differs"
+    one_thread = True
     files: tuple[str, ...] = argument(
         "models and case files of any formats, or names of built-in cases; the first is"
         " compared with each of the others",
@@ -293,7 +293,7 @@ class PrintTemplates(Command):
     meanings.
     """
 
-    about: ClassVar[str] = "print a sample table of hardpoints for each suspension template"
+    about = "print a sample table of hardpoints for each suspension template"
     template: tuple[str, ...] = argument("print only these; default: all", "NAME", "*")
     bushings: bool = switch(
         "print a file of bushings by role, for kincheck kc TABLE --bushings FILE"

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ..errors import KincheckError, refuse, unknown
 from ..options import argument, destination, json_file, option, options, switch, verbosity, whole
@@ -33,7 +33,7 @@ class ListRuns(Command):
     runs, and their steps.
     """
 
-    about: ClassVar[str] = "list the stored runs, their trends and their steps"
+    about = "list the stored runs, their trends and their steps"
     history: Path | None = destination(f"history file, {WRITTEN}", Path, environment=HISTORY)
     case: tuple[str, ...] = option("trends of these cases only", metavar="NAME", several="together")
     engine: tuple[str, ...] = option(
@@ -183,7 +183,7 @@ class ReportChanges(Command):
     Exit status: 0 no regression, 1 a regression, 2 the tool could not do its work.
     """
 
-    about: ClassVar[str] = "report the changes since another run"
+    about = "report the changes since another run"
     subject: str | None = argument(
         "number of a run in the history, or a results.json; default: the latest run, or an"
         " earlier one of another selection that failed and was not green since",

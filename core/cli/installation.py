@@ -19,7 +19,7 @@ from ..case.case import Case
 from ..extras import how_to_add, how_to_install, python_of
 from ..harness.engine import PATIENCE, Engine
 from ..harness.provenance import circumstances
-from ..harness.record import Outcome, Record
+from ..harness.record import Outcome
 from ..harness.run import run
 from ..program import disk_cache
 from ..program.llvm import compiler
@@ -95,8 +95,8 @@ class Machine(msgspec.Struct, frozen=True):
 
 
 class Check(msgspec.Struct, frozen=True):
-    """Result of the self-check. error: largest error against the reference [unit of its output],
-    with its tolerance.
+    """Result of the self-check. error: position error against the reference, the largest over its
+    tolerance [unit of its output], with the tolerance.
     """
 
     case: str
@@ -134,6 +134,18 @@ def examine(
         apart: requirements of steppers that have environments of their own, by engine.
     """
     problem = _cache_problem()
+    (record,) = run([case], [native], tol=tol).records
+    found = [each.position for each in record.errors.values() if each.position is not None]
+    worst = max(found, key=lambda each: each.ratio, default=None)
+    check = Check(
+        case.name,
+        record.outcome,
+        record.message,
+        worst and worst.max_abs,
+        worst and worst.tolerance,
+        record.us_per_step,
+        record.loop,
+    )
     about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
     machine = Machine(
         about["python"],
@@ -150,9 +162,7 @@ def examine(
         0 if problem else disk_cache.size(),
         problem,
     )
-    return Examination(
-        SCHEMA, about["kincheck"], parts(engines, apart), machine, _check(case, native, tol)
-    )
+    return Examination(SCHEMA, about["kincheck"], parts(engines, apart), machine, check)
 
 
 def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
@@ -281,20 +291,3 @@ def _cache_problem() -> str:
             return ""
     except OSError as error:
         return f"{error.strerror}; {remedy}"
-
-
-def _check(case: Case, native: Engine, tol: float) -> Check:
-    (record,) = run([case], [native], tol=tol).records
-    error, tolerance = _largest(record)
-    return Check(
-        case.name, record.outcome, record.message, error, tolerance, record.us_per_step, record.loop
-    )
-
-
-def _largest(record: Record) -> tuple[float | None, float | None]:
-    """Return the position error that is largest relative to its tolerance, and the tolerance."""
-    found = [each.position for each in record.errors.values() if each.position is not None]
-    if not found:
-        return None, None
-    worst = max(found, key=lambda each: each.ratio)
-    return worst.max_abs, worst.tolerance

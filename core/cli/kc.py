@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import HARDPOINTS, Supplied
 from ..errors import KincheckError, refuse
@@ -57,7 +57,7 @@ class MeasureCompliance(Isolated):
     one, or the tool could not do its work.
     """
 
-    about: ClassVar[str] = "kinematics and compliance: equilibria on bushings over travel and loads"
+    about = "kinematics and compliance: equilibria on bushings over travel and loads"
     case: str = argument(
         "name of a built-in case, or path to a case file or a hardpoint table", "CASE"
     )
@@ -142,8 +142,7 @@ class MeasureCompliance(Isolated):
         problems += views.failures(results)
         problems += lacking(checked, (), named) if checked else []
         refuse(problems)
-        bad = checked is not None and any(each.outcome.bad for each in checked.records)
-        return Status.DEVIATES if bad else Status.WITHIN
+        return Status.of(checked) if checked is not None else Status.WITHIN
 
     def _engines(self, registry: Registry, problems: list[str]) -> list[Engine]:
         """Return native and the named engines; none if nothing is to be checked or stored."""

@@ -57,7 +57,7 @@ class BenchEngines(Command):
     take turns in one process.
     """
 
-    about: ClassVar[str] = "run time against error, batch and mechanism size, first use, memory"
+    about = "run time against error, batch and mechanism size, first use, memory"
     cases: tuple[str, ...] = option(
         f"built-in names, patterns, or case files; all: every built-in case; default: {STRUT}",
         metavar="CASE",
@@ -165,7 +165,7 @@ class BenchFormulation(Command):
     sweep. This needs mpmath.
     """
 
-    about: ClassVar[str] = "operation counts and round-off of the paper's rows"
+    about = "operation counts and round-off of the paper's rows"
     seed: int = option(
         "seed of the random states; default %(default)s", whole(0), "N", default=SEED
     )
@@ -191,9 +191,7 @@ class BenchCompliance(Command):
     of many samples: travel and lateral force on a grid.
     """
 
-    about: ClassVar[str] = (
-        "equilibria and compliance matrices of a suspension, many samples together"
-    )
+    about = "equilibria and compliance matrices of a suspension, many samples together"
     case: str = argument("case file of kincheck kc", "CASE")
     rounds: int = option("rounds; default %(default)s", whole(1), "N", default=ROUNDS)
     json: str | None = json_file()
@@ -213,7 +211,7 @@ class BenchCompliance(Command):
 class BenchAll(Command):
     """Measure the engines on a few cases, and the formulation. This takes some minutes."""
 
-    about: ClassVar[str] = "measure the engines, the formulation and its programs"
+    about = "measure the engines, the formulation and its programs"
     below: ClassVar[Mapping[str, type[Command]]] = {
         "engines": BenchEngines,
         "formulation": BenchFormulation,
@@ -244,7 +242,7 @@ class StressEngines(Command):
     could not do its work, or an engine supports none of the samples.
     """
 
-    about: ClassVar[str] = "stress-test engines with random degenerate mechanisms"
+    about = "stress-test engines with random degenerate mechanisms"
     family: tuple[str, ...] = option("default: all families", metavar="NAME", several="together")
     list: bool = switch("list the families")
     samples: int | None = option(

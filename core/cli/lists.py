@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -36,7 +36,7 @@ class List(Command):
     the installed versions (kincheck doctor also imports them); or list the keys and types of files.
     """
 
-    about: ClassVar[str] = "list cases and engines"
+    about = "list cases and engines"
     schema: bool = switch("list the keys of a case file, and of a file of variations")
     joints: bool = switch("list the types a case file can name: joints, drivers, motions")
     outputs: bool = switch("list the types of outputs a case file can name, with their signs")
@@ -46,6 +46,7 @@ class List(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ..harness.engine import versions
         from ..report.terminal import page
 
         console = page(None)
@@ -70,7 +71,9 @@ class List(Command):
         ]
         width = max(len(engine.name) for engine in engines)
         for engine in engines:
-            version = _version(engine)
+            # a simulator with an extra is not imported
+            name = engine.name
+            version = installed_version(name) if is_extra(name) else versions([engine])[0]
             state = (
                 f"not installed: {how_to_install(engine.name)}"
                 if version is None
@@ -78,13 +81,6 @@ class List(Command):
             )
             console.print(f"  {engine.name:{width}}  {state}", soft_wrap=True)
         return Status.WITHIN
-
-
-def _version(engine: Engine) -> str | None:
-    """Return the installed version of an engine; a simulator with an extra is not imported."""
-    from ..harness.engine import versions
-
-    return installed_version(engine.name) if is_extra(engine.name) else versions([engine])[0]
 
 
 def _print_references(options: List, console: Console) -> None:
@@ -178,7 +174,7 @@ class PrintSchema(Command):
     reader and writer.
     """
 
-    about: ClassVar[str] = "print the JSON Schema of a file"
+    about = "print the JSON Schema of a file"
     name: str = argument(
         f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
         "NAME",
@@ -214,8 +210,8 @@ class Completion(Command):
     files. Repeat this after an update.
     """
 
-    about: ClassVar[str] = "print the completion script of a shell"
-    epilog: ClassVar[str | None] = (
+    about = "print the completion script of a shell"
+    epilog = (
         "bash: echo 'eval \"$(kincheck completion bash)\"' >> ~/.bashrc. zsh: kincheck"
         " completion zsh > a folder of $fpath, as _kincheck. tcsh: kincheck completion tcsh >"
         " ~/.kincheck.tcsh, and source that in ~/.tcshrc. Then open a new shell."

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.io.model_writer import Writer
     from ..harness.engine import Engine
+    from ..harness.record import Results
 
 
 class Status(IntEnum):
@@ -32,6 +33,11 @@ class Status(IntEnum):
     WITHIN = 0
     DEVIATES = 1
     FAILED = 2
+
+    @classmethod
+    def of(cls, results: Results) -> Status:
+        """Return the status of complete results."""
+        return cls(any(record.outcome.bad for record in results.records))
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from os.path import exists
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import MOST_NAMED, KincheckError, SolveError, refuse, shortened
+from ..errors import MOST_NAMED, KincheckError, SolveError, collected, refuse, shortened
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -41,7 +42,7 @@ from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, WithRecordings,
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
-    from ..harness.record import Record, Results
+    from ..harness.record import Facts, Record, Results
     from ..history.runs import Keeping
     from .destinations import Trends
 
@@ -80,7 +81,7 @@ class Run(Isolated, WithRecordings):
     status if others are judged.
     """
 
-    about: ClassVar[str] = "solve cases with engines and judge the results"
+    about = "solve cases with engines and judge the results"
     cases: str | Path | Case | Sequence[str | Path | Case] | None = argument(
         CASES, "CASE", "*", default=()
     )
@@ -218,11 +219,7 @@ class Run(Isolated, WithRecordings):
             return stopped
         if problems or plan.unread:
             return Status.FAILED
-        return (
-            Status.DEVIATES
-            if any(record.outcome.bad for record in results.records)
-            else Status.WITHIN
-        )
+        return Status.of(results)
 
 
 def _shown(options: Run) -> Callable[[Results, TextIO], None]:
@@ -251,7 +248,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
         problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
     if options.bench is not None and options.out is None:
         problems.append("--bench adds to the report. Give --out DIR.")
-    tell = complain if options.command else _nothing
+    tell: Callable[[Iterable[str]], object] = complain if options.command else list
     unread: dict[str, str] = {}
     cases = _cases(options, registry, unread)
     if options.command:
@@ -263,7 +260,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
             f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
         )
     elif options.recorded:
-        try:
+        with collected(problems):
             cases[0], recorded = shared_options.recorded_engines(
                 options.recorded,
                 cases[0],
@@ -271,37 +268,32 @@ def _planned(options: Run, registry: Registry) -> _Plan:
                 analysis=options.analysis,
                 sheet=options.supplied.sheet,
             )
-        except KincheckError as error:
-            problems += str(error).splitlines()
     if not (options.reference or options.recorded or options.fmu):
         problems += filter(None, [options.curve.without_curve])
     if options.reference and not problems:
-        try:
+        with collected(problems):
             # a reference may name an unreadable case, which does not stop the others
             files = [*map(Path, several(options.reference))]
             cases, notes = judged(cases, files, options.curve, unused if unread else None)
             tell(notes)
             if notes and not options.command:
                 cases = [replace(cases[0], assembly=(*cases[0].assembly, *notes))]
-        except KincheckError as error:
-            problems += str(error).splitlines()
     engines = _engines(options, registry, problems)
     baseline = registry.baseline(engines)
-    if recorded and shared_options.undriven(cases[0]):
-        engines, baseline = [], None
+    if recorded:
+        from ..kinematics import degrees_of_freedom
+
+        mechanism = cases[0].mechanism
+        if degrees_of_freedom(mechanism) > len(mechanism.drivers):  # no engine can solve it
+            engines, baseline = [], None
     if options.fmu and options.jobs == 0:
         problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
-    try:
+    with collected(problems):
         foreign = shared_options.foreign_engines(options, cases, options.curve.columns)
         engines += [*foreign, *recorded]
-    except KincheckError as error:
-        problems += str(error).splitlines()
-    keys = [(engine.name, engine.mode) for engine in engines]
-    problems += [
-        f"engine {name}: found twice; rename one"
-        for name, mode in keys
-        if keys.count((name, mode)) > 1
-    ][:1]
+    keys = Counter((engine.name, engine.mode) for engine in engines)
+    twice = [name for (name, _), count in keys.items() if count > 1]
+    problems += [f"engine {name}: found twice; rename one" for name in twice[:1]]
     problems += options.unwritable(*REPORT)
     problems = problems or shared_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does
@@ -319,10 +311,6 @@ def _planned(options: Run, registry: Registry) -> _Plan:
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engines else [],
     )
-
-
-def _nothing(lines: object) -> None:
-    pass
 
 
 def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
@@ -526,7 +514,7 @@ def _keeping(
     return found, []
 
 
-def _known(path: Path, facts: Mapping[str, Any]) -> bool:
+def _known(path: Path, facts: Facts) -> bool:
     """Return whether a history has a run that was asked for the same."""
     from ..history.queries import same
     from ..history.store import Store

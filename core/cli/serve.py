@@ -6,7 +6,7 @@ import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import CurveOptions, Supplied
 from ..errors import KincheckError
@@ -33,7 +33,7 @@ class Serve(Command):
     cannot be used.
     """
 
-    about: ClassVar[str] = "edit a suspension or move a mechanism in a browser"
+    about = "edit a suspension or move a mechanism in a browser"
     case: str | Path | Case = argument(
         "table of hardpoints, case file, model, or built-in case", "FILE"
     )

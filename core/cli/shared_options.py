@@ -311,10 +311,3 @@ def recorded_engines(
         found = found or resampled.case
         engines.append(RecordedEngine(file.stem, samples, resampled, accuracy))
     return found or case, engines
-
-
-def undriven(case: Case) -> bool:
-    """Return whether a case has freedoms without a driver, so that no engine can solve it."""
-    from ..kinematics import degrees_of_freedom
-
-    return degrees_of_freedom(case.mechanism) > len(case.mechanism.drivers)

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, refuse, unknown
@@ -67,7 +67,7 @@ class Sweep(Command):
     status 130.
     """
 
-    about: ClassVar[str] = "solve many variants of a design"
+    about = "solve many variants of a design"
     case: str | Path | Case = argument(ONE_CASE, "CASE")
     variation: str | Path = option(
         "file that states what varies, and by how much (kincheck-vary/1)",
@@ -203,7 +203,13 @@ class Sweep(Command):
             problems.append(
                 "--scheduler: the cluster decides the number of threads. Leave out --jobs."
             )
-        problems += replay_problems(self)
+        latin = self.sampling is Sampling.LATIN
+        if self.replay and latin and self.samples is None:
+            problems.append(
+                "--replay: a Latin hypercube depends on the number of variants. Give --samples."
+            )
+        if self.replay and not latin and self.samples is not None:
+            problems.append("--replay: seed and index identify a variant. Leave out --samples.")
         if self.replay and (self.store or self.scheduler):
             problems.append(
                 "--replay solves in this process and stores nothing. Leave out --store and"
@@ -380,20 +386,6 @@ def limited(options: Sweep, variation: Variation, whole: Case, case: Case) -> Va
     return replace(variation, limits=tuple(kept.values()))
 
 
-def replay_problems(options: Sweep) -> list[str]:
-    """Return the problems of a replay: a Latin hypercube depends on the number of variants."""
-    if not options.replay:
-        return []
-    if options.sampling is Sampling.LATIN:
-        if options.samples is None:
-            return [
-                "--replay: a Latin hypercube depends on the number of variants. Give --samples."
-            ]
-    elif options.samples is not None:
-        return ["--replay: seed and index identify a variant. Leave out --samples."]
-    return []
-
-
 def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | None) -> int:
     """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
@@ -421,11 +413,7 @@ def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | No
     if engine is not None:
         problems += lacking(results, [], [engine.name]) + uncompared(results)
     complain(problems)
-    if problems:
-        return Status.FAILED
-    return (
-        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
-    )
+    return Status.FAILED if problems else Status.of(results)
 
 
 def checking_solver(options: Sweep, engine: Engine) -> Solver:

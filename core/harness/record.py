@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import msgspec
 import numpy as np
@@ -22,6 +22,8 @@ from ..trajectory import PER_TIME, QUANTITIES
 from .evidence import Evidence, Suspect
 from .scene_record import Scene
 
+Facts: TypeAlias = Mapping[str, Any]
+"""Circumstances of a run, or facts of a case, as `Results.run` has them."""
 USEFUL = ("toe", "camber", "caster", "roll_center_height", "half_track_change", "scrub_radius")
 """Outputs of a suspension that are drawn first."""
 FEW, SHOWN = 9, 6

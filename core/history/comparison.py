@@ -14,7 +14,7 @@ import msgspec
 
 from ..case.io.outputs import DEFAULT_ATOL
 from ..harness.labels import UNMADE, motion_unit, number
-from ..harness.record import Deviation, Outcome, OutputSeries, Record
+from ..harness.record import Deviation, Facts, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Finding, Kind, Loose, Regressions, Step, changes, same_machine
@@ -492,7 +492,7 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
             yield Finding.of(Kind.GONE, now, message, **each.place)
 
 
-def loose(history: History, cases: Mapping[str, Any]) -> list[Loose]:
+def loose(history: History, cases: Facts) -> list[Loose]:
     """Return the outputs whose errors stayed far below their tolerances in all runs, by case.
 
     Args:

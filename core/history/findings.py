@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from ..harness.record import Record
+from ..harness.record import Facts, Record
 
 
 class Kind(StrEnum):
@@ -243,7 +243,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
 CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "platform")
 
 
-def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
+def changes(now: Facts, before: Facts) -> list[Change]:
     """Return the differences in versions, machine and settings: engines first, then kincheck and
     its dependencies.
     """
@@ -259,14 +259,14 @@ def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
     return [Change(what=what, before=a, now=b) for what, a, b in pairs if a != b]
 
 
-def _files(facts: Mapping[str, Any]) -> dict[str, Any]:
+def _files(facts: Facts) -> dict[str, Any]:
     """Return the state of the files of a run; edits are given by their digest, if it is known."""
     git: dict[str, Any] = facts.get("git") or {}
     edits = git.get("edits") or ("some" if git.get("changed") else None)
     return {"commit": git.get("commit"), "uncommitted edits": edits}
 
 
-def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
+def same_machine(now: Facts, before: Facts) -> bool:
     """Return whether both runs had equal processors, so that their times can be compared by the
     clock.
 

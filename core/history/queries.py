@@ -20,12 +20,9 @@ import msgspec
 from ..case.io.atomic_files import write
 from ..case.io.table_file import WRITERS, Kind, lack
 from ..errors import KincheckError
-from ..harness.record import Deviations, Outcome, Seconds
+from ..harness.record import Deviations, Facts, Outcome, Seconds
 from .database import OUTCOME
 from .store import Pair, RunRow, Store
-
-Facts = Mapping[str, Any]
-"""Circumstances of a run, as `Results.run`."""
 
 
 def same(a: Facts, b: Facts) -> bool:

@@ -17,7 +17,7 @@ from ..case.case import Case
 from ..errors import KincheckError
 from ..harness.engine import PATIENCE, Engine, versions
 from ..harness.provenance import circumstances, conditions, plain, references
-from ..harness.record import Record, Results
+from ..harness.record import Facts, Record, Results
 from ..harness.results_file import read_results
 from ..harness.run import planned
 from .findings import RunName
@@ -268,7 +268,7 @@ class Keeping:
 
     store: Store
     run: int
-    facts: Mapping[str, Any]
+    facts: Facts
     resumed: bool = False
     made: Sequence[Record] = ()
     problems: list[str] = field(default_factory=list[str])
@@ -305,7 +305,7 @@ def keep(
     *,
     tol: float,
     command: str,
-    settings: Mapping[str, Any],
+    settings: Facts,
     resume: bool,
     unread: Sequence[str] = (),
     sources: Mapping[str, str] | None = None,
@@ -330,7 +330,7 @@ def keep(
     plan = planned(cases, engines, unread)
     # the place of the work and the number of workers change no record
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]
-    git: Mapping[str, Any] = facts["git"] or {}
+    git: Facts = facts["git"] or {}
     state = [facts[name] for name in ("kincheck", "python", "numpy")] + [
         git.get(name) for name in ("commit", "changed", "edits")
     ]

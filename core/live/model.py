@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-import msgspec
 import numpy as np
 
 from ..case.case import HELD_BUT, SLOW, Case, size
@@ -19,7 +18,7 @@ from ..mechanism.motions import Ramp, Slowed
 from ..studies.diagnosis import diagnose
 from ..trajectory import Array
 from .protocol import Answer, LiveDriver, Move, Opening, Pose, Reach, Reached, Solve
-from .table import TOL, drawn, drawn_frames, opening_of, sweep_axis
+from .table import TOL, LiveFile, drawn, drawn_frames, sweep_axis
 
 WAY = 33
 """Samples on the way from the design to a pose; longer steps are divided by the solver."""
@@ -27,7 +26,7 @@ REACH = 129
 """Samples on the way to the end of a slider, which tell its reach."""
 
 
-class LiveModel:
+class LiveModel(LiveFile):
     """A mechanism with drivers, opened.
 
     Args:
@@ -46,8 +45,7 @@ class LiveModel:
 
     def opening(self, engines: Sequence[str]) -> Opening:
         """Return the mechanism as it is."""
-        opening = opening_of(self.kind, self.file, self.case, self.axis, engines)
-        return msgspec.structs.replace(opening, drivers=[*self.drivers.values()])
+        return self.opening_of(engines, drivers=[*self.drivers.values()])
 
     def solve(self, asked: Solve) -> Answer:
         """Return the motion over the sweep of the case; of a mechanism without one, its design

@@ -73,7 +73,34 @@ MOVED = 2e-5
 three digits shown, and rounding of 1e-15 m over it too."""
 
 
-class LiveTable:
+class LiveFile:
+    """A file that is open.
+
+    Attributes:
+        axis: of the sweep, as in reports.
+    """
+
+    kind: str
+    file: Path
+    case: Case
+    axis: Axis
+
+    def opening_of(self, engines: Sequence[str], **own: Any) -> Opening:
+        """Return what the openings of all files tell, and what this one does."""
+        own = {"unit": self.case.length_unit, **own}
+        return Opening(
+            kind=self.kind,
+            file=self.file.name,
+            source=self.case.source,
+            outputs=[*map(_live_output, self.case.outputs)],
+            axis=LiveAxis(self.axis.label, self.axis.values, self.axis.scale, self.axis.up),
+            engines=[*engines],
+            reference=_live_reference(self.case),
+            **own,
+        )
+
+
+class LiveTable(LiveFile):
     """A table of hardpoints, opened.
 
     Args:
@@ -116,8 +143,8 @@ class LiveTable:
         directions = ("forward", "left", "up"), ("rearward", "right", "down")
         axes = axes_of(self.table, self.supplied.axes)
         limits = self.variation.limits if self.variation else ()
-        return msgspec.structs.replace(
-            opening_of(self.kind, self.file, self.case, self.axis, engines),
+        return self.opening_of(
+            engines,
             unit=unit_of(self.table, self.supplied.units).name,
             axes=",".join(directions[sign < 0][k] for k, sign in axes),
             points=[
@@ -259,7 +286,12 @@ class LiveTable:
             designs.solve(_geometry(case), TOL)
             return designs
 
-        with _at_once():  # otherwise an edit in between waits for the compiler
+        at_once: AbstractContextManager[None] = nullcontext()
+        if available():
+            from ..program.llvm.jit import compiled_at_once
+
+            at_once = compiled_at_once()
+        with at_once:  # otherwise an edit in between waits for the compiler
             designs = prepared(path)
             self._held = {
                 alone: prepared(_in_parts(held_case(case, alone).sweep.path))
@@ -312,7 +344,12 @@ class LiveTable:
                 if alone in self._held:
                     fine = self._held[alone].solve(geometry, TOL)
                     held = replace(fine, kept=fine.kept[:, ::PARTS], solved=fine.solved[::PARTS])
-                    known = held.solved & _same_place(case, designs, found, held)
+                    off = [
+                        np.abs(designs.motion(found, name)[0] - designs.motion(held, name)[0])
+                        for name in names
+                    ]
+                    # at one place: not in another assembly
+                    known = held.solved & (np.max(off, axis=(0, 1)) <= SAME_POSE * size(case))
                 at = {
                     name: Vec3(*(Jet(*each) for each in zip(*motion, strict=True)))
                     for name in names
@@ -323,20 +360,6 @@ class LiveTable:
                     jet = counted(case.mechanism, case.sweep.path, each, moved, design)
                     values[each.name] = np.where(known, jet.x, np.nan)
         return values
-
-
-def opening_of(kind: str, file: Path, case: Case, axis: Axis, engines: Sequence[str]) -> Opening:
-    """Return what the openings of all files tell."""
-    return Opening(
-        kind=kind,
-        file=file.name,
-        source=case.source,
-        unit=case.length_unit,
-        outputs=[*map(_live_output, case.outputs)],
-        axis=LiveAxis(axis.label, axis.values, axis.scale, axis.up),
-        engines=[*engines],
-        reference=_live_reference(case),
-    )
 
 
 def drawn_frames(solved: NDArray[np.bool_], always: Sequence[int] = ()) -> list[int]:
@@ -428,25 +451,6 @@ def _in_parts(path: Way) -> Way:
     samples = np.arange(len(path.times))
     parts = np.arange(PARTS * (len(samples) - 1) + 1) / PARTS
     return replace(path, times=np.interp(parts, samples, path.times))
-
-
-def _same_place(
-    case: Case, designs: PreparedDesigns, found: Variants, held: Variants
-) -> NDArray[np.bool_]:
-    """Return whether two solutions have the points at one place: not in another assembly."""
-    off = [
-        np.abs(designs.motion(found, name)[0] - designs.motion(held, name)[0]).max(axis=0)
-        for name in without_forces(case).points
-    ]
-    return np.max(off, axis=0) <= SAME_POSE * size(case)
-
-
-def _at_once() -> AbstractContextManager[None]:
-    if not available():
-        return nullcontext()
-    from ..program.llvm.jit import compiled_at_once
-
-    return compiled_at_once()
 
 
 def _by_place(sizes: Mapping[str, int], geometry: Array) -> dict[str, Array]:

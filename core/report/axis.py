@@ -5,10 +5,9 @@ page.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from rich.console import Console
 from rich.text import Text
@@ -17,7 +16,7 @@ from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
 from ..case.units import ANGLES, LENGTHS
 from ..errors import shortened
-from ..harness.record import Outcome, Record, Results
+from ..harness.record import Facts, Outcome, Record, Results
 from ..unit_text import unit_text, value_text, with_unit
 from . import terminal
 
@@ -44,7 +43,7 @@ DRIVER_UNITS = {
 """SI unit of the values of a driver, by its type."""
 
 
-def in_table_units(unit: str, facts: Mapping[str, Any]) -> tuple[str, float]:
+def in_table_units(unit: str, facts: Facts) -> tuple[str, float]:
     """Return the name of an SI unit in the units of a case of hardpoints, and its size [SI]. Rates
     of change per metre stay per metre, and forces and torques in N and N m.
     """
@@ -68,7 +67,7 @@ class Moved:
     values: list[float]
 
     @classmethod
-    def of(cls, name: str, driver: Mapping[str, Any], values: list[float]) -> Moved:
+    def of(cls, name: str, driver: Facts, values: list[float]) -> Moved:
         """Return a driver in the display unit of its type, with its values."""
         unit, scale = DISPLAY.get(DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
         return cls(name.replace("_", " "), unit, scale, values)
@@ -121,7 +120,7 @@ class Axis(Moved):
         return [self.scale * self.values[k] for k in self.kept]
 
 
-def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iterable[int]) -> Axis:
+def driver_axis(facts: Facts, records: Sequence[Record], worst: Iterable[int]) -> Axis:
     """Return the axis of the sweep.
 
     Args:
@@ -155,7 +154,7 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
     return Axis(name, unit, swept.scale, values, title, _kept(len(values), worst), up, further)
 
 
-def _upwards(driver: Mapping[str, Any]) -> int:
+def _upwards(driver: Facts) -> int:
     """Return 1 if the driver moves a point along the global z axis, -1 if against it, else 0."""
     if driver.get("type") != "point_coordinate":
         return 0
@@ -205,7 +204,7 @@ def print_travel(results: Results, console: Console) -> None:
             _print(solved[0], facts, console)
 
 
-def _print(record: Record, facts: Mapping[str, Any], console: Console) -> None:
+def _print(record: Record, facts: Facts, console: Console) -> None:
     places = events(record, facts)
     heads = [">" + each.replace(", ", "\n") for each in places]
     table = terminal.columns(record.case, *heads, ">gradient at design", "")
@@ -216,7 +215,7 @@ def _print(record: Record, facts: Mapping[str, Any], console: Console) -> None:
         console.print(table)
 
 
-def events(record: Record, facts: Mapping[str, Any]) -> dict[str, int]:
+def events(record: Record, facts: Facts) -> dict[str, int]:
     """Return the samples of rebound, design and jounce, or of the ends of another driver, by a head
     with their travel: "rebound, -80 mm".
 
@@ -234,7 +233,7 @@ def events(record: Record, facts: Mapping[str, Any]) -> dict[str, int]:
 
 
 def _rows(
-    record: Record, facts: Mapping[str, Any], samples: list[int], design: int
+    record: Record, facts: Facts, samples: list[int], design: int
 ) -> Iterator[tuple[str, ...]]:
     for name, series in record.outputs.items():
         if name.removeprefix("left_").removeprefix("right_") not in NAMES or not series.position:
@@ -249,7 +248,7 @@ def _rows(
         yield visible(with_unit(name, unit)), *cells, gradient, per_unit
 
 
-def _shown(unit: str, facts: Mapping[str, Any]) -> tuple[str, float]:
+def _shown(unit: str, facts: Facts) -> tuple[str, float]:
     text, size = in_table_units(unit, facts)
     return unit_text(text).replace("deg", "\N{DEGREE SIGN}"), 1.0 / size
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
-from ..harness.record import OutputSeries, Record, Results
+from ..harness.record import Facts, OutputSeries, Record, Results
 from .axis import DRIVER_UNITS, in_table_units
 
 COLUMNS: Mapping[str, Kind] = {
@@ -76,7 +75,7 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
     The columns are the drivers and the outputs, behind the names of cases and engines where there
     are several. Rates of change per metre of travel stay per metre.
     """
-    facts: Mapping[str, Any] = results.run.get("cases", {})
+    facts: Facts = results.run.get("cases", {})
     if not facts or not all(each.get("units") for each in facts.values()):
         return None
     tables = list[tuple[str, str, dict[str, list[float | None]]]]()
@@ -100,7 +99,7 @@ def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
 
 
 def columns_of(
-    about: Mapping[str, Any], record: Record, outputs: Mapping[str, OutputSeries]
+    about: Facts, record: Record, outputs: Mapping[str, OutputSeries]
 ) -> dict[str, list[float | None]]:
     """Return the values of drivers and outputs in the units of the table, by their heads.
 
@@ -169,7 +168,7 @@ def curves(results: Results, case: str | None = None) -> Iterator[Rows]:
     for record in results.records:
         if case not in (None, record.case) or not record.driver:
             continue
-        about: Mapping[str, Any] = results.run.get("cases", {}).get(record.case, {})
+        about: Facts = results.run.get("cases", {}).get(record.case, {})
         if record.case not in written:
             written.add(record.case)
             for name, series in results.references.get(record.case, {}).items():
@@ -179,7 +178,7 @@ def curves(results: Results, case: str | None = None) -> Iterator[Rows]:
 
 
 def _rows(
-    about: Mapping[str, Any],
+    about: Facts,
     record: Record,
     who: tuple[str, str],
     output: str,
@@ -187,7 +186,7 @@ def _rows(
     otherwise: bool,
 ) -> Rows:
     driver, values = next(iter(record.driver.items()))
-    facts: Mapping[str, Any] = about.get("driver", {})
+    facts: Facts = about.get("driver", {})
     head = record.case, *who, output, series.unit
     unit = DRIVER_UNITS.get(facts.get("type", ""))
     unknown = [None] * len(values)

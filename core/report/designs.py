@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -16,7 +15,7 @@ from ..case.case import MARKER, PER_TRAVEL, Case
 from ..case.units import LENGTHS
 from ..dataset import Dataset, Variable
 from ..harness.labels import named
-from ..harness.record import Results
+from ..harness.record import Facts, Results
 from ..joints import Kind
 from ..kinematics import kinds, places
 from ..tabular import Tabular
@@ -52,7 +51,7 @@ class Designs(Tabular):
 
     results: Results
     cases: Sequence[Case]
-    facts: Mapping[str, Any]
+    facts: Facts
     drivers: Mapping[str, Sequence[float | None]]
     curves: Mapping[str, Mapping[str, Array]]
     units: Mapping[str, str]
@@ -115,7 +114,7 @@ def designs_of(results: Results, cases: Sequence[Case]) -> Designs:
     return Designs(results, cases, facts, drivers, curves, names, other)
 
 
-def _defined_otherwise(facts: Mapping[str, Any]) -> dict[str, str]:
+def _defined_otherwise(facts: Facts) -> dict[str, str]:
     found: dict[str, dict[str, str]] = {}
     for case, about in facts.items():
         for name, each in about["outputs"].items():

@@ -6,12 +6,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 from ..case.case import Truth
 from ..harness.evidence import Evidence
 from ..harness.labels import against, engine_name, motion_unit, number, output_label, product
-from ..harness.record import Deviation, OutputSeries, Record, Results
+from ..harness.record import Deviation, Facts, OutputSeries, Record, Results
 from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
 from ..unit_text import FORCES, motion_word, value_text
@@ -133,7 +132,7 @@ class CaseView:
     axis: Axis
     outputs: list[OutputView]
     worst: Judged | None
-    account: Mapping[str, Any] | None
+    account: Facts | None
     scene: Drawing | None
     trends: list[Plot]
     marks: Sequence[Mark]
@@ -168,7 +167,7 @@ def case_view(given: Material, name: str, anchor: str) -> CaseView:
     """Return one case of the page; add its figures to those of the page."""
     results = given.results
     records = [record for record in results.records if record.case == name]
-    facts: Mapping[str, Any] = results.run.get("cases", {}).get(name, {})
+    facts: Facts = results.run.get("cases", {}).get(name, {})
     deviations = judged(records)
     axis = driver_axis(facts, records, (each.deviation.worst_step for each in deviations))
     names = dict.fromkeys(output for record in records for output in record.outputs)

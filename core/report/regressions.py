@@ -90,10 +90,11 @@ def headline(found: Regressions) -> str:
             f"{found.run.name}: {', '.join([failing, *rest])}; nothing to compare with:"
             f" {found.reason}"
         )
+    words = {**COUNTED, Kind.FAILURE: "new failure" + "s" * (len(pairs(found, Kind.FAILURE)) > 1)}
     counts = [
-        f"{_counted(found, kind)} {_plural(kind, found)}"
+        f"{count} {words.get(kind, kind)}"
         for kind in Kind
-        if found.fails(kind) and _counted(found, kind)
+        if found.fails(kind) and (count := _counted(found, kind))
     ]
     counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
@@ -127,12 +128,6 @@ def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
 def _counted(found: Regressions, kind: Kind) -> int:
     """Return the number of pairs with findings of a kind; an unreadable case is one fault."""
     return sum(case not in found.unread for case, _, _ in pairs(found, kind))
-
-
-def _plural(kind: Kind, found: Regressions) -> str:
-    if kind is Kind.FAILURE:
-        return "new failure" + ("s" if len(pairs(found, kind)) > 1 else "")
-    return COUNTED.get(kind, str(kind))
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
@@ -305,24 +300,20 @@ def print_regressions(found: Regressions, file: TextIO) -> None:
     if passed_by := passed_by_says(found):
         _print_line(console, passed_by)
     for kind in Kind:
-        _print_kind(console, found, kind)
+        group = rows(each for each in found.findings if each.kind is kind)
+        if not group:
+            continue
+        _print_line(console, "")
+        title = f"{kind} ({len(pairs(found, kind))}): {WHY[kind]}"
+        _print_line(console, title, "bold red" if found.fails(kind) else "bold")
+        table = terminal.columns("engine", "case", "what")
+        for each in group[:LONGEST]:
+            table.add_row(*(Text(visible(cell)) for cell in (each.engine, each.where, each.what)))
+        console.print(terminal.indented(table))
+        _print_rest(console, len(group))
     for over, title in STEPS.items():
         _print_list(console, title.lower(), step_lines(found.steps, over=over))
     _print_list(console, "tolerances that could be tightened", loose_says(found.loose))
-
-
-def _print_kind(console: Console, found: Regressions, kind: Kind) -> None:
-    group = rows(each for each in found.findings if each.kind is kind)
-    if not group:
-        return
-    style = "bold red" if found.fails(kind) else "bold"
-    _print_line(console, "")
-    _print_line(console, f"{kind} ({len(pairs(found, kind))}): {WHY[kind]}", style)
-    table = terminal.columns("engine", "case", "what")
-    for each in group[:LONGEST]:
-        table.add_row(*(Text(visible(cell)) for cell in (each.engine, each.where, each.what)))
-    console.print(terminal.indented(table))
-    _print_rest(console, len(group))
 
 
 def _print_list(console: Console, title: str, lines: list[str]) -> None:

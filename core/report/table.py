@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
-from typing import IO, Any, TextIO
+from typing import IO, TextIO
 
 from rich.cells import cell_len
 from rich.console import Console
@@ -14,7 +14,7 @@ from rich.text import Text
 
 from ..case.io.escape import visible
 from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread, unsound
-from ..harness.record import Deviation, Outcome, Record, Results
+from ..harness.record import Deviation, Facts, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import FORCES, motion_word, with_unit
 from . import terminal
@@ -57,12 +57,6 @@ COLOURS = {
 LENGTH = "m"
 
 
-def _heads(reactions: bool) -> tuple[str, ...]:
-    units = [motion_unit(LENGTH, quantity) for quantity in QUANTITIES]
-    errors = [f">error\n{unit}" for unit in (*(FORCES if reactions else ()), *units)]
-    return "engine", "outcome", *errors, ">us/step"
-
-
 def print_table(results: Results, file: IO[str], *, reactions: bool = False) -> None:
     """Print the sign conventions, a line per record, every message, and outcome counts.
 
@@ -75,13 +69,21 @@ def print_table(results: Results, file: IO[str], *, reactions: bool = False) -> 
     print_signs(results.run, console)
     several = len({record.mode for record in results.records}) > 1
     rows = [(record, _cells(record, several, reactions)) for record in results.records]
-    table = terminal.columns("case", *_heads(reactions), "truth")
+    units = [motion_unit(LENGTH, quantity) for quantity in QUANTITIES]
+    errors = [f">error\n{unit}" for unit in (*(FORCES if reactions else ()), *units)]
+    heads = "engine", "outcome", *errors, ">us/step"
+    table = terminal.columns("case", *heads, "truth")
     for record, cells in rows:
         table.add_row(Text(visible(record.case)), *cells, Text(visible(truth(record))))
     if rows and table.natural_width(console, console.options) <= console.width:
         console.print(table)
     elif rows:
-        _print_by_case(rows, console, _heads(reactions))
+        standards = {
+            case: _standard([record for record, _ in group])
+            for case, group in groupby(rows, lambda row: row[0].case)
+        }
+        titled = [(record.case, standards[record.case], cells) for record, cells in rows]
+        _print_below_titles(titled, heads, console)
     print_travel(results, console)
     print_messages(results, console)
 
@@ -93,12 +95,17 @@ def print_outputs(results: Results, file: TextIO) -> None:
     If the console is too narrow, the outputs stand below their case and engine.
     """
     console = terminal.console(file)
-    rows = [
-        ((record.case, record.engine), _of_output(record, name))
-        for record in results.records
-        for name in record.errors
-    ]
-    heads = _output_heads({cells[-1].plain for _, cells in rows})
+    rows = list[tuple[tuple[str, str], tuple[Text, ...]]]()
+    for record in results.records:
+        for name, errors in record.errors.items():
+            unit = record.outputs[name].unit if name in record.outputs else LENGTH
+            cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
+            cells = Text(visible(name)), *cells, Text(visible(unit))
+            rows.append(((record.case, record.engine), cells))
+    # the first error of forces, which have no position, is called value
+    words = {motion_word(QUANTITIES[0], cells[-1].plain) for _, cells in rows} or {QUANTITIES[0]}
+    first = words.pop() if len(words) == 1 else "value"
+    heads = "output", *(f">{head}" for head in (first, *QUANTITIES[1:])), "unit"
     table = terminal.columns("case", "engine", *heads)
     for names, cells in rows:
         table.add_row(*(Text(visible(each)) for each in names), *cells)
@@ -112,23 +119,6 @@ def print_outputs(results: Results, file: TextIO) -> None:
             line = f"–: {record.case} · {record.engine}: {named(outputs)}: {reason}"
             console.print(Text(visible(line)), soft_wrap=True)
     print_table(results, file)
-
-
-def _output_heads(units: Collection[str]) -> tuple[str, ...]:
-    """Return the heads of the table of outputs in these units; with forces, which have no position,
-    the first error is called value.
-    """
-    words = {motion_word(QUANTITIES[0], unit) for unit in units} or {QUANTITIES[0]}
-    first = words.pop() if len(words) == 1 else "value"
-    return ("output", *(f">{head}" for head in (first, *QUANTITIES[1:])), "unit")
-
-
-def _of_output(record: Record, name: str) -> tuple[Text, ...]:
-    """Return the cells of `_output_heads`."""
-    errors = record.errors[name]
-    unit = record.outputs[name].unit if name in record.outputs else LENGTH
-    cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
-    return Text(visible(name)), *cells, Text(visible(unit))
 
 
 def _missing(record: Record) -> dict[str, list[str]]:
@@ -175,18 +165,6 @@ def _cells(record: Record, several: bool, reactions: bool) -> tuple[Text, ...]:
     return Text(visible(engine)), outcome, *errors, Text(_time(record.us_per_step))
 
 
-def _print_by_case(
-    rows: Sequence[tuple[Record, tuple[Text, ...]]], console: Console, heads: Sequence[str]
-) -> None:
-    """Print the records of each case below its name and standard."""
-    standards = {
-        case: _standard([record for record, _ in group])
-        for case, group in groupby(rows, lambda row: row[0].case)
-    }
-    titled = [(record.case, standards[record.case], cells) for record, cells in rows]
-    _print_below_titles(titled, heads, console)
-
-
 def _print_below_titles(
     rows: Sequence[tuple[str, str, tuple[Text, ...]]], heads: Sequence[str], console: Console
 ) -> None:
@@ -226,7 +204,7 @@ def _time(us: float | None) -> str:
     return f"{us:.3g}" if us < 999.5 else f"{us:.0f}"
 
 
-def print_signs(run: Mapping[str, Any], console: Console) -> None:
+def print_signs(run: Facts, console: Console) -> None:
     """Print the sign conventions above a table of outputs."""
     for line in signs(run):
         console.print(Text(visible(line)), soft_wrap=True)

@@ -31,11 +31,15 @@ def trends(history: History) -> dict[str, list[Past]]:
     for (case, engine, mode), entries in history.pairs.items():
         name = product(engine, mode)
         for entry in entries:
+            errors = dict[str, float]()
+            for deviations in entry.errors.values():
+                for motion, deviation in deviations.items():
+                    errors[motion] = max(errors.get(motion, 0.0), deviation.ratio)
             found.setdefault(case, []).append(
                 Past(
                     run_name(history.runs[entry.run]),
                     name,
-                    in_tolerances(entry),
+                    errors,
                     entry.us_per_step,
                     entry.outcome.bad,
                     entry.version,
@@ -51,15 +55,6 @@ def run_name(row: RunRow) -> str:
     several runs.
     """
     return f"{row.started[:16].replace('T', ' ')} #{row.id}"
-
-
-def in_tolerances(entry: Entry) -> dict[str, float]:
-    """Return the largest error of the outputs in tolerances, by motion."""
-    found: dict[str, float] = {}
-    for deviations in entry.errors.values():
-        for motion, deviation in deviations.items():
-            found[motion] = max(found.get(motion, 0.0), deviation.ratio)
-    return found
 
 
 def largest_errors(entry: Entry, case: str, row: RunRow) -> dict[str, float]:

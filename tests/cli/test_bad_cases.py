@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import kincheck.adapters
 import kincheck.cases
 import kincheck.core
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.report.report import caveats, headline
@@ -38,7 +38,7 @@ def test_cases_beside_a_bad_one_run(kincheck_main, capsys, tmp_path, monkeypatch
     Path(bad).write_text('schema = "kincheck-case/9"\n')
     files = "--out out --junit junit.xml --history history".split()
     for _ in range(2):
-        assert kincheck_main("run", "crank", bad, "crank_two", *files) == 2
+        assert kincheck_main("run crank", bad, "crank_two", *files) == 2
     captured = capsys.readouterr()
     message = f"{bad}: schema: found"
     assert captured.err.count(message) == 2  # once each run
@@ -57,7 +57,7 @@ def test_cases_beside_a_bad_one_run(kincheck_main, capsys, tmp_path, monkeypatch
     )
     assert error.get("message") == found.unread[bad]
     # what is broken tonight is told, and tomorrow too
-    assert kincheck_main("report", "--history", "history") == 1
+    assert kincheck_main("report --history history") == 1
     told = capsys.readouterr().out
     assert message.partition(":")[0].replace("_", r"\_") in told
     assert told.startswith(
@@ -66,10 +66,10 @@ def test_cases_beside_a_bad_one_run(kincheck_main, capsys, tmp_path, monkeypatch
     )
     # and is one fault, however many engines were to solve it
     engines = [RIGHT, Fake("other")]
-    assert kincheck_main("run", "crank", "--history", "history", engines=engines) == 0
-    assert kincheck_main("run", "crank", bad, "--history", "history", engines=engines) == 2
+    assert kincheck_main("run crank --history history", engines=engines) == 0
+    assert kincheck_main("run crank", bad, "--history", "history", engines=engines) == 2
     capsys.readouterr()
-    assert kincheck_main("report", "--history", "history") == 1
+    assert kincheck_main("report --history history") == 1
     told = capsys.readouterr().out.splitlines()[0]
     told = re.sub(r": \d slower, ", ": ", told)  # of sweeps of 0.05 ms, on a busy machine
     assert told == "## run 4 against run 3 (last green): 1 case could not be read"
@@ -82,8 +82,8 @@ def test_run_without_readable_case_is_stored(kincheck_main, capsys, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     files = "--out out --junit junit.xml --markdown cases.md --history history".split()
     for _ in range(2):
-        assert kincheck_main("run", "crank", *files) == 0
-    assert kincheck_main("run", "crank", *files, cases={"rod": crank("rod")}) == 2
+        assert kincheck_main("run crank", *files) == 0
+    assert kincheck_main("run crank", *files, cases={"rod": crank("rod")}) == 2
     captured = capsys.readouterr()
     assert captured.err.count("there is no case 'crank'") == 1
     assert captured.out.endswith("nothing was run\n1 case could not be read: crank\n")
@@ -93,7 +93,7 @@ def test_run_without_readable_case_is_stored(kincheck_main, capsys, tmp_path, mo
         "not run"
     ]
     assert "1 case could not be read: crank" in Path("cases.md").read_text()
-    assert kincheck_main("report", "--history", "history") == 1
+    assert kincheck_main("report --history history") == 1
     assert capsys.readouterr().out.startswith(
         "## run 3 against run 2 (last green): 1 case could not be read"
     )
@@ -101,7 +101,7 @@ def test_run_without_readable_case_is_stored(kincheck_main, capsys, tmp_path, mo
 
 def test_bad_option_and_cases_are_told(kincheck_main, capsys):
     RIGHT.solves = 0
-    assert kincheck_main("run", "crank", "nosuch", "--engine", "nativ", engines=[RIGHT]) == 2
+    assert kincheck_main("run crank nosuch --engine nativ", engines=[RIGHT]) == 2
     assert [line[:29] for line in capsys.readouterr().err.splitlines()] == [
         "kincheck: there is no case 'n",
         "kincheck: there is no engine ",
@@ -113,11 +113,11 @@ def test_a_bad_built_in_case_is_a_message(kincheck_main, capsys, monkeypatch):
     def load(name):
         raise CaseError("crank.toml: sweep.steps = 0: expected at least 1")
 
-    status = kincheck_main("run", "crank", cases={"crank": crank()})
+    status = kincheck_main("run crank", cases={"crank": crank()})
     assert status == 0
     monkeypatch.setattr(kincheck.cases, "load", load)
     capsys.readouterr()
-    assert main.main(["run", "crank"]) == 2
+    assert main(["run", "crank"]) == 2
     assert capsys.readouterr().err == "kincheck: crank.toml: sweep.steps = 0: expected at least 1\n"
 
 

@@ -7,7 +7,7 @@ import kincheck.adapters
 import kincheck.cases
 import kincheck.core
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.extras import how_to_install
 
 from ..support.fakes import Fake, crank, off, partial, raising
@@ -58,7 +58,7 @@ def test_run_with_only_errors_has_status_2(kincheck_main, capsys, engines, statu
 
 
 def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
-    assert kincheck_main("run", "--json", "-", engines=[RIGHT, MISSING]) == 0
+    assert kincheck_main("run --json -", engines=[RIGHT, MISSING]) == 0
     records = json.loads(capsys.readouterr().out)["records"]
     assert [(each["case"], each["engine"]) for each in records] == [
         ("crank", "native"),
@@ -82,7 +82,7 @@ def test_simulators_run_in_worker_processes(
 ):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     RIGHT.solves = 0
-    assert kincheck_main("run", "crank", "--json", "-", *options, engines=engines, jobs=None) == 0
+    assert kincheck_main("run crank --json -", *options, engines=engines, jobs=None) == 0
     facts = json.loads(capsys.readouterr().out)["run"]
     assert (facts["jobs"] == 0) is inside
     assert ("timeout" in facts) is not inside
@@ -99,7 +99,7 @@ def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
     assert kincheck_main(*argv, engines=[RIGHT, Fake("other")]) == 0
     capsys.readouterr()
     monkeypatch.setattr(kincheck.adapters, "engine", load)
-    assert main.main([*argv, "--jobs", "0"]) == 1
+    assert main([*argv, "--jobs", "0"]) == 1
     records = json.loads(capsys.readouterr().out)["records"]
     assert [each["outcome"] for each in records] == ["pass", "error"]
     assert (
@@ -111,13 +111,7 @@ def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
 def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
     assert (
         kincheck_main(
-            "run",
-            "crank_two",
-            "crank_two",
-            "--engine",
-            "native",
-            "--json",
-            "-",
+            "run crank_two crank_two --engine native --json -",
             engines=[RIGHT, WRONG],
         )
         == 0
@@ -129,12 +123,7 @@ def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
 
 def test_unselected_native_is_the_standard(kincheck_main, capsys):
     cases = {"crank": crank(reference=False)}
-    assert (
-        kincheck_main(
-            "run", "--engine", "wrong", "--json", "-", engines=[RIGHT, WRONG], cases=cases
-        )
-        == 1
-    )
+    assert kincheck_main("run --engine wrong --json -", engines=[RIGHT, WRONG], cases=cases) == 1
     (record,) = json.loads(capsys.readouterr().out)["records"]
     assert record["engine"] == "wrong"
     assert "against native" in record["message"]
@@ -187,9 +176,9 @@ def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, s
 
 
 def test_status_of_help_and_no_command(capsys):
-    assert main.main([]) == 2
-    assert main.main(["--help"]) == 0
-    assert main.main(["run", "--help"]) == 0
+    assert main([]) == 2
+    assert main(["--help"]) == 0
+    assert main(["run", "--help"]) == 0
 
 
 @pytest.mark.parametrize(
@@ -208,9 +197,7 @@ def test_status_of_help_and_no_command(capsys):
 )
 def test_unable_required_engine_has_status_2(kincheck_main, capsys, engine, said):
     assert (
-        kincheck_main(
-            "run", "crank", "--require", engine.name, "--json", "-", engines=[RIGHT, engine]
-        )
+        kincheck_main("run crank --require", engine.name, "--json", "-", engines=[RIGHT, engine])
         == 2
     )
     captured = capsys.readouterr()

@@ -8,7 +8,7 @@ import sys
 import xml.etree.ElementTree as ET
 
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.harness.execution import error_text
 from kincheck.core.harness.record import from_json
 from kincheck.core.harness.results_file import read_results
@@ -25,9 +25,7 @@ def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
         os.write(1, b"from the file descriptor\n")
         return off("position", lambda p: p)(case)
 
-    assert (
-        kincheck_main("run", "crank", "--json", "-", engines=[Fake("native", answer=chatty)]) == 0
-    )
+    assert kincheck_main("run crank --json -", engines=[Fake("native", answer=chatty)]) == 0
     captured = capfd.readouterr()
     assert len(from_json(captured.out.encode()).records) == 1
     for text in ("from Python", "from the file descriptor", "[1/1] crank native: pass", "truth"):
@@ -92,9 +90,7 @@ def test_contradictory_length_is_noted_in_results(tmp_path, capsys, length, told
     file, out = tmp_path / "rod.toml", tmp_path / "out"
     file.write_text(ROD.replace("LENGTH", length))
     assert (
-        main.main(
-            f"run {file} --engine native --out {out} --markdown {tmp_path / 'rod.md'}".split()
-        )
+        main(f"run {file} --engine native --out {out} --markdown {tmp_path / 'rod.md'}".split())
         == 2
     )
     note = (
@@ -124,12 +120,12 @@ def test_contradictory_length_is_noted_by_explain(tmp_path, capsys, length):
         ["explain", str(file)],
         f"sweep {file} --vary {vary} --out {out}".split(),
     ):
-        assert main.main(command) == 0
+        assert main(command) == 0
         assert (f"\nnote: {note}" in capsys.readouterr().out) is told
     assert (
         "Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()
     ) is told
-    assert main.main(f"run {file} --engine native --explain".split()) == 2
+    assert main(f"run {file} --engine native --explain".split()) == 2
     assert (f"\n  note: {note}" in capsys.readouterr().out) is told
 
 
@@ -139,7 +135,7 @@ def test_unsolvable_case_is_explained_beside_others(tmp_path, capsys):
     )
     (tmp_path / "rod.toml").write_text(ROD.replace("LENGTH", "1.0"))
     files = [str(tmp_path / f"{name}.toml") for name in ("far", "rod")]
-    assert main.main(["run", *files, "--engine", "native", "--explain"]) == 2
+    assert main(["run", *files, "--engine", "native", "--explain"]) == 2
     printed = capsys.readouterr().out
     assert (
         "\nfar: cannot be solved: mechanism 'far' does not close at the design position" in printed
@@ -160,7 +156,7 @@ def test_out_of_memory_names_the_limit(monkeypatch):
 
 def test_run_table_shows_every_outcome(kincheck_main, capsys):
     engines = [RIGHT, WRONG, PARTIAL, BROKEN, MISSING, UNABLE]
-    assert kincheck_main("run", "crank", engines=engines) == 1
+    assert kincheck_main("run crank", engines=engines) == 1
     captured = capsys.readouterr()
     rows = {line.split()[1]: line for line in captured.out.splitlines() if line.startswith("crank")}
     assert "pass" in rows["native"]
@@ -187,9 +183,7 @@ def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
     out = tmp_path / "made" / "here"
     assert (
         kincheck_main(
-            "run",
-            "crank",
-            "--out",
+            "run crank --out",
             out,
             "--json",
             tmp_path / "r.json",
@@ -213,7 +207,7 @@ def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
 def test_unwritable_destination_is_found_first(kincheck_main, capsys, tmp_path, option, name):
     (tmp_path / "file").write_text("here already")
     RIGHT.solves = 0
-    assert kincheck_main("run", "crank", option, tmp_path / name) == 2
+    assert kincheck_main("run crank", option, tmp_path / name) == 2
     captured = capsys.readouterr()
     assert captured.err.startswith(f"kincheck: {option} ")
     assert len(captured.err.splitlines()) == 1
@@ -240,7 +234,7 @@ def test_internal_defect_has_status_2(kincheck_main, capsys, monkeypatch):
 @pytest.mark.parametrize("option", ["--junit", "--markdown"])
 def test_standard_output_takes_json_alone(kincheck_main, capsys, option, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert kincheck_main("run", "crank", option, "-", engines=[RIGHT]) == 2
+    assert kincheck_main("run crank", option, "-", engines=[RIGHT]) == 2
     assert (
         f"{option} -: standard output takes the document of --json alone" in capsys.readouterr().err
     )

@@ -5,12 +5,12 @@ import subprocess
 import sys
 
 import kincheck.core
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.version import VERSION
 
 
 def test_the_version_is_that_of_the_installation(capsys):
-    assert main.main(["--version"]) == 0
+    assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"kincheck {kincheck.core.__version__}\n"
     assert kincheck.core.__version__ == importlib.metadata.version("kincheck")
 

@@ -9,8 +9,8 @@ import sys
 import pytest
 from kincheck import cases
 from kincheck.core import Revolute
-from kincheck.core.cli import main
 from kincheck.core.cli.joint_loading import named_joint
+from kincheck.core.cli.main import main
 from kincheck.core.harness.provenance import truth_of
 from kincheck.core.options import whole
 from kincheck.core.report.terminal import Meter, columns, console
@@ -32,14 +32,14 @@ def test_whole_numbers_refuse_other_values(text):
 
 
 def test_a_pattern_names_all_cases_that_match(kincheck_main, capsys):
-    assert kincheck_main("run", "crank*", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank*", engines=[RIGHT]) == 0
     assert "2 pass" in capsys.readouterr().out
-    assert kincheck_main("run", "crank_?wo", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank_?wo", engines=[RIGHT]) == 0
     assert "1 pass" in capsys.readouterr().out
 
 
 def test_a_command_for_one_case_refuses_a_pattern_of_several(kincheck_main, capsys):
-    assert kincheck_main("explain", "cran*", engines=[RIGHT]) == 2
+    assert kincheck_main("explain cran*", engines=[RIGHT]) == 2
     said = capsys.readouterr().err
     assert "'cran*' matches 2 cases: crank, crank_two. Name one of them" in said
 
@@ -52,13 +52,13 @@ def test_a_pattern_names_files_too(kincheck_main, tmp_path, capsys):
 
 
 def test_quiet_and_verbose(kincheck_main, capsys):
-    assert kincheck_main("run", "crank", "-q", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank -q", engines=[RIGHT]) == 0
     assert capsys.readouterr() == ("1 pass\n", "")
-    assert kincheck_main("run", "crank", "-v", engines=[RIGHT]) == 0
+    assert kincheck_main("run crank -v", engines=[RIGHT]) == 0
     out = capsys.readouterr().out
     assert re.search(r"crank +native +x +\S+ of \S+ +\S+ of", out)
     assert re.search(r"^case +engine +output +position +velocity", out, re.MULTILINE)
-    assert kincheck_main("list", "-q", engines=[RIGHT]) == 0
+    assert kincheck_main("list -q", engines=[RIGHT]) == 0
     assert capsys.readouterr().out.split() == ["crank", "crank_two", "native"]
 
 
@@ -77,7 +77,7 @@ def test_quiet_and_verbose(kincheck_main, capsys):
     ],
 )
 def test_mistakes_name_the_command_and_the_remedy(line, said, capsys):
-    assert main.main(line.split()) == 2
+    assert main(line.split()) == 2
     found = capsys.readouterr().err
     assert said in found
     assert len(found.splitlines()) == 2
@@ -103,7 +103,7 @@ def test_records_stand_below_their_case_on_a_narrow_console(
     kincheck_main, capsys, monkeypatch, width
 ):
     monkeypatch.setenv("COLUMNS", str(width))
-    assert kincheck_main("run", "crank", engines=[RIGHT, Fake("twin")]) == 0
+    assert kincheck_main("run crank", engines=[RIGHT, Fake("twin")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= width
     assert sum("crank" in line for line in lines) == (2 if width == 200 else 1)
@@ -150,7 +150,7 @@ echo "${{COMPREPLY[@]}}"
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
     pytest.importorskip("shtab")
-    assert main.main(["completion", "bash"]) == 0
+    assert main(["completion", "bash"]) == 0
     (script := tmp_path / "script").write_text(capsys.readouterr().out)
     for words, expected in (
         ("kincheck exp", "export explain"),
@@ -173,7 +173,7 @@ def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
 def test_lists_fit_the_console_and_keep_every_word(argv, capsys, monkeypatch):
     def words(width):
         monkeypatch.setenv("COLUMNS", str(width))
-        assert main.main(argv) == 0
+        assert main(argv) == 0
         lines = capsys.readouterr().out.splitlines()
         assert max(map(len, lines)) <= width or width == 200
         return sorted(" ".join(lines).split())
@@ -188,10 +188,10 @@ def test_the_tables_of_every_output_and_of_its_history_fit(
     monkeypatch.setenv("COLUMNS", str(width))
     history = ("--history", tmp_path / "runs.sqlite")
     engines = [RIGHT, Fake("a-twin-with-a-long-name")]
-    assert kincheck_main("run", "crank", "--verbose", *history, engines=engines) == 0
+    assert kincheck_main("run crank --verbose", *history, engines=engines) == 0
     out = capsys.readouterr().out
     assert kincheck_main("history", *history, engines=engines) == 0
-    assert kincheck_main("history", "--case", "crank", *history, engines=engines) == 0
+    assert kincheck_main("history --case crank", *history, engines=engines) == 0
     assert max(map(len, (out + capsys.readouterr().out).splitlines())) <= width
     assert out.count("0.0e+00 of ") == 12  # two outputs of two engines, three orders each
 
@@ -245,10 +245,10 @@ half_width = 0.1
 
 def test_run_and_study_say_why_a_force_has_no_value(tmp_path, capsys):
     (case := tmp_path / "two_hinges.toml").write_text(UNDETERMINED)
-    main.main(f"run {case} --engine native -v".split())
+    main(f"run {case} --engine native -v".split())
     assert "hinge: samples without a value are null; rigid bodies do not" in capsys.readouterr().out
     (varied := tmp_path / "mass.toml").write_text(VARIED)
-    assert main.main(f"sweep {case} --vary {varied} --samples 4 -q".split()) == 0
+    assert main(f"sweep {case} --vary {varied} --samples 4 -q".split()) == 0
     out = capsys.readouterr().out
     assert "no variant has a value of hinge; kincheck run CASE --engine native --verbose" in out
     assert "None" not in out
@@ -270,7 +270,7 @@ def test_repr_of_case_is_one_line():
     ],
 )
 def test_check_joint_knows_the_names_of_built_in_joints(name, said, capsys):
-    assert main.main(["check-joint", name]) == 2
+    assert main(["check-joint", name]) == 2
     assert said in capsys.readouterr().err
 
 

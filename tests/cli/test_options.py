@@ -157,9 +157,9 @@ def test_none_and_any_iterable_are_arguments():
 
 
 def test_an_abbreviation_is_the_shortest_option(capsys):
-    assert main(["run", "rssr", "--eng", "native", "-q"]) == 0
+    assert main("run rssr --eng native -q".split()) == 0
     assert capsys.readouterr().out == "1 pass\n"
-    assert main(["run", "rssr", "--re", "native"]) == 2
+    assert main("run rssr --re native".split()) == 2
     assert "ambiguous option: --re could match --reference, --require" in capsys.readouterr().err
 
 

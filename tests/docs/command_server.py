@@ -36,7 +36,7 @@ def serve(address):
     ):
         report = ["--out", os.path.dirname(address)]
         main(["run", "five_bar", *IN_PROCESS, "--engine", *engines, *report])
-        main(["explain", "rssr", "--samples", "3"])
+        main("explain rssr --samples 3".split())
 
     gc.freeze()  # what is imported is never searched again
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)

@@ -11,7 +11,7 @@ from base64 import b64decode
 from pathlib import Path
 
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.history.queries import NUMBERS, export, faultless, read
@@ -27,7 +27,7 @@ FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
 
 
 def history(path, *argv):
-    return main.main(["history", "--history", str(path), *map(str, argv)])
+    return main(["history", "--history", str(path), *map(str, argv)])
 
 
 # Files of another time
@@ -76,7 +76,7 @@ def test_a_later_schema_is_refused_by_every_command(path, capsys):
     with Store(path) as store:
         store.connection.execute("PRAGMA user_version = 99")
     for command in ("history", "report"):
-        assert main.main([command, "--history", str(path)]) == 2
+        assert main([command, "--history", str(path)]) == 2
         assert "its schema is version 99, this kincheck knows" in capsys.readouterr().err
 
 
@@ -119,7 +119,7 @@ def test_trends_of_a_pair_and_its_steps(path, capsys):
 
 def test_history_refuses_unknown_names_and_files(path, capsys, monkeypatch):
     monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
-    assert main.main(["history"]) == 2
+    assert main(["history"]) == 2
     assert "no file is given. Give --history FILE, or set KINCHECK_HIST" in capsys.readouterr().err
     assert history(path) == 2
     assert "there is no such file" in capsys.readouterr().err
@@ -127,7 +127,7 @@ def test_history_refuses_unknown_names_and_files(path, capsys, monkeypatch):
     assert history(path, "--case", "frist") == 2
     assert "there is no case 'frist'; did you mean 'first'?" in capsys.readouterr().err
     monkeypatch.setenv("KINCHECK_HISTORY", str(path))
-    assert main.main(["history"]) == 0
+    assert main(["history"]) == 0
 
 
 def test_green_runs_have_passes_only(path):
@@ -312,18 +312,18 @@ def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
     }.items():
         (tmp_path / name).write_bytes(to_json(Results(run=facts, records=made)))
     before, now = str(tmp_path / "before.json"), str(tmp_path / "now.json")
-    assert main.main(["report", now, "--against", before]) == 1
+    assert main(["report", now, "--against", before]) == 1
     assert (
         "10 → 20 ms a sweep (×2; by the spread from run to run, ×1.75 may be chance)"
         in capsys.readouterr().out
     )
-    assert main.main(["report", before, "--against", now]) == 0
-    assert main.main(["report", before]) == 0
+    assert main(["report", before, "--against", now]) == 0
+    assert main(["report", before]) == 0
     assert (
         "nothing to compare with: last-green needs a history, and none is given"
         in capsys.readouterr().out
     )
-    assert main.main(["report"]) == 2
+    assert main(["report"]) == 2
     assert (
         "no run without a history. Give --history FILE, or a results.json"
         in capsys.readouterr().err

@@ -75,7 +75,7 @@ def test_unusable_history_costs_no_result(
     fault(path, monkeypatch)
     out, junit = tmp_path / "out", tmp_path / "junit.xml"
     files = ["--history", path, "--out", out, "--junit", junit]
-    assert kincheck_main("run", "crank", *files) == 2
+    assert kincheck_main("run crank", *files) == 2
     while HELD:
         HELD.pop().close()
     told, said = capsys.readouterr()
@@ -123,7 +123,7 @@ def passed_over(capsys, path):
 
 def test_run_beside_damaged_run_is_stored(kincheck_main, damaged, tmp_path, capsys):
     out = tmp_path / "out"
-    assert kincheck_main("run", "crank", "--history", damaged, "--out", out) == 2
+    assert kincheck_main("run crank --history", damaged, "--out", out) == 2
     assert "1 pass" in passed_over(capsys, damaged)
     assert NO_TRENDS not in (out / "report.html").read_text()
     with Store(damaged, writable=False) as store:

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 
 import msgspec
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome, OutputSeries, Seconds, to_json
 from kincheck.core.history.findings import Kind, Regressions
 from kincheck.core.history.store import Store
@@ -224,9 +224,9 @@ def test_changed_reference_is_reported(tmp_path, capsys):
     }
     for file, changes in zip(files, ({}, {"references": references}), strict=True):
         file.write_bytes(to_json(replace(RESULTS, run={**FACTS, "started": file.name}, **changes)))
-    assert main.main(f"report {files[0]} --against {files[0]}".split()) == 0
+    assert main(f"report {files[0]} --against {files[0]}".split()) == 0
     assert "Reference changed" not in capsys.readouterr().out
-    assert main.main(f"report {files[1]} --against {files[0]}".split()) == 0
+    assert main(f"report {files[1]} --against {files[0]}".split()) == 0
     said = capsys.readouterr().out
     assert "Reference changed (2): results are judged by other reference values" in said
     assert (
@@ -262,7 +262,7 @@ def test_the_command_writes_every_format(path, tmp_path, capsys):
     nights(path, 6)
     keep_changed(path, **worse(20.0), message="<script>alert(1)</script> | *x*")
     out = tmp_path / "report"
-    assert main.main(f"report --history {path} --out {out}".split()) == 1
+    assert main(f"report --history {path} --out {out}".split()) == 1
     text = (out / "regressions.md").read_text()
     assert capsys.readouterr().out == text
     found = msgspec.json.decode((out / "regressions.json").read_bytes(), type=Regressions)
@@ -337,7 +337,7 @@ def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")  # no colours
     monkeypatch.setenv("COLUMNS", "200")
-    assert main.main(["report", "--history", str(path)]) == 1
+    assert main(["report", "--history", str(path)]) == 1
     shown = capsys.readouterr().out
     for mark in ("<details>", "<summary>", "## ", "| ", "**", "&lt;"):
         assert mark not in shown

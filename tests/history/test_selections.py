@@ -43,7 +43,7 @@ def report(kincheck_main, tmp_path, capsys):
 
     def report():
         capsys.readouterr()
-        status = kincheck_main("report", "--history", str(tmp_path / "kept"))
+        status = kincheck_main("report --history", str(tmp_path / "kept"))
         return status, capsys.readouterr().out
 
     return report
@@ -197,6 +197,6 @@ def test_a_run_without_records_has_an_outcome_in_the_table(path, kincheck_main, 
     with Store(path) as store:
         facts = {"started": "2026-11-02T03:00", "command": "kincheck run"}
         store.begin_run("none", [("a", "b", "projection")], facts)
-    assert kincheck_main("history", "--history", str(path)) == 0
+    assert kincheck_main("history --history", str(path)) == 0
     found = [line.split()[4:6] for line in capsys.readouterr().out.splitlines()[1:]]
     assert found == [["1", "missing"], ["–", "–"]]

@@ -7,7 +7,7 @@ import random
 
 import numpy as np
 import pytest
-from kincheck.core.cli import main
+from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
 from kincheck.core.history.steps import change_points, lasting, steps
@@ -138,13 +138,13 @@ def test_repeated_slow_stretches_are_separate(path, capsys):
         (9, True, 17),
     ]
     assert [(each.first, each.last) for each in found(path, standing=True)] == [(25, 24)]
-    assert main.main(f"report --against 20 --history {path}".split()) == 1
+    assert main(f"report --against 20 --history {path}".split()) == 1
     said = capsys.readouterr().out
     assert " · since run 25 |" in said
     assert "ms a sweep since run 25 (" in said
     assert "steps that came and went" in said.lower()
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
-    assert main.main(f"history --case first --engine mujoco --last 0 --history {path}".split()) == 0
+    assert main(f"history --case first --engine mujoco --last 0 --history {path}".split()) == 0
     said = capsys.readouterr().out
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
 

@@ -362,6 +362,7 @@ def kincheck(*arguments, limit=None, **environment):
     )
     command = [
         sys.executable,
+        "-B",  # a limit would cut files of bytecode
         "-c",
         f"{restrict}import sys; from tests.support.drill import main; sys.exit(main())",
         *map(str, arguments),

@@ -65,6 +65,15 @@ class Page:
         ASKED.validate(message)
         self.socket.send(json.dumps(message))
 
+    def solve(self, points, **more):
+        """Ask for the answer to a design."""
+        self.say(type="solve", points=points, **more)
+
+    def answers(self, number):
+        """Whether a question still has its answer."""
+        self.solve(self.points, id=number)
+        return self.told("answer")["id"] == number
+
     def told(self, kind):
         """Return the next message of a kind."""
         while True:

@@ -126,8 +126,7 @@ def test_socket_of_a_stranger_is_refused(served, case):
 def test_bad_message_is_told_and_the_next_answered(page, text):
     page.socket.send(text)
     assert page.told("invalid")["message"].startswith("message: ")
-    page.say(type="solve", points=page.points, id=4)
-    assert page.told("answer")["id"] == 4
+    assert page.answers(4)
 
 
 def test_flood_of_messages_ends_the_page_alone(page, open_page):
@@ -139,18 +138,16 @@ def test_flood_of_messages_ends_the_page_alone(page, open_page):
             page.socket.recv(timeout=20)
     assert page.socket.close_code == 1008
     other = open_page()
-    other.say(type="solve", points=other.points, id=1)
-    assert other.told("answer")["id"] == 1
+    assert other.answers(1)
 
 
 def test_slow_page_holds_up_no_other(page, open_page):
     """A page that reads nothing: its answers wait in its socket, and the newest comes last."""
     for k in range(300):
-        page.say(type="solve", points=page.moved("uca_outer", 1, 0.01 * k), id=k)
+        page.solve(page.moved("uca_outer", 1, 0.01 * k), id=k)
     other = open_page()
     for k in range(3):
-        other.say(type="solve", points=other.points, id=k)
-        assert other.told("answer")["id"] == k
+        assert other.answers(k)
     while page.told("answer")["id"] != 299:
         pass
 
@@ -169,8 +166,7 @@ def test_killed_worker_is_a_verdict_and_the_server_lives(page):
     verdicts = [page.told("verdict") for _ in range(2)]
     assert "crashed" in {each["outcome"] for each in verdicts}
     assert [each["last"] for each in verdicts] == [False, True]
-    page.say(type="solve", points=page.points, id=9)
-    assert page.told("answer")["id"] == 9
+    assert page.answers(9)
 
 
 def test_message_beyond_the_limit_ends_the_page(page):
@@ -202,7 +198,7 @@ def test_mechanism_speaks_the_schema():
     with page_of(server) as socket:
         page = Page(socket)
         (driver,) = page.opening["drivers"]
-        page.say(type="solve", points=[])
+        page.solve([])
         page.told("answer")
         page.say(type="reach", driver=driver["name"])
         assert page.told("reached")["low"] < driver["design"]
@@ -227,10 +223,10 @@ def test_case_from_python_follows_the_page(car):
     server = kincheck_live(car, TRAVEL)
     with page_of(server) as socket:
         page = Page(socket)
-        page.say(type="solve", points=page.moved("uca_outer", 2, -400))
+        page.solve(page.moved("uca_outer", 2, -400))
         page.told("refused")
         assert server.case.mechanism == load(car, TRAVEL).mechanism
-        page.say(type="solve", points=page.moved("uca_outer", 1, 2.0))
+        page.solve(page.moved("uca_outer", 1, 2.0))
         page.told("answer")
     assert server.case.mechanism.point("uca_outer").position[1] == pytest.approx(0.542)
     assert server.address in server._repr_html_()
@@ -262,7 +258,7 @@ def test_typed_text_has_the_message_of_the_file(page, car, text, told):
 def test_edit_answers_what_run_gives_for_the_saved_table(page, car):
     """The numbers of a program whose inputs are hardpoints, against one made for the table."""
     points = page.moved("uca_outer", 1, 10.0)
-    page.say(type="solve", points=points, id=1)
+    page.solve(points, id=1)
     found = page.told("answer")["outputs"]
     page.say(type="save", points=points, name="other.csv", id=2)
     assert page.told("saved")["name"] == "other.csv"
@@ -278,21 +274,21 @@ def test_ranking_gives_what_a_moved_point_changes(page):
     effects = {(e["point"], e["axis"]): e["slopes"] for e in page.told("ranking")["effects"]}
     toe = []
     for by in (0.05, -0.05):
-        page.say(type="solve", points=page.moved("tierod_inner", 2, by))
+        page.solve(page.moved("tierod_inner", 2, by))
         toe.append(page.told("answer")["outputs"]["toe"])
     for slope, sample in zip(effects["tierod_inner", "z"], (0, 10, 20), strict=True):
         assert slope == pytest.approx((toe[0][sample] - toe[1][sample]) / 1e-4, rel=1e-5, abs=1e-9)
 
 
 def test_refusal_names_the_row(page):
-    page.say(type="solve", points=page.moved("uca_outer", 2, -400), id=7)
+    page.solve(page.moved("uca_outer", 2, -400), id=7)
     found = page.told("refused")
     assert found["point"] == "uca_outer"
     assert "expected" in found["message"] or "not above" in found["message"]
 
 
 def test_travel_out_of_reach_is_marked_and_told(page):
-    page.say(type="solve", points=page.moved("tierod_outer", 1, -40.0), id=7)
+    page.solve(page.moved("tierod_outer", 1, -40.0), id=7)
     message = json.loads(page.socket.recv(timeout=60))
     if message["type"] == "answer" and not all(message["solved"]):
         assert message["message"]
@@ -302,7 +298,7 @@ def test_travel_out_of_reach_is_marked_and_told(page):
 
 def test_of_many_edits_the_last_is_answered(page):
     for k in range(100):
-        page.say(type="solve", points=page.moved("uca_outer", 1, 0.1 * k), id=k)
+        page.solve(page.moved("uca_outer", 1, 0.1 * k), id=k)
     answers = [page.told("answer")["id"]]
     while answers[-1] != 99:
         answers.append(page.told("answer")["id"])
@@ -311,19 +307,18 @@ def test_of_many_edits_the_last_is_answered(page):
 
 def test_two_pages_do_not_disturb_each_other(open_page):
     one, other = open_page(), open_page()
-    one.say(type="solve", points=one.moved("uca_outer", 1, 5.0), id=1)
-    other.say(type="solve", points=other.points, id=1)
+    one.solve(one.moved("uca_outer", 1, 5.0), id=1)
+    other.solve(other.points, id=1)
     first, second = one.told("answer")["outputs"], other.told("answer")["outputs"]
     assert first["camber"] != second["camber"]
 
 
 def test_page_that_ends_early_leaves_the_server_alive(served, open_page):
     gone = open_page()
-    gone.say(type="solve", points=gone.points)
+    gone.solve(gone.points)
     gone.socket.socket.close()
     page = open_page()
-    page.say(type="solve", points=page.points, id=3)
-    assert page.told("answer")["id"] == 3
+    assert page.answers(3)
 
 
 def test_save_keeps_the_text_and_all_files(page, car):
@@ -363,7 +358,7 @@ def test_save_in_a_folder_without_rights_is_told(page, car):
 
 def test_file_changed_underneath_is_told_and_read_anew(page, car, open_page):
     car.write_text(CAR.replace("uca_front,90,", "uca_front,95,"), "utf-8")
-    page.say(type="solve", points=page.points)
+    page.solve(page.points)
     assert "has changed" in page.told("changed")["message"]
     assert open_page().points[0] == [95.0, 260.0, 285.0]
 
@@ -373,8 +368,7 @@ def test_file_spoilt_underneath_refuses_a_new_page(car, served, page):
     host = f"127.0.0.1:{served.port}"
     with connect(f"ws://{host}/socket?token={served.token}", origin=f"http://{host}") as other:
         assert "expected hardpoints" in json.loads(other.recv(timeout=20))["message"]
-    page.say(type="solve", points=page.points, id=5)
-    assert page.told("answer")["id"] == 5
+    assert page.answers(5)
 
 
 def test_check_tells_each_engine_and_ignores_strange_ones(page):

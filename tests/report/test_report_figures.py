@@ -82,11 +82,7 @@ def in_unit(found, unit):
 @pytest.mark.parametrize("motion", ["position", "velocity"])
 def test_error_figures_hold_the_distances_from_the_reference(tmp_path, motion, unit):
     made = results()
-    run = Results(
-        run=made.run,
-        records=[in_unit(record, unit) for record in made.records],
-        references=made.references,
-    )
+    run = replace(made, records=[in_unit(record, unit) for record in made.records])
     page = report(run, tmp_path)
     word = "value" if (motion, unit) == ("position", "N") else motion
     of = unit if motion == "position" else f"{unit}/s"
@@ -151,7 +147,7 @@ def test_missing_values_leave_gaps(tmp_path):
     broken = replace(
         whole, outputs={"half_track_change": output}, solved=19, us_per_step=None, rank=None
     )
-    page = report(Results(run=run.run, records=[broken], references=run.references), tmp_path)
+    page = report(replace(run, records=[broken]), tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert [k for k, value in enumerate(curve["x"]) if value is None] == [4, 5]
     [errors] = traces(page, "case-0-0-position", "one", "lines+markers")

@@ -56,7 +56,7 @@ def shown(tmp_path, monkeypatch):
         seconds=Seconds(build=0.5, first=1.5, warm=0.75),
         us_per_step=123456.0,
     )
-    run = Results(run=run.run, records=[native, one, two], references=run.references)
+    run = replace(run, records=[native, one, two])
     text = io.StringIO()
     monkeypatch.setenv("COLUMNS", "40")
     print_outputs(run, text)

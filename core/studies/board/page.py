@@ -4,7 +4,7 @@ and the settings.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import groupby, pairwise
 
 from ...errors import number_of
@@ -138,7 +138,8 @@ def _messages(rows: Sequence[Row]) -> list[str]:
 def _alike(rows: Sequence[Row]) -> list[str]:
     found = list[str]()
     for group, each in groupby(rows, key=lambda row: row.group):
-        best = _best(each)
+        # the best known settings of each stepper, which may be the defaults
+        best = {(row.engine, row.integrator): row for row in each}.values()
         errors = [row.error for row in best if row.error]
         if len({row.engine for row in best if row.error}) > 1 and max(errors) < 1.1 * min(errors):
             found.append(
@@ -147,12 +148,6 @@ def _alike(rows: Sequence[Row]) -> list[str]:
                 " engine's."
             )
     return found
-
-
-def _best(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows with the best known settings of each stepper, which may be the defaults."""
-    found = {(row.engine, row.integrator): row for row in rows}
-    return [*found.values()]
 
 
 def _cells(row: Row, truth: TruthFacts) -> list[str]:
