@@ -71,7 +71,7 @@ IMPORTS = {
         "kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
-        ". primitives program joints mechanism kinematics/formulation kinematics/forces "
+        ". primitives program mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
         "kinematics/statics kinematics/diagnosis program/llvm"

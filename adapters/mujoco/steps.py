@@ -88,10 +88,6 @@ class Stepping(Simulation):
         }
         return {**own[self.kind], **shared, "options": "no gravity, no contact, no autoreset"}
 
-    def unsupported(self, case: Case) -> str | None:
-        """Return a message on the joint or driver that is not supported here, or None."""
-        return MuJoCo().unsupported(case)
-
     def efforts(self) -> Mapping[str, Stepping]:
         """Return the efforts by the number of steps."""
         counts = (1, 2, 3, 5, 8) if self.kind == "projecting" else (1, 2, 4, 8, 16)
@@ -180,7 +176,7 @@ class _Steps:
             n = self.count(abs(until - t))
             if self.how.kind == "projecting":
                 self.project(driven[..., k])
-            else:
+            elif n:  # samples may be repeated
                 self.step(leg, t, until, n)
             if self.warned:
                 raise SimulationEndedError(f"MuJoCo warns: {self.warned[0]}")
