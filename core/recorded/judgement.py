@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import Case, size
+from ..case.units import LENGTHS
 from ..errors import shortened
 from ..harness.trajectory_check import CONSTRAINED
 from ..kinematics import Needed, Residuals, Worst, needed_forces, replayed
@@ -26,7 +27,6 @@ from .samples import Samples, driven_angles, samples_of
 # part of the stated one are counted.
 _LESS = 0.1
 _NAMED = 6
-_FACTORS = {"mm": 1e-3, "cm": 1e-2, "inch": 0.0254, "foot": 0.3048}
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +136,9 @@ def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
                 for name, pose in meaning.bodies.items()
             }
             changes[f"{reading}"] = replace(meaning, bodies=bodies)
-    for unit, factor in _FACTORS.items():
-        changes[f"positions in {unit}, not m,"] = _scaled(meaning, factor)
-        changes[f"positions in m, not {unit},"] = _scaled(meaning, 1.0 / factor)
+    for unit, length in LENGTHS.items():
+        changes[f"positions in {unit}, not m,"] = _scaled(meaning, length.size)
+        changes[f"positions in m, not {unit},"] = _scaled(meaning, 1.0 / length.size)
     found = list[str]()
     for words, change in changes.items():
         if change == meaning:

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..algebra import Quat, Vec3, X, Y, Z, quat
 from ..case.case import TIME, Case, Quantity
-from ..case.io.document import decimal, fault, shown, unknown_name
+from ..case.io.document import decimal, fault, require_known, shown, unknown_name
 from ..case.io.reference_samples import DERIVATIVES, known_columns
 from ..case.io.table import read_unit, required_unit
 from ..errors import MOST_NAMED, brief, shortened
@@ -340,8 +340,7 @@ class Reader:
         order, *names = ("".join(_AXES.get(x, x) for x in words[0]) if words else "", *words[1:])
         order = order if key == "euler" else "".join(words[:1])
         known = SEQUENCES if key == "euler" else ORDERS
-        if order not in known:
-            raise unknown_name(self.file, MAP, order, known, f"{key} {' or '.join(known)}")
+        require_known(self.file, MAP, order, known, f"{key} {' or '.join(known)}")
         flags = ("fixed", "inverted") if key == "euler" else ("inverted",)
         stated = {word: word in names for word in flags}
         return Reading(order, **stated), [name for name in names if name not in flags]
@@ -472,9 +471,8 @@ def read_accuracy(file: Path, case: Case, texts: Sequence[str]) -> Accuracy:
     sizes = dict[str, float]()
     for text in texts:
         name, _, right = (part.strip() for part in text.partition("="))
-        if name not in units:
-            expected = f"{', '.join(QUANTITIES)} or an output"
-            raise unknown_name(file, ACCURACY, name, units, expected)
+        expected = f"{', '.join(QUANTITIES)} or an output"
+        require_known(file, ACCURACY, name, units, expected)
         number, _, unit = right.partition(" ")
         try:
             found = decimal(number)

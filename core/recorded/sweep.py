@@ -124,7 +124,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
         found = replace(sweep, values=start + rate * time.values)
         notes.append(f"{file}: drivers at the recorded times{words}")
         moved = replace(found, values=found.values + rate * time.half)
-        return _resampled(case, found, True, [moved], notes, TIME, found)
+        return _swept(Resampled(case, True, [moved], notes, TIME, found), found)
     if lead not in followed:
         problem = f"found no motion of a driver, expected time, the driver {lead}, or the poses"
         raise fault(file, "", f'{problem} of its bodies; say {MAP} "{lead}=COLUMN"')
@@ -137,7 +137,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
     if alone and (time is None or rates or samples.count == 1):
         moved = [replace(values, values=values.values + drive.halves[0])]
         rated = not timed and (rates or time is None)
-        return _resampled(case, values, rated, moved, notes, column, values)
+        return _swept(Resampled(case, rated, moved, notes, column, values), values)
     lacking = [] if timed else [name for name in sweep.motions if name not in followed]
     if lacking:
         problem = f"found no motion of the driver {lacking[0]}, expected that of all"
@@ -148,14 +148,12 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
         raise fault(file, "", f"found samples whose time does not increase, {expected}; sort them")
     rated = time is not None and all(len(each.orders) == 3 for each in followed.values())
     found = Sweep(TIME, times, motions=_motions(case, times, followed, {}))
-    changes = [
-        (name, order) for name, each in followed.items() for order in range(len(each.orders))
-    ]
     variants = [
         replace(found, motions=_motions(case, times, followed, {name: order}))
-        for name, order in changes
+        for name, each in followed.items()
+        for order in range(len(each.orders))
     ]
-    return _resampled(case, found, rated, variants, notes, column, values)
+    return _swept(Resampled(case, rated, variants, notes, column, values), found)
 
 
 def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
@@ -232,16 +230,9 @@ def _motions(
     return found
 
 
-def _resampled(
-    case: Case,
-    sweep: Sweep,
-    rated: bool,
-    variants: Sequence[Sweep],
-    notes: Sequence[str],
-    lead: str,
-    values: Sweep,
-) -> Resampled:
+def _swept(whole: Resampled, sweep: Sweep) -> Resampled:
     """Return the case with a sweep, and with its reference if that has all its samples."""
+    case = whole.case
     found = replace(case, sweep=sweep)
     if case.reference:
         allowed = SAME * float(np.abs(case.sweep.values).max())
@@ -249,12 +240,12 @@ def _resampled(
         if sweep.driver != case.sweep.driver or index is None:
             note = f"{case.name}: its reference is at other samples, and is not interpolated"
             found = replace(found, reference={}, origin=None, truth=Truth.CONSENSUS_ONLY)
-            return Resampled(found, rated, variants, [*notes, note], lead, values)
+            return replace(whole, case=found, notes=[*whole.notes, note])
         there = np.flatnonzero(index >= 0)[np.argsort(index[index >= 0])]
         found = replace(
             found, reference={name: _at(each, there) for name, each in case.reference.items()}
         )
-    return Resampled(found, rated, variants, notes, lead, values)
+    return replace(whole, case=found)
 
 
 def _at(series: Series, rows: NDArray[np.intp]) -> Series:

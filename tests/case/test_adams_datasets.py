@@ -8,13 +8,13 @@ import math
 import numpy as np
 import pytest
 from kincheck import CaseError, residuals
-from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.kinematics import NativeSolver
 from scipy.spatial.transform import Rotation
 
 from ..support.adams_texts import AT, AXES, HALF, MM, UNITS, Deck, X, Y, Z, about, driven, jointed
+from ..support.written_again import written_again
 
 
 def read(tmp_path, text, name="deck.adm", **options):
@@ -195,9 +195,7 @@ def test_motion_of_markers_drives_point_and_joint(tmp_path):
 def test_case_file_of_a_deck_moves_alike(tmp_path):
     deck = driven("STEP(TIME, 0.5, 0, 1, 30D) + 0.1*SIN(TIME)")
     case = read(tmp_path, deck, drive=("time:0:1.5:7",))
-    file = tmp_path / "again.toml"
-    file.write_text(case_text(case))
-    again = load_case(file)
+    again = written_again(case, tmp_path)
     for one, other in zip(solved(case)["PART_2"], solved(again)["PART_2"], strict=True):
         assert one == pytest.approx(other, abs=1e-14)
 

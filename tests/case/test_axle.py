@@ -21,6 +21,7 @@ from ..oracles.rods import Carrier
 from ..support.case_texts import complains
 from ..support.rods_of_templates import RODS as ALL_RODS
 from ..support.rods_of_templates import solved
+from ..support.written_again import written_again
 
 WHEELBASE = 1.55
 RODS = {name: ALL_RODS[name] for name in ("double_wishbone", "five_link", "mcpherson")}
@@ -28,9 +29,14 @@ CLOSE = 1e-12
 
 
 def axle(folder, name, motion, travel="0.04:9"):
+    said = Supplied(travel=travel, axle=motion, wheelbase=str(WHEELBASE))
+    return load(table(folder, name), said)
+
+
+def table(folder, name="double_wishbone"):
     file = folder / f"{name}.csv"
     file.write_text(sample_table(TEMPLATES[name]))
-    return load(file, Supplied(travel=travel, axle=motion, wheelbase=str(WHEELBASE)))
+    return file
 
 
 def answer(case, name="native"):
@@ -136,8 +142,7 @@ def test_wheels_in_heave_are_one_wheel(tmp_path):
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_points_of_an_axle_are_on_bodies_of_their_side(tmp_path, name):
     """As those of one wheel, mirrored for the right; what is fixed stays so, steered or not."""
-    file = tmp_path / f"{name}.csv"
-    file.write_text(sample_table(TEMPLATES[name]))
+    file = table(tmp_path, name)
     wheel, both = (
         load(file, Supplied(travel="0.02:3", axle=motion)).mechanism for motion in (None, "roll")
     )
@@ -173,13 +178,8 @@ def test_parallel_lines_have_no_roll_centre(tmp_path):
 
 
 def test_a_case_file_of_an_axle(tmp_path):
-    """Written and read again: the same outputs; [suspension.other] and the sides are in it."""
-    case = axle(tmp_path, "five_link", "roll")
-    file = tmp_path / "case.toml"
-    file.write_text(case_text(case))
-    again = load_case(file)
-    assert again.outputs == case.outputs
-    assert again.mechanism == case.mechanism
+    """[suspension.other] and the sides are in it."""
+    written_again(axle(tmp_path, "five_link", "roll"), tmp_path)
 
 
 def changed(folder, edit):
@@ -281,12 +281,6 @@ CAR = {
     "brake_share": str(SHARE),
     "drive_share": "1",
 }
-
-
-def table(folder, name="double_wishbone"):
-    file = folder / f"{name}.csv"
-    file.write_text(sample_table(TEMPLATES[name]))
-    return file
 
 
 def expected_while_steering(motion, position, travel, rack):
@@ -431,9 +425,7 @@ def test_side_is_stated_in_the_file(tmp_path):
     case = load(plain(tmp_path, "mcpherson", "FR", "# side: right"), of("mcpherson"))
     assert not case.assembly
     assert "right side" in case.source
-    file = tmp_path / "again.toml"
-    file.write_text(case_text(case))
-    again, ours = solved(load_case(file)), solved(case)
+    again, ours = solved(written_again(case, tmp_path)), solved(case)
     np.testing.assert_allclose(again["toe"], ours["toe"], rtol=CLOSE, atol=CLOSE)
 
 

@@ -4,7 +4,6 @@ rods and lines.
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
@@ -13,6 +12,7 @@ from kincheck.core.errors import CaseError
 
 from ..support.case_texts import complains
 from ..support.rods_of_templates import CLOSE, DATA, RODS, expected, solved
+from ..support.written_again import written_again
 
 
 def sample(folder, name, travel="0.05:11", extra=""):
@@ -34,14 +34,7 @@ def test_outputs_of_each_template(tmp_path, name):
 
 @pytest.mark.parametrize("name", RODS)
 def test_a_case_file_of_the_table(tmp_path, name):
-    """Written and read, it has the same mechanism, outputs and samples."""
-    case = sample(tmp_path, name)
-    file = tmp_path / "case.toml"
-    file.write_text(case_text(case))
-    again = load(file)
-    assert again.outputs == case.outputs
-    assert again.mechanism == case.mechanism
-    assert np.abs(again.sweep.values - case.sweep.values).max() < 1e-16
+    written_again(sample(tmp_path, name), tmp_path)
 
 
 def test_a_slope_beside_each_output(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Sweep
-from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.measures import (
     Angle,
     Component,
@@ -24,6 +24,7 @@ from kincheck.core.mechanism.motions import Ramp, Sine
 
 from ..support.case_texts import BASE, complains, edited, write
 from ..support.measure_cases import AXIS, RATE, arm
+from ..support.written_again import written_again
 
 TOLERANCE = (1e-9, 0.0, "test")
 
@@ -238,9 +239,7 @@ def test_a_case_file_has_all_measures(tmp_path):
 
 def test_measures_are_written_and_read_again(tmp_path):
     case = load_case(write(tmp_path, MM + MEASURES))
-    again = load_case(write(tmp_path, case_text(case), "again.toml"))
-    assert again.outputs == case.outputs
-    assert again.mechanism.points == case.mechanism.points
+    written_again(case, tmp_path)
 
 
 FREE = ('"joint_displacement"\njoint = "guide"\natol', '"joint_angle"\njoint = "guide"\natol')

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.catalogue import output_catalogue
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
@@ -27,6 +26,7 @@ from ..support.case_texts import refused
 from ..support.rods_of_templates import solved
 from ..support.suspension_changes import TOE, changed
 from ..support.suspension_files import STRUT, TABLE, loaded, unreferenced
+from ..support.written_again import written_again
 
 POINTS = STRUT["points"] | {"top": {"body": "chassis", "position": [1.0, 0.55, 0.6]}}
 ON_CHASSIS = changed("suspension", wheel_center="top") | {"points": POINTS}
@@ -450,12 +450,10 @@ def test_wrong_point_is_told(changes, key, words):
 
 @pytest.mark.parametrize("axle", [None, "roll"])
 def test_case_file_of_a_table_keeps_the_points(tmp_path, axle):
-    table, file = tmp_path / "car.csv", tmp_path / "car.toml"
+    table = tmp_path / "car.csv"
     table.write_text(sample_table(TEMPLATES["mcpherson"]) + "wheel_axis,1,790,309,\n")
     case = load(table, Supplied(travel="0.04:3", axle=axle))
-    file.write_text(case_text(case))
-    again = load(file)
-    assert (again.mechanism, again.outputs) == (case.mechanism, case.outputs)
+    again = written_again(case, tmp_path)
     vehicle = again.outputs[0].vehicle
     side = "left_" if axle else ""
     assert (vehicle.wheel_axis, vehicle.wheel_contact) == (

@@ -1,17 +1,14 @@
 """Programs of any language as engines: what they are given, what they answer, how they fail."""
 
-import json
 import shutil
 import subprocess
 import sys
 
 import pytest
-from kincheck.adapters import engine
 from kincheck.core.cli.main import main
 
 from ..support.crank import MECHANISM
 
-NATIVE = engine("native")
 CASE = f"""{MECHANISM}[sweep]
 driver = "turn"
 start = -1.0
@@ -45,20 +42,18 @@ for row in rows:
 
 
 @pytest.fixture
-def judged(kincheck_main, tmp_path):
+def judged(last_record, tmp_path):
     """Returns status and record of a program, a command or the text of a Python program."""
 
     def run(program, words="{samples} {out}", *options):
-        case, out, file = (tmp_path / name for name in ("crank.toml", "out.json", "crank.py"))
+        case, file = tmp_path / "crank.toml", tmp_path / "crank.py"
         case.write_text(CASE)
         command = program
         if "\n" in program:
             file.write_text(program)
             command = f"{sys.executable} {file}"
-        options = ("--engine-command", f"{command} {words}", *options, "--json", out, "--quiet")
         jobs = None if "--jobs" in options else "0"
-        status = kincheck_main("run", case, *options, engines=[NATIVE], jobs=jobs)
-        return status, json.loads(out.read_text())["records"][-1] if out.exists() else None
+        return last_record(case, "--engine-command", f"{command} {words}", *options, jobs=jobs)
 
     return run
 

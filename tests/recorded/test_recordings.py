@@ -1,7 +1,6 @@
 """Recordings as engines: a four-bar by closed form in 40 digits, as other programs write it."""
 
 import csv
-import json
 import re
 import struct
 import zlib
@@ -18,6 +17,7 @@ NATIVE = engine("native")
 CASE = DATA / "fourbar.toml"
 PARTS = {"PART_2": "crank", "PART_3": "coupler", "PART_4": "rocker"}
 MODELICA = ["--map", "MOTION_1=crank.phi", "--map", "JOINT_4.angle=rocker.phi"]
+ANGLES = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
 XYZW, EULER = "quaternion xyzw qx qy qz qw", "euler 123 a b c"
 
 
@@ -29,15 +29,11 @@ def maps(attitude, parts=PARTS):
 
 
 @pytest.fixture
-def judged(kincheck_main, tmp_path):
+def judged(last_record):
     """Returns status and record of a recording of the four-bar; the record is None without one."""
 
     def run(file, *options):
-        out = tmp_path / "out.json"
-        case = [CASE, "--recorded", file, *options, "--json", out, "--quiet"]
-        status = kincheck_main("run", *case, engines=[NATIVE])
-        records = json.loads(out.read_text())["records"] if out.exists() else [None]
-        return status, records[-1]
+        return last_record(CASE, "--recorded", file, *options)
 
     return run
 
@@ -97,13 +93,18 @@ def test_adams_results_are_judged_in_all_rates(judged):
 
 
 @pytest.mark.parametrize(
-    ("file", "tolerance"),
-    [("fourbar_modelica.mat", 2e-15), ("fourbar_modelica_single.mat", 1e-7)],
+    ("file", "options", "tolerance"),
+    [
+        ("fourbar_modelica.mat", MODELICA, 2e-15),
+        ("fourbar_modelica_single.mat", MODELICA, 1e-7),
+        ("fourbar.mot", ANGLES, 1e-9),
+    ],
 )
-def test_modelica_results_of_truth_pass(judged, file, tolerance):
-    status, record = judged(DATA / file, *MODELICA)
+def test_results_of_truth_pass(judged, file, options, tolerance):
+    status, record = judged(DATA / file, *options)
     assert status == 0
     assert largest(record) < tolerance
+    assert ("angles without a unit in deg" in record["message"]) == file.endswith("mot")
 
 
 def written_as(file, form, crank, rocker):
@@ -114,11 +115,11 @@ def written_as(file, form, crank, rocker):
         for row in [("crank [rad]", "rocker [rad]"), *rows]:
             book.active.append(row)
         book.save(file)
-        return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+        return ANGLES
     if form == "storage":
         lines = ["run", "inDegrees=no", "endheader", "crank\trocker"]
         file.write_text("\n".join([*lines, *(f"{x!r}\t{y!r}" for x, y in rows)]))
-        return ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
+        return ANGLES
     variables, names = {
         "vectors": ({"crank": crank, "rocker": rocker, "n": 3.0}, ("crank", "rocker")),
         "matrix": ({"log": np.column_stack([crank, rocker])}, ("log(1)", "log(2)")),
@@ -187,14 +188,6 @@ def test_unpacked_size_of_a_file_is_bounded(judged, tmp_path, capsys):
     assert "bytes when unpacked; write fewer samples or channels" in capsys.readouterr().err
 
 
-def test_opensim_motion_of_truth_passes(judged):
-    options = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
-    status, record = judged(DATA / "fourbar.mot", *options)
-    assert status == 0
-    assert largest(record) < 1e-9
-    assert "angles without a unit in deg" in record["message"]
-
-
 @pytest.mark.parametrize("column", [2, 5, 7, 8, 13, 14, 16, 18, 21])
 @pytest.mark.parametrize("name", ["fourbar_xyzw.csv", "fourbar_123.csv"])
 def test_one_moved_number_fails_by_name(judged, table, name, column):
@@ -258,9 +251,6 @@ def test_wrong_convention_is_named(judged, file, wrong, right):
     status, record = judged(DATA / file, *texts)
     assert status == 1
     assert right in record["message"]
-
-
-ANGLES = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
 
 
 def test_other_zeros_are_explained_and_then_pass(judged):
@@ -485,7 +475,7 @@ RACK = RACK.replace('component = "x"', 'component = "z"')
 @pytest.mark.parametrize("driven", ["by column", "by poses"])
 @pytest.mark.parametrize("first", [0, 20, 45])
 @pytest.mark.parametrize("kind", ["gears", "rack"])
-def test_coupled_joints_pass_after_several_turns(kincheck_main, tmp_path, kind, first, driven):
+def test_coupled_joints_pass_after_several_turns(last_record, tmp_path, kind, first, driven):
     turn = np.linspace(0.0, 12.0, 61)[first:]
     half, nil = 0.5 * turn, 0.0 * turn
     other = {"gears": -1.25 * turn, "rack": nil}[kind]
@@ -505,16 +495,14 @@ def test_coupled_joints_pass_after_several_turns(kincheck_main, tmp_path, kind, 
     case, file = tmp_path / "case.toml", tmp_path / "run.csv"
     case.write_text({"gears": GEARS, "rack": RACK}[kind])
     file.write_text("\n".join(rows))
-    given = ["run", case, "--recorded", file, "--quiet"]
-    out = tmp_path / "out.json"
-    assert kincheck_main(*given, "--json", out, engines=[NATIVE]) == 0
-    message = json.loads(out.read_text())["records"][-1]["message"]
-    assert ("coupled joints begin after whole turns" in message) == (first > 0)
+    status, record = last_record(case, "--recorded", file)
+    assert status == 0
+    assert ("coupled joints begin after whole turns" in record["message"]) == (first > 0)
     case.write_text(case.read_text().replace("-0.4", "-0.40001").replace("0.05", "0.05001"))
-    assert kincheck_main(*given, engines=[NATIVE]) == 1
+    assert last_record(case, "--recorded", file)[0] == 1
 
 
-def test_wheel_half_a_turn_off_fails_where_turns_are_known(kincheck_main, tmp_path):
+def test_wheel_half_a_turn_off_fails_where_turns_are_known(last_record, tmp_path):
     """A turn more of the driver would explain it; the driver's column says that there is none."""
     turn = np.linspace(0.0, 2.0, 11)
     rows = ["turn," + ",".join(f"b.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))]
@@ -527,8 +515,7 @@ def test_wheel_half_a_turn_off_fails_where_turns_are_known(kincheck_main, tmp_pa
     case, file = tmp_path / "case.toml", tmp_path / "run.csv"
     case.write_text(GEARS.replace('body = "b"\nposition = [0.4', 'body = "a"\nposition = [0.1'))
     file.write_text("\n".join(rows))
-    given = ["run", case, "--recorded", file, "--quiet"]
-    assert kincheck_main(*given, engines=[NATIVE]) == 1
+    assert last_record(case, "--recorded", file)[0] == 1
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ JSON Schema of case files, made from the types of their readers.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 import msgspec
 
@@ -26,7 +26,6 @@ from .schema import (
     BodyKeys,
     CaseKeys,
     ClosureKeys,
-    Described,
     FreeKeys,
     OutputKeys,
     PointKeys,
@@ -53,6 +52,7 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
 _SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
 """The end of a sentence."""
 
+T = TypeVar("T")
 Rows: TypeAlias = list[tuple[str, ...]]
 
 ON_TYPES = (
@@ -84,30 +84,22 @@ def type_tables() -> dict[str, Rows]:
     the name of the type and ends with its meaning.
     """
     return {
-        'joints: type, bodies = ["first", "second"], and': [
-            (name, _keys(cls), *_counts(cls), _meaning(cls))
-            for name, cls in sorted(Joint.registry.items())
-        ],
-        'joints that couple two others: type, joints = ["first", "second"], and': [
-            (name, _keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}", _meaning(cls))
-            for name, cls in sorted(Coupler.registry.items())
-        ],
-        "drivers: type, and": [
-            (name, _keys(cls), _meaning(cls)) for name, cls in sorted(DRIVERS.items())
-        ],
-        "motions of drivers: type, and": [
-            (name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())
-        ],
-        "force elements: type, and": [
-            (
-                name,
-                f'bodies = ["first", "second"], {_keys(cls)}'
-                if issubclass(cls, SpringDamper | Bushing)
-                else _keys(cls),
-                _meaning(cls),
-            )
-            for name, cls in sorted(ELEMENTS.items())
-        ],
+        'joints: type, bodies = ["first", "second"], and': _rows(
+            Joint.registry, lambda cls: (_keys(cls), *_counts(cls))
+        ),
+        'joints that couple two others: type, joints = ["first", "second"], and': _rows(
+            Coupler.registry,
+            lambda cls: (_keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}"),
+        ),
+        "drivers: type, and": _rows(DRIVERS),
+        "motions of drivers: type, and": _rows(Motion.registry),
+        "force elements: type, and": _rows(
+            ELEMENTS,
+            lambda cls: (
+                'bodies = ["first", "second"], ' * issubclass(cls, SpringDamper | Bushing)
+                + _keys(cls),
+            ),
+        ),
     }
 
 
@@ -124,12 +116,20 @@ def output_tables() -> dict[str, Rows]:
     for name, cls in sorted(SuspensionOutput.registry.items()):
         needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
         rows.append((name, f"[{cls.measure}]", keys(cls), f"positive: {cls.positive}", needs))
+    of_all = (
+        "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
+    )
     return {
-        "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and": [
-            (name, keys(cls), _meaning(cls)) for name, cls in sorted(Measure.registry.items())
-        ],
+        of_all: _rows(Measure.registry, lambda cls: (keys(cls),)),
         "outputs of a wheel: type, and": rows,
     }
+
+
+def _rows(
+    registry: Mapping[str, type[T]],
+    cells: Callable[[type[T]], tuple[str, ...]] = lambda cls: (_keys(cls),),
+) -> Rows:
+    return [(name, *cells(cls), _meaning(cls)) for name, cls in sorted(registry.items())]
 
 
 def rows_of(cls: type[Joint]) -> int | None:
@@ -151,7 +151,7 @@ def _counts(cls: type[Joint]) -> tuple[str, str]:
     return f"{count} {'row' if rows == 1 else 'rows'}", f"{left} free{names}"
 
 
-def _keys(cls: type[Described]) -> str:
+def _keys(cls: type[Any]) -> str:
     """Return the keys of a type. Optional keys are in brackets; keys of motions and forces have
     units.
     """
@@ -164,7 +164,7 @@ def _keys(cls: type[Described]) -> str:
     return ", ".join(names) or "nothing else"
 
 
-def _meaning(cls: type[Described] | type[Measure]) -> str:
+def _meaning(cls: type[Any]) -> str:
     """Return the first sentence of a class's docstring. For a dataclass without a docstring,
     Python gives the signature.
     """
@@ -191,16 +191,14 @@ TEMPLATE = "#/$defs/{name}"
 
 def case_schema() -> dict[str, Any]:
     """Return the schema of case files, with all joint types registered so far."""
-    joints: Mapping[str, type[Joint | Coupler]] = {**Joint.registry, **Coupler.registry}
-    measures = {name: keys_of(cls) for name, cls in Measure.registry.items()}
-    outputs = {name: keys_of(cls) for name, cls in SuspensionOutput.registry.items()}
+    measures, outputs = map(_structs, (Measure.registry, SuspensionOutput.registry))
     tables: Tables = {
         "bodies": BodyKeys,
-        "joints": {name: keys_of(cls) for name, cls in joints.items()},
-        "couplers": {name: keys_of(cls) for name, cls in Coupler.registry.items()},
+        "joints": _structs({**Joint.registry, **Coupler.registry}),
+        "couplers": _structs(Coupler.registry),
         "points": PointKeys,
-        "drivers": {name: keys_of(cls) for name, cls in DRIVERS.items()},
-        "forces": {name: keys_of(cls) for name, cls in ELEMENTS.items()},
+        "drivers": _structs(DRIVERS),
+        "forces": _structs(ELEMENTS),
         "outputs": {COORDINATE: OutputKeys, **measures, **outputs},
     }
     single = {
@@ -213,12 +211,16 @@ def case_schema() -> dict[str, Any]:
         "compliance": RigKeys,
         "equilibrium": RestingKeys,
     }
-    motions = {name: keys_of(cls) for name, cls in Motion.registry.items()}
+    motions = _structs(Motion.registry)
     found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})
     for name in DRIVERS:
         keys = found["$defs"][f"drivers.{name}"]["properties"]
         keys["motion"] = any_of([f"motion.{name}" for name in motions])
     return found
+
+
+def _structs(registry: Mapping[str, type[Any]]) -> dict[str, Keys]:
+    return {name: keys_of(cls) for name, cls in registry.items()}
 
 
 def document_schema(

@@ -114,6 +114,14 @@ def unknown_name(
     return fault(file, key, f"found {shown(name)}, expected {expected}; {remedy(str(name), known)}")
 
 
+def require_known(
+    file: Path, key: str, name: str | None, known: Iterable[str], expected: str
+) -> None:
+    """Refuse a name that is none of the known ones; see `unknown_name`. None is no name."""
+    if name is not None and name not in (names := [*known]):
+        raise unknown_name(file, key, name, names, expected)
+
+
 def join(key: str, name: str) -> str:
     """Return the path of a key inside a table."""
     name = name if name.isprintable() and name else repr(name)
@@ -380,6 +388,10 @@ class Section:
     def unknown(self, name: object, known: Iterable[str], expected: str) -> CaseError:
         """Return the error of a name here that is none of the known ones; see `unknown_name`."""
         return unknown_name(self.file, self.key, name, known, expected)
+
+    def require(self, name: str | None, known: Iterable[str], expected: str) -> None:
+        """Refuse a name here that is none of the known ones; see `require_known`."""
+        require_known(self.file, self.key, name, known, expected)
 
     @property
     def table(self) -> dict[str, Any]:

@@ -373,9 +373,8 @@ def read_free(root: Section, mechanism: Mechanism, units: FileUnits) -> Free | N
     keys, rates = section.typed(FreeKeys), dict[str, float]()
     known = coordinates(mechanism)
     for name, rate in keys.rates.items():
-        if name not in known:
-            expected = "a driver or a joint with a rotation or translation"
-            raise section.at("rates").unknown(name, known, expected)
+        expected = "a driver or a joint with a rotation or translation"
+        section.at("rates").require(name, known, expected)
         rates[name] = _unit(known[name], units)(rate)
     return Free(keys.duration, keys.samples, rates)
 
@@ -507,8 +506,7 @@ def with_bushings(case: Case, file: Path) -> Case:
     root, joints = bushings_in(file), case.mechanism.given_joints
     names = [joint.name for joint in joints]
     for name, section in root.at("joints").each():
-        if name not in names:
-            raise section.unknown(name, names, "a joint")
+        section.require(name, names, "a joint")
     found = read_bushings(root, joints, FileUnits())
     if not found:
         raise root.at("joints").fault(
@@ -549,10 +547,9 @@ def read_resting(section: Section, mechanism: Mechanism) -> Resting:
     Raises:
         CaseError: unknown keys or names.
     """
-    keys, known = section.typed(RestingKeys), mechanism.drivers
+    keys, known = section.typed(RestingKeys), [driver.name for driver in mechanism.drivers]
     for name in keys.held:
-        if name not in (names := [driver.name for driver in known]):
-            raise section.at("held").unknown(name, names, "a driver")
+        section.at("held").require(name, known, "a driver")
     return Resting(keys.held)
 
 
@@ -572,7 +569,6 @@ def read_rig(section: Section, mechanism: Mechanism, units: FileUnits) -> Rig:
     for key, names in known.items():
         given: Any = getattr(keys, key)
         for name in [given] if isinstance(given, str) else given or ():
-            if name not in names:
-                raise section.at(key).unknown(name, names, what[key])
+            section.at(key).require(name, names, what[key])
     stiffness = keys.tire_stiffness and units.power(STIFFNESS, keys.tire_stiffness)
     return Rig(keys.wheel, keys.contact, keys.held, keys.loads, stiffness)

@@ -20,7 +20,7 @@ from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
 from ..suspension import Convention, PerTravel, SuspensionOutput
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
-from .document import decimal, fault, shown, unknown_name
+from .document import decimal, fault, require_known, shown
 from .reader_options import CurveOptions
 from .reference import compared
 from .reference_file import sha256
@@ -196,8 +196,7 @@ def _with_accuracy(
                 f' the output it is of; say --accuracy "{names[0]}={text}"',
             )
         for name in names:
-            if name not in units:
-                raise unknown_name(file, "--accuracy", name, units, "an output with a column")
+            require_known(file, "--accuracy", name, units, "an output with a column")
             bare = compared[name].convert
             stated[name] = size_of(file, "--accuracy", name, right, units[name], bare)
     why = f"the accuracy of {file.name}, as its user states it"
@@ -239,8 +238,7 @@ def size_of(file: Path, option: str, name: str, text: str, unit: str, bare: Conv
 
 def _signs(file: Path, written: str, stated: str | None) -> str:
     """Return the convention of signs that the file or the user states; empty without any."""
-    if stated is not None and stated not in list(Convention):
-        raise unknown_name(file, "--signs", stated, [*Convention], "a convention")
+    require_known(file, "--signs", stated, Convention, "a convention")
     if stated is not None and written not in ("", stated):
         raise fault(
             file,
@@ -331,10 +329,8 @@ def read_stated(
                 f"found {shown(text)}, expected COLUMN=OUTPUT, COLUMN=-OUTPUT or"
                 f' COLUMN="OUTPUT [UNIT]"; say {MAP} "Toe Angle=toe [deg]"',
             )
-        if name != driver and name not in known:
-            raise unknown_name(
-                file, MAP, name, [driver, *known], f"the driver {driver} or an output"
-            )
+        expected = f"the driver {driver} or an output"
+        require_known(file, MAP, name, [driver, *known], expected)
         if head in stated or name in [target.name for target in stated.values()]:
             raise fault(
                 file,

@@ -121,9 +121,7 @@ def check_point(section: Section, name: str, mechanism: Mechanism) -> None:
     Raises:
         CaseError: there is no such point.
     """
-    known = [point.name for point in mechanism.points]
-    if name not in known:
-        raise section.unknown(name, known, "a point")
+    section.require(name, [point.name for point in mechanism.points], "a point")
 
 
 def _kingpin(
@@ -216,8 +214,7 @@ def _travel(section: Section, named: str | None, vehicle: Vehicle, case: Case) -
             and abs(unit(each.direction) @ unit(vehicle.up)) > LEVEL
         )
         return next(of_wheel, None)
-    if named not in (names := [each.name for each in drivers]):
-        raise section.at("travel").unknown(named, names, "a driver")
+    section.at("travel").require(named, [each.name for each in drivers], "a driver")
     return named
 
 

@@ -23,7 +23,7 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ....trajectory import Array
 from ...case import Case, Hardpoint, Quantity, Sweep, size
-from ...io.document import decimal, fault, interval, measure, shown, unknown_name
+from ...io.document import decimal, fault, interval, measure, require_known, shown
 from ...io.outputs import default, with_all_coordinates, with_slopes
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
@@ -156,8 +156,7 @@ def mechanism_of(
         CaseError: an unknown motion, or the rack moves and there are no tie rods.
         MechanismError: the places do not fit the mechanism.
     """
-    if said is not None and said not in list(AxleMotion):
-        raise unknown_name(file, "--axle", said, [*AxleMotion], "a motion")
+    require_known(file, "--axle", said, AxleMotion, "a motion")
     steering = said == AxleMotion.STEER
     if (steering or travels.rack is not None) and not template.steered:
         option, what, expected = (
@@ -251,8 +250,7 @@ def vehicle_of(
     if contact is not None:
         _require_within(file, named[WHEEL_CONTACT], size, RADII)
     position = supplied.position
-    if position is not None and position not in list(Axle):
-        raise unknown_name(file, "--position", position, [*Axle], "an axle")
+    require_known(file, "--position", position, Axle, "an axle")
     return Vehicle(
         convention=Convention.ISO_8855,
         side=side,

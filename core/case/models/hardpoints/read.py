@@ -18,7 +18,7 @@ import numpy as np
 from ....errors import MOST_NAMED, brief, shortened, similar
 from ....mechanism.mechanism import Mechanism, Vector
 from ...case import Case, Sweep, Truth
-from ...io.document import explained, fault, parse, read_text, shown, unknown_name
+from ...io.document import explained, fault, parse, read_text, require_known, shown, unknown_name
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...notes import SUSPENSIONS
@@ -442,15 +442,13 @@ def _read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> 
         CaseError: the file cannot be read, or a role or point is unknown.
     """
     text = read_text(file, LARGEST_NAMES, "it holds a name for each role of a template")
-    known, found = [*points], dict[str, str]()
+    found = dict[str, str]()
     for role, name in parse(file, text).items():
-        if role not in roles:
-            raise unknown_name(file, role, role, roles, "a role")
+        require_known(file, role, role, roles, "a role")
         if not isinstance(name, str):
             raise fault(
                 file, role, f"found {shown(name)}, expected the name of a point; write it in quotes"
             )
-        if name not in known:
-            raise unknown_name(file, role, name, known, "a point of the table")
+        require_known(file, role, name, points, "a point of the table")
         found[role] = name
     return found

@@ -229,8 +229,7 @@ def with_file(
     root, found = bushings_in(file), dict[str, Any]()
     known = [role for role in at if joint_at(template, role)]
     for role, section in root.at("bushings").each() if root.at("bushings").value else ():
-        if role not in known:
-            raise section.unknown(role, known, f"a role of a joint of {template.name}")
+        section.require(role, known, f"a role of a joint of {template.name}")
         keys = section.typed(RoleKeys)
         found[role] = {name: getattr(keys, name) for name in keys.__struct_fields__}
     if not found:

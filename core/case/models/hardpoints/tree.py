@@ -129,7 +129,7 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
         CaseError: not Python, no points, or points of several suspensions.
     """
     left_out = list[str]()
-    leaves = [Leaf((key,), value, key) for key, value in _facts_of_comments(text)]
+    leaves = _facts_of_comments(text)
     try:
         for each, above in _statements(ast.parse(text).body):
             targets = each.targets if isinstance(each, ast.Assign) else []
@@ -208,9 +208,7 @@ def toml_tree(file: Path, text: str) -> list[Leaf]:
     Raises:
         CaseError: not TOML.
     """
-    facts = _facts_of_comments(text)
-    stated = [Leaf((key,), value, key) for key, value in facts]
-    return [*_leaves(parse(file, text)), *stated]
+    return [*_leaves(parse(file, text)), *_facts_of_comments(text)]
 
 
 def has_points(tree: Sequence[Leaf]) -> bool:
@@ -236,9 +234,13 @@ def fact_of(text: str) -> tuple[str, str] | None:
     return (found[1].lower(), found[2].strip()) if found else None
 
 
-def _facts_of_comments(text: str) -> list[tuple[str, str]]:
+def _facts_of_comments(text: str) -> list[Leaf]:
     comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
-    return [fact for comment in comments if (fact := fact_of(comment))]
+    return _stated(fact for comment in comments if (fact := fact_of(comment)))
+
+
+def _stated(facts: Iterable[tuple[str, str]]) -> list[Leaf]:
+    return [Leaf((key,), value, key) for key, value in facts]
 
 
 def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
@@ -295,8 +297,7 @@ def read_assignments(
             problem = f"found {unit}, and {facts['unit']} in a comment, expected one unit"
             raise fault(file, units[unit], f"{problem}; correct either")
         facts.setdefault("unit", unit)
-    stated_facts = [Leaf((key,), value, key) for key, value in facts.items()]
-    return _table(file, "Assigned", [*found, *stated_facts], supplied, left_out)
+    return _table(file, "Assigned", [*found, *_stated(facts.items())], supplied, left_out)
 
 
 def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
