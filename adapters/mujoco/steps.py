@@ -90,6 +90,9 @@ class Stepping(Simulation):
 
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint or driver that is not supported here, or None."""
+        for coupler in case.mechanism.couplers:
+            if coupler.curve and coupler.curve.knots:
+                return f"{coupler}: MuJoCo's equality has powers up to the fourth; use projection"
         return MuJoCo().unsupported(case)
 
     def efforts(self) -> Mapping[str, Stepping]:

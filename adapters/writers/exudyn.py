@@ -371,8 +371,8 @@ class _Script:
 
     def relate(self, name: str, terms: Terms) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, (_, factor) = Relation(name, terms, ()).follower(signed=False)
-        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
+        one, other, line = Relation(name, terms, ()).follower(signed=False)
+        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), line.at(0.0)[1])
 
     def values(self, joint: Any) -> Mapping[str, tuple[float, ...]]:
         """Return the coordinates of a joint at the start, by freedom."""

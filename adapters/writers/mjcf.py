@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from ...core.algebra import vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
 from ...core.case.models.trees.masses import STAND_INS
+from ...core.errors import KincheckError
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion
@@ -266,6 +267,11 @@ class _Model:
             ET.SubElement(self.equalities, "tendon", tendon1=name)
             return
         one, other, curve = relation.follower(signed=False)
+        if curve.knots:
+            raise KincheckError(
+                f"joint {relation.name!r} is a spline, which has no counterpart in MJCF, whose"
+                " joints follow polynomials; write URDF or OpenSim instead"
+            )
         names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
-        polynomial = numbers([*curve, 0, 0, 0, 0][:5])
+        polynomial = numbers([*curve.powers[0], 0, 0, 0, 0][:5])
         ET.SubElement(self.equalities, "joint", names, polycoef=polynomial)

@@ -4,21 +4,23 @@ The format has no velocities, and its ball joints lock at a right angle, so the 
 its start pose. Hinges and slides have the coordinates of the case there, as default values; those
 of balls, crosses and free bodies are zero. A body has its frame of the case. Loops are closed
 by Simbody's constraints of a point, a distance or a whole frame; coordinate couplers relate
-coordinates to one another by a factor or a polynomial. Spring-dampers are forces of OpenSim. Names
-in OpenSim are parts of paths: an underscore replaces characters with a meaning in paths.
+coordinates to one another by a factor, a polynomial or a spline. Spring-dampers are forces of
+OpenSim. Names in OpenSim are parts of paths: an underscore replaces characters with a meaning in
+paths.
 """
 
 from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import IDENTITY, Quat, triple, vec
 from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.joints import PiecewisePolynomial
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper, TorsionSpringDamper
@@ -263,20 +265,21 @@ class _Model:
         return False
 
     def couple(
-        self, constraints: ET.Element, name: str, one: str, other: str, follows: Sequence[float]
+        self, constraints: ET.Element, name: str, one: str, other: str, follows: PiecewisePolynomial
     ) -> None:
-        """Let one coordinate follow a polynomial of another, both from the start, the constant
-        first.
-        """
+        """Let one coordinate follow a function of another, both from the start."""
         y, x = (self.values.get(each, 0.0) for each in (one, other))
-        curve = Powers(follows)(Powers((-x, 1.0))) + y
-        follows = curve.coef.tolist()
         element = ET.SubElement(constraints, "CoordinateCouplerConstraint", name=_name(name))
-        function = ET.SubElement(
-            ET.SubElement(element, "coupled_coordinates_function"),
-            "LinearFunction" if len(follows) == 2 else "PolynomialFunction",
-        )
-        add_text(function, "coefficients", numbers(follows[::-1]))
+        around = ET.SubElement(element, "coupled_coordinates_function")
+        if follows.knots:
+            spline = ET.SubElement(around, "SimmSpline")
+            points = [(at + x, value + y) for at, value in follows.knots]
+            for key, values in zip("xy", zip(*points, strict=True), strict=True):
+                add_text(spline, key, numbers(values))
+        else:
+            moved: list[float] = (Powers(follows.powers[0])(Powers((-x, 1.0))) + y).coef.tolist()
+            kind = "LinearFunction" if len(moved) == 2 else "PolynomialFunction"
+            add_text(ET.SubElement(around, kind), "coefficients", numbers(moved[::-1]))
         add_text(element, "independent_coordinate_names", _name(other))
         add_text(element, "dependent_coordinate_name", _name(one))
 

@@ -56,7 +56,7 @@ def write(
         if coupler.curve:
             raise KincheckError(
                 f"{coupler} has no counterpart in SDF, whose joints mimic others by a factor; write"
-                " MJCF, URDF or OpenSim instead"
+                " URDF or OpenSim instead"
             )
     model = _Model(at_start(mechanism, way))
     model.add_bushings(mechanism)
@@ -91,8 +91,8 @@ class _Model:
         for joint in self.tree.joints:
             if joint.move != "free":  # a link without a joint is free
                 self.add_joint(joint)
-        for name, one, other, (_, factor) in self.tree.relations:
-            self.relate(name, one, other, factor)
+        for name, one, other, line in self.tree.relations:
+            self.relate(name, one, other, line.at(0.0)[1])
         for point in mechanism.points:
             frame = {"name": f"point.{point.name}", "attached_to": point.body}
             self.add_pose(ET.SubElement(self.model, "frame", frame), point.position)

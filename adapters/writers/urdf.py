@@ -293,17 +293,15 @@ class _Model:
             )
 
     def relate(self, relation: Relation) -> None:
-        """Keep the weighted sum of coordinates at zero, or a coordinate at a polynomial of
-        another.
-        """
+        """Keep the weighted sum of coordinates at zero, or one at a function of another."""
         if relation.curve:
-            one, other, coefficients = relation.follower(signed=False)
-            table = {
-                "kind": "polynomial",
+            one, other, curve = relation.follower(signed=False)
+            table: dict[str, Any] = {
+                "kind": "spline" if curve.knots else "polynomial",
                 "driven": self.coordinates[one],
                 "driving": self.coordinates[other],
-                "coefficients": coefficients,
             }
+            table |= {"points": curve.knots} if curve.knots else {"coefficients": curve.powers[0]}
         else:
             weights = {self.coordinates[name, one]: w for name, one, w in relation.terms}
             table = {"kind": "linear", "weights": weights}

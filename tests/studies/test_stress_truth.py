@@ -36,9 +36,7 @@ from kincheck.core.studies.truth.path import by_body
 from kincheck.core.studies.truth.proofs import distance_from_proof
 from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 
-POLYNOMIAL = "polynomial"
-EVERY = {case.name: case for case in probes()}
-PROBES = {name: case for name, case in EVERY.items() if name != POLYNOMIAL}
+PROBES = {case.name: case for case in probes()}
 CRANK, ROD = 0.3, 1.0
 
 
@@ -68,11 +66,6 @@ def test_jacobian_and_curvature_equal_differences(name):
     others = np.setdiff1d(np.arange(len(second)), rows.turn_rows)
     assert np.abs(rows.jacobian(at)[0] @ rates[1:].reshape(-1) - first[:, 0])[others].max() < 1e-8
     assert np.abs(rows.beyond(at, rates) - second)[others].max() < 1e-6
-
-
-def test_a_polynomial_coupler_has_no_truth_and_is_refused():
-    with pytest.raises(NotStatedError, match="no polynomial conditions"):
-        followed(EVERY[POLYNOMIAL])
 
 
 @pytest.mark.parametrize("name", PROBES)

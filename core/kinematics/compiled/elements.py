@@ -245,7 +245,7 @@ class _Writer:
 def _content(c: Constraint | Relation) -> Any:
     """Return what of a constraint holds its numbers."""
     if isinstance(c, Relation):
-        return tuple(c.weights.values()), tuple(c.curve), c.drive
+        return tuple(c.weights.values()), c.curve, c.drive
     return c.primitive
 
 
