@@ -19,7 +19,7 @@ import numpy as np
 from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import IDENTITY, Quat, triple, vec
-from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.joints import PiecewisePolynomial
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -68,6 +68,7 @@ def write(
     way: Mapping[str, BodyMotion],
     start: Mapping[str, float],
     zeros: Zeros = NO_ZEROS,
+    ranges: Ranges = NO_RANGES,
 ) -> Mapping[str, str]:
     """Return an .osim file in the pose at the end of the way; see `Writer`.
 
@@ -78,12 +79,13 @@ def write(
     values = joint_coordinates(mechanism, way)
     values = {key: x + zeros.get(key, 0.0) for key, x in values.items()}
     gravity = mechanism.gravity if mechanism.has_loads else NONE
-    model = _Model(at_start(mechanism, way), gravity, values)
+    model = _Model(at_start(mechanism, way), gravity, values, ranges)
     model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     masses, left_out = text.facts(mechanism, model.sprung, True, model.tree.frames.values())
     others = [f.name for f in mechanism.forces if getattr(f, "law", "") != Law.CARDAN]
     left_out += text.own_law(mechanism, model.sprung.intersection(others), "OpenSim")
+    left_out += text.lost_limits(ranges, model.tree.coordinates)
     closed = loops(model.tree.ties, TIES[:3])
     add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, left_out))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
@@ -105,9 +107,15 @@ class _Model:
     """The document during its construction; the mechanism is at its start."""
 
     def __init__(
-        self, mechanism: Mechanism, gravity: Vector, values: Mapping[tuple[str, str], float]
+        self,
+        mechanism: Mechanism,
+        gravity: Vector,
+        values: Mapping[tuple[str, str], float],
+        ranges: Ranges,
     ) -> None:
         self.tree = hung(mechanism)
+        names = self.tree.coordinates
+        self.ranges = {names[key]: limits for key, limits in ranges.items() if key in names}
         # values of coordinates at the start, by name
         self.values = {name: values.get(key, 0.0) for key, name in self.tree.coordinates.items()}
         self.root = ET.Element("OpenSimDocument", Version="40000")
@@ -192,7 +200,10 @@ class _Model:
         for suffix in suffixes:
             coordinate = ET.SubElement(coordinates, "Coordinate", name=_name(joint.name + suffix))
             add_text(coordinate, "default_value", numbers([value]))
-            add_text(coordinate, "range", "-1e9 1e9")
+            limits = self.ranges.get(joint.name)
+            add_text(coordinate, "range", numbers(limits) if limits else "-1e9 1e9")
+            if limits:
+                add_text(coordinate, "clamped", "true")
         frames = ET.SubElement(element, "frames")
         turn = _turns(orientation(joint.move, joint.axis))
         if joint.move in ("fixed", "free"):

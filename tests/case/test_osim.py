@@ -7,6 +7,8 @@ import sys
 
 import numpy as np
 import pytest
+from kincheck import adapters
+from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.undriven import undriven_file
@@ -443,3 +445,37 @@ def test_older_documents_are_brought_up_to_date(write):
     expected = expected @ transform((0, 0, -2))
     assert np.allclose(placed(tree, "a"), expected, rtol=0, atol=EXACT)
     assert tree.moves["q"].value == 0.3
+
+
+@pytest.mark.parametrize("to", ["osim", "mjcf", "urdf", "sdf"])
+def test_exports_keep_limits(write, tmp_path, to):
+    """From a start at which they count from another zero; a slide too."""
+    clamped = [texts(range=each, clamped="true") for each in ((-0.5, 0.75), (-0.1, 0.3))]
+    joints = [
+        joint("PinJoint", "A", "", "a", coordinate("A", 0.2, clamped[0])),
+        joint("SliderJoint", "B", "a", "b", coordinate("B", 0.05, clamped[1])),
+    ]
+    case = load(write(model("ab", joints)), Supplied(drive=("A:0.2:0.6:3",), hold=("B",)))
+    zeros = {"osim": (0.0, 0.0), "mjcf": (0.0, 0.0), "urdf": (0.2, 0.05), "sdf": (0.4, 0.05)}[to]
+    files = written(case, adapters.writer(to), 0.4)
+    file = write(next(text for end, text in files.items() if end != ".constraints.json"), f"w.{to}")
+    found = undriven_file(file).coordinates
+    for name, limits, zero in zip("AB", ((-0.5, 0.75), (-0.1, 0.3)), zeros, strict=True):
+        limit = found[name].limit
+        assert (limit.lower + zero, limit.upper + zero) == pytest.approx(limits, abs=1e-12)
+
+
+def test_start_or_drive_beyond_limits_is_noted(write):
+    bounded = texts(range=(-0.5, 0.75), clamped="true")
+    joints = [
+        joint("PinJoint", x, "", x.lower(), coordinate(x, v, bounded))
+        for x, v in (("A", 0.0), ("B", 0.9), ("C", 0.75))
+    ]
+    file = write(model("abc", joints))
+    case = load(file, Supplied(drive=("A:0:1:5",), hold=("B", "C")))
+    (note,) = (each for each in case.assembly if "beyond their limits" in each)
+    assert note == (
+        "joints beyond their limits: A at 0 to 1, limits -0.5 to 0.75; B at 0.9, limits -0.5 to"
+        " 0.75"
+    )
+    assert "beyond" not in " ".join(load(write(model("a", joints[:1])), DRIVE).assembly)

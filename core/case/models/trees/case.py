@@ -184,8 +184,30 @@ class _Parts:
                 f" --start count from the model's zero, and are at the start"
                 f" {shortened(values, MOST_NAMED)}"
             )
+        ranges = {
+            (name, FREEDOMS[move.kind]): (move.limit.lower, move.limit.upper)
+            for name, move in tree.joints.items()
+            if isinstance(self.joints.get(name), Revolute | Translational) and move.limit.is_range
+        }
+        beyond: list[str] = []
+        for (name, _), (lower, upper) in ranges.items():
+            move = tree.joints[name]
+            values, off = self.driving.driven.get(name, (move.value,)), digits[move.kind]
+            low, high = float(min(values)), float(max(values))
+            if low < lower - off or high > upper + off:
+                reached = f"{low:.9g} to {high:.9g}" if low < high else f"{low:.9g}"
+                beyond.append(f"{name} at {reached}, limits {lower:.9g} to {upper:.9g}")
+        if beyond:
+            notes.append(f"joints beyond their limits: {shortened(beyond, MOST_NAMED, '; ')}")
         case = Case(
-            tree.file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=(*notes,)
+            tree.file.stem,
+            source,
+            Truth.CONSENSUS_ONLY,
+            mechanism,
+            sweep,
+            (),
+            assembly=(*notes,),
+            ranges=ranges,
         )
         dof = degrees_of_freedom(mechanism)
         if dof != len(drivers) or not model.is_exact:

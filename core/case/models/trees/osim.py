@@ -302,7 +302,7 @@ class _Reader:
         return FramedFreedom(name, kind, axis, coordinate, self.values[name], limit=limit)
 
     def _custom(self, element: Element, name: str) -> list[FramedFreedom]:
-        """Return the moves of a custom joint: of each coordinate an axis it moves as much as itself;
+        """Return the moves of a custom joint: of each coordinate an axis moved as much as itself;
         other axes follow. One without such an axis turns a hinge, and another one back.
         """
         coordinates = {each.required("name"): each for each in self._coordinates(element, name, 0)}
