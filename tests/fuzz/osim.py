@@ -35,17 +35,21 @@ WORDS = (
     *("/ground", "/bodyset/a", "..", "on_parent", "SimmSpline", "CustomJoint", "40000", "30000"),
     *("SpringGeneralizedForce", "BushingForce", "Marker", "PhysicalOffsetFrame", "Constant"),
 )
+SPLINE = tagged("SimmSpline", texts(x=(-1, -0.2, 0.1, 0.5, 2), y=(0.3, 0.1, 0.2, 0.4, 0.1)))
 BENT = joint(
     "CustomJoint",
     "knee",
     "",
     "a",
-    coordinate("A", 0.1, texts(clamped="true", range=(-1, 1))) + coordinate("lift"),
+    coordinate("A", 0.1, texts(clamped="true", range=(-1, 1)))
+    + coordinate("lift")
+    + coordinate("free"),
     inside=tagged(
         "SpatialTransform",
         axis("rotation1", (0, 0, 1), line(-1, 0.2), "A")
         + axis("translation1", (1, 0, 0), line(0.5, 0.1), "A")
-        + axis("translation2", (0, 1, 0), line(1, 0), "lift"),
+        + axis("translation2", (0, 1, 0), line(1, 0), "lift")
+        + axis("translation3", (0, 0, 1), SPLINE, "free"),
     ),
 )
 TIED = (

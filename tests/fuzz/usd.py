@@ -35,7 +35,8 @@ MOST_OF_IT = stage(
         "Prismatic",
         "k",
         *("a", "b", None, None, "rel newton:mimicJoint = </r/j>", "float newton:mimicCoef1 = 2"),
-        apis="NewtonMimicAPI PhysicsDriveAPI:linear",
+        "double mjc:coef2 = 0.1",
+        apis="NewtonMimicAPI MjcEqualityJointAPI PhysicsDriveAPI:linear",
     ),
     joint("Revolute", "l", "b", "c", (0, 0, 1), None, "float drive:linear:physics:damping = 1"),
     joint(
