@@ -159,7 +159,7 @@ def test_axes_of_custom_joint_follow_their_coordinates(write):
     assert any("bend 0.7" in note for note in case.assembly)
 
 
-# The knee of gait2392 of https://github.com/opensim-org/opensim-models (Delp and others, 1990):
+# The knee of gait2392 of https://github.com/opensim-org/opensim-models (CC BY 3.0):
 # displacements of the shank [m] over the angle [rad].
 FORWARD = (
     (-2.0944, -1.74533, -1.39626, -1.0472, -0.698132, -0.349066, -0.174533)

@@ -267,7 +267,9 @@ def _mass(element: Element) -> Mass | None:
             return None  # that of its collision shapes
         matrix = element.child("inertia")
         entries = [
-            default if matrix is None else matrix.value(name, 1, (default,))[0]
+            matrix.value(name, 1, (default,))[0]
+            if matrix is not None and matrix.child_text(name)
+            else default
             for name, default in zip(ENTRIES, UNIT, strict=True)
         ]
         (mass,) = element.value("mass", 1, (1.0,))
