@@ -189,26 +189,9 @@ class _Parts:
             for name, move in tree.joints.items()
             if isinstance(self.joints.get(name), Revolute | Translational) and move.limit.is_range
         }
-        beyond: list[str] = []
-        for (name, _), (lower, upper) in ranges.items():
-            move = tree.joints[name]
-            values, off = self.driving.driven.get(name, (move.value,)), digits[move.kind]
-            low, high = float(min(values)), float(max(values))
-            if low < lower - off or high > upper + off:
-                reached = f"{low:.9g} to {high:.9g}" if low < high else f"{low:.9g}"
-                beyond.append(f"{name} at {reached}, limits {lower:.9g} to {upper:.9g}")
-        if beyond:
-            notes.append(f"joints beyond their limits: {shortened(beyond, MOST_NAMED, '; ')}")
-        case = Case(
-            tree.file.stem,
-            source,
-            Truth.CONSENSUS_ONLY,
-            mechanism,
-            sweep,
-            (),
-            assembly=(*notes,),
-            ranges=ranges,
-        )
+        notes += self.driving.beyond_limits(tree, digits)
+        name, truth = tree.file.stem, Truth.CONSENSUS_ONLY
+        case = Case(name, source, truth, mechanism, sweep, (), assembly=(*notes,), ranges=ranges)
         dof = degrees_of_freedom(mechanism)
         if dof != len(drivers) or not model.is_exact:
             with explained(tree.file):
