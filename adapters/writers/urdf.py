@@ -282,9 +282,9 @@ class _Model:
             element = self.attach(following, parent, link.point, name, KINDS[link.move])
             ET.SubElement(element, "axis", xyz=numbers(link.axis))
             key = joint.name, link.name
-            zero, limits = self.zeros.get(key, 0.0), self.ranges.get(key, (-1e9, 1e9))
-            limit = [numbers([x - zero]) for x in limits]
-            ET.SubElement(element, "limit", FAR | dict(zip(("lower", "upper"), limit, strict=True)))
+            limits = [numbers([x - self.zeros.get(key, 0.0)]) for x in self.ranges.get(key, ())]
+            limit = FAR | dict(zip(("lower", "upper"), limits, strict=False))
+            ET.SubElement(element, "limit", limit)
             self.q[name] = [*value]
             self.coordinates[joint.name, link.name] = name
 

@@ -80,6 +80,16 @@ def test_every_joint_type_moves_as_in_the_native_solver(name):
     assert worst(truth, {name: motion.position for name, motion in found.points.items()}) < 1.0
 
 
+@pytest.mark.parametrize("name", ["polynomial", "spline"])
+def test_curves_have_their_rates_and_accelerations(name):
+    """Against the native solver, whose curves other tests hold to closed forms."""
+    case = PROBES[name]
+    found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
+    for point, (_, v, a) in followed(case).points.items():
+        np.testing.assert_allclose(v.astype(float), found.points[point].velocity, atol=1e-12)
+        np.testing.assert_allclose(a.astype(float), found.points[point].acceleration, atol=1e-11)
+
+
 @pytest.mark.parametrize(
     "name",
     [

@@ -266,3 +266,5 @@ for one in (T, R):
         COUPLINGS[f"polynomial of screws, {one} by {other}"] = (*screws, by)
         by = replace(by, kind=Spline, law=POINTS)
         COUPLINGS[f"spline, {one} by {other}"] = (of[one], of[other], by)
+turned = Link(Revolute, flipped=True), replace(by, driven=(2, T), driving=(3, R))
+COUPLINGS["spline by a turned hinge"] = (SLIDE, *turned)
