@@ -29,6 +29,12 @@ class KincheckError(Exception):
     kind: FailureKind | None = None
 
 
+def refuse(problems: Iterable[str]) -> None:
+    """Raise the problems as one KincheckError, if there are any."""
+    if lines := [*problems]:
+        raise KincheckError("\n".join(lines))
+
+
 class Phrase:
     """A text with lengths; readers of files write them in the unit of the file, `str` in metres.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Complex
 from typing import Any, cast
 
@@ -50,6 +50,13 @@ def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
             f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}",
             kind=FailureKind.NOT_FINITE,
         )
+
+
+def finite_numbers(who: str, value: Any, count: int, expected: str) -> Any:
+    """Return so many finite numbers as a tuple, see `triple`."""
+    found = held(who, value, count, expected)
+    require_finite(who, found, expected)
+    return found
 
 
 def _of_later(number: Any) -> bool:
@@ -105,6 +112,26 @@ def require_positive(who: str, what: str, number: Any) -> None:
     """Raise SolveError unless a number is positive and finite."""
     if not (finite(number) and number > 0):
         raise SolveError(f"{who}: {what} is {number!r}, expected a positive number")
+
+
+def require_known(
+    who: str,
+    what: str,
+    names: Iterable[Any],
+    known: Iterable[Any],
+    first: Callable[[], None] | None = None,
+) -> None:
+    """Raise SolveError unless all names are of known members.
+
+    Args:
+        first: called before, for what is a better explanation.
+    """
+    there = [each.name for each in known]
+    for name in names:
+        if name not in there:
+            if first is not None:
+                first()
+            raise no_such(who, what, name, there)
 
 
 def no_such(who: str, what: str, name: Any, known: Sequence[str]) -> SolveError:

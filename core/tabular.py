@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias, cast
+
+from numpy.typing import NDArray
 
 from .dataset import Dataset, Variable
 from .errors import KincheckError, unknown
@@ -51,22 +53,24 @@ class Tabular:
         if isinstance(self, msgspec.Struct):
             return cast("dict[str, Any]", msgspec.to_builtins(self))
 
+        return self._arrays(lambda values: _plain(values.tolist()))
+
+    def _arrays(self, written: Callable[[NDArray[Any]], Any]) -> dict[str, Any]:
+        """Return the dataset in the form of xarray, with its values as a function writes them."""
+        data = self.dataset()
+
         def arrays(variables: Mapping[str, Variable]) -> dict[str, Any]:
             return {
                 name: {
                     "dims": each.dims,
-                    "attrs": _units(each),
-                    "data": _plain(each.values.tolist()),
+                    "attrs": {"units": each.unit} if each.unit else {},
+                    "data": written(each.values),
                 }
                 for name, each in variables.items()
             }
 
-        data = self.dataset()
-        return {
-            "dims": data.sizes,
-            "coords": arrays(data.coords),
-            "data_vars": arrays(data.variables),
-        }
+        coords, variables = arrays(data.coords), arrays(data.variables)
+        return {"dims": data.sizes, "coords": coords, "data_vars": variables}
 
     def to_dataframe(self) -> DataFrame:
         """Return a pandas table. The units of its columns are in `attrs["units"]`.
@@ -87,14 +91,8 @@ class Tabular:
         """
         found = library("to_xarray", "xarray", "xarray")
 
-        def arrays(variables: Mapping[str, Variable]) -> dict[str, Any]:
-            return {
-                name: (each.dims, each.values, _units(each)) for name, each in variables.items()
-            }
-
-        data = self.dataset()
-        title = {"title": self.summary()}
-        return found.Dataset(arrays(data.variables), arrays(data.coords), attrs=title)
+        arrays = self._arrays(lambda values: values)
+        return found.Dataset.from_dict({**arrays, "attrs": {"title": self.summary()}})
 
     def plot(self, *names: str) -> Figure:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
@@ -129,10 +127,6 @@ class Tabular:
         axes[-1].set_xlabel(f"{data.x} [{x.unit}]" if x.unit else data.x)
         axes[0].set_title(self.summary())
         return figure
-
-
-def _units(variable: Variable) -> dict[str, str]:
-    return {"units": variable.unit} if variable.unit else {}
 
 
 def _plain(values: Any) -> Any:

@@ -71,7 +71,7 @@ IMPORTS = {
         "kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
-        ". primitives program joints mechanism kinematics/formulation kinematics/forces "
+        ". primitives program mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
         "kinematics/statics kinematics/diagnosis program/llvm"
@@ -88,7 +88,7 @@ IMPORTS = {
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
-    "recorded": (". primitives joints mechanism kinematics case case/io case/models/trees harness"),
+    "recorded": (". primitives mechanism kinematics case case/io case/models/trees harness"),
     "history": ". case case/io harness",
     "report": ". joints mechanism kinematics case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",

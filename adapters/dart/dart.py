@@ -20,9 +20,10 @@ from ...core.joints import Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.simulation import SteppedTree, Stepping, Tie
-from ..shared.tree_forces import NO_MASS, Mass, mass_properties
+from ..shared.tree_forces import NO_MASS, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Link
+from ..shared.tree_simulator import Mass
 
 # DART puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -204,7 +205,8 @@ class DartWorld(SteppedTree, DartModel):
         self.world.setTimeStep(h)
         skeleton.setPositions(q)
         skeleton.setVelocities(v)
-        for motor, velocity in zip(self.motors, driven.tolist(), strict=True):
+        rates = self.mean_rates(q, driven, h).tolist()
+        for motor, velocity in zip(self.motors, rates, strict=True):
             motor.setCommand(0, velocity)
         self.world.step(False)
         return np.array(skeleton.getPositions()), np.array(skeleton.getVelocities())

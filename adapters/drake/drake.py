@@ -26,9 +26,10 @@ from ...core.joints import Fixed, Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.simulation import SimulationEndedError, SteppedTree, Stepping, Tie
-from ..shared.tree_forces import Mass, mass_properties
+from ..shared.tree_forces import mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Chain, Link, Relation
+from ..shared.tree_simulator import Mass
 
 # Drake puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -212,7 +213,6 @@ class DrakePlant(SteppedTree, DrakeModel):
         gap = float(np.ptp(times)) / max(len(times) - 1, 1)
         DrakeModel.__init__(self, case, (gap or 1.0) / steps)
         self.set_off(case, steps)
-        self.rates = [self.coordinate(body)[1] for body, _ in self.driven]
         self.efforts = self.plant.get_applied_generalized_force_input_port()
 
     def carry(self, chain: Chain) -> None:
@@ -265,7 +265,8 @@ class DrakePlant(SteppedTree, DrakeModel):
     def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
         plant, context = self.plant, self.context
         forces = np.zeros_like(v)
-        forces[self.rates] = ARMATURE * (driven - v[self.rates]) / h
+        change = self.mean_rates(q, driven, h) - v[self.driven_v]
+        forces[self.driven_v] = ARMATURE * change / h
         plant.SetPositions(context, q)
         plant.SetVelocities(context, v)
         self.efforts.FixValue(context, forces)

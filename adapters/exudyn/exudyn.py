@@ -12,11 +12,10 @@ follows any number of turns, and acts by two torques that the adapter sets.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,9 +36,10 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
 from ..shared.exudyn_joints import JOINTS
-from ..shared.force_solution import Dynamics, Element, elastic_force, left_out_of, places, reacting
+from ..shared.force_solution import Element, elastic_force, left_out_of, places, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
-from .rows import NO_ROTATION, Rows, turned
+from ..shared.projection_model import Dynamics
+from .rows import NO_ROTATION, Rows, System, turned
 
 COMPUTED_BY = {
     "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
@@ -66,8 +66,8 @@ class Twister:
 class Loads:
     """The loads of a case in an Exudyn system, added before the system is assembled."""
 
-    def __init__(self, rows: Rows, case: Case, kinds: Any) -> None:
-        self.rows, self.mbs, self.items, self.kinds = rows, rows.mbs, rows.items, kinds
+    def __init__(self, rows: Rows, case: Case) -> None:
+        self.rows, self.mbs, self.items, self.kinds = rows, rows.mbs, rows.items, rows.kinds
         self.case, self.mechanism = case, case.mechanism
         self.springs: dict[str, int] = {}
         self.twisters: list[Twister] = []
@@ -133,7 +133,7 @@ class Loads:
         return Twister(each, value, rows.marker(joint.i, place.point), torques)
 
     def dynamics(self, model: Any, J: Array, v: Array, a: Array) -> Dynamics:
-        """Return the forces; see `force_solution.ForceModel`.
+        """Return the forces; see `ProjectionModel`.
 
         Args:
             model: the model in Exudyn; see `exudyn.ExudynModel`.
@@ -281,18 +281,20 @@ class Exudyn(ProjectionEngine):
         """Return Exudyn's system of the case."""
         return ExudynModel(case)
 
-    def build(self, case: Case) -> ExudynModel:
-        """Return Exudyn's system of the case in the scaled frame, at the design position."""
-        return self.model_of(self.own(case))
-
     def floor(self, case: Case) -> Floor:
         """Return the floor from the static solver's residual and Jacobian.
 
         Accelerations need two rates of the rows for a difference.
         """
-        model = self.build(case)
+        model = self.model_of(self.own(case))
         solved = self.solve(model, case, 1e-12)
-        _container, mbs, settings, solver = _least()
+        # the smallest model has one free coordinate
+        least = System()
+        node = least.mbs.AddNode(least.items.Node1D())
+        least.mbs.AddObject(least.items.ObjectMass1D(nodeNumber=node, mass=1.0))
+        least.mbs.Assemble()
+        mbs, settings, solver = least.mbs, least.settings(), least.exu.MainSolverStatic()
+        solver.InitializeSolver(mbs, settings)
         residual = (
             lambda: model.solver.ComputeAlgebraicEquations(model.mbs),
             lambda: solver.ComputeAlgebraicEquations(mbs),
@@ -308,21 +310,6 @@ class Exudyn(ProjectionEngine):
             "ComputeAlgebraicEquations (rates)": (*residual[:2], 2),
         }
         return floor_of(self.name, solved, model.unknowns, pose, once)
-
-
-def _least() -> tuple[Any, Any, Any, Any]:
-    """Return container, system, settings and solver of the smallest model, one free coordinate."""
-    exu: Any = importlib.import_module("exudyn")
-    items: Any = importlib.import_module("exudyn.itemInterface")
-    exu.config.printToConsole = False
-    container = exu.SystemContainer()
-    mbs = container.AddSystem()
-    mbs.AddObject(items.ObjectMass1D(nodeNumber=mbs.AddNode(items.Node1D()), mass=1.0))
-    mbs.Assemble()
-    settings, solver = exu.SimulationSettings(), exu.MainSolverStatic()
-    settings.solution.file.write = False
-    solver.InitializeSolver(mbs, settings)
-    return container, mbs, settings, solver
 
 
 def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:
@@ -351,20 +338,13 @@ class ExudynModel:
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        exu: Any = importlib.import_module("exudyn")
-        # the harness reports results; Exudyn's banners would mix with them
-        exu.config.printToConsole = False
-        self.container: Any = exu.SystemContainer()  # owns the system, and must live as long as it
-        self.mbs: Any = self.container.AddSystem()
-        items: Any = importlib.import_module("exudyn.itemInterface")
-        rows = Rows(self.mbs, items, case.mechanism, loaded=bool(case.forces))
-        kinds = exu.OutputVariableType
-        self.loads = Loads(rows, case, kinds) if case.forces else None
+        system = self.system = System()
+        self.mbs = system.mbs
+        rows = Rows(system, case.mechanism, loaded=bool(case.forces))
+        self.loads = Loads(rows, case) if case.forces else None
         self.mbs.Assemble()
-
-        self.settings: Any = exu.SimulationSettings()
-        self.settings.solution.file.write = False
-        self.solver: Any = exu.MainSolverStatic()
+        self.settings = system.settings()
+        self.solver: Any = system.exu.MainSolverStatic()
         if not self.solver.InitializeSolver(self.mbs, self.settings):
             raise SolveError(
                 f"case {case.name!r}: Exudyn does not initialise its solver:"
@@ -381,8 +361,8 @@ class ExudynModel:
 
         # rows by values: drivers, then shared unknowns
         self.followed = np.zeros((len(self.kept), rows.values))
-        for each in rows.following:
-            self.followed[each.row, each.value] = each.weight
+        for row, value, weight in rows.following:
+            self.followed[row, value] = weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
         # rows that follow a function: row, index of its unknown, minus the function
         drivers = len(case.mechanism.drivers)
@@ -398,6 +378,7 @@ class ExudynModel:
         ]
         self.wanted = [(number, position - origin) for (number, origin), position in points]
         self.ground = rows.ground
+        kinds = system.kinds
         self.rotation = kinds.RotationMatrix
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
         self.details = {"rows": len(self.target)}
@@ -505,7 +486,7 @@ class ExudynModel:
         )
         return position, velocity, acceleration
 
-    computed_by = COMPUTED_BY
+    computed_by: ClassVar[Mapping[str, str]] = COMPUTED_BY
 
     def dynamics(self, v: Array, a: Array) -> Dynamics:
         assert self.loads is not None

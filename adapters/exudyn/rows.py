@@ -10,6 +10,7 @@ turn. The objects are those of `exudyn_joints`.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,13 +41,29 @@ class Equation:
     keeps: float
 
 
-@dataclass(frozen=True)
-class Following:
-    """A row that follows a weight times a value: a driver's value or a further unknown."""
+class System:
+    """An empty system of Exudyn.
 
-    row: int
-    value: int
-    weight: float
+    Attributes:
+        exu, items: Exudyn's package, and its objects.
+        container: owner of the system, which must live as long as it.
+        kinds: Exudyn's output variables.
+    """
+
+    def __init__(self) -> None:
+        self.exu: Any = importlib.import_module("exudyn")
+        self.items: Any = importlib.import_module("exudyn.itemInterface")
+        # the harness reports results; Exudyn's banners would mix with them
+        self.exu.config.printToConsole = False
+        self.container: Any = self.exu.SystemContainer()
+        self.mbs: Any = self.container.AddSystem()
+        self.kinds: Any = self.exu.OutputVariableType
+
+    def settings(self) -> Any:
+        """Return settings of a solver that writes no files."""
+        found = self.exu.SimulationSettings()
+        found.solution.file.write = False
+        return found
 
 
 class Rows:
@@ -57,21 +74,22 @@ class Rows:
         nodes: numbers of the nodes, one for each moving body.
         rows: all equations, in order.
         owned: the rows of each joint.
-        following: the equations that follow a value.
+        following: rows that follow a weight times a value, a driver's or a further unknown: row,
+            value, weight.
         turning: rows that follow an angle, with their markers on the first and second body; the
             first marker turns about its z axis.
         bent: rows that follow a function of a value: row, value, minus the function.
         values: the number of drivers and further unknowns.
     """
 
-    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism, *, loaded: bool = False) -> None:
-        self.loaded = loaded
-        self.mbs, self.items, self.mechanism = mbs, items, mechanism
-        self.ground = int(mbs.AddObject(items.ObjectGround()))
+    def __init__(self, system: System, mechanism: Mechanism, *, loaded: bool = False) -> None:
+        self.loaded, self.mechanism = loaded, mechanism
+        self.mbs, self.items, self.kinds = system.mbs, system.items, system.kinds
+        self.ground = int(self.mbs.AddObject(self.items.ObjectGround()))
         self.bodies = {GROUND: (self.ground, np.zeros(3))}
         self.nodes: list[int] = []
         self.rows: list[Equation] = []
-        self.following: list[Following] = []
+        self.following: list[tuple[int, int, float]] = []
         self.turning: dict[int, tuple[int, int]] = {}
         self.bent: list[tuple[int, int, PiecewisePolynomial]] = []
         self.values = len(mechanism.drivers)
@@ -204,7 +222,7 @@ class Rows:
 
     def follow(self, row: int, value: int, weight: float = 1.0) -> None:
         """Let a row follow a value."""
-        self.following.append(Following(row, value, weight))
+        self.following.append((row, value, weight))
 
     def drive(self, driver: Driver, value: int) -> None:
         """Make the driver's coordinate follow its value."""

@@ -7,7 +7,6 @@ gears, racks and pinions. The drivers' values come from Python, from a table pre
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,6 +20,7 @@ from ...core.kinematics import start_of as where_from
 from ...core.mechanism.mechanism import GROUND
 from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.trajectory import Array
+from ..shared.exudyn_joints import objects_of
 from ..shared.simulation import (
     Leg,
     SimulatedPose,
@@ -29,8 +29,9 @@ from ..shared.simulation import (
     start_of,
     uneven,
 )
+from ..shared.tree_plan import ends_of
 from .exudyn import Exudyn, ExudynModel
-from .rows import Rows
+from .rows import Rows, System
 
 
 class DriverTable:
@@ -57,11 +58,11 @@ class Coordinates(Rows):
     """
 
     def __init__(
-        self, mbs: Any, items: Any, case: Case, table: DriverTable, *, loaded: bool = False
+        self, system: System, case: Case, table: DriverTable, *, loaded: bool = False
     ) -> None:
         self.table = table
         self.angles: list[int | None] = []
-        super().__init__(mbs, items, case.mechanism, loaded=loaded)
+        super().__init__(system, case.mechanism, loaded=loaded)
 
     def relative(self, name: str, freedom: str, value: int | None = None) -> int:
         """Return a new marker for the coordinate of a joint."""
@@ -135,12 +136,12 @@ def limitation_of(case: Case) -> str | None:
                 f"{joint}: Exudyn's own solvers have no object that ties two products, which"
                 " the joint needs"
             )
-        kept = _kept(joint)
-        if abs(kept) > NOTHING:
-            return (
-                f"{joint} keeps a product at {kept:.3g}, and Exudyn's own objects keep products at"
-                " only zero; make its axes exact"
-            )
+        for each in objects_of(joint, ends_of(case.mechanism, joint)):
+            if abs(each.keeps) > NOTHING:
+                return (
+                    f"{joint} keeps a product at {each.keeps:.3g}, and Exudyn's own objects keep"
+                    " products at only zero; make its axes exact"
+                )
     for coupler in case.mechanism.couplers:
         if coupler.curve:
             return f"{coupler}: Exudyn's own solvers have no object that keeps a curve"
@@ -151,15 +152,6 @@ def limitation_of(case: Case) -> str | None:
     if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
         return "turns of coupled joints count from the design, where this motion does not begin"
     return None
-
-
-def _kept(joint: joints.Joint) -> float:
-    """Return the constant value of the last row of a joint [m or -]."""
-    if isinstance(joint, joints.Universal | joints.PerpendicularAxes):
-        return unit(joint.axes[0]) @ unit(joint.axes[1])
-    if isinstance(joint, joints.RevoluteSpherical):
-        return float(np.array([*unit(joint.axis)]) @ np.subtract(joint.points[1], joint.points[0]))
-    return 0.0
 
 
 # Relative and absolute tolerance of Newton; it leaves the constraints at round-off.
@@ -244,16 +236,13 @@ def static_modified() -> Solver:
 
 class _Solved:
     def __init__(self, case: Case, how: Solver) -> None:
-        self.exu: Any = importlib.import_module("exudyn")
-        self.how, self.of = how, ExudynModel(case)
+        self.system, self.how, self.of = System(), how, ExudynModel(case)
         self.start = start_of(self.of, case)
-        self.container: Any = self.exu.SystemContainer()
-        mbs = self.mbs = self.container.AddSystem()
-        items: Any = importlib.import_module("exudyn.itemInterface")
+        mbs, items, kinds = self.system.mbs, self.system.items, self.system.kinds
+        self.exu, self.mbs = self.system.exu, mbs
         self.table = DriverTable()
-        rows = Coordinates(mbs, items, case, self.table)
+        rows = Coordinates(self.system, case, self.table)
         self.angles = rows.angles
-        kinds = self.exu.OutputVariableType
         self.sensors: list[list[int]] = []
         self.still: dict[int, Array] = {}
         for k, point in enumerate(map(case.mechanism.point, case.points)):
@@ -295,8 +284,7 @@ class _Solved:
         }
 
     def _settings(self) -> Any:
-        settings = self.exu.SimulationSettings()
-        settings.solution.file.write = False
+        settings = self.system.settings()
         settings.solution.sensors.writePeriod = 1e-9  # at every step
         types = self.exu.LinearSolverType
         settings.linearSolver.solverType = (

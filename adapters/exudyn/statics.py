@@ -6,7 +6,6 @@ by user functions, of displacement and rotation as Exudyn measures them.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,6 +19,7 @@ from ..shared.equilibrium import Rest, equilibria
 from ..shared.force_solution import elastic_force, elastic_forces, elastic_torque
 from ..shared.poses import frame_along
 from .exudyn import Exudyn, Loads
+from .rows import System
 from .solvers import Coordinates, DriverTable, Solver
 
 # Tolerance of Newton on forces out of balance, as a part of the largest stiffness and load: the
@@ -131,15 +131,12 @@ class Statics:
     """Exudyn's system of a case with loads, its drivers held."""
 
     def __init__(self, case: Case) -> None:
-        self.exu: Any = importlib.import_module("exudyn")
-        self.exu.config.printToConsole = False
-        items: Any = importlib.import_module("exudyn.itemInterface")
-        self.case, self.container = case, self.exu.SystemContainer()
-        mbs = self.mbs = self.container.AddSystem()
-        self.table = DriverTable()
-        rows = self.rows = Coordinates(mbs, items, case, self.table, loaded=True)
-        self.kinds = self.exu.OutputVariableType
-        StaticLoads(rows, case, self.kinds)
+        self.case, self.table = case, DriverTable()
+        system = self.system = System()
+        mbs = self.mbs = system.mbs
+        self.exu, self.kinds = system.exu, system.kinds
+        rows = self.rows = Coordinates(system, case, self.table, loaded=True)
+        StaticLoads(rows, case)
         mbs.Assemble()
         self.state = mbs.systemData
         count = range(self.state.NumberOfLoads())
@@ -147,8 +144,7 @@ class Statics:
         names = [driver.name for driver in case.mechanism.drivers]
         self.names = names
         self.values = case.sweep.path.drive(names, case.sweep.path.times)[0].T
-        settings = self.settings = self.exu.SimulationSettings()
-        settings.solution.file.write = False
+        settings = self.settings = system.settings()
         settings.linearSolver.solverType = self.exu.LinearSolverType.EigenDense
         settings.linearSolver.ignoreSingularJacobian = True
         static = settings.staticSolver

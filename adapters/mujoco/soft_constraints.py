@@ -10,7 +10,7 @@ accelerations; its tendon equality, which models a rod, has no Jdot v. Run:
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,10 +19,8 @@ from ...core.case.case import Case
 from ...core.case.io.case_file import load_case
 from ...core.errors import CaseError, KincheckError
 from ...core.kinematics import start_of
-from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array
 from ..shared.equivalents import own_frame
-from ..shared.pose_solver import Sample
 from ..shared.projection import Walk
 from .mujoco import MuJoCo, MuJoCoModel
 
@@ -83,7 +81,11 @@ def rod_forces(case: Case, rod: str) -> RodForces:
     own = {(way, name): list[float]() for way in ("forward", "inverse") for name in SOFTNESS}
     exact = m.eq_solref.copy(), m.eq_solimp.copy()
     m.opt.iterations, m.opt.tolerance = ITERATIONS, 0.0
-    samples = list(_samples(model, case))
+    walk, path = Walk(model, case, TOL, None, own_frame(case)), case.sweep.path
+    origin, message = walk.start(path, start_of(case.mechanism, path))
+    if origin is None:
+        raise CaseError(f"case {case.name!r}: {message}")
+    samples = [at for _, at in walk.reached(origin)]
     mj.mj_setConst(m, d)
     for at in samples:
         model.restore(at.saved)
@@ -132,22 +134,6 @@ def _rigid(
     system = np.block([[mass, -E.T], [E, np.zeros((rows, rows))]])
     found = np.linalg.solve(system, np.concatenate([applied - drift, -bias]))
     return np.asarray(found[n:], dtype=np.float64)
-
-
-def _samples(model: MuJoCoModel, case: Case) -> Iterator[Sample]:
-    """Yield the samples that the engine reaches."""
-    walk, path = Walk(model, case, TOL, None, own_frame(case)), case.sweep.path
-    origin, message = walk.start(path, start_of(case.mechanism, path))
-    if origin is None:
-        raise CaseError(f"case {case.name!r}: {message}")
-    step = float(np.abs(np.diff(path.times)).max(initial=0.0))
-    for side in outwards(path.times, origin.t):
-        at = origin
-        for k in side:
-            at, reached = walk.advance(path, at, float(path.times[k]), step)
-            if not reached:
-                break
-            yield at
 
 
 def report_lines(found: RodForces, rod: str) -> str:

@@ -93,7 +93,7 @@ class Stepping(Simulation):
         for coupler in case.mechanism.couplers:
             if coupler.curve and coupler.curve.knots:
                 return f"{coupler}: MuJoCo's equality has powers up to the fourth; use projection"
-        return MuJoCo().unsupported(case)
+        return super().unsupported(case)
 
     def efforts(self) -> Mapping[str, Stepping]:
         """Return the efforts by the number of steps."""
@@ -183,7 +183,7 @@ class _Steps:
             n = self.count(abs(until - t))
             if self.how.kind == "projecting":
                 self.project(driven[..., k])
-            else:
+            elif n:  # samples may be repeated
                 self.step(leg, t, until, n)
             if self.warned:
                 raise SimulationEndedError(f"MuJoCo warns: {self.warned[0]}")

@@ -17,8 +17,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,18 +26,12 @@ from ...core.case.case import Case
 from ...core.joints import Distance, Fixed
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.equivalents import fits, jointed
-from ..shared.simulation import (
-    Leg,
-    SimulatedPose,
-    Simulation,
-    SimulationEndedError,
-    TiedTree,
-    start_of,
-)
-from ..shared.tree_forces import Mass, mass_properties
+from ..shared.equivalents import fits
+from ..shared.simulation import SimulatedPose, SteppedTree, Stepping, TiedTree
+from ..shared.tree_forces import mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Chain, Closure, Link, Relation, relations
+from ..shared.tree_simulator import Mass
 
 
 class Pinocchio(TreeEngine):
@@ -161,75 +154,18 @@ ACCURACY = 1e-14
 DECAY = 50.0
 
 
-@dataclass(frozen=True)
-class Dynamics(Simulation):
-    """Pinocchio's constrained forward dynamics.
-
-    Attributes:
-        steps: number of steps between samples.
-    """
-
-    steps: int = 2
-    name = "pinocchio"
-    projection = Pinocchio
-    loop = "python"
-
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """Integrator, stabilisation and steps."""
-        return {
-            "acceleration": "constraintDynamics",
-            "integrator": "Runge-Kutta, fourth order, of the adapter",
-            "steps per sample": self.steps,
-            "stabilisation": f"Baumgarte, critically damped, decay in {DECAY:g} steps",
-            "proximal": f"mu {MU:g} where rows are redundant, else none",
-            "driven coordinates": f"set at every step, armature {ARMATURE:g}",
-            "rods": "bodies between a cross and a ball",
-        }
-
-    def unsupported(self, case: Case) -> str | None:
-        """Return a message on the joint or driver that is not supported here, or None."""
-        if (self.version() or "").startswith("3."):
-            return "constraintDynamics of Pinocchio 3 has another signature; install Pinocchio 4"
-        case = Pinocchio().known(case)
-        for joint in case.mechanism.joints:
-            if relations(joint):
-                return f"{joint} relates coordinates, which Pinocchio's constraintDynamics refuses"
-            if isinstance(joint, Distance) and not fits(joint):
-                return (
-                    f"{joint} has another length than at design; Pinocchio has no distance"
-                    " constraint, and a body in its place would not fit"
-                )
-        for coupler in case.mechanism.couplers:
-            return f"{coupler} relates coordinates, which Pinocchio's constraintDynamics refuses"
-        return Pinocchio().unsupported(case)
-
-    def efforts(self) -> Mapping[str, Dynamics]:
-        """Return the efforts by the number of steps."""
-        return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8)}
-
-    def build(self, case: Case) -> _Model:
-        """Return tree, constraints and start."""
-        return _Model(
-            importlib.import_module("pinocchio"),
-            replace(case, mechanism=jointed(Pinocchio().known(case).mechanism)),
-            self.steps,
-        )
-
-
-class _Model(TiedTree, PinocchioModel):
+class PinocchioSteps(SteppedTree, PinocchioModel):
     """The mechanism with masses, and its loops as rigid constraints."""
 
     has = "rigid constraint"
+    not_finite = "constraintDynamics diverges to non-finite numbers"
+    close = TiedTree.close  # of one body with itself too
 
-    def __init__(self, pin: Any, case: Case, steps: int) -> None:
-        self.ties, self.steps = [], steps
-        super().__init__(pin, case)
-        self.start = start_of(self, case)
-        self.sign = np.array([float(sign) for _, sign in self.driven])
-        self.driven_q, self.driven_v = map(
-            list, zip(*(self.coordinate(at) for at, _ in self.driven), strict=True)
-        )
+    def __init__(self, case: Case, steps: int) -> None:
+        pin: Any = importlib.import_module("pinocchio")
+        self.ties, self.stabilised = [], 0.0
+        PinocchioModel.__init__(self, pin, case)
+        self.set_off(case, steps)
         armature = np.array(self.model.armature)
         armature[self.driven_v] = ARMATURE
         self.model.armature = armature
@@ -282,24 +218,9 @@ class _Model(TiedTree, PinocchioModel):
         yield from carried([*self.carrier])  # before any chain, those are the ground
         yield from (part for part in parts if not isinstance(part, Chain))
 
-    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
-        """Yield the poses of a leg."""
-        q, v = self.start.configuration, leg.sign * self.start.v
-        yield self.pose(*self.put(q, v, leg.drive(leg.times[:1])[..., 0]), 0)
-        for t, until in pairwise(leg.times.tolist()):
-            h = abs(until - t) / self.steps
-            self.stabilise(h)
-            # at the beginning, the middle and the end of every step
-            driven = leg.drive(t + (until - t) * np.arange(2 * self.steps + 1) / (2 * self.steps))
-            for k in range(0, 2 * self.steps, 2):
-                q, v = self.step(q, v, h, driven[..., k : k + 3])
-                if not np.isfinite(v).all():
-                    raise SimulationEndedError("constraintDynamics diverges to non-finite numbers")
-            yield self.pose(*self.put(q, v, driven[..., -1]), self.steps)
-
     def stabilise(self, h: float) -> None:
         """Set the stabilisation, critically damped, for steps of length h [s]."""
-        rate = 1.0 / (DECAY * h)
+        rate, self.stabilised = 1.0 / (DECAY * h), h
         for constraint in self.constraints:
             parameters = constraint.m_baumgarte_parameters
             parameters.Kp, parameters.Kd = rate**2, 2.0 * rate
@@ -308,7 +229,7 @@ class _Model(TiedTree, PinocchioModel):
         """Return q, v and tau with the driven coordinates at their values, rates and forces."""
         q, v, tau = q.copy(), v.copy(), np.zeros(self.model.nv)
         q[self.driven_q], v[self.driven_v], tau[self.driven_v] = (
-            self.sign * driven * np.array([[1.0], [1.0], [ARMATURE]])
+            self.signs * driven * np.array([[1.0], [1.0], [ARMATURE]])
         )
         return q, v, tau
 
@@ -319,10 +240,12 @@ class _Model(TiedTree, PinocchioModel):
             self.model, self.dynamics, q, v, tau, self.constraints, self.found, self.proximal
         )
 
-    def step(self, q: Array, v: Array, h: float, driven: Array) -> tuple[Array, Array]:
+    def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
         """Return the state after one Runge-Kutta step, with the configuration moved along its rates
         from the start of the step.
         """
+        if h != self.stabilised:
+            self.stabilise(h)
         q, v, _ = self.put(q, v, driven[..., 0])
         rates, accelerations = list[Array](), list[Array]()
         for part, moment in ((0.0, 0), (0.5, 1), (0.5, 1), (1.0, 2)):
@@ -340,10 +263,9 @@ class _Model(TiedTree, PinocchioModel):
             weights @ np.array(accelerations)
         )
 
-    def pose(self, q: Array, v: Array, tau: Array, steps: int) -> SimulatedPose:
-        """Return the pose at this state, with the number of steps since the previous sample."""
-        self.q = q
-        a = self.acceleration(q, v, tau)
+    def pose(self, q: Array, v: Array, a: Array, driven: Array, steps: int) -> SimulatedPose:
+        q, v, tau = self.put(q, v, driven)
+        self.q, a = q, self.acceleration(q, v, tau)
         self.pin.framesForwardKinematics(self.model, self.data, q)
         points = np.array(self.points(v, a)).swapaxes(0, 1)
         gaps = [
@@ -353,3 +275,42 @@ class _Model(TiedTree, PinocchioModel):
         return SimulatedPose(
             points, max((float(np.abs(gap).max()) for gap in gaps), default=0.0), steps
         )
+
+
+@dataclass(frozen=True)
+class Dynamics(Stepping):
+    """Pinocchio's constrained forward dynamics."""
+
+    steps: int = 2
+    projection, model = Pinocchio, PinocchioSteps
+    counts = (1, 2, 4, 8)
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Integrator, stabilisation and steps."""
+        return {
+            "acceleration": "constraintDynamics",
+            "integrator": "Runge-Kutta, fourth order, of the adapter",
+            "steps per sample": self.steps,
+            "stabilisation": f"Baumgarte, critically damped, decay in {DECAY:g} steps",
+            "proximal": f"mu {MU:g} where rows are redundant, else none",
+            "driven coordinates": f"set at every step, armature {ARMATURE:g}",
+            "rods": "bodies between a cross and a ball",
+        }
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return a message on the joint or driver that is not supported here, or None."""
+        if (self.version() or "").startswith("3."):
+            return "constraintDynamics of Pinocchio 3 has another signature; install Pinocchio 4"
+        case = Pinocchio().known(case)
+        for joint in case.mechanism.joints:
+            if relations(joint):
+                return f"{joint} relates coordinates, which Pinocchio's constraintDynamics refuses"
+            if isinstance(joint, Distance) and not fits(joint):
+                return (
+                    f"{joint} has another length than at design; Pinocchio has no distance"
+                    " constraint, and a body in its place would not fit"
+                )
+        for coupler in case.mechanism.couplers:
+            return f"{coupler} relates coordinates, which Pinocchio's constraintDynamics refuses"
+        return Pinocchio().unsupported(case)

@@ -27,14 +27,15 @@ redundant, so a loop has dependent rows only by its geometry (planar loops).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
 from ...core.algebra import Vec3
+from ...core.errors import number_of
 from ...core.joints import (
     ConstantVelocity,
     Cylindrical,
@@ -59,56 +60,29 @@ from ...core.joints.base import triad, unit
 from ...core.trajectory import Array
 
 
-class Frame(Protocol):
-    """A frame on a body: a point, with axes that are global at design, in the simulator's current
-    configuration. All vectors are in global axes.
+@dataclass(eq=False)
+class BodyFrame:
+    """A frame of a body as the simulator last reported it: a point, with axes that are global at
+    design. All vectors are in global axes.
+
+    Attributes:
+        body: number of the body.
+        handle: the simulator's handle; None for a frame of the ground, which never moves.
+        position: of the point [m], shape (3,).
+        rotation: of the body since design, shape (3, 3).
+        jacobian: of the point over that of the rotation, shape (6, unknowns).
+        velocity: of the point [m/s], and the angular velocity [rad/s], shape (6,).
+        acceleration: of the point [m/s^2], and the angular acceleration [rad/s^2], shape (6,); Jdot
+            v if the coordinates are not accelerated.
     """
 
-    @property
-    def position(self) -> Array:
-        """The position of the point [m], shape (3,)."""
-        ...
-
-    @property
-    def rotation(self) -> Array:
-        """The rotation matrix of the body since design, shape (3, 3)."""
-        ...
-
-    @property
-    def jacobian(self) -> Array:
-        """The Jacobian of the point over that of the rotation, shape (6, unknowns)."""
-        ...
-
-    @property
-    def velocity(self) -> Array:
-        """The velocity of the point [m/s] and the angular velocity [rad/s], shape (6,)."""
-        ...
-
-    @property
-    def acceleration(self) -> Array:
-        """The acceleration of the point [m/s^2] and the angular acceleration [rad/s^2], shape (6,);
-        Jdot v if the coordinates are not accelerated.
-        """
-        ...
-
-
-class FrameOnBody(Frame, Protocol):
-    """A frame with the number of its body."""
-
-    @property
-    def body(self) -> int: ...
-
-
-class Vector(Protocol):
-    """A vector that moves with the mechanism."""
-
-    def placed(self) -> tuple[Array, Array]:
-        """Return x and J_x, shapes (3,) and (3, unknowns)."""
-        ...
-
-    def moving(self) -> tuple[Array, Array, Array]:
-        """Return x, its rate and its bias, each of shape (3,)."""
-        ...
+    body: int
+    handle: Any
+    position: Array
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    jacobian: Array = field(default_factory=lambda: np.zeros((6, 0)))
+    velocity: Array = field(default_factory=lambda: np.zeros(6))
+    acceleration: Array = field(default_factory=lambda: np.zeros(6))
 
 
 class Condition(Protocol):
@@ -128,9 +102,13 @@ class Condition(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """A unit vector of a body, a0 at design."""
+    """A unit vector of a body, a0 at design.
 
-    frame: Frame
+    `placed` returns x and J_x, shapes (3,) and (3, unknowns); `moving` returns x, its rate and its
+    bias, each of shape (3,).
+    """
+
+    frame: BodyFrame
     a0: Array
 
     def placed(self) -> tuple[Array, Array]:
@@ -148,10 +126,12 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """The vector from the point of frame i to that of frame j [m]."""
+    """The vector from the point of frame i to that of frame j [m]; with the methods of
+    `Direction`.
+    """
 
-    i: Frame
-    j: Frame
+    i: BodyFrame
+    j: BodyFrame
 
     def placed(self) -> tuple[Array, Array]:
         return self.j.position - self.i.position, (self.j.jacobian - self.i.jacobian)[:3]
@@ -159,6 +139,9 @@ class Difference:
     def moving(self) -> tuple[Array, Array, Array]:
         rate, bias = self.j.velocity - self.i.velocity, self.j.acceleration - self.i.acceleration
         return self.j.position - self.i.position, rate[:3], bias[:3]
+
+
+Vector: TypeAlias = Direction | Difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,8 +219,8 @@ class Thread:
     parallel axes.
     """
 
-    i: Frame
-    j: Frame
+    i: BodyFrame
+    j: BodyFrame
     f: Array
     h: Array
     p: float
@@ -270,52 +253,47 @@ def skew(a: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Closure:
-    """The rows of a cut joint type and their description."""
+class Part:
+    """Conditions of a joint between two frames, in words, and their number of rows."""
 
     text: str
-    conditions: Callable[[Any, Frame, Frame], Sequence[Condition]]
+    n: int
+    conditions: Callable[[Any, BodyFrame, BodyFrame], Sequence[Condition]]
 
 
-def _at_point(i: Frame, j: Frame) -> list[Condition]:
-    return [Coincident(Difference(i, j))]
-
-
-def _parallel(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+def _parallel(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     f, g, h = map(_array, triad(joint.axis))
     return [Dot(Direction(i, a), Direction(j, h)) for a in (f, g)]
 
 
-def _alike(i: Frame, j: Frame) -> list[Condition]:
+def _alike(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     # cyclic pairs of the axes: the gradients a × b are the three axes, so the rows are independent
     x, y, z = np.eye(3)
     return [Dot(Direction(i, a), Direction(j, b)) for a, b in ((x, y), (y, z), (z, x))]
 
 
-def _on_line(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+def _on_line(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     f, g, _ = map(_array, triad(joint.axis))
     return [Dot(Direction(i, a), Difference(i, j)) for a in (f, g)]
 
 
-def _on_plane(joint: Any, i: Frame, j: Frame) -> list[Condition]:
-    return [Dot(Direction(i, _array(unit(joint.axis))), Difference(i, j))]
-
-
-def _crossed(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+def _crossed(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     # a table may round the right angle; two hinges keep the design angle
     a, b = (_array(unit(axis)) for axis in joint.axes)
     return [Dot(Direction(i, a), Direction(j, b), float(a @ b))]
 
 
-def _link(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+def _rod(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
+    length = joint.rod_length if isinstance(joint, Distance) else math.dist(*joint.points)
+    return [Length(Difference(i, j), length)]
+
+
+def _across(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     h, d = _array(unit(joint.axis)), np.subtract(*joint.points[::-1])
-    return [
-        Length(Difference(i, j), math.hypot(*d)),
-        Dot(Direction(i, h), Difference(i, j), float(h @ d)),
-    ]
+    return [Dot(Direction(i, h), Difference(i, j), float(h @ d))]
 
 
-def twistless(joint: Any, i: Frame, j: Frame) -> list[Condition]:
+def _twistless(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     """Return the row of a constant-velocity joint about its shafts.
 
     With f × g along each shaft, f_i . g_j = g_i . f_j.
@@ -329,59 +307,54 @@ def twistless(joint: Any, i: Frame, j: Frame) -> list[Condition]:
     return [EqualDots(*(Dot(Direction(i, _array(a)), Direction(j, b)) for a, b in (left, right)))]
 
 
-def _threaded(joint: Screw, i: Frame, j: Frame) -> list[Condition]:
+def _threaded(joint: Screw, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     f, _, h = map(_array, triad(joint.axis))
     return [Thread(i, j, f, h, joint.lead / (2.0 * math.pi))]
 
 
-CLOSURES: dict[type[Joint], Closure] = {
-    Spherical: Closure("points coincide (3 rows)", lambda joint, i, j: _at_point(i, j)),
-    Revolute: Closure(
-        "points coincide (3 rows), axes parallel (2)",
-        lambda joint, i, j: _at_point(i, j) + _parallel(joint, i, j),
-    ),
-    Translational: Closure(
-        "axes aligned (3 rows), point on line (2)",
-        lambda joint, i, j: _alike(i, j) + _on_line(joint, i, j),
-    ),
-    Universal: Closure(
-        "points coincide (3 rows), axes at right angle (1)",
-        lambda joint, i, j: _at_point(i, j) + _crossed(joint, i, j),
-    ),
-    Fixed: Closure(
-        "points coincide (3 rows), axes aligned (3)",
-        lambda joint, i, j: _at_point(i, j) + _alike(i, j),
-    ),
-    Distance: Closure(
-        "points at constant distance (1 row)",
-        lambda joint, i, j: [Length(Difference(i, j), joint.rod_length)],
-    ),
-    Cylindrical: Closure(
-        "axes parallel (2 rows), point on line (2)",
-        lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j),
-    ),
-    Screw: Closure(
-        "axes parallel (2 rows), point on line (2), displacement by turn (1)",
-        lambda joint, i, j: _parallel(joint, i, j) + _on_line(joint, i, j) + _threaded(joint, i, j),
-    ),
-    Planar: Closure(
-        "axes parallel (2 rows), point on plane (1)",
-        lambda joint, i, j: _parallel(joint, i, j) + _on_plane(joint, i, j),
-    ),
-    ConstantVelocity: Closure(
-        "points coincide (3 rows), shafts turn alike (1)",
-        lambda joint, i, j: _at_point(i, j) + twistless(joint, i, j),
-    ),
-    OrientationLock: Closure("axes aligned (3 rows)", lambda joint, i, j: _alike(i, j)),
-    ParallelAxes: Closure("axes parallel (2 rows)", _parallel),
-    PerpendicularAxes: Closure("axes at right angle (1 row)", _crossed),
-    Inline: Closure("point on line (2 rows)", _on_line),
-    InPlane: Closure("point on plane (1 row)", _on_plane),
-    RevoluteSpherical: Closure(
-        "points at constant distance (1 row), link across the hinge (1)", _link
-    ),
+COINCIDENT = Part("points coincide", 3, lambda joint, i, j: [Coincident(Difference(i, j))])
+ON_LINE = Part("point on line", 2, _on_line)
+ON_PLANE = Part(
+    "point on plane",
+    1,
+    lambda joint, i, j: [Dot(Direction(i, _array(unit(joint.axis))), Difference(i, j))],
+)
+ROD = Part("points at constant distance", 1, _rod)
+PARALLEL = Part("axes parallel", 2, _parallel)
+ALIKE = Part("axes aligned", 3, _alike)
+CROSSED = Part("axes at right angle", 1, _crossed)
+
+CLOSURES: Mapping[type[Joint], Sequence[Part]] = {
+    Spherical: [COINCIDENT],
+    Revolute: [COINCIDENT, PARALLEL],
+    Translational: [ALIKE, ON_LINE],
+    Universal: [COINCIDENT, CROSSED],
+    Fixed: [COINCIDENT, ALIKE],
+    Distance: [ROD],
+    Cylindrical: [PARALLEL, ON_LINE],
+    Screw: [PARALLEL, ON_LINE, Part("displacement by turn", 1, _threaded)],
+    Planar: [PARALLEL, ON_PLANE],
+    ConstantVelocity: [COINCIDENT, Part("shafts turn alike", 1, _twistless)],
+    OrientationLock: [ALIKE],
+    ParallelAxes: [PARALLEL],
+    PerpendicularAxes: [CROSSED],
+    Inline: [ON_LINE],
+    InPlane: [ON_PLANE],
+    RevoluteSpherical: [ROD, Part("link across the hinge", 1, _across)],
 }
-"""Closures by exact joint type."""
+"""Conditions that close a loop, by exact joint type."""
+
+
+def closure_text(by: type[Joint]) -> str:
+    """Return the conditions of a joint type in words, with their rows."""
+    first, *others = CLOSURES[by]
+    texts = [f"{first.text} ({number_of(first.n, 'row')})"]
+    return ", ".join(texts + [f"{each.text} ({each.n})" for each in others])
+
+
+def closing(by: type[Joint], joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
+    """Return the conditions of a joint type between frames on both bodies of a joint."""
+    return [each for part in CLOSURES[by] for each in part.conditions(joint, i, j)]
 
 
 def _array(a: Vec3) -> Array:
@@ -399,24 +372,6 @@ class Coordinates(Protocol):
     def unknowns(self) -> int: ...
 
     def coordinate(self, body: Any) -> tuple[int, int]: ...
-
-
-@dataclass(eq=False)
-class BodyFrame:
-    """A frame of a body as the simulator last reported it; see `constraints.Frame`.
-
-    Attributes:
-        body: number of the body.
-        handle: the simulator's handle; None for a frame of the ground, which never moves.
-    """
-
-    body: int
-    handle: Any
-    position: Array
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-    jacobian: Array = field(default_factory=lambda: np.zeros((6, 0)))
-    velocity: Array = field(default_factory=lambda: np.zeros(6))
-    acceleration: Array = field(default_factory=lambda: np.zeros(6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -484,7 +439,7 @@ class Curved:
 class DrivenPoint:
     """The displacement since design of a point along the fixed direction k [m]."""
 
-    frame: FrameOnBody
+    frame: BodyFrame
     k: Array
     design: Array
     n = 1

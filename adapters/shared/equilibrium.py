@@ -26,8 +26,9 @@ from ...core.forces import Forces
 from ...core.mechanism.loads import Force, ForceElement, Torque
 from ...core.trajectory import Array, PointMotion, Trajectory
 from .equivalents import own_frame
-from .force_solution import ForceModel, places, solved_forces
-from .pose_solver import RANK_TOLERANCE
+from .force_solution import places, solved_forces
+from .projection import RANK_TOLERANCE
+from .projection_model import ProjectionModel
 
 # As in the native walk: the ratio of two corrections that proves a solution nearby (Kantorovich),
 # a correction whose square is round-off, and round-off.
@@ -119,7 +120,7 @@ class Walk:
         case: the same case in SI.
     """
 
-    def __init__(self, model: ForceModel, case: Case) -> None:
+    def __init__(self, model: ProjectionModel, case: Case) -> None:
         self.model, self.case, self.frame = model, case, own_frame(case)
         drivers, path = case.mechanism.drivers, case.sweep.path
         units = np.array([1.0 if each.turns else self.frame.unit for each in drivers])

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,8 +32,8 @@ from ...core.mechanism.loads import (
 )
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .constraints import CLOSURES, BodyFrame, FrameOnBody, by_frame
-from .pose_solver import ProjectionModel
+from .constraints import BodyFrame, by_frame, closing
+from .projection_model import Dynamics, ProjectionModel
 from .tree_plan import ends_of
 
 
@@ -64,7 +64,7 @@ class Element:
     """
 
     given: ForceElement
-    frames: Sequence[FrameOnBody]
+    frames: Sequence[BodyFrame]
     axis: Array
     angle: Callable[[], float]
 
@@ -131,9 +131,7 @@ def _cubic(table: Curve) -> Any:
     return PchipInterpolator(*np.array(table).T)
 
 
-def bushing_at_work(
-    each: Bushing, i: FrameOnBody, j: FrameOnBody
-) -> tuple[float, tuple[Array, Array]]:
+def bushing_at_work(each: Bushing, i: BodyFrame, j: BodyFrame) -> tuple[float, tuple[Array, Array]]:
     """Return the amount of a bushing, and its wrenches on both bodies about their points.
 
     Written with rotation matrices, as the native engine's with Euler parameters.
@@ -197,43 +195,6 @@ def axis_of(each: ForceElement, mechanism: Mechanism) -> Array:
     return np.array([*unit(joint.axis)])
 
 
-@dataclass(frozen=True, eq=False)
-class Dynamics:
-    """Forces of a simulator at a sample, in kg, s and the model's unit of length.
-
-    Attributes:
-        demand: M a + h - Q for the unknowns, shape (unknowns,).
-        reactions: by joint, the wrench on its second body about the joint's point, force over
-            moment: the part without multipliers, shape (6,), and the derivative by the multipliers,
-            of the rows left out last, shape (6, rows).
-        elements: the force of each force element.
-        left_out: derivative by dx of the rows left out within digits, shape (rows, unknowns).
-    """
-
-    demand: Array
-    reactions: Mapping[str, tuple[Array, Array]]
-    elements: Mapping[str, float]
-    left_out: Array
-
-
-@runtime_checkable
-class ForceModel(ProjectionModel, Protocol):
-    """A simulator's model with forces.
-
-    Attributes:
-        computed_by: for the record, the forces that the simulator computes, with its calls.
-    """
-
-    @property
-    def computed_by(self) -> Mapping[str, str]: ...
-
-    def dynamics(self, v: Array, a: Array) -> Dynamics:
-        """Return the simulator's forces at velocities and accelerations, at the current
-        configuration, after calls of `residual` and `jacobian`.
-        """
-        ...
-
-
 class Solved(Protocol):
     """A solved sample: the saved configuration, driver values in the unit of the rows, rates."""
 
@@ -265,7 +226,11 @@ def reacting(case: Case) -> list[str]:
 
 
 def solved_forces(
-    model: ForceModel, case: Case, samples: Mapping[int, Solved], unit: float, freedoms: int = 0
+    model: ProjectionModel,
+    case: Case,
+    samples: Mapping[int, Solved],
+    unit: float,
+    freedoms: int = 0,
 ) -> Forces:
     """Return the forces that the outputs of the case use, at solved samples.
 
@@ -327,7 +292,7 @@ def solved_forces(
     )
 
 
-def _given(model: ForceModel, at: Solved) -> _Given:
+def _given(model: ProjectionModel, at: Solved) -> _Given:
     model.restore(at.saved)
     model.residual(at.c)
     J, columns = np.array(model.jacobian()), np.array(model.driver_columns())
@@ -389,7 +354,7 @@ class LeftOut:
             for each in self.frames
         )
         found, exerted = list[Array](), list[RowWrench]()
-        for condition in CLOSURES[type(self.joint)].conditions(self.joint, i, j):
+        for condition in closing(type(self.joint), self.joint, i, j):
             found.append(np.atleast_2d(condition.rows()[1]))
             rows = slice(first, first := first + len(found[-1]))
             exerted += [

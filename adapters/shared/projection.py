@@ -8,17 +8,20 @@ convergence, or to another assembly, is halved.
 
 from __future__ import annotations
 
+import importlib
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...core.case.case import Case
-from ...core.failures import FailureKind
-from ...core.joints import Joint
+from ...core.case.case import Case, size
+from ...core.errors import SolveError
+from ...core.failures import FailureKind, PoseFailure
 from ...core.kinematics import (
     LONGEST_TURN,
+    ROUNDING,
     Start,
     continued,
     continuous,
@@ -26,11 +29,11 @@ from ...core.kinematics import (
     solve_from_start,
     start_of,
 )
-from ...core.mechanism.motions import Driver, Path, outwards
+from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .equivalents import GLOBAL, OwnFrame
-from .force_solution import ForceModel, solved_forces
-from .pose_solver import PoseSolver, ProjectionModel, Sample
+from .force_solution import solved_forces
+from .projection_model import ProjectionModel
 
 # Newton steps after one predictor of second order, by effort; None iterates to convergence.
 EFFORTS: Mapping[str, int | None] = {
@@ -50,26 +53,6 @@ SMALLEST_STEP = 2.0**-20
 # fails there. Closer to a singular pose than the root of round-off, rounding would choose the
 # assembly.
 FOLD = 8.0 * SMALLEST_STEP
-
-
-def without_counterpart(
-    case: Case, simulator: str, joints: Collection[type[Joint]], drivers: Collection[type[Driver]]
-) -> str | None:
-    """Return a message on the first joint or driver that has none of these exact types, or None.
-
-    A subclass may have another meaning.
-    """
-    for what, known in (
-        *((joint, joints) for joint in case.mechanism.joints),
-        *((d, drivers) for d in case.mechanism.drivers),
-    ):
-        if type(what) not in known:
-            who = str(what) if isinstance(what, Joint) else f"driver {what.name!r} ({what.type})"
-            return (
-                f"{who} has no counterpart in {simulator} here; known:"
-                f" {', '.join(each.type for each in known)}"
-            )
-    return None
 
 
 def solve_by_projection(
@@ -96,8 +79,191 @@ def solve_by_projection(
     )
 
 
-class Walk(PoseSolver):
-    """The walk of a model along the motion of a case, sample by sample."""
+MAX_ITERATIONS = 20
+# Singular values below this fraction of the largest count as zero: far above round-off (1e-15), far
+# below a regular mechanism (1e-2).
+RANK_TOLERANCE = 1e-9
+# Step at which least squares have converged: the remaining residual comes from contradictory rows.
+ARRIVED = 1e-6
+# Largest error of a pose that counts as round-off, of unknowns of size one.
+EXACT = 4.0 * float(np.finfo(np.float64).eps)
+
+LOST = PoseFailure(FailureKind.NOT_FOUND)
+"""Failure of a pose without a known cause."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A solved pose with all data for the next step of the walk."""
+
+    t: float
+    c: Array  # of the drivers
+    saved: Any
+    x: Array
+    v: Array
+    a: Array
+    rows: tuple[Array, Array, Array]
+    jacobian: Array
+    inverse: Array  # of the Jacobian
+    corrected: Array
+    iterations: int
+    residual: float
+
+
+class Walk:
+    """Newton's method on the rows of a model, and the walk along the motion of a case, sample by
+    sample.
+    """
+
+    def __init__(
+        self,
+        model: ProjectionModel,
+        case: Case,
+        tol: float,
+        corrections: int | None = None,
+        frame: OwnFrame = GLOBAL,
+    ) -> None:
+        self.model, self.case, self.tol, self.corrections, self.frame = (
+            model,
+            case,
+            tol,
+            corrections,
+            frame,
+        )
+        self.drivers = [driver.name for driver in case.mechanism.drivers]
+        self.turns = np.array([driver.turns for driver in case.mechanism.drivers], dtype=np.bool_)
+        self.units = np.where(self.turns, 1.0, frame.unit)[:, None]
+        # the samples at once, because each call costs more than its values
+        self.path = case.sweep.path
+        samples = self.drive(self.path, self.path.times)
+        self.driven = {float(t): samples[..., k] for k, t in enumerate(self.path.times)}
+        self.size = size(case) / frame.unit
+        self.lost = LOST  # failure of the last pose that was not found
+        self.ended, self.failures = list[str](), list[FailureKind]()
+        model.reset()
+        model.residual(np.zeros(len(case.mechanism.drivers)))
+        jacobian = model.jacobian()
+        singular = np.linalg.svd(jacobian, compute_uv=False)
+        self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
+        joints = jacobian[~np.any(model.driver_columns(), axis=1)]
+        self.dof = jacobian.shape[1] - (
+            int(np.linalg.matrix_rank(joints, tol=RANK_TOLERANCE * singular[0]))
+            if len(joints)
+            else 0
+        )
+        self.square = jacobian.shape == (self.rank, self.rank)
+        self.rows, self.unknowns = jacobian.shape
+        self.lapack: Any = importlib.import_module("scipy.linalg.lapack")
+        if self.rank < self.unknowns:
+            raise SolveError(
+                f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
+                " coordinates of the simulator's model are left free by joints and drivers at the"
+                " design position; add a driver or a joint; if their number is"
+                " right a driver does not move it there (a lock-up): give the design in another"
+                " pose",
+                FailureKind.FREE,
+            )
+
+    def drive(self, path: Path, times: Array) -> Array:
+        """Return values, rates and accelerations of the drivers in the units of the rows, shape (3,
+        drivers, times).
+        """
+        return path.drive(self.drivers, times) / self.units
+
+    def inverse(self, A: Array) -> Array | None:
+        """Return the inverse of a matrix of the rows, or of its least squares; None if singular.
+
+        The matrix may not be square, because point closures of a planar loop are redundant.
+        """
+        if not self.square:
+            return self._least_squares(A, np.eye(self.rows))
+        # LAPACK's solver of many right-hand sides starts threads, even for a few unknowns
+        lu, pivots, singular = self.lapack.dgetrf(A)
+        return None if singular else self.lapack.dgetri(lu, pivots)[0]
+
+    def _least_squares(self, A: Array, b: Array) -> Array:
+        # QR decomposition with a choice of columns
+        free, work = np.zeros((self.unknowns, 1), dtype=np.int32), 64 * (self.rows + self.unknowns)
+        return self.lapack.dgelsy(A, b, free, RANK_TOLERANCE, work)[1][: self.unknowns]
+
+    def _step(self, r: Array) -> Array:
+        """Return Newton's step for residuals."""
+        A = self.model.jacobian()
+        if not self.square:
+            return self._least_squares(A, -r)
+        *_, step, singular = self.lapack.dgesv(A, -r)
+        return np.asarray(step if not singular else math.nan * r, dtype=np.float64)
+
+    def newton(self, c: Array) -> tuple[Array, int, float] | None:
+        """Return the sum of all steps, the iterations and the last residual at driver values c, or
+        None.
+        """
+        self.lost, met = LOST, False
+        worst, moved = 0.0, math.inf
+        corrected = np.zeros(self.unknowns)
+        for iteration in range(MAX_ITERATIONS):
+            r, before = self.model.residual(c), worst
+            worst = float(np.abs(r).max())
+            if not math.isfinite(worst):
+                return None
+            if iteration == self.corrections:
+                return corrected, iteration, worst
+            if self.corrections is None:
+                # the error is about the last step times the ratio of its residuals; if it is not
+                # round-off, one more step makes it so, as convergence is quadratic
+                exact = moved * worst <= EXACT * before
+                if worst <= self.tol and (met or exact):
+                    return corrected, iteration, worst
+                if met:
+                    break
+                met = worst <= self.tol
+            step = self._step(r)
+            moved = float(np.abs(step).max())
+            if not math.isfinite(moved):
+                return None
+            self.model.move(step)
+            corrected += step
+        if worst <= ROUNDING:
+            self.lost = PoseFailure(FailureKind.BELOW_ROUNDING, worst, self.tol)
+        elif not self.square and moved <= ARRIVED:
+            self.lost = PoseFailure(FailureKind.NO_POSE, worst, self.tol)
+        return None
+
+    def solve(self, path: Path, t: float) -> Sample | None:
+        """Return the pose with its rates on a path at time t, starting from the current pose, or
+        None.
+        """
+        known = self.driven.get(t) if path is self.path else None
+        c, c_t, c_tt = self.drive(path, np.array([t]))[..., 0] if known is None else known
+        done = self.newton(c)
+        if done is None:
+            return None
+        jacobian, columns = np.array(self.model.jacobian()), self.model.driver_columns()
+        nu = columns @ c_t
+        if (inverse := self.inverse(jacobian)) is None:
+            return None
+        v = inverse @ nu
+        gamma = columns @ c_tt - self.model.bias(v)
+        a = inverse @ gamma
+        # least squares would hide rates that do not satisfy the rows (a driver at a dead centre)
+        if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
+            self.lost = PoseFailure(FailureKind.DEAD_CENTRE)
+            return None
+        position, velocity, acceleration = (
+            np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True)
+        )
+        return Sample(
+            t,
+            c,
+            self.model.save(),
+            position.ravel(),
+            v,
+            a,
+            (position, velocity, acceleration),
+            jacobian,
+            inverse,
+            *done,
+        )
 
     def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
         """Walk a path from start to time t with halved steps after failures; return the end, and
@@ -187,33 +353,41 @@ class Walk(PoseSolver):
         """Return the kind of a failure at the start."""
         return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
 
+    def reached(self, origin: Sample) -> Iterator[tuple[int, Sample]]:
+        """Yield the samples reached from a pose, outwards; `ended` and `failures` have the ends."""
+        path, times = self.path, self.path.times
+        step = (
+            float(np.abs(np.diff(times)).max()) if len(times) > 1 else abs(float(times[0])) or 1.0
+        )
+        for side in outwards(times, origin.t):
+            at = origin
+            last: float | None = None
+            for k in side:
+                at, reached = self.advance(path, at, float(times[k]), step)
+                if not reached:
+                    self.ended.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
+                    self.failures.append(self.lost.kind)
+                    break
+                last = float(times[k])
+                yield int(k), at
+
     def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:
         path, points = self.path, self.case.points
-        times, n = path.times, len(path.times)
+        self.ended, self.failures = list[str](), list[FailureKind]()
+        n = len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
         samples = dict[int, Sample]()
-        solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
-        failures = list[FailureKind]()
+        solved = np.zeros(n, dtype=np.bool_)
         origin, message = self.start(path, begin)
         if origin is None:
-            messages.append(message)
-            failures.append(self.kind_at_start)
+            self.ended.append(message)
+            self.failures.append(self.kind_at_start)
         else:
-            step = float(np.abs(np.diff(times)).max()) if n > 1 else abs(float(times[0])) or 1.0
-            for side in outwards(times, origin.t):
-                at = origin
-                last: float | None = None
-                for k in side:
-                    at, reached = self.advance(path, at, float(times[k]), step)
-                    if not reached:
-                        messages.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
-                        failures.append(self.lost.kind)
-                        break
-                    last = float(times[k])
-                    motion[:, k] = at.rows
-                    iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
-                    samples[int(k)] = at
+            for k, at in self.reached(origin):
+                motion[:, k] = at.rows
+                iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
+                samples[k] = at
         unit = self.frame.unit
         position, velocity, acceleration = (
             self.frame.back(motion[0]),
@@ -233,17 +407,22 @@ class Walk(PoseSolver):
             **details,
         }
         forces = None
-        if self.case.forces and isinstance(self.model, ForceModel):
+        if self.case.forces:
             forces = solved_forces(self.model, self.case, samples, unit)
-            messages += filter(None, [forces.message])
+            self.ended += filter(None, [forces.message])
             facts["forces"] = {**forces.account(), "computed_by": dict(self.model.computed_by)}
         return Trajectory(
             moves,
             solved,
             iterations,
             largest_found(unit * residual[solved]),
-            "; ".join(messages),
+            "; ".join(self.ended),
             facts,
             forces=forces,
-            failures=failures,
+            failures=self.failures,
         )
+
+
+def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
+    # a millionth: far above round-off, far below the error of an unsatisfied row
+    return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))

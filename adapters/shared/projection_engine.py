@@ -29,9 +29,8 @@ from ...core.mechanism.motions import JointAngle, JointDisplacement, PointCoordi
 from ...core.trajectory import Trajectory
 from .equilibrium import Rest, Walk, equilibria
 from .equivalents import in_own_frame, own_frame
-from .force_solution import ForceModel
-from .pose_solver import ProjectionModel
-from .projection import EFFORTS, solve_by_projection, without_counterpart
+from .projection import EFFORTS, solve_by_projection
+from .projection_model import ProjectionModel
 
 # Rounds of calls; the fastest round counts, so that interruptions do not matter. A round is long
 # against the clock's resolution.
@@ -70,7 +69,7 @@ def floor_of(
     poses = float(solved.iterations[solved.solved].mean())
     counts = {**dict.fromkeys([*pose, *solve], poses), **dict.fromkeys(rates, 1.0)}
     parts = {
-        name: counts[name] * each * microseconds(call, least)
+        name: counts[name] * each * max(0.0, _microseconds(call) - _microseconds(least))
         for name, (call, least, each) in {**pose, **solve, **rates}.items()
     }
     counted = (
@@ -81,10 +80,8 @@ def floor_of(
     return Floor(sum(parts.values()), counted, parts)
 
 
-def microseconds(call: Call, least: Call) -> float:
-    """Return the time of a call minus the time on the smallest model [us]."""
-    fastest = [min(timeit.repeat(each, number=CALLS, repeat=ROUNDS)) for each in (call, least)]
-    return max(0.0, 1e6 * (fastest[0] - fastest[1]) / CALLS)
+def _microseconds(call: Call) -> float:
+    return 1e6 * min(timeit.repeat(call, number=CALLS, repeat=ROUNDS)) / CALLS
 
 
 DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
@@ -151,10 +148,19 @@ class ProjectionEngine(ABC):
         return in_own_frame(self.known(case))
 
     def unsupported(self, case: Case) -> str | None:
-        """Return a message on the joint or driver without a counterpart or an equivalent here, or
-        None.
+        """Return a message on the first joint or driver that has none of the known exact types, and
+        no equivalent of them, or None. A subclass may have another meaning.
         """
-        return without_counterpart(self.known(case), self.title, self.joints, DRIVERS)
+        mechanism = self.known(case).mechanism
+        for each in (*mechanism.joints, *mechanism.drivers):
+            known = self.joints if isinstance(each, Joint) else DRIVERS
+            if type(each) not in known:
+                driver = f"driver {each.name!r} ({each.type})"
+                return (
+                    f"{each if isinstance(each, Joint) else driver} has no counterpart in"
+                    f" {self.title} here; known: {', '.join(kind.type for kind in known)}"
+                )
+        return None
 
     @abstractmethod
     def model_of(self, case: Case) -> ProjectionModel:
@@ -190,7 +196,7 @@ class ProjectionEngine(ABC):
 
         def solve(case: Case, group: Sequence[int]) -> tuple[Mapping[int, Rest], Forces, str]:
             model = self.build(case)
-            if not (case.forces and isinstance(model, ForceModel)):
+            if not case.forces:
                 raise UnsupportedError(f"{self.title} gives no forces of case {case.name!r}")
             return Walk(model, self.known(case)).solve(group)
 

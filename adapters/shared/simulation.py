@@ -16,7 +16,7 @@ the middle of the step. Accelerations are the change of velocities over the last
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, ClassVar, Self
@@ -32,11 +32,11 @@ from ...core.kinematics import start_of as where_from
 from ...core.mechanism.mechanism import Vector
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
-from .constraints import CLOSURES
+from .constraints import closing, closure_text
 from .equivalents import fits, jointed
-from .pose_solver import ProjectionModel
 from .projection import Walk
 from .projection_engine import ProjectionEngine
+from .projection_model import ProjectionModel
 from .tree_model import TreeModel
 from .tree_plan import Closure, relations
 
@@ -263,6 +263,10 @@ class Simulation:
         """Return the version of the simulator, or None if the import fails."""
         return self.projection().version()
 
+    def unsupported(self, case: Case) -> str | None:
+        """Return a message on the joint or driver that is not supported here, or None."""
+        return self.projection().unsupported(case)
+
     def floor(self, case: Case) -> None:
         """Return None: the bound on steps in Python is that of projection."""
 
@@ -281,6 +285,7 @@ class Stepping(Simulation):
         steps: between samples.
         model: class of the simulator's model.
         described: description of solver, constraints and drivers.
+        counts: numbers of steps of the efforts.
         rods: whether the simulator has a distance constraint; otherwise rods are bodies.
         couples: whether the simulator has a constraint that couples two coordinates.
         equal: whether all steps of a simulation have the same length.
@@ -289,6 +294,7 @@ class Stepping(Simulation):
     steps: int = 4
     model: ClassVar[type[SteppedTree]]
     described: ClassVar[Mapping[str, Any]]
+    counts: ClassVar[Sequence[int]] = (1, 2, 4, 8, 16)
     rods: ClassVar[bool] = False
     couples: ClassVar[bool] = False
     equal: ClassVar[bool] = False
@@ -331,7 +337,7 @@ class Stepping(Simulation):
 
     def efforts(self) -> Mapping[str, Self]:
         """Return the efforts by the number of steps."""
-        return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
+        return {f"{n} steps a sample": replace(self, steps=n) for n in self.counts}
 
     def build(self, case: Case) -> SteppedTree:
         """Return tree, constraints and start."""
@@ -378,21 +384,22 @@ class TiedTree(TreeModel):
     def tie(self, name: str, tie: Tie, joint: Any = None) -> None:
         """Add a tie under the name of its joint."""
         self.ties.append(tie)
-        closure = CLOSURES[tie.by]
-        self.closures[name] = f"{self.has}, {closure.text}"
-        frames = map(self.add_frame, tie.bodies, tie.points)
-        self.conditions += closure.conditions(joint, *frames)
+        self.closures[name] = f"{self.has}, {closure_text(tie.by)}"
+        i, j = map(self.add_frame, tie.bodies, tie.points)
+        self.conditions += closing(tie.by, joint, i, j)
 
 
 class SteppedTree(TiedTree):
-    """A tree with ties and given velocities of the driven coordinates.
+    """A tree with ties and given values of the driven coordinates.
 
     The constructor makes the model and calls `set_off`.
 
     Attributes:
-        driven_at: indices of the driven coordinates in q.
+        driven_q, driven_v: indices of the driven coordinates in q and v.
         signs: signs of the driven coordinates in the tree.
     """
+
+    not_finite: ClassVar[str] = "its velocities are not finite"
 
     @abstractmethod
     def __init__(self, case: Case, steps: int) -> None:
@@ -407,7 +414,8 @@ class SteppedTree(TiedTree):
             steps: between samples.
         """
         self.steps, self.start = steps, start_of(self, case)
-        self.driven_at = [self.coordinate(body)[0] for body, _ in self.driven]
+        places = [self.coordinate(body) for body, _ in self.driven]
+        self.driven_q, self.driven_v = [q for q, _ in places], [v for _, v in places]
         self.signs = np.array([float(sign) for _, sign in self.driven])
 
     @abstractmethod
@@ -415,7 +423,8 @@ class SteppedTree(TiedTree):
         """Return the configuration and the velocities after a step.
 
         Args:
-            driven: velocities of the driven coordinates over the step [their units per second].
+            driven: values, rates and accelerations of the drivers at the beginning, the middle and
+                the end of the step, shape (3, drivers, 3).
             h: length of the step [s].
 
         Raises:
@@ -434,21 +443,25 @@ class SteppedTree(TiedTree):
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """Yield the poses of a leg."""
         q, v, a = self.start.configuration, leg.sign * self.start.v, self.start.a
-        yield self.pose(q, v, a, leg.drive(leg.times[:1])[0, :, 0], 0)
-        parts = np.arange(self.steps + 1) / self.steps
+        yield self.pose(q, v, a, leg.drive(leg.times[:1])[..., 0], 0)
+        parts = np.arange(2 * self.steps + 1) / (2 * self.steps)
         for t, until in pairwise(leg.times.tolist()):
             h = abs(until - t) / self.steps
-            values = leg.drive(t + (until - t) * parts)[0]
-            for aim in values[:, 1:].T if h else ():  # samples may be repeated
+            driven = leg.drive(t + (until - t) * parts)
+            for k in range(0, 2 * self.steps, 2) if h else ():  # samples may be repeated
                 before = v
-                q, v = self.step(q, v, (self.signs * aim - q[self.driven_at]) / h, h)
+                q, v = self.step(q, v, driven[..., k : k + 3], h)
                 if not np.isfinite(v).all():
-                    raise SimulationEndedError("its velocities are not finite")
+                    raise SimulationEndedError(self.not_finite)
                 a = (v - before) / h
-            yield self.pose(q, v, a, values[:, -1], self.steps)
+            yield self.pose(q, v, a, driven[..., -1], self.steps)
+
+    def mean_rates(self, q: Array, driven: Array, h: float) -> Array:
+        """Return the velocities of the driven coordinates over a step."""
+        return (self.signs * driven[0, :, 2] - q[self.driven_q]) / h
 
     def pose(self, q: Array, v: Array, a: Array, driven: Array, steps: int) -> SimulatedPose:
         """Return the pose at this state, with the number of steps since the previous sample."""
         self.q = q
-        residual = float(np.abs(self.residual(driven)).max())
+        residual = float(np.abs(self.residual(driven[0])).max())
         return SimulatedPose(np.array(self.points(v, a)).swapaxes(0, 1), residual, steps)

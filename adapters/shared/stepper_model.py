@@ -30,13 +30,12 @@ from ...core.joints import (
     Universal,
 )
 from ...core.joints.base import triad
-from ...core.mechanism.body import inertia_matrix
+from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.tree import spanning_tree
 from ...core.trajectory import Array
 from .constraints import skew
-from .tree_plan import CHAINS, Link, ends_of
+from .tree_plan import Chain, Closure, Link, ends_of, plan_tree
 
 Plain: TypeAlias = dict[str, Any]
 
@@ -71,17 +70,22 @@ def stepper_model(mechanism: Mechanism, twists: Mapping[str, Array]) -> Plain:
     """
     mechanism = replace(mechanism, drivers=())
     _require_known(mechanism)
-    tree = spanning_tree(mechanism, [j.name for j in mechanism.joints if not isinstance(j, TIED)])
-    for joint in tree.cut:
+    carrying = [joint.name for joint in mechanism.joints if not isinstance(joint, TIED)]
+    parts = [*plan_tree(mechanism, whole=TIED, first=carrying)]
+    cut = [each.joint for each in parts if isinstance(each, Closure)]
+    for joint in cut:
         if not isinstance(joint, TIED):
             raise UnsupportedError(f"{joint} closes a loop, and no tie of points replaces it")
-    carriers = {branch.child: branch for branch in tree.branches}
-    moves = {name: _moves(mechanism, branch) for name, branch in carriers.items()}
+    chains = {each.child: each for each in parts if isinstance(each, Chain)}
+    for name, chain in chains.items():
+        if chain.joint is None:
+            raise UnsupportedError(f"body {name!r} has no joint that carries it")
+    moves = {name: [link for _, link, *_ in each.each()] for name, each in chains.items()}
     jacobians, first = dict[str, Array](), 0
     total = sum(_columns(each).shape[1] for each in moves.values())
-    for name, branch in carriers.items():
+    for name, chain in chains.items():
         own = _columns(moves[name])
-        found = jacobians.get(branch.parent, np.zeros((6, total))).copy()
+        found = jacobians.get(chain.parent, np.zeros((6, total))).copy()
         found[:, first : first + own.shape[1]] = own
         jacobians[name], first = found, first + own.shape[1]
     nothing = np.zeros((6, total))
@@ -91,11 +95,11 @@ def stepper_model(mechanism: Mechanism, twists: Mapping[str, Array]) -> Plain:
 
     ties, kept, rows = list[Plain](), dict[str, list[int]](), np.zeros((0, total))
     length = _length(mechanism)
-    for joint in tree.cut:
+    for joint in cut:
         ties += _ties(mechanism, joint, relative(joint), length)
     for joint in mechanism.joints:
         flags = [*map(int, KEPT[type(joint)])]
-        if joint in tree.cut and any(flags):
+        if joint in cut and any(flags):
             for k, row in enumerate(_rows(mechanism, joint, relative(joint))):
                 more = np.vstack([rows, row])
                 flags[k] *= int(_rank(more) > len(rows))
@@ -105,8 +109,8 @@ def stepper_model(mechanism: Mechanism, twists: Mapping[str, Array]) -> Plain:
         "name": mechanism.name,
         "gravity": [*mechanism.gravity],
         "bodies": [
-            _body(mechanism, name, carriers[name], moves[name], twists)
-            for name in _depth_first({name: each.parent for name, each in carriers.items()})
+            _body(mechanism.body(name), chains[name], moves[name], twists)
+            for name in _depth_first({name: each.parent for name, each in chains.items()})
         ],
         "ties": ties,
         "joints": [
@@ -167,15 +171,6 @@ def _carrier(mechanism: Mechanism, name: str) -> str:
 
 def _ends(mechanism: Mechanism, joint: Joint) -> list[str]:
     return [_carrier(mechanism, name) for name in joint.bodies]
-
-
-def _moves(mechanism: Mechanism, branch: Any) -> list[Link]:
-    joint = branch.joint
-    if joint is None:
-        raise UnsupportedError(f"body {branch.child!r} has no joint that carries it")
-    sign = 1 if joint.j == branch.child else -1
-    links = CHAINS[type(joint)](joint, ends_of(mechanism, joint)[0])[::sign]
-    return [replace(each, axis=tuple(sign * x for x in each.axis)) for each in links]
 
 
 def _columns(moves: list[Link]) -> Array:
@@ -245,28 +240,22 @@ def _depth_first(parents: Mapping[str, str]) -> list[str]:
     return found[1:]
 
 
-def _body(
-    mechanism: Mechanism,
-    name: str,
-    branch: Any,
-    moves: list[Link],
-    twists: Mapping[str, Array],
-) -> Plain:
-    body, parent = mechanism.body(name), branch.parent
-    relative = twists[name] - twists.get(parent, np.zeros(6))
+def _body(body: Body, chain: Chain, moves: list[Link], twists: Mapping[str, Array]) -> Plain:
+    relative = twists[body.name] - twists.get(chain.parent, np.zeros(6))
     assert body.inertia is not None
+    assert chain.joint is not None
     columns = _columns(moves)
     rates = np.linalg.lstsq(columns, relative)[0] if columns.size else np.zeros(0)
     return {
-        "name": name,
-        "parent": parent,
-        "joint": branch.joint.name,
-        "second": branch.joint.j == name,
+        "name": body.name,
+        "parent": chain.parent,
+        "joint": chain.joint.name,
+        "second": chain.sign > 0,
         "moves": [
             {"kind": each.move, "axis": [*each.axis], "point": [*each.point]} for each in moves
         ],
         "rates": rates.tolist(),
-        "twist": twists[name].tolist(),
+        "twist": twists[body.name].tolist(),
         "mass": body.mass,
         "center": [*(body.center_of_mass or body.origin)],
         "inertia": inertia_matrix(body.inertia).tolist(),

@@ -12,58 +12,32 @@ joint's coordinate do not belong to its reaction.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import Any, ClassVar, Protocol
+from typing import Any
 
 import numpy as np
 
-from ...core.case.case import Case
 from ...core.joints import Joint
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body, inertia_matrix
-from ...core.mechanism.loads import TorsionSpringDamper
+from ...core.mechanism.loads import ForceElement, TorsionSpringDamper
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .constraints import Frame, skew
+from .constraints import BodyFrame, skew
 from .force_solution import (
-    Dynamics,
     Element,
     LeftOut,
-    RowWrench,
     axis_of,
     left_out_of,
     places,
     reacting,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """A joint of the tree.
-
-    Attributes:
-        bodies: numbers of all carried bodies, the joint's body first.
-        sign: minus if this body is the joint's first.
-    """
-
-    bodies: list[int]
-    sign: int
-
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """A joint at the closure of a loop.
-
-    Attributes:
-        second: number of the joint's second body.
-        rows: rows of the joint.
-    """
-
-    second: int
-    rows: Collection[slice]
+from .projection_model import Dynamics
+from .tree_plan import Relation
+from .tree_simulator import Mass, TreeSimulator
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +45,17 @@ class Site:
     """A joint whose reaction is requested, and a frame at its point on its second body.
 
     Attributes:
-        parts: the joint itself, or what holds its rows.
+        second: number of the second body.
+        carried: by the parts of the joint in the tree, numbers of all carried bodies, that of the
+            part first, and a sign: minus if this body is the joint's first.
+        cut: rows of the parts of the joint that close loops, and of those left out.
     """
 
     joint: Joint
-    frame: Frame
-    parts: Sequence[Carried | Cut]
+    frame: BodyFrame
+    second: int
+    carried: Sequence[tuple[list[int], int]]
+    cut: Sequence[slice]
 
     def reaction(
         self, passed_on: Callable[[int, Array], Array], exerted: Array, loads: Array
@@ -93,14 +72,12 @@ class Site:
         """
         to_point = from_origin(self.frame.position)
         alone, by_multiplier = np.zeros(6), np.zeros(exerted.shape[1:])
-        for part in self.parts:
-            if isinstance(part, Cut):
-                for rows in part.rows:
-                    by_multiplier[:, rows] += to_point @ exerted[part.second][:, rows]
-                continue
-            total = passed_on(part.bodies[0], self.frame.position)
-            alone += part.sign * (total - to_point @ loads[part.bodies].sum(axis=0))
-            by_multiplier -= part.sign * (to_point @ exerted[part.bodies].sum(axis=0))
+        for bodies, sign in self.carried:
+            total = passed_on(bodies[0], self.frame.position)
+            alone += sign * (total - to_point @ loads[bodies].sum(axis=0))
+            by_multiplier -= sign * (to_point @ exerted[bodies].sum(axis=0))
+        for rows in self.cut:
+            by_multiplier[:, rows] += to_point @ exerted[self.second][:, rows]
         return alone, by_multiplier
 
     def along(self, freedom: str) -> Array:
@@ -154,72 +131,16 @@ def of_relations(
 NO_MASS = 1e-100
 
 
-class LoadedTree(Protocol):
-    """Members of a model that the forces need; see `tree_model.TreeModel`.
-
-    Attributes:
-        parents: number of the carrier of each body.
-        branch_of: joint of the tree -> number of the carried body, and its sign.
-    """
-
-    case: Case
-    recursion: ClassVar[bool]
-    carrier: dict[str, Any]
-    parents: list[int]
-    branch_of: dict[str, tuple[int, int]]
-
-    def add_frame(self, body: Any, at: Vector) -> Any: ...
-
-    def look(self, frame: Any) -> None:
-        """Read a frame's place, Jacobian, velocity and acceleration."""
-        ...
-
-    def jacobian(self) -> Array: ...
-    def inverse_dynamics(self, v: Array, a: Array) -> Array: ...
-    def passed_on(self, body: int, point: Array) -> Array: ...
-
-    def angle(self, joint: str) -> float:
-        """Return a joint's angle [rad], zero at design."""
-        ...
-
-    def exerted(self) -> Sequence[RowWrench]:
-        """Return the wrenches of unit multipliers of rows between bodies."""
-        ...
-
-    def rows_of(self, joint: str) -> Sequence[slice]:
-        """Return the rows of a cut joint."""
-        ...
-
-    def coordinate_rows(self) -> Mapping[int, Sequence[tuple[str, str]]]:
-        """Return the rows of coordinates, and joint and freedom of each coordinate."""
-        ...
-
-    def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
-        """Return the weight of a joint's coordinate in a row."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Mass:
-    """A body with mass, and a frame at its centre of mass."""
-
-    body: Body
-    frame: Any
-
-
 class TreeForces:
     """Frames of joints, masses and force elements of a model, and their forces."""
 
-    def __init__(self, model: LoadedTree) -> None:
+    def __init__(self, model: TreeSimulator) -> None:
         self.model, mechanism = model, model.case.mechanism
         self.gravity = np.array(mechanism.gravity)
-        self.frames: list[Any] = []
+        self.frames: list[BodyFrame] = []
         self.elements = [self._element(each) for each in mechanism.forces]
         self.masses = [
-            Mass(
-                body,
-                self._frame(body.name, body.center_of_mass or body.origin),
-            )
+            Mass(body, self._frame(body.name, body.center_of_mass or body.origin))
             for body in mechanism.moving
             if body.mass > 0.0
         ]
@@ -229,52 +150,54 @@ class TreeForces:
         }
         self.left_out = left_out_of(mechanism, self._frame)
 
-    def _frame(self, body: str, at: Vector) -> Any:
+    def _frame(self, body: str, at: Vector) -> BodyFrame:
         self.frames.append(self.model.add_frame(self.model.carrier[body], at))
         return self.frames[-1]
 
-    def _element(self, each: Any) -> Element:
-        mechanism, model = self.model.case.mechanism, self.model
-        frames = [self._frame(body, at) for body, at in places(each, mechanism)]
-        turning = isinstance(each, TorsionSpringDamper)
-        return Element(
-            each,
-            frames,
-            axis_of(each, mechanism),
-            (lambda: model.angle(each.joint)) if turning else lambda: 0.0,
-        )
+    def _element(self, each: ForceElement) -> Element:
+        model = self.model
+        frames = [self._frame(*end) for end in places(each, model.case.mechanism)]
+
+        def angle() -> float:
+            assert isinstance(each, TorsionSpringDamper)
+            body, sign = model.coordinates[each.joint, "rotation"]
+            return sign * float(model.q[model.coordinate(body)[0]])
+
+        return Element(each, frames, axis_of(each, model.case.mechanism), angle)
 
     @cached_property
     def sites(self) -> list[Site]:
         """Return the requested joints."""
         model, found = self.model, list[Site]()
+        mechanism = model.case.mechanism
         for name, frame in self.points.items():
-            joint, parts = model.case.mechanism.joint(name), list[Carried | Cut]()
-            for part in model.case.mechanism.parts_of(name):
-                if part in model.branch_of:
-                    body, sign = model.branch_of[part]
-                    parts.append(Carried(carried_by(body, model.parents), sign))
-                else:
-                    parts.append(Cut(model.carrier[joint.j], model.rows_of(part)))
-            left_out = [rows for each, rows in self.slices if each.of == name]
-            parts.append(Cut(model.carrier[joint.j], left_out))
-            found.append(Site(joint, frame, parts))
+            joint, parts = mechanism.joint(name), mechanism.parts_of(name)
+            branches = [model.branch_of[part] for part in parts if part in model.branch_of]
+            cut = [rows for rows, what in model.own_rows if what in parts]
+            cut += [model.rows_of(each) for part, each, _ in model.tied if part in parts]
+            cut += [rows for each, rows in self.slices if each.of == name]
+            carried = [(carried_by(body, model.parents), sign) for body, sign in branches]
+            found.append(Site(joint, frame, model.carrier[joint.j], carried, cut))
         return found
 
     @cached_property
     def slices(self) -> list[tuple[LeftOut, slice]]:
         """Return the rows left out, which follow those of the model."""
-        first = len(self.model.jacobian())
+        first = len(self.model.J)
         ends = [*accumulate((each.joint.rows for each in self.left_out), initial=first)]
         return [*zip(self.left_out, map(slice, ends, ends[1:]), strict=False)]
 
     @cached_property
     def shares(self) -> Mapping[str, Sequence[tuple[int, str]]]:
         """Return the rows and freedoms of each joint's coordinates."""
-        return of_relations(self.model.case.mechanism, self.model.coordinate_rows())
+        model = self.model
+        rows = [(model.rows_of(row), relation) for row, relation in model.related]
+        rows += [(at, what) for at, what in model.own_rows if isinstance(what, Relation)]
+        terms = {at.start: [each[:2] for each in relation.terms] for at, relation in rows}
+        return of_relations(model.case.mechanism, terms)
 
     def dynamics(self, v: Array, a: Array) -> Dynamics:
-        """Return the forces at velocities and accelerations; see `force_solution.ForceModel`."""
+        """Return the forces at velocities and accelerations; see `ProjectionModel`."""
         model = self.model
         demand, bodies = model.inverse_dynamics(v, a), len(model.parents)
         for frame in self.frames:
@@ -291,7 +214,7 @@ class TreeForces:
             left_out.append(rows)
             exerting += wrenches
         total = np.vstack(left_out)
-        exerted = np.zeros((bodies, 6, len(model.jacobian()) + len(total)))
+        exerted = np.zeros((bodies, 6, len(model.J) + len(total)))
         for each in exerting:
             exerted[each.body][:, each.rows] += about_origin(each.point, each.wrenches)
         passed_on, reactions = self._passed_on(bodies), dict[str, tuple[Array, Array]]()
@@ -299,7 +222,8 @@ class TreeForces:
             name = site.joint.name
             alone, by_multiplier = site.reaction(passed_on, exerted, loads)
             for row, freedom in self.shares[name]:
-                weight = model.coordinate_weight(row, name, freedom)
+                body, sign = model.coordinates[name, freedom]
+                weight = sign * float(model.J[row, model.coordinate(body)[1]])
                 by_multiplier[:, row] -= weight * site.along(freedom)
             reactions[name] = alone, by_multiplier
         return Dynamics(demand, reactions, amounts, total)

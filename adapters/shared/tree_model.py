@@ -1,23 +1,16 @@
 """A mechanism as one tree of slides, hinges and balls, for simulators with generalized coordinates.
 
 The base adds the parts of the plan (`tree_plan`), the conditions of loops (`constraints`) and the
-drivers. A simulator adds links and frames and reports their motion. It knows a body by the number
-of its link; the ground is body 0. The axes of every body are global at design, and its origin is
-the point of its link there.
-
-A constructor prepares the simulator's empty model and then calls the base constructor, which calls
-`add_link` for every link, parents first, `make_frame` for every frame, and finally `finish`. Then
-the model is solved: `design` and `moved` return configurations q, `place` and `rate` update the
-simulator's data, which `placement`, `slope` and `motion` read frame by frame.
+drivers to a simulator; see `tree_simulator`.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,134 +20,22 @@ from ...core.harness.engine import Floor
 from ...core.joints import Fixed, Joint, Translational
 from ...core.joints.base import unit
 from ...core.mechanism.loads import TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ...core.mechanism.motions import JointDriver, PointCoordinate
 from ...core.trajectory import Array
-from .constraints import CLOSURES, BodyFrame, Condition, Curved, DrivenPoint, Linear, by_frame
-from .force_solution import Dynamics, RowWrench
+from .constraints import CLOSURES, Curved, DrivenPoint, Linear, closing, closure_text
 from .projection_engine import Call, ProjectionEngine, floor_of
-from .tree_forces import Mass, TreeForces
-from .tree_plan import Chain, Closure, Link, Relation, plan_tree
-
-
-class TreeSimulator(ABC):
-    """A simulator of trees of links.
-
-    Attributes:
-        q: the configuration, never changed in place.
-        recursion: whether the simulator gives the wrenches of its joints.
-        computed_by: the forces that the simulator computes, with its calls.
-    """
-
-    q: Array
-    recursion: ClassVar[bool] = True
-    computed_by: ClassVar[Mapping[str, str]]
-
-    @abstractmethod
-    def add_link(self, parent: int, link: Link, offset: Array) -> None:
-        """Add a body that moves by a link relative to its parent, at an offset from the parent's
-        origin [m].
-        """
-
-    @abstractmethod
-    def make_frame(self, body: int, offset: Array) -> Any:
-        """Return a handle of a frame of a body other than the ground, at an offset from its origin
-        [m].
-        """
-
-    @abstractmethod
-    def finish(self) -> None:
-        """Finish the model for solving; no link and no frame follows."""
-
-    @property
-    @abstractmethod
-    def unknowns(self) -> int:
-        """The number of velocities."""
-
-    @abstractmethod
-    def coordinate(self, body: Any) -> tuple[int, int]:
-        """Return the indices of a slide's or hinge's coordinate in q and in v."""
-
-    @abstractmethod
-    def design(self) -> Array:
-        """Return the configuration at design, zero for slides and hinges."""
-
-    @abstractmethod
-    def moved(self, dx: Array) -> Array:
-        """Return the configuration q advanced by dx, shape (unknowns,)."""
-
-    @abstractmethod
-    def place(self) -> None:
-        """Update the simulator's poses and Jacobians to q."""
-
-    @abstractmethod
-    def rate(self, v: Array, a: Array) -> None:
-        """Update the simulator's velocities and accelerations to v and a, at the q last placed."""
-
-    @abstractmethod
-    def placement(self, handle: Any) -> tuple[Array, Array]:
-        """Return the position of a frame [m], shape (3,), and the rotation since design, shape
-        (3, 3).
-        """
-
-    @abstractmethod
-    def slope(self, handle: Any) -> Array:
-        """Return the Jacobian of a frame's point over that of its rotation, global axes, shape
-        (6, unknowns).
-        """
-
-    @abstractmethod
-    def motion(self, handle: Any) -> tuple[Array, Array]:
-        """Return velocity and acceleration of a frame's point, over the angular velocity and
-        acceleration, global axes, each of shape (6,).
-
-        Without accelerations of the coordinates, the acceleration is Jdot v.
-        """
-
-    @abstractmethod
-    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
-        """Set the masses of these bodies, zero mass for others, and the gravity of the model."""
-
-    @abstractmethod
-    def inverse_dynamics(self, v: Array, a: Array) -> Array:
-        """Return M a + h at v and a, at the q last placed, shape (unknowns,).
-
-        It also updates velocities and accelerations, as `rate` does.
-        """
-
-    def passed_on(self, body: int, point: Array) -> Array:
-        """Return the wrench that a body's joint transmits to it and all carried bodies, after
-        `inverse_dynamics`: force over moment about a global point, shape (6,).
-
-        Only simulators with a recursion implement it.
-        """
-        raise NotImplementedError
-
-    def look(self, frame: BodyFrame) -> None:
-        """Read pose, Jacobian and motion of a frame."""
-        if frame.handle is not None:
-            frame.position, frame.rotation = self.placement(frame.handle)
-            frame.jacobian = self.slope(frame.handle)
-            frame.velocity, frame.acceleration = self.motion(frame.handle)
+from .projection_model import Dynamics
+from .tree_forces import TreeForces
+from .tree_plan import Chain, Closure, Relation, plan_tree
+from .tree_simulator import TreeSimulator
 
 
 class TreeModel(TreeSimulator):
     """The mechanism in a simulator; a `ProjectionModel`. Order of rows: joints, couplers, drivers.
 
     Attributes:
-        origin: origin of each body, global at design [m].
-        carrier: name of a body of the mechanism -> number of its body here.
-        coordinates: joint and freedom -> the simulator's coordinate, by default the number of the
-            body that it moves, and its sign.
-        conditions: all rows, the rows of drivers last.
-        closures: name of a cut joint -> description of its rows.
         whole: types of joints that close a loop by all their conditions; see `plan_tree`.
-        parents: number of the carrier of each body; the ground carries itself.
-        branch_of: joint of the tree -> carried body, and its sign: -1 if it is the joint's first.
-        tied: conditions between frames, with their joint and frames.
-        related: rows of coordinates, with their relation.
-        own: the simulator's own constraints, whose rows come first: their number, and what they
-            keep, the name of a cut joint or a relation.
         merges: whether bodies that a fixed joint connects are one body of the simulator.
         forces: None unless outputs of the case use forces.
     """
@@ -166,16 +47,10 @@ class TreeModel(TreeSimulator):
     def __init__(self, case: Case) -> None:
         self.case, mechanism = case, case.mechanism
         self.carrier = {GROUND: 0} | {body.name: 0 for body in mechanism.bodies if body.fixed}
-        self.origin = [np.zeros(3)]
-        self.coordinates: dict[tuple[str, str], tuple[Any, int]] = {}
-        self.conditions: list[Condition] = []
-        self.closures: dict[str, str] = {}
-        self.frames: list[BodyFrame] = []
-        self.parents = [0]
-        self.branch_of: dict[str, tuple[int, int]] = {}
-        self.tied: list[tuple[str, Condition, tuple[BodyFrame, BodyFrame]]] = []
-        self.related: list[tuple[Condition, Relation]] = []
-        self.own: list[tuple[int, str | Relation]] = []
+        self.origin, self.parents = [np.zeros(3)], [0]
+        self.coordinates, self.closures, self.branch_of = {}, {}, {}
+        self.conditions, self.frames = [], []
+        self.tied, self.related, self.own = [], [], []
         self.loaded = self.gives_forces and bool(case.forces)
         for part in self.plan():
             match part:
@@ -235,11 +110,11 @@ class TreeModel(TreeSimulator):
 
     def close(self, closure: Closure) -> None:
         """Add the conditions of a cut joint."""
-        joint, by = closure.joint, CLOSURES[closure.by]
+        joint = closure.joint
         copied = f"on a copy of {joint.j!r}: " if closure.links else ""
-        self.closures[joint.name] = copied + by.text
+        self.closures[joint.name] = copied + closure_text(closure.by)
         i, j = map(self.add_frame, self.bodies_of(closure), closure.points)
-        conditions = by.conditions(joint, i, j)
+        conditions = closing(closure.by, joint, i, j)
         self.conditions += conditions
         self.tied += [(joint.name, each, (i, j)) for each in conditions]
 
@@ -273,12 +148,6 @@ class TreeModel(TreeSimulator):
         self.carrier[chain.child] = at
         if chain.joint and not chain.cut:
             self.branch_of[chain.joint.name] = at, chain.sign
-
-    def add_frame(self, body: int, at: Vector) -> BodyFrame:
-        """Add a frame to a body, at a point, global at design [m]."""
-        handle = self.make_frame(body, np.array(at) - self.origin[body]) if body else None
-        self.frames.append(BodyFrame(body, handle, np.array(at)))
-        return self.frames[-1]
 
     def add_row(self, relation: Relation) -> None:
         """Add the row of a relation or of a driver's coordinate."""
@@ -348,62 +217,9 @@ class TreeModel(TreeSimulator):
                 frame.velocity, frame.acceleration = self.motion(frame.handle)
         return [(each.position, each.velocity[:3], each.acceleration[:3]) for each in self.wanted]
 
-    # forces; see `tree_forces.LoadedTree`
-
     def dynamics(self, v: Array, a: Array) -> Dynamics:
         assert self.forces is not None
         return self.forces.dynamics(v, a)
-
-    def angle(self, joint: str) -> float:
-        """Return a joint's angle [rad], zero at design."""
-        body, sign = self.coordinates[joint, "rotation"]
-        return sign * float(self.q[self.coordinate(body)[0]])
-
-    @property
-    def own_count(self) -> int:
-        """Return the number of rows of the simulator's own constraints."""
-        return sum(n for n, _ in self.own)
-
-    @property
-    def own_rows(self) -> list[tuple[slice, str | Relation]]:
-        """Return the rows of the simulator's own constraints, and what they keep."""
-        ends = accumulate((n for n, _ in self.own), initial=0)
-        kept = (what for _, what in self.own)
-        return [(slice(*pair), what) for pair, what in zip(pairwise(ends), kept, strict=True)]
-
-    def rows_of(self, joint: str) -> list[slice]:
-        """Return the rows of a cut joint."""
-        tied = [self._rows(each) for name, each, _ in self.tied if name == joint]
-        return [rows for rows, what in self.own_rows if what == joint] + tied
-
-    def _rows(self, condition: Condition) -> slice:
-        return self.slices[self.conditions.index(condition)]
-
-    def exerted(self) -> list[RowWrench]:
-        """Return the wrenches of unit multipliers of conditions between frames."""
-        found = [
-            RowWrench(self._rows(condition), frame.body, frame.position, wrenches)
-            for _, condition, frames in self.tied
-            for frame, wrenches in zip(frames, by_frame(condition, frames), strict=True)
-        ]
-        return found + [
-            RowWrench(self._rows(each), each.frame.body, each.frame.position, each.pull)
-            for each in self.conditions
-            if isinstance(each, DrivenPoint)
-        ]
-
-    def coordinate_rows(self) -> dict[int, list[tuple[str, str]]]:
-        """Return the rows of coordinates, and joint and freedom of each."""
-        rows = [(self._rows(row), relation) for row, relation in self.related]
-        rows += [(at, what) for at, what in self.own_rows if isinstance(what, Relation)]
-        return {
-            at.start: [(joint, freedom) for joint, freedom, _ in relation.terms]
-            for at, relation in rows
-        }
-
-    def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
-        body, sign = self.coordinates[joint, freedom]
-        return sign * float(self.J[row, self.coordinate(body)[1]])
 
 
 # The smallest model: one slide with a driven point, so one frame in a condition.
@@ -434,13 +250,12 @@ class TreeEngine(ProjectionEngine):
     def model_of(self, case: Case) -> TreeModel:
         """Return the simulator's model of the unscaled case, at the design position."""
 
-    def build(self, case: Case) -> TreeModel:
-        """Return the simulator's model of the case in the scaled frame, at the design position."""
-        return self.model_of(self.own(case))
-
     def floor(self, case: Case) -> Floor:
         """Return the floor from all simulator calls for a pose and its rates."""
-        model, least = self.build(case), self.model_of(replace(case, mechanism=LEAST, outputs=()))
+        model, least = (
+            self.model_of(self.own(case)),
+            self.model_of(replace(case, mechanism=LEAST, outputs=())),
+        )
         solved = self.solve(model, case, 1e-12)
         n, wanted = len(model.moving), len(model.wanted)
         # the same Python on the smallest model

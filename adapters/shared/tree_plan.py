@@ -289,7 +289,11 @@ def plan_tree(
         if type(joint) in whole and joint.name not in counted:
             yield Closure(joint, joint.bodies, ends, type(joint))
             continue
-        links, point, turns = end_of_loop(CHAINS[type(joint)](joint, ends[0]), ends[0])
+        links, point, tied = CHAINS[type(joint)](joint, ends[0]), ends[0], Fixed
+        if links and links[-1].move == "ball":
+            # no link: a tie of points allows the same rotation
+            *links, ball = links
+            point, tied = ball.point, Spherical
         first, signs[joint.name] = joint.i, 1
         if links:
             last = link_names(joint.name, links)[-1]
@@ -298,7 +302,6 @@ def plan_tree(
                 first += "'"
             yield Chain(joint, joint.i, first, links, 1, point, cut=True)
         yield from related(joint)
-        tied = Spherical if turns else Fixed
         yield Closure(joint, (first, joint.j), (point, point), tied, [each.move for each in links])
     for coupler in mechanism.couplers:
         named = tuple(signs[name] for name in coupler.joints)
@@ -319,19 +322,6 @@ def relations(joint: Joint) -> list[list[tuple[str, str, float]]]:
         [(joint.name, freedom, weight) for freedom, weight in relation.items()]
         for relation in found
     ]
-
-
-def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vector, bool]:
-    """Return the links of a chain for a loop, and the point of the tie to its last body.
-
-    Returns:
-        The links, the point (P, or the centre of a ball), and whether the bodies may rotate about
-        it: a ball at the end of a chain is not a link, because a tie of points allows the same
-        rotation.
-    """
-    if links and links[-1].move == "ball":
-        return links[:-1], links[-1].point, True
-    return links, P, False
 
 
 def middle(mechanism: Mechanism, body: Body) -> Array:

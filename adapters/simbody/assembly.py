@@ -110,8 +110,8 @@ class _Assembled(SimbodyModel):
             coordinate.getValue(state) - sign * value
             for (coordinate, sign), value in zip(self.held, values.tolist(), strict=True)
         ]
-        stations: list[Any] = self.wanted
-        points = np.full((3, len(stations), 3), np.nan)
-        points[0] = [station.position for station in stations]
+        points = np.full((3, len(self.wanted), 3), np.nan)
+        for k, frame in enumerate(self.wanted):
+            points[0, k] = frame.position if frame.handle is None else self.position(frame.handle)
         violated = np.abs([*state.getQErr().to_numpy(), *gaps]).max(initial=0.0)
         return SimulatedPose(points, float(violated), 1)

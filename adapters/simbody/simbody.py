@@ -20,9 +20,9 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from math import cos, hypot, sin
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,9 +36,10 @@ from ...core.trajectory import Array
 from ..shared.force_solution import RowWrench
 from ..shared.poses import Parameters, euler_angles, orientation
 from ..shared.projection_engine import Call, floor_of
-from ..shared.tree_forces import NO_MASS, Mass, mass_properties
+from ..shared.tree_forces import NO_MASS, mass_properties
 from ..shared.tree_model import LEAST, TreeEngine, TreeModel
 from ..shared.tree_plan import Closure, Link, Relation
+from ..shared.tree_simulator import Mass
 
 UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
 
@@ -64,89 +65,138 @@ def turned(p: Sequence[float], turn: Sequence[float]) -> Parameters:
     return e0 / size, e1 / size, e2 / size, e3 / size
 
 
-class Solved(Protocol):
-    """A model in Simbody's state; u, a: velocities and accelerations of the coordinates; matrix:
-    for results.
-    """
-
-    state: Any
-    matter: Any
-    matrix: Any
-    u: Array
-    a: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Station:
-    """A point of a body and the body's axes; see `constraints.Frame`.
-
-    Attributes:
-        body: number of the body.
-        carrier: OpenSim's body.
-        point: position of the point in the axes of the body [m].
-    """
-
-    of: Solved
-    body: int
-    carrier: Any
-    point: Any
-
-    @cached_property
-    def _place(self) -> tuple[Any, Any, Any]:
-        return self.of.state, self.carrier.getMobilizedBodyIndex(), self.point
-
-    @property
-    def position(self) -> Array:
-        return self.carrier.findStationLocationInGround(self.of.state, self.point).to_numpy()
-
-    @property
-    def rotation(self) -> Array:
-        R = self.carrier.getTransformInGround(self.of.state).R()
-        return np.array([[R.get(i, j) for j in range(3)] for i in range(3)])
-
-    @property
-    def jacobian(self) -> Array:
-        self.of.matter.calcFrameJacobian(*self._place, self.of.matrix)
-        J = self.of.matrix.to_numpy()
-        return np.concatenate((J[3:], J[:3]))  # Simbody has the rotation first
-
-    @property
-    def velocity(self) -> Array:
-        turn = self.carrier.getAngularVelocityInGround(self.of.state)
-        return np.concatenate((self._speed(), turn.to_numpy()))
-
-    @property
-    def acceleration(self) -> Array:
-        bias = self.of.matter.calcBiasForFrameJacobian(*self._place)
-        bias = np.concatenate((bias.get(1).to_numpy(), bias.get(0).to_numpy()))
-        return bias + self.jacobian @ self.of.a if self.of.a.any() else bias
-
-    def motion(self) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration of the point."""
-        matter, matrix = self.of.matter, self.of.matrix
-        matter.calcStationJacobian(*self._place, matrix)
-        J, bias = matrix.to_numpy(), matter.calcBiasForStationJacobian(*self._place)
-        return self.position, J @ self.of.u, bias.to_numpy() + J @ self.of.a
-
-    def _speed(self) -> Array:
-        return self.carrier.findStationVelocityInGround(self.of.state, self.point).to_numpy()
-
-
 NO_TURN = (0.0, 0.0, 0.0)
 
 
-class ConstrainedTree(TreeModel):
+def coordinate_name(body: int) -> str:
+    """Return the name in OpenSim of the coordinate of a body's slide or hinge."""
+    return f"coordinate_{body}"
+
+
+class Simbody(TreeEngine):
+    """The engine `simbody`."""
+
+    name, title, package = "simbody", "Simbody", "opensim"
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Return the coordinates of Simbody's tree and the calls that give the rows of its
+        constraints.
+        """
+        return {
+            "coordinates": (
+                "spanning tree of OpenSim's slider, pin and ball joints; balls keep Euler"
+                " parameters here, and Simbody gets their Euler angles"
+            ),
+            "residual": "getQErr; drivers: coordinates, or points of bodies",
+            "jacobian": "calcG; driven points: calcFrameJacobian",
+            "acceleration": (
+                "calcBiasForAccelerationConstraints; points: calcBiasForFrameJacobian"
+            ),
+            "cut_joints": (
+                "ConstantDistanceConstraint or PointOnLineConstraint; or PointConstraint or"
+                " WeldConstraint, to an auxiliary body where the joint has slides or hinges"
+            ),
+            "relations": "CoordinateCouplerConstraint",
+        }
+
+    def model_of(self, case: Case) -> SimbodyModel:
+        """Return OpenSim's model of the case."""
+        return SimbodyModel(opensim(), case)
+
+    def floor(self, case: Case) -> Floor:
+        """Return the floor from Simbody's stages and its calls for constraints and points."""
+        model = self.model_of(self.own(case))
+        solved = self.solve(model, case, 1e-12)
+        own = _calls(model)
+        least = _calls(self.model_of(replace(case, mechanism=LEAST, outputs=())))
+        driven = sum(isinstance(each, PointCoordinate) for each in case.mechanism.drivers)
+        points = len(model.wanted)
+
+        def timed(**times: int) -> Mapping[str, tuple[Call, Call, int]]:
+            return {name: (own[name], least[name], n) for name, n in times.items()}
+
+        pose = timed(realizePosition=1, calcG=1, calcFrameJacobian=driven)
+        rates = timed(
+            realizeVelocity=2,
+            calcBiasForAccelerationConstraints=1,
+            calcBiasForFrameJacobian=driven,
+            calcStationJacobian=points,
+            calcBiasForStationJacobian=points,
+        )
+        return floor_of(self.name, solved, model.unknowns, pose, rates)
+
+
+def _calls(of: SimbodyModel) -> Mapping[str, Call]:
+    """Return the calls of the projection mode into Simbody, by name."""
+    whole, matter, state, J, b = of.model, of.matter, of.state, of.matrix, of.column
+    q, u = (of.o.Vector.createFromMat(np.zeros(n)) for n in (of.slots, of.unknowns))
+    body, point = of.make_frame(1, np.zeros(3))
+    at = body.getMobilizedBodyIndex(), point
+    return {
+        "realizePosition": lambda: (state.setQ(q), whole.realizePosition(state)),
+        "realizeVelocity": lambda: (state.setU(u), whole.realizeVelocity(state)),
+        "calcG": partial(matter.calcG, state, J),
+        "calcBiasForAccelerationConstraints": partial(
+            matter.calcBiasForAccelerationConstraints, state, b
+        ),
+        "calcFrameJacobian": partial(matter.calcFrameJacobian, state, *at, J),
+        "calcBiasForFrameJacobian": partial(matter.calcBiasForFrameJacobian, state, *at),
+        "calcStationJacobian": partial(matter.calcStationJacobian, state, *at, J),
+        "calcBiasForStationJacobian": partial(matter.calcBiasForStationJacobian, state, *at),
+    }
+
+
+def opensim() -> Any:
+    """Return OpenSim's package without its messages, imported at the first call."""
+    package: Any = importlib.import_module("opensim")
+    package.Logger.setLevelString("Off")
+    return package
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """All rows of Simbody's constraints; see `constraints.Condition`."""
+
+    of: SimbodyModel
+    n: int
+
+    def rows(self) -> tuple[Any, Array]:
+        state, G = self.of.state, self.of.matrix
+        self.of.matter.calcG(state, G)
+        return state.getQErr().to_numpy(), G.to_numpy()
+
+    def bias(self) -> Any:
+        self.of.matter.calcBiasForAccelerationConstraints(self.of.state, self.of.column)
+        return self.of.column.to_numpy()
+
+
+class SimbodyModel(TreeModel):
     """The OpenSim model of a case: a body with its joint for each link, a constraint for each cut
     joint and each relation.
+
+    The configuration q has the coordinates of slides and hinges at Simbody's indices, and Euler
+    parameters at the four indices of a ball.
 
     Attributes:
         o: OpenSim's package.
         model: OpenSim's model, which owns all other objects.
         bodies: OpenSim's bodies by their numbers; the first is the ground.
         moves: OpenSim's joint of each body after the ground.
+        slots: number of Simbody's coordinates.
+        balls: indices of each ball's coordinates in q and v.
     """
 
     whole = (Distance, Inline)
+    recursion = False
+    computed_by: ClassVar[Mapping[str, str]] = {
+        "inverse dynamics": "calcResidualForceIgnoringConstraints, getGravityBodyForces",
+        "reactions of tree joints": (
+            "Newton and Euler, of the adapter, by velocities and accelerations of Simbody's bodies"
+        ),
+        "reactions of cut joints": "calcConstraintForcesFromMultipliers",
+        "force elements": "of the adapter, by stations of Simbody",
+    }
 
     def __init__(self, o: Any, case: Case) -> None:
         self.o, self.model = o, o.Model()
@@ -227,197 +277,6 @@ class ConstrainedTree(TreeModel):
         """Return a vector as OpenSim's type."""
         return self.o.Vec3(*map(float, a))
 
-
-def coordinate_name(body: int) -> str:
-    """Return the name in OpenSim of the coordinate of a body's slide or hinge."""
-    return f"coordinate_{body}"
-
-
-COMPUTED_BY: Mapping[str, str] = {
-    "inverse dynamics": "calcResidualForceIgnoringConstraints, getGravityBodyForces",
-    "reactions of tree joints": (
-        "Newton and Euler, of the adapter, by velocities and accelerations of Simbody's bodies"
-    ),
-    "reactions of cut joints": "calcConstraintForcesFromMultipliers",
-    "force elements": "of the adapter, by stations of Simbody",
-}
-
-
-class LoadedSimbody(ConstrainedTree):
-    """The tree with masses; see `tree_forces.LoadedTree`."""
-
-    recursion: ClassVar[bool] = False
-    computed_by: ClassVar[Mapping[str, str]] = COMPUTED_BY
-    state: Any
-    matter: Any
-
-    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
-        self.model.setGravity(self.vector(gravity))
-        for each in masses:
-            link: int = each.frame.body
-            mass, center, I = mass_properties(each.body, self.origin[link])  # noqa: E741
-            entries = I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
-            body = self.bodies[link]
-            body.setMass(mass)
-            body.setMassCenter(self.vector(center))
-            body.setInertia(self.o.Inertia(*entries))
-
-    def inverse_dynamics(self, v: Array, a: Array) -> Array:
-        o, state, n = self.o, self.state, self.unknowns
-        self.rate(v, a)
-        self.model.realizeDynamics(state)
-        none, found = o.Vector(n, 0.0), o.Vector(n, 0.0)
-        gravity = self.model.getGravityBodyForces(state)
-        self.matter.calcResidualForceIgnoringConstraints(
-            state, none, gravity, o.Vector.createFromMat(np.ascontiguousarray(a)), found
-        )
-        return np.array(found.to_numpy())
-
-    def look(self, frame: Any) -> None:
-        pass  # stations are read on demand
-
-    def exerted(self) -> list[RowWrench]:
-        found = super().exerted()
-        origins = [self.position_of(number) for number in range(len(self.bodies))]
-        for rows, keeps in self.own_rows:
-            if not isinstance(keeps, str):
-                continue
-            wrenches = np.array([self._on_bodies(row) for row in range(rows.start, rows.stop)])
-            found += [
-                RowWrench(rows, number, origins[number], wrenches[:, number])
-                for number in range(len(self.bodies))
-                if wrenches[:, number].any()
-            ]
-        return found
-
-    def position_of(self, number: int) -> Array:
-        """Return the position of a body's origin."""
-        body = self.bodies[number]
-        return body.findStationLocationInGround(self.state, self.o.Vec3(0.0)).to_numpy()
-
-    def _on_bodies(self, row: int) -> Array:
-        """Return the wrench of a unit multiplier on each body, shape (bodies, 6): force over moment
-        about its origin.
-        """
-        o, unit = self.o, np.zeros(self.own_count)
-        unit[row] = 1.0
-        on_bodies, on_coordinates = o.VectorOfSpatialVec(), o.Vector()
-        self.matter.calcConstraintForcesFromMultipliers(
-            self.state, o.Vector.createFromMat(unit), on_bodies, on_coordinates
-        )
-        each = [on_bodies.get(int(body.getMobilizedBodyIndex())) for body in self.bodies]
-        return np.array([[*w.get(1).to_numpy(), *w.get(0).to_numpy()] for w in each])
-
-
-class Simbody(TreeEngine):
-    """The engine `simbody`."""
-
-    name, title, package = "simbody", "Simbody", "opensim"
-
-    @property
-    def described(self) -> Mapping[str, Any]:
-        """Return the coordinates of Simbody's tree and the calls that give the rows of its
-        constraints.
-        """
-        return {
-            "coordinates": (
-                "spanning tree of OpenSim's slider, pin and ball joints; balls keep Euler"
-                " parameters here, and Simbody gets their Euler angles"
-            ),
-            "residual": "getQErr; drivers: coordinates, or points of bodies",
-            "jacobian": "calcG; driven points: calcFrameJacobian",
-            "acceleration": (
-                "calcBiasForAccelerationConstraints; points: calcBiasForFrameJacobian"
-            ),
-            "cut_joints": (
-                "ConstantDistanceConstraint or PointOnLineConstraint; or PointConstraint or"
-                " WeldConstraint, to an auxiliary body where the joint has slides or hinges"
-            ),
-            "relations": "CoordinateCouplerConstraint",
-        }
-
-    def model_of(self, case: Case) -> SimbodyModel:
-        """Return OpenSim's model of the case."""
-        return SimbodyModel(opensim(), case)
-
-    def floor(self, case: Case) -> Floor:
-        """Return the floor from Simbody's stages and its calls for constraints and points."""
-        model = self.model_of(self.own(case))
-        solved = self.solve(model, case, 1e-12)
-        own = _calls(model)
-        least = _calls(self.model_of(replace(case, mechanism=LEAST, outputs=())))
-        driven = sum(isinstance(each, PointCoordinate) for each in case.mechanism.drivers)
-        points = len(model.wanted)
-
-        def timed(**times: int) -> Mapping[str, tuple[Call, Call, int]]:
-            return {name: (own[name], least[name], n) for name, n in times.items()}
-
-        pose = timed(realizePosition=1, calcG=1, calcFrameJacobian=driven)
-        rates = timed(
-            realizeVelocity=2,
-            calcBiasForAccelerationConstraints=1,
-            calcBiasForFrameJacobian=driven,
-            calcStationJacobian=points,
-            calcBiasForStationJacobian=points,
-        )
-        return floor_of(self.name, solved, model.unknowns, pose, rates)
-
-
-def _calls(of: SimbodyModel) -> Mapping[str, Call]:
-    """Return the calls of the projection mode into Simbody, by name."""
-    whole, matter, state, J, b = of.model, of.matter, of.state, of.matrix, of.column
-    q, u = (of.o.Vector.createFromMat(np.zeros(n)) for n in (of.slots, of.unknowns))
-    station = of.make_frame(1, np.zeros(3))
-    at = station.carrier.getMobilizedBodyIndex(), station.point
-    return {
-        "realizePosition": lambda: (state.setQ(q), whole.realizePosition(state)),
-        "realizeVelocity": lambda: (state.setU(u), whole.realizeVelocity(state)),
-        "calcG": partial(matter.calcG, state, J),
-        "calcBiasForAccelerationConstraints": partial(
-            matter.calcBiasForAccelerationConstraints, state, b
-        ),
-        "calcFrameJacobian": partial(matter.calcFrameJacobian, state, *at, J),
-        "calcBiasForFrameJacobian": partial(matter.calcBiasForFrameJacobian, state, *at),
-        "calcStationJacobian": partial(matter.calcStationJacobian, state, *at, J),
-        "calcBiasForStationJacobian": partial(matter.calcBiasForStationJacobian, state, *at),
-    }
-
-
-def opensim() -> Any:
-    """Return OpenSim's package without its messages, imported at the first call."""
-    package: Any = importlib.import_module("opensim")
-    package.Logger.setLevelString("Off")
-    return package
-
-
-@dataclass(frozen=True, eq=False)
-class Constraints:
-    """All rows of Simbody's constraints; see `constraints.Condition`."""
-
-    of: SimbodyModel
-    n: int
-
-    def rows(self) -> tuple[Any, Array]:
-        state, G = self.of.state, self.of.matrix
-        self.of.matter.calcG(state, G)
-        return state.getQErr().to_numpy(), G.to_numpy()
-
-    def bias(self) -> Any:
-        self.of.matter.calcBiasForAccelerationConstraints(self.of.state, self.of.column)
-        return self.of.column.to_numpy()
-
-
-class SimbodyModel(LoadedSimbody):
-    """The constrained tree in Simbody's state.
-
-    The configuration q has the coordinates of slides and hinges at Simbody's indices, and Euler
-    parameters at the four indices of a ball.
-
-    Attributes:
-        slots: number of Simbody's coordinates.
-        balls: indices of each ball's coordinates in q and v.
-    """
-
     def finish(self) -> None:
         o = self.o
         self.model.finalizeConnections()
@@ -469,27 +328,125 @@ class SimbodyModel(LoadedSimbody):
         self.model.realizePosition(self.state)
 
     def rate(self, v: Array, a: Array) -> None:
-        self.u, self.a = v, a
+        self.a = a
         self.state.setU(self.o.Vector.createFromMat(v))
         self.model.realizeVelocity(self.state)
 
-    def add_frame(self, body: int, at: Vector) -> Any:
-        # separate from the frames of the base, which reads all their data at every pose
-        return self.make_frame(body, np.array(at) - self.origin[body])
+    def make_frame(self, body: int, offset: Array) -> tuple[Any, Any]:
+        return self.bodies[body], self.vector(offset)
 
-    def make_frame(self, body: int, offset: Array) -> Station:
-        return Station(self, body, self.bodies[body], self.vector(offset))
+    def _place(self, handle: tuple[Any, Any]) -> tuple[Any, Any, Any]:
+        body, point = handle
+        return self.state, body.getMobilizedBodyIndex(), point
 
-    def placement(self, handle: Station) -> tuple[Array, Array]:
-        return handle.position, handle.rotation
+    def position(self, handle: tuple[Any, Any]) -> Array:
+        """Return the position of a frame's point."""
+        body, point = handle
+        return body.findStationLocationInGround(self.state, point).to_numpy()
 
-    def slope(self, handle: Station) -> Array:
-        return handle.jacobian
+    def placement(self, handle: tuple[Any, Any]) -> tuple[Array, Array]:
+        R = handle[0].getTransformInGround(self.state).R()
+        return self.position(handle), np.array([[R.get(i, j) for j in range(3)] for i in range(3)])
 
-    def motion(self, handle: Station) -> tuple[Array, Array]:
-        return handle.velocity, handle.acceleration
+    def slope(self, handle: tuple[Any, Any]) -> Array:
+        self.matter.calcFrameJacobian(*self._place(handle), self.matrix)
+        J = self.matrix.to_numpy()
+        return np.concatenate((J[3:], J[:3]))  # Simbody has the rotation first
+
+    def motion(self, handle: tuple[Any, Any]) -> tuple[Array, Array]:
+        body, point = handle
+        speed = body.findStationVelocityInGround(self.state, point).to_numpy()
+        turn = body.getAngularVelocityInGround(self.state).to_numpy()
+        bias = self._bias(handle)
+        acceleration = bias + self.slope(handle) @ self.a if self.a.any() else bias
+        return np.concatenate((speed, turn)), acceleration
+
+    def _bias(self, handle: tuple[Any, Any]) -> Array:
+        bias = self.matter.calcBiasForFrameJacobian(*self._place(handle))
+        return np.concatenate((bias.get(1).to_numpy(), bias.get(0).to_numpy()))
+
+    # driven points need no rotation, which takes much of the time of a pose
+
+    def observe(self) -> None:
+        if self.tied:
+            super().observe()
+            return
+        self.place()
+        for frame in self.moving:
+            frame.position, frame.jacobian = self.position(frame.handle), self.slope(frame.handle)
+
+    def observe_rates(self, v: Array) -> None:
+        if self.tied:
+            super().observe_rates(v)
+            return
+        self.v = v
+        self.rate(v, np.zeros_like(v))
+        for frame in self.moving:
+            frame.acceleration = self._bias(frame.handle)
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.rate(v, a)
-        stations: list[Any] = self.wanted
-        return [station.motion() for station in stations]
+        found: list[tuple[Array, Array, Array]] = []
+        for frame in self.wanted:
+            if frame.handle is None:
+                found.append((frame.position, np.zeros(3), np.zeros(3)))
+                continue
+            self.matter.calcStationJacobian(*self._place(frame.handle), self.matrix)
+            J = self.matrix.to_numpy()
+            bias = self.matter.calcBiasForStationJacobian(*self._place(frame.handle)).to_numpy()
+            found.append((self.position(frame.handle), J @ v, bias + J @ a))
+        return found
+
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        self.model.setGravity(self.vector(gravity))
+        for each in masses:
+            link: int = each.frame.body
+            mass, center, I = mass_properties(each.body, self.origin[link])  # noqa: E741
+            entries = I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
+            body = self.bodies[link]
+            body.setMass(mass)
+            body.setMassCenter(self.vector(center))
+            body.setInertia(self.o.Inertia(*entries))
+
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        o, state, n = self.o, self.state, self.unknowns
+        self.rate(v, a)
+        self.model.realizeDynamics(state)
+        none, found = o.Vector(n, 0.0), o.Vector(n, 0.0)
+        gravity = self.model.getGravityBodyForces(state)
+        self.matter.calcResidualForceIgnoringConstraints(
+            state, none, gravity, o.Vector.createFromMat(np.ascontiguousarray(a)), found
+        )
+        return np.array(found.to_numpy())
+
+    def exerted(self) -> list[RowWrench]:
+        found = super().exerted()
+        origins = [self.position_of(number) for number in range(len(self.bodies))]
+        for rows, keeps in self.own_rows:
+            if not isinstance(keeps, str):
+                continue
+            wrenches = np.array([self._on_bodies(row) for row in range(rows.start, rows.stop)])
+            found += [
+                RowWrench(rows, number, origins[number], wrenches[:, number])
+                for number in range(len(self.bodies))
+                if wrenches[:, number].any()
+            ]
+        return found
+
+    def position_of(self, number: int) -> Array:
+        """Return the position of a body's origin."""
+        body = self.bodies[number]
+        return body.findStationLocationInGround(self.state, self.o.Vec3(0.0)).to_numpy()
+
+    def _on_bodies(self, row: int) -> Array:
+        """Return the wrench of a unit multiplier on each body, shape (bodies, 6): force over moment
+        about its origin.
+        """
+        o, unit = self.o, np.zeros(self.own_count)
+        unit[row] = 1.0
+        on_bodies, on_coordinates = o.VectorOfSpatialVec(), o.Vector()
+        self.matter.calcConstraintForcesFromMultipliers(
+            self.state, o.Vector.createFromMat(unit), on_bodies, on_coordinates
+        )
+        each = [on_bodies.get(int(body.getMobilizedBodyIndex())) for body in self.bodies]
+        return np.array([[*w.get(1).to_numpy(), *w.get(0).to_numpy()] for w in each])

@@ -100,7 +100,7 @@ class _Model:
             self.add_site(point.name, point.body, point.position)
         for tie in self.ties:
             self.close(tie)
-        sprung = {force.name for force in mechanism.forces if self.add_spring(force)}
+        sprung = {force.name for force in text.without_curves(mechanism) if self.add_spring(force)}
         share_masses(self.frames, self.ties, mechanism)
         for frame in self.frames.values():
             self.weigh(frame)
@@ -109,10 +109,10 @@ class _Model:
             # an inertia of each coordinate alone: otherwise hinges in line make the mass matrix
             # nearly singular
             default = ET.Element("default")
-            armature = numbers([text.STAND_IN[1]]) if self.loaded else "1"
+            armature = numbers(text.STAND_IN[1]) if self.loaded else "1"
             ET.SubElement(default, "joint", armature=armature)
             self.root.insert(2, default)
-        masses, left_out = text.facts(mechanism, sprung, True, self.frames.values())
+        masses, left_out = text.facts(mechanism, sprung, self.frames.values(), "MuJoCo")
         masses = f"{masses}{'' if whole else ARMATURE}" if self.loaded else PLAIN
         left_out += text.lost_limits(ranges, self.coordinates)
         add_note(self.root, NOTE.format(masses, loops(self.ties, KINDS), left_out))
@@ -120,7 +120,7 @@ class _Model:
     def text(self, start: Mapping[str, float]) -> str:
         """Return the document, with a consistent start."""
         for driver, value in start.items():
-            ET.SubElement(self.custom, "numeric", name=driver, data=numbers([value]))
+            ET.SubElement(self.custom, "numeric", name=driver, data=numbers(value))
         # MuJoCo numbers coordinates in document order; the joint among the defaults has no name
         names = [
             each.get("name", "") for each in self.root.iter() if each.tag in ("joint", "freejoint")
@@ -158,7 +158,7 @@ class _Model:
         if self.loaded:
             at = {
                 "pos": numbers(local(frame, text.center_of(frame))),
-                "mass": numbers([text.mass_of(frame)]),
+                "mass": numbers(text.mass_of(frame)),
                 "fullinertia": numbers(text.six(text.own_inertia(frame))),
             }
         self.elements[frame.name].insert(0, ET.Element("inertial", at))
@@ -198,7 +198,7 @@ class _Model:
             along = {} if link.move == "ball" else {"axis": numbers(direction(frame, link.axis))}
             at = {"pos": numbers(local(frame, link.point)), **along}
             if zero := self.zeros.get((joint.name, link.name), 0.0):
-                at["ref"] = numbers([zero])
+                at["ref"] = numbers(zero)
             if limits := self.ranges.get((joint.name, link.name)):
                 at["range"] = numbers(limits)
             ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
@@ -222,8 +222,6 @@ class _Model:
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether MJCF has the force element."""
-        if getattr(force, "curve", None):
-            return False
         if isinstance(force, SpringDamper):
             tendon = self.add_tendon(force.name, force.bodies, force.points)
             tendon.set("springlength", numbers([force.free_length]))
@@ -236,11 +234,11 @@ class _Model:
             if tendon is None or "stiffness" in tendon.attrib:  # between fixed bodies, or a second
                 return False
             zero = self.zeros.get((force.joint, "rotation"), 0.0)
-            tendon.set("springref", numbers([force.free_angle + zero]))
+            tendon.set("springref", numbers(force.free_angle + zero))
         else:
             return False
-        tendon.set("stiffness", numbers([force.stiffness]))
-        tendon.set("damping", numbers([force.damping]))
+        tendon.set("stiffness", numbers(force.stiffness))
+        tendon.set("damping", numbers(force.damping))
         return True
 
     def add_tendon(
@@ -269,7 +267,7 @@ class _Model:
             tendon = ET.SubElement(self.tendons, "fixed", name=name)
             for joint, freedom, weight in relation.terms:
                 own = self.coordinates[joint, freedom]
-                ET.SubElement(tendon, "joint", joint=own, coef=numbers([weight]))
+                ET.SubElement(tendon, "joint", joint=own, coef=numbers(weight))
             ET.SubElement(self.equalities, "tendon", tendon1=name)
             return
         one, other, curve = relation.follower(signed=False)

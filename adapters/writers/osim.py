@@ -23,7 +23,7 @@ from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.joints import PiecewisePolynomial
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
-from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper, TorsionSpringDamper
+from ...core.mechanism.loads import ForceElement, Law, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.poses import (
@@ -82,9 +82,8 @@ def write(
     model = _Model(at_start(mechanism, way), gravity, values, ranges)
     model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    masses, left_out = text.facts(mechanism, model.sprung, True, model.tree.frames.values())
-    others = [f.name for f in mechanism.forces if getattr(f, "law", "") != Law.CARDAN]
-    left_out += text.own_law(mechanism, model.sprung.intersection(others), "OpenSim")
+    frames = model.tree.frames.values()
+    masses, left_out = text.facts(mechanism, model.sprung, frames, "OpenSim", law=Law.CARDAN)
     left_out += text.lost_limits(ranges, model.tree.coordinates)
     closed = loops(model.tree.ties, TIES[:3])
     add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, left_out))
@@ -121,7 +120,7 @@ class _Model:
         self.root = ET.Element("OpenSimDocument", Version="40000")
         model = ET.SubElement(self.root, "Model", name=_name(mechanism.name))
         ET.SubElement(model, "Ground", name=GROUND)
-        add_text(model, "gravity", numbers(gravity))
+        add_text(model, "gravity", gravity)
         bodies, joints, constraints, markers = (
             ET.SubElement(ET.SubElement(model, kind, name=kind.lower()), "objects")
             for kind in ("BodySet", "JointSet", "ConstraintSet", "MarkerSet")
@@ -139,12 +138,13 @@ class _Model:
         for point in mechanism.points:
             marker = ET.SubElement(markers, "Marker", name=_name(point.name))
             add_text(marker, "socket_parent_frame", _path(point.body))
-            add_text(marker, "location", numbers(self.local(point.body, point.position)))
+            add_text(marker, "location", self.local(point.body, point.position))
 
         self.model, self.sprung = model, set[str]()
         if mechanism.forces:
             forces = self.forces()
-            self.sprung = {f.name for f in mechanism.forces if self.add_spring(forces, f)}
+            plain = text.without_curves(mechanism)
+            self.sprung = {each.name for each in plain if self.add_spring(forces, each)}
 
     def forces(self) -> ET.Element:
         """Return the place of force elements."""
@@ -156,21 +156,18 @@ class _Model:
     def add_bushings(self, design: Mechanism) -> None:
         """Add the bushings of the mechanism at design; OpenSim's torque is that of `Law.CARDAN`."""
         for each in design.forces:
-            if not (isinstance(each, Bushing) and text.plain_bushing(each)):
+            if not text.plain_bushing(each):
                 continue
             element = ET.SubElement(self.forces(), SPRINGS[2], name=_name(each.name))
             for k in (1, 2):
                 add_text(element, f"socket_frame{k}", f"end{k}")
             frames = ET.SubElement(element, "frames")
             for k, (body, at, turn) in enumerate(bushing_ends(design, each), 1):
-                frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=f"end{k}")
-                add_text(frame, "socket_parent", _path(body))
-                add_text(frame, "translation", numbers(at))
-                add_text(frame, "orientation", numbers(euler_angles([float(x) for x in turn])))
-            add_text(element, "rotational_stiffness", numbers(each.turning_stiffness))
-            add_text(element, "translational_stiffness", numbers(each.stiffness))
-            add_text(element, "rotational_damping", numbers(each.turning_damping))
-            add_text(element, "translational_damping", numbers(each.damping))
+                _add_frame(frames, f"end{k}", body, at, turn)
+            add_text(element, "rotational_stiffness", each.turning_stiffness)
+            add_text(element, "translational_stiffness", each.stiffness)
+            add_text(element, "rotational_damping", each.turning_damping)
+            add_text(element, "translational_damping", each.damping)
             self.sprung.add(each.name)
 
     def frame(self, body: str) -> Body:
@@ -184,9 +181,9 @@ class _Model:
     def add_body(self, bodies: ET.Element, body: Body) -> None:
         """Add a body with its mass."""
         element = ET.SubElement(bodies, "Body", name=_name(body.name))
-        add_text(element, "mass", numbers([text.mass_of(body)]))
-        add_text(element, "mass_center", numbers(local(body, text.center_of(body))))
-        add_text(element, "inertia", numbers(text.six(text.own_inertia(body))))
+        add_text(element, "mass", text.mass_of(body))
+        add_text(element, "mass_center", local(body, text.center_of(body)))
+        add_text(element, "inertia", text.six(text.own_inertia(body)))
 
     def add_joint(self, joints: ET.Element, joint: Hung) -> None:
         """Add a joint between a frame of the parent and a frame of the child, which coincide at
@@ -199,9 +196,9 @@ class _Model:
         coordinates = ET.SubElement(element, "coordinates") if suffixes else element
         for suffix in suffixes:
             coordinate = ET.SubElement(coordinates, "Coordinate", name=_name(joint.name + suffix))
-            add_text(coordinate, "default_value", numbers([value]))
+            add_text(coordinate, "default_value", value)
             limits = self.ranges.get(joint.name)
-            add_text(coordinate, "range", numbers(limits) if limits else "-1e9 1e9")
+            add_text(coordinate, "range", limits or "-1e9 1e9")
             if limits:
                 add_text(coordinate, "clamped", "true")
         frames = ET.SubElement(element, "frames")
@@ -217,15 +214,11 @@ class _Model:
             back = turn * about(vec((0.0, 0.0, 1.0)), -value)
         ends = (("parent", joint.parent, zero, back), ("child", joint.child, joint.point, turn))
         for end, body, point, axes in ends:
-            frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=end)
-            add_text(frame, "socket_parent", _path(body))
-            add_text(frame, "translation", numbers(self.local(body, point)))
-            add_text(frame, "orientation", numbers(self.angles(body, axes)))
+            _add_frame(frames, end, body, self.local(body, point), self.turned(body, axes))
 
-    def angles(self, body: str, turn: Quat) -> tuple[float, float, float]:
-        """Return the angles of a rotation, global at design, in the axes of a link [rad]."""
-        p = attitude(self.frame(body)).conjugate() * turn
-        return euler_angles([float(each) for each in p])
+    def turned(self, body: str, turn: Quat) -> Quat:
+        """Return a rotation, global at design, in the axes of a link."""
+        return attitude(self.frame(body)).conjugate() * turn
 
     def add_tie(self, constraints: ET.Element, tie: Tie) -> None:
         """Add a constraint between two links."""
@@ -234,31 +227,26 @@ class _Model:
             frames = ET.SubElement(element, "frames")
             for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
                 add_text(element, f"socket_frame{k}", f"end{k}")
-                frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=f"end{k}")
-                add_text(frame, "socket_parent", _path(link))
-                add_text(frame, "translation", numbers(self.local(link, at)))
-                add_text(frame, "orientation", numbers(self.angles(link, IDENTITY)))
+                turn = self.turned(link, IDENTITY)
+                _add_frame(frames, f"end{k}", link, self.local(link, at), turn)
             return
         kind = "PointConstraint" if tie.length is None else "ConstantDistanceConstraint"
         element = ET.SubElement(constraints, kind, name=_name(tie.name))
         for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
             add_text(element, f"socket_body_{k}", _path(link))
-            add_text(element, f"location_body_{k}", numbers(self.local(link, at)))
+            add_text(element, f"location_body_{k}", self.local(link, at))
         if tie.length is not None:
-            add_text(element, "constant_distance", numbers([tie.length]))
+            add_text(element, "constant_distance", tie.length)
 
     def add_spring(self, forces: ET.Element, force: ForceElement) -> bool:
         """Add a spring-damper; return whether OpenSim has it."""
-        if getattr(force, "curve", None):
-            return False
         if isinstance(force, SpringDamper):
             element = ET.SubElement(forces, SPRINGS[0], name=_name(force.name))
             for k, (link, at) in enumerate(zip(force.bodies, force.points, strict=True), 1):
                 add_text(element, f"body{k}", _path(link))
-                add_text(element, f"point{k}", numbers(self.local(link, at)))
-            stiffness, length, damping = (
-                numbers([each]) for each in (force.stiffness, force.free_length, force.damping)
-            )
+                add_text(element, f"point{k}", self.local(link, at))
+            stiffness, damping = numbers(force.stiffness), numbers(force.damping)
+            length = numbers([force.free_length])
             # a force that pulls the points together is positive
             add_text(element, "expression", f"{stiffness}*(d-{length})+{damping}*ddot")
             return True
@@ -268,10 +256,10 @@ class _Model:
                 return False
             element = ET.SubElement(forces, SPRINGS[1], name=_name(force.name))
             add_text(element, "coordinate", _name(coordinate))
-            add_text(element, "stiffness", numbers([force.stiffness]))
+            add_text(element, "stiffness", force.stiffness)
             rest = force.free_angle + self.values[coordinate]
-            add_text(element, "rest_length", numbers([rest]))
-            add_text(element, "viscosity", numbers([force.damping]))
+            add_text(element, "rest_length", rest)
+            add_text(element, "viscosity", force.damping)
             return True
         return False
 
@@ -286,13 +274,21 @@ class _Model:
             spline = ET.SubElement(around, "SimmSpline")
             points = [(at + x, value + y) for at, value in follows.knots]
             for key, values in zip("xy", zip(*points, strict=True), strict=True):
-                add_text(spline, key, numbers(values))
+                add_text(spline, key, values)
         else:
             moved: list[float] = (Powers(follows.powers[0])(Powers((-x, 1.0))) + y).coef.tolist()
             kind = "LinearFunction" if len(moved) == 2 else "PolynomialFunction"
-            add_text(ET.SubElement(around, kind), "coefficients", numbers(moved[::-1]))
+            add_text(ET.SubElement(around, kind), "coefficients", moved[::-1])
         add_text(element, "independent_coordinate_names", _name(other))
         add_text(element, "dependent_coordinate_name", _name(one))
+
+
+def _add_frame(frames: ET.Element, name: str, body: str, at: Vector, turn: Quat) -> None:
+    """Add a frame of a link, by its place and rotation in the link."""
+    frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=name)
+    add_text(frame, "socket_parent", _path(body))
+    add_text(frame, "translation", at)
+    add_text(frame, "orientation", euler_angles([float(x) for x in turn]))
 
 
 def _turns(angles: Vector) -> Quat:

@@ -15,13 +15,13 @@ from math import inf
 
 import numpy as np
 
-from ...core.algebra import triple
+from ...core.algebra import IDENTITY, Quat, triple
 from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
-from ...core.case.models.trees.robot_elements import BUSHING, STRUT, STRUT_LAW
+from ...core.case.models.trees.robot_elements import BUSHING, STRUT
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
-from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
+from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.equivalents import cross_of
@@ -68,8 +68,8 @@ def write(
     model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     zero = text.zeros_of(values) + text.lost_limits(ranges, model.tree.coordinates)
-    masses, left_out = text.facts(mechanism, model.sprung, False, model.tree.frames.values())
-    left_out += text.own_law(mechanism, model.sprung, "Drake")
+    frames = model.tree.frames.values()
+    masses, left_out = text.facts(mechanism, model.sprung, frames, "Drake", gravity=False)
     note = NOTE.format(masses, at and f" ({at})", model.loops, zero + left_out)
     add_note(model.root, note)
     kinds = (["link", "frame", "joint", "drake:ball_constraint"], [STRUT])
@@ -109,7 +109,9 @@ class _Model:
         for tie in self.tree.ties:
             if tie.length is None:
                 self.add_tie(tie, arm)
-        self.sprung = {each.name for each in mechanism.forces if self.add_spring(each)}
+        self.sprung = {
+            each.name for each in text.without_curves(mechanism) if self.add_spring(each)
+        }
 
     def add_rod(self, tie: Tie) -> None:
         """Add a link on a cross at the first point of a rod; tie its end to the second point."""
@@ -128,20 +130,22 @@ class _Model:
     def add_link(self, body: Body) -> None:
         """Add a link with the frame and the mass of a body."""
         link = ET.SubElement(self.model, "link", name=body.name)
-        self.add_pose(link, body.origin, body)
+        self.add_pose(link, body.origin, attitude(body))
         inertial = ET.SubElement(link, "inertial")
         add_text(inertial, "pose", f"{numbers(local(body, text.center_of(body)))} 0 0 0")
-        add_text(inertial, "mass", numbers([text.mass_of(body)]))
+        add_text(inertial, "mass", text.mass_of(body))
         inertia = ET.SubElement(inertial, "inertia")
         entries = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
         for entry, value in zip(entries, text.six(text.own_inertia(body)), strict=True):
-            add_text(inertia, entry, numbers([value]))
+            add_text(inertia, entry, value)
 
-    def add_pose(self, element: ET.Element, at: Vector, frame: Body | None = None) -> None:
-        """Add the pose of an element at a point, in global axes or those of a body."""
-        e0, e1, e2, e3 = attitude(frame or Body(GROUND))
-        options = {"relative_to": "__model__", "rotation_format": "quat_xyzw"}
-        add_text(element, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
+    def add_pose(
+        self, element: ET.Element, at: Vector, turn: Quat = IDENTITY, of: str = "__model__"
+    ) -> None:
+        """Add the pose of an element, in the axes of the model or a link."""
+        e0, e1, e2, e3 = turn
+        options = {"relative_to": of, "rotation_format": "quat_xyzw"}
+        add_text(element, "pose", (*at, e1, e2, e3, e0), options)
 
     def add_joint(self, joint: Hung) -> None:
         """Add a joint at its point, in global axes."""
@@ -154,10 +158,10 @@ class _Model:
         self.add_pose(element, joint.point)
         if joint.move in ("slide", "hinge"):
             axis = ET.SubElement(element, "axis")
-            add_text(axis, "xyz", numbers(joint.axis))
+            add_text(axis, "xyz", joint.axis)
             limit = ET.SubElement(axis, "limit")
             for key, x in zip(("lower", "upper"), self.limits.get(joint.name, FAR), strict=True):
-                add_text(limit, key, numbers([x]))
+                add_text(limit, key, x)
 
     def joint_name(self, name: str) -> str:
         """Return the name of a joint, which in SDF must differ from the names of links."""
@@ -175,41 +179,34 @@ class _Model:
                 end = "P" if side == "A" else "Q"
                 add_text(element, f"drake:ball_constraint_body_{side}", link)
                 name = f"drake:ball_constraint_p_{side}{end}"
-                add_text(element, name, numbers(self.local(link, point)))
+                add_text(element, name, self.local(link, point))
 
     def add_bushings(self, design: Mechanism) -> None:
         """Add the bushings of the mechanism at design. Drake's law has forces along half-way axes,
         at half-way points, and angles of roll, pitch and yaw.
         """
         for each in design.forces:
-            if not (isinstance(each, Bushing) and text.plain_bushing(each)):
+            if not text.plain_bushing(each):
                 continue
             element = ET.Element(BUSHING)
             for side, (body, at, turn) in zip("AC", bushing_ends(design, each), strict=True):
                 name = f"{each.name}.{side}"
                 frame = ET.SubElement(self.model, "frame", name=name, attached_to=body)
-                e0, e1, e2, e3 = turn
-                options = {"relative_to": body, "rotation_format": "quat_xyzw"}
-                add_text(frame, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
+                self.add_pose(frame, at, turn, body)
                 add_text(element, f"drake:bushing_frame{side}", name)
             for what, values in text.bushing_law(each).items():
-                add_text(element, f"drake:bushing_{what}", numbers(values))
+                add_text(element, f"drake:bushing_{what}", values)
             self.model.append(element)
             self.sprung.add(each.name)
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether Drake has it."""
-        if getattr(force, "curve", None):
-            return False
         if isinstance(force, SpringDamper):
             if not force.free_length:  # Drake refuses it
                 return False
             element = ET.SubElement(self.model, STRUT, name=force.name)
-            for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
-                add_text(element, f"{STRUT}_body_{side}", link)
-                add_text(element, f"{STRUT}_p_{side}{end}", numbers(self.local(link, P)))
-            for key in STRUT_LAW:
-                add_text(element, f"{STRUT}_{key}", numbers([getattr(force, key)]))
+            for tag, content in text.strut(force, self.local).items():
+                add_text(element, tag, content)
             return True
         if isinstance(force, TorsionSpringDamper):
             name = self.tree.coordinates.get((force.joint, "rotation"))
@@ -218,9 +215,9 @@ class _Model:
             if axis is None or axis.find("dynamics") is not None:
                 return False
             dynamics = ET.SubElement(axis, "dynamics")
-            add_text(dynamics, "damping", numbers([force.damping]))
-            add_text(dynamics, "spring_reference", numbers([force.free_angle]))
-            add_text(dynamics, "spring_stiffness", numbers([force.stiffness]))
+            add_text(dynamics, "damping", force.damping)
+            add_text(dynamics, "spring_reference", force.free_angle)
+            add_text(dynamics, "spring_stiffness", force.stiffness)
             return True
         return False
 
@@ -242,5 +239,5 @@ class _Model:
             )
         if taken[0]:
             one, other, factor = other, one, 1.0 / factor
-        options = {"joint": self.joint_name(other), "multiplier": numbers([factor]), "offset": "0"}
+        options = {"joint": self.joint_name(other), "multiplier": numbers(factor), "offset": "0"}
         ET.SubElement(self.joints[one], MIMIC, options)

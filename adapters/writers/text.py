@@ -5,18 +5,18 @@ a format cannot hold.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from ...core.case.io.model_writer import Ranges, Zeros
-from ...core.case.models.trees.robot_elements import BUSHING_LAW
+from ...core.case.models.trees.robot_elements import BUSHING_LAW, STRUT, STRUT_LAW
 from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
 from ...core.joints import Distance
 from ...core.mechanism.body import Body, inertia_matrix
-from ...core.mechanism.loads import Bushing
+from ...core.mechanism.loads import Bushing, ForceElement, Law, SpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array
 from ..shared.poses import direction
@@ -59,18 +59,32 @@ def weighs_all(frames: Iterable[Body]) -> bool:
 
 
 def facts(
-    mechanism: Mechanism, sprung: Collection[str], gravity: bool, frames: Iterable[Body]
+    mechanism: Mechanism,
+    sprung: Collection[str],
+    frames: Iterable[Body],
+    title: str,
+    *,
+    gravity: bool = True,
+    law: Law | None = None,
 ) -> tuple[str, str]:
-    """Return sentences on the masses of a file, and on the loads that it cannot hold.
+    """Return sentences on the masses of a file, and on the loads that it cannot hold or holds by
+    another law.
 
     Args:
         sprung: names of the force elements in the file.
-        gravity: whether the file has gravity.
         frames: of the links in the file, with their masses.
+        title: of the simulator whose law of bushings the file has.
+        gravity: whether the file has gravity.
+        law: of bushings that is the simulator's.
     """
     if not mechanism.has_loads:
         return PLAIN, ""
-    return weights(frames), left_out(mechanism, sprung, gravity)
+    lacks = left_out(mechanism, sprung, gravity)
+    bushings = [each for each in mechanism.forces if isinstance(each, Bushing)]
+    if names := [str(f) for f in bushings if f.name in sprung and f.law is not law]:
+        how = f"By {title}'s own law, equal to first order in displacement and angle"
+        lacks += f" {how}: {', '.join(names)}."
+    return weights(frames), lacks
 
 
 def weights(frames: Iterable[Body]) -> str:
@@ -90,18 +104,27 @@ def add_note(root: ET.Element, text: str) -> None:
     root.insert(0, ET.Comment(text.replace("--", "- -")))
 
 
-def own_law(mechanism: Mechanism, sprung: Collection[str], title: str) -> str:
-    """Return a sentence on the bushings in a file whose law is the format's own."""
-    names = [str(f) for f in mechanism.forces if isinstance(f, Bushing) and f.name in sprung]
-    if not names:
-        return ""
-    law = f"By {title}'s own law, equal to first order in displacement and angle"
-    return f" {law}: {', '.join(names)}."
+def plain_bushing(each: ForceElement) -> TypeGuard[Bushing]:
+    """Return whether an element is a bushing without curve and preload, which formats lack."""
+    return isinstance(each, Bushing) and not each.curve and not any(each.preload)
 
 
-def plain_bushing(each: Bushing) -> bool:
-    """Return whether a bushing has neither curve nor preload, which formats lack."""
-    return not each.curve and not any(each.preload)
+def without_curves(mechanism: Mechanism) -> list[ForceElement]:
+    """Return the force elements without curves, which formats lack."""
+    return [each for each in mechanism.forces if not getattr(each, "curve", None)]
+
+
+def strut(force: SpringDamper, local: Callable[[str, Vector], Iterable[float]]) -> dict[str, str]:
+    """Return the texts of Drake's spring between two points, by tag.
+
+    Args:
+        local: returns a point in the axes of a link.
+    """
+    found = dict[str, str]()
+    for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
+        found[f"{STRUT}_body_{side}"] = link
+        found[f"{STRUT}_p_{side}{end}"] = numbers(local(link, P))
+    return found | {f"{STRUT}_{key}": numbers(getattr(force, key)) for key in STRUT_LAW}
 
 
 def bushing_law(each: Bushing) -> dict[str, tuple[float, ...]]:
@@ -113,16 +136,18 @@ def bushing_law(each: Bushing) -> dict[str, tuple[float, ...]]:
 
 
 def add_text(
-    parent: ET.Element, tag: str, text: str, options: Mapping[str, str] | None = None
+    parent: ET.Element, tag: str, content: Any, options: Mapping[str, str] | None = None
 ) -> None:
-    """Add an element that holds a text."""
+    """Add an element that holds a text, or numbers."""
+    text = content if isinstance(content, str) else numbers(content)
     ET.SubElement(parent, tag, dict(options or {})).text = text
 
 
-def numbers(values: Iterable[Any]) -> str:
+def numbers(values: Iterable[Any] | float) -> str:
     """Return the shortest text of the same doubles, with up to 17 digits."""
     # minus zero looks like a mistake
-    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
+    every = values if isinstance(values, Iterable) else [values]
+    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in every)
 
 
 def document(root: ET.Element, kinds: Sequence[Sequence[str]], reserved: Sequence[str] = ()) -> str:

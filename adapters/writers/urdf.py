@@ -23,20 +23,21 @@ import numpy as np
 
 from ...core.algebra import vec
 from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
-from ...core.case.models.trees.robot_elements import BUSHING, STRUT, STRUT_LAW
+from ...core.case.models.trees.robot_elements import BUSHING, STRUT
 from ...core.joints import Joint
-from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper
+from ...core.mechanism.loads import ForceElement, SpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.trajectory import Array, BodyMotion
 from ..shared.constraints import (
     CLOSURES,
+    BodyFrame,
     Coincident,
     Condition,
     Difference,
     Direction,
     Dot,
-    Frame,
     Length,
+    closing,
 )
 from ..shared.poses import displacements, link_coordinates
 from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
@@ -191,7 +192,7 @@ class _Model:
                 case Relation():
                     self.relate(part)
         masses, left_out = "Nothing has a mass.", ""
-        sprung = {each.name for each in mechanism.forces if self.add_spring(each)}
+        sprung = {each.name for each in text.without_curves(mechanism) if self.add_spring(each)}
         if mechanism.has_loads:
             known = {body.name: body for body in mechanism.bodies if body.mass or not body.fixed}
             frames = [
@@ -201,8 +202,7 @@ class _Model:
             ]
             for frame in frames:
                 self.weigh(frame)
-            masses, left_out = text.facts(mechanism, sprung, False, frames)
-            left_out += text.own_law(mechanism, sprung, "Drake")
+            masses, left_out = text.facts(mechanism, sprung, frames, "Drake", gravity=False)
         left_out += text.lost_limits(ranges, self.coordinates)
         closed = dict.fromkeys(each["joint"] for each in self.constraints)
         closed = f": {', '.join(closed)}" if closed else ""
@@ -231,23 +231,19 @@ class _Model:
         link.insert(0, inertial)
         center = numbers(self.arm(body.name, text.center_of(body)))
         ET.SubElement(inertial, "origin", xyz=center, rpy="0 0 0")
-        ET.SubElement(inertial, "mass", value=numbers([text.mass_of(body)]))
-        values = [numbers([x]) for x in text.six(text.inertia_of(body))]
+        ET.SubElement(inertial, "mass", value=numbers(text.mass_of(body)))
+        values = [numbers(x) for x in text.six(text.inertia_of(body))]
         ET.SubElement(inertial, "inertia", dict(zip(ENTRIES, values, strict=True)))
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring between points, or a bushing; return whether Drake has it."""
         if isinstance(force, SpringDamper):
-            if force.curve or not force.free_length:  # Drake refuses springs of no length
+            if not force.free_length:  # Drake refuses springs of no length
                 return False
             element = ET.SubElement(self.root, STRUT, name=force.name)
-            for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
-                ET.SubElement(element, f"{STRUT}_body_{side}", name=link)
-                place = numbers(self.arm(link, P))
-                ET.SubElement(element, f"{STRUT}_p_{side}{end}", value=place)
-            for key in STRUT_LAW:
-                ET.SubElement(element, f"{STRUT}_{key}", value=numbers([getattr(force, key)]))
-        elif isinstance(force, Bushing) and text.plain_bushing(force):
+            for tag, content in text.strut(force, self.arm).items():
+                ET.SubElement(element, tag, {"name" if "_body_" in tag else "value": content})
+        elif text.plain_bushing(force):
             turn = numbers(_roll_pitch_yaw(np.array(force.triad).T))
             element = ET.Element(BUSHING, name=force.name)
             for side, link in zip("AC", force.bodies, strict=True):
@@ -282,7 +278,7 @@ class _Model:
             element = self.attach(following, parent, link.point, name, KINDS[link.move])
             ET.SubElement(element, "axis", xyz=numbers(link.axis))
             key = joint.name, link.name
-            limits = [numbers([x - self.zeros.get(key, 0.0)]) for x in self.ranges.get(key, ())]
+            limits = [numbers(x - self.zeros.get(key, 0.0)) for x in self.ranges.get(key, ())]
             limit = FAR | dict(zip(("lower", "upper"), limits, strict=False))
             ET.SubElement(element, "limit", limit)
             self.q[name] = [*value]
@@ -292,10 +288,10 @@ class _Model:
         """Add the conditions of a cut joint."""
         joint = closure.joint
         frames = [
-            cast(Frame, _End(link, self.arm(link, P)))
+            cast(BodyFrame, _End(link, self.arm(link, P)))
             for link, P in zip(closure.ends, closure.points, strict=True)
         ]
-        for condition in CLOSURES[closure.by].conditions(joint, *frames):
+        for condition in closing(closure.by, joint, *frames):
             self.constraints += (
                 {"joint": joint.name, **written} for written in _as_data(condition)
             )

@@ -17,11 +17,50 @@ from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp, Slowed
 from ..trajectory import Array
-from .compliance import Rig
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
 from .quantity import Quantity
+
+
+class Load(StrEnum):
+    """A load of a wheel; see `studies.compliance.rig`."""
+
+    LONGITUDINAL = "longitudinal"
+    LATERAL = "lateral"
+    BRAKING = "braking"
+    ALIGNING = "aligning"
+
+
+@dataclass(frozen=True)
+class Resting:
+    """The table [equilibrium].
+
+    Attributes:
+        held: drivers with values; all others are free.
+    """
+
+    held: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The table [compliance]; None follows from the other tables.
+
+    Attributes:
+        wheel: the wheel's carrier.
+        contact: point of the wheel's contact with the road.
+        held: drivers with values; all others are free.
+        loads: loads whose slopes are wanted.
+        tire_stiffness: vertical [N/m], for the ride rate.
+    """
+
+    wheel: str | None = None
+    contact: str | None = None
+    held: tuple[str, ...] | None = None
+    loads: tuple[Load, ...] = tuple(Load)
+    tire_stiffness: float | None = None
+
 
 if TYPE_CHECKING:
     from ..kinematics import LoadPoint
@@ -307,7 +346,7 @@ class Case:
             CaseError: there is no such row.
         """
         rows = {each.name: each for each in self.hardpoints}
-        found: dict[str, Array] = {}
+        found = dict[str, Array]()
         values = places(self.mechanism)
         for name, given in offsets.items():
             if name not in rows:

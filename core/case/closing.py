@@ -96,7 +96,7 @@ def held_case(case: Case, drivers: Sequence[str]) -> Case:
     times: Array = np.unique([0.0, *path.times]) if path.covers(0.0) else np.unique(path.times)
     shortest = float(np.diff(times).min(initial=1.0))
     rate = STEP * size(case) / shortest
-    motions: dict[str, Motion] = {}
+    motions = dict[str, Motion]()
     for name in dict.fromkeys((*path.motions, *drivers)):
         values = path.motions[name].at(times)[0] if name in path.motions else np.zeros_like(times)
         motions[name] = Waypoints(

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -18,15 +18,15 @@ from ..algebra import ZERO, Vec3, quat, triple, vec
 from ..errors import MechanismError, SolveError
 from ..forces import Forces
 from ..jet import Jet
-from ..joints.base import triad, unit
+from ..joints.base import triad
 from ..mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from ..mechanism.mechanism import GROUND, Mechanism, Point, Vector
 from ..mechanism.motions import JointDriver, PointCoordinate
 from ..primitives.base import Pose
 from ..trajectory import Array
 from .case import HELD_BUT
-from .pose_measures import JointAngle, JointDisplacement, Measure, place_on
-from .quantity import HIDDEN, MARKER, Output, Quantity
+from .pose_measures import COORDINATES, Measure, coordinate_of, place_on
+from .quantity import AXES, FACT, HIDDEN, MARKER, Axis, Quantity
 
 NEWTON, NEWTON_METRE = "N", "N m"
 
@@ -34,7 +34,6 @@ NEWTON, NEWTON_METRE = "N", "N m"
 # A coordinate that moves by less than this part of the driver's does not determine the motion
 # there [rad or m by rad or m]: the effort at it would have lost all digits.
 DEAD_CENTRE = 1e-9
-_COORDINATES: Mapping[str, Any] = {"rotation": JointAngle, "translation": JointDisplacement}
 
 
 class Frame(StrEnum):
@@ -47,30 +46,25 @@ class Frame(StrEnum):
     JOINT = "joint"
 
 
-class Axis(StrEnum):
-    """A global axis."""
-
-    X = "x"
-    Y = "y"
-    Z = "z"
-
-
 @dataclass(frozen=True)
 class ForceMeasure(Measure):
     """Base of the measures of forces; each reads one joint, driver or force element.
 
     Attributes:
+        of_key: the key that names it.
         turns: whether the value is a torque or moment.
     """
 
     measure = NEWTON
 
-    turns: bool = field(default=False, kw_only=True, metadata=HIDDEN)
+    of_key: ClassVar[str]
+
+    turns: bool = field(default=False, kw_only=True, metadata=FACT)
 
     @property
-    @abstractmethod
     def read(self) -> str:
         """Name of the joint, driver or force element."""
+        return getattr(self, self.of_key)
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -132,21 +126,17 @@ class ForceMeasure(Measure):
 
 @dataclass(frozen=True)
 class _JointReaction(ForceMeasure):
+    of_key = "joint"
+
     joint: str
     component: Axis | None = None
     direction: Vector | None = None
     frame: Frame = Frame.GLOBAL
     about: str | None = None
-    bodies: tuple[str, str] = field(default=("", ""), kw_only=True, metadata=HIDDEN)
+    bodies: tuple[str, str] = field(default=("", ""), kw_only=True, metadata=FACT)
     tip: Vector | None = field(default=None, kw_only=True, metadata=HIDDEN)
     now: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
     arm: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """All keys and the unit, without what belongs to samples."""
-        hidden = ("tip", "now", "arm")
-        return {key: value for key, value in super().facts.items() if key not in hidden}
 
     def check(self, mechanism: Mechanism) -> None:
         super().check(mechanism)
@@ -226,10 +216,6 @@ class _JointReaction(ForceMeasure):
         arm = places[0] - places[-1] if self.about is not None else None
         return replace(self, now=now, arm=arm)
 
-    @property
-    def read(self) -> str:
-        return self.joint
-
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         return _joint_place(mechanism, self.joint)
 
@@ -237,8 +223,7 @@ class _JointReaction(ForceMeasure):
     def along(self) -> Vector:
         """The direction, global unit vector [-]."""
         if self.component is not None:
-            x, y, z = (float(axis == self.component) for axis in Axis)
-            return x, y, z
+            return AXES[self.component]
         direction = self.direction or (0.0, 0.0, 0.0)
         length = math.hypot(*direction)
         x, y, z = (component / length for component in direction)
@@ -303,7 +288,7 @@ class JointMoment(_JointReaction):
     measure = NEWTON_METRE
     positive = "moment about the joint's point on the second body"
 
-    turns: bool = field(default=True, kw_only=True, metadata=HIDDEN)
+    turns: bool = field(default=True, kw_only=True, metadata=FACT)
 
 
 @dataclass(frozen=True)
@@ -315,6 +300,7 @@ class DriverEffort(ForceMeasure):
 
     type = "driver_effort"
     positive = "along the driver's coordinate, so that effort times rate is the power put in"
+    of_key = "driver"
 
     driver: str
     at: str | None = None
@@ -325,9 +311,7 @@ class DriverEffort(ForceMeasure):
     @property
     def facts(self) -> Mapping[str, Any]:
         """All keys and the unit; the driver whose motion alone counts, if there are others."""
-        hidden = ("rates", "alone", "ratio")
-        found = {key: value for key, value in super().facts.items() if key not in hidden}
-        return found | ({HELD_BUT: [*self.alone]} if self.alone else {})
+        return {**super().facts, **({HELD_BUT: [*self.alone]} if self.alone else {})}
 
     @property
     def sense(self) -> str:
@@ -341,7 +325,7 @@ class DriverEffort(ForceMeasure):
         super().check(mechanism)
         if self.at is not None:
             joint = mechanism.joint(self.at)
-            if not _COORDINATES.keys() & {*joint.freedoms}:
+            if not COORDINATES.keys() & {*joint.freedoms}:
                 raise MechanismError(
                     f"joint {self.at!r} is {joint.type} and has no rotation or translation for an"
                     " effort; name another joint",
@@ -354,13 +338,9 @@ class DriverEffort(ForceMeasure):
         if self.at is None:
             return replace(self, turns=driver.turns)
         joint = mechanism.joint(self.at)
-        there = next(each for each in _COORDINATES if each in joint.freedoms)
-        if isinstance(driver, JointDriver):
-            own: Quantity = _COORDINATES[driver.freedom](self.name, 0, 0, "", joint=driver.joint)
-        else:
-            x, y, z = unit(driver.direction)
-            own = Output(self.name, driver.point, (x, y, z), False, 0.0, 0.0, "")
-        rates = _COORDINATES[there](self.name, 0, 0, "", joint=self.at), own
+        there = next(each for each in COORDINATES if each in joint.freedoms)
+        own = coordinate_of(driver, relative=False)
+        rates = COORDINATES[there](self.name, 0.0, 0.0, "", joint=self.at), own
         alone = (self.driver,) if len(mechanism.drivers) > 1 else ()
         return replace(self, turns=there == "rotation", rates=rates, alone=alone)
 
@@ -388,11 +368,6 @@ class DriverEffort(ForceMeasure):
         with np.errstate(all="ignore"):
             still = np.abs(there) <= DEAD_CENTRE * np.abs(own)
             return replace(self, ratio=np.where(still, np.nan, own / there))
-
-    @property
-    def read(self) -> str:
-        """Name of the driver."""
-        return self.driver
 
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         """Return the driven body, and the driven point or a place of the joint."""
@@ -432,6 +407,7 @@ class ElementForce(ForceMeasure):
 
     type = "element_force"
     positive = "tension of a spring; torque on the joint's second body of a torsional one"
+    of_key = "force"
 
     force: str
 
@@ -440,10 +416,6 @@ class ElementForce(ForceMeasure):
         turns = isinstance(element, TorsionSpringDamper | Torque)
         turns |= isinstance(element, Bushing) and element.turns_only
         return replace(self, turns=turns)
-
-    @property
-    def read(self) -> str:
-        return self.force
 
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         element = mechanism.force(self.force)

@@ -21,6 +21,7 @@ from ..joints import AxialJoint, Coupler, Distance, Joint, Kind, Revolute, Trans
 from ..mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ..mechanism.motions import JointAngle
 from .case import Case, Output, Sweep, Truth
+from .quantity import AXES
 
 # Design position: skew axes and uneven numbers, so no row vanishes by symmetry. Global, in metres.
 HINGE = Revolute("hinge", GROUND, "a", (0.1, -0.2, 0.3), (1.0, 2.0, 2.0))
@@ -29,8 +30,6 @@ LINK: Vector = (0.33, -0.18, 0.34)
 AXIS: Vector = (2.0, -1.0, 2.0)
 LENGTH = 0.05
 NUMBER = 1.5
-
-AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 # A perpendicular pair, and one 40 degrees apart for joints whose shafts must point in one
 # direction.
@@ -178,20 +177,18 @@ def _of_joint(joint: Joint) -> Iterator[Case]:
             f"{joint}: has {joint.rows} rows, expected one or more; return its primitives"
         )
     for rods in combinations(range(len(RODS)), freedoms):
-        yield _case(joint.type, [replace(joint, i="a", j="b")], _rods("b", rods))
+        yield _case(joint.type, [replace(joint, i="a", j="b")], _rods(rods))
 
 
 def _of_coupler(coupler: Coupler) -> Case:
     kinds: dict[str, type[AxialJoint]] = {"rotation": Revolute, "translation": Translational}
     first, second = (kinds[freedom] for freedom in coupler.freedoms)
     joints = [first("first", "a", "b", POINT, AXIS), second("second", "a", "c", LINK, PAIRS[0][1])]
-    return _case(
-        coupler.type, joints, _rods("b", [0]), [replace(coupler, joints=("first", "second"))]
-    )
+    return _case(coupler.type, joints, _rods([0]), [replace(coupler, joints=("first", "second"))])
 
 
-def _rods(body: str, chosen: Sequence[int]) -> list[Joint]:
-    return [Distance(f"rod_{k + 1}", body, GROUND, RODS[k]) for k in chosen]
+def _rods(chosen: Sequence[int]) -> list[Joint]:
+    return [Distance(f"rod_{k + 1}", "b", GROUND, RODS[k]) for k in chosen]
 
 
 def _case(

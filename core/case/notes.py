@@ -44,7 +44,7 @@ def _reference_notes(case: Case) -> Iterator[str]:
     origin = case.origin
     if origin and origin.grid:
         yield f"the reference has {origin.grid}"
-    coarse: list[str] = []
+    coarse = list[str]()
     for name, series in (case.reference or {}).items():
         known = series.position[np.isfinite(series.position)]
         half = series.uncertainty.get("position", np.zeros(1))
@@ -102,7 +102,7 @@ def _placed_by_drivers(mechanism: Mechanism) -> set[str]:
     driven = {
         (each.joint, each.freedom) for each in mechanism.drivers if isinstance(each, JointDriver)
     }
-    beside: dict[str, list[str]] = {}
+    beside = dict[str, list[str]]()
     for joint in mechanism.joints:
         moved = sum((joint.name, each) in driven for each in joint.freedoms)
         if (moved or not joint.freedoms) and joint.rows + moved == 6:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, fields, replace
+from enum import StrEnum
 from functools import reduce
 from operator import add
 from typing import Any, ClassVar, Protocol, cast
@@ -18,6 +19,18 @@ from ..trajectory import MARKER as MARKER
 
 ORDERS = 3
 """Orders of an output of the pose alone: value, velocity and acceleration."""
+
+
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""Global axes by name."""
+
+
+class Axis(StrEnum):
+    """A global axis."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
 
 
 class Quantity(Protocol):
@@ -79,7 +92,10 @@ class Quantity(Protocol):
 
 
 HIDDEN: Mapping[str, Any] = {"hidden": True}
-"""Metadata of a field that the table of an output in a case file does not give."""
+FACT: Mapping[str, Any] = {"hidden": True, "fact": True}
+"""Metadata of a field that the table of an output in a case file does not give; it is a fact of the
+output, or none.
+"""
 
 
 class PoseQuantity:
@@ -143,8 +159,11 @@ class TypedQuantity(PoseQuantity, ABC):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Properties for readers of results."""
-        names = [each.name for each in fields(cast("Any", self))]
-        own = {name: getattr(self, name) for name in names if name not in ("vehicle", "other")}
+        own = {
+            each.name: getattr(self, each.name)
+            for each in fields(cast("Any", self))
+            if each.metadata.get("fact", not each.metadata.get("hidden"))
+        }
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
     @abstractmethod

@@ -24,8 +24,8 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import Array
 from .measures import JointAngle, Orientation
+from .pose_measures import angular_velocity, floats, signed
 from .quantity import Quantity
-from .rotation import angular_velocity, floats, signed
 
 
 def counted(
@@ -137,18 +137,14 @@ def turns(x: Array, v: Array, period: float, path: Path) -> Array:
     Args:
         x, v: values and velocities, samples along the first axis; NaN if unknown.
     """
-    order = np.argsort(path.times, kind="stable")
-    t, x, v = path.times[order], x[order], v[order]
-    t = t.reshape(-1, *(1,) * (x.ndim - 1))
-    before = _known_before(np.isfinite(x))
+    order, t, before, first = _in_time(path, np.isfinite(x))
+    x, v = x[order], v[order]
     change = x - np.take_along_axis(x, before, 0)
     speed = 0.5 * (v + np.take_along_axis(v, before, 0))
-    gone = speed * (t - np.take_along_axis(np.broadcast_to(t, x.shape), before, 0))
+    gone = speed * (t - np.take_along_axis(t, before, 0))
     count = np.cumsum(_whole((np.nan_to_num(gone) - change) / period), axis=0)
-    nearest = np.argsort(np.abs(t).ravel(), kind="stable")
-    first = nearest[np.argmax(np.isfinite(x)[nearest], axis=0)][None]
-    x0, v0, n0 = (np.take_along_axis(each, first, 0) for each in (x, v, count))
-    expected = np.nan_to_num(v0 * t.ravel()[first]) * float(_through_design(path))
+    x0, v0, n0, since = (np.take_along_axis(each, first, 0) for each in (x, v, count, t))
+    expected = np.nan_to_num(v0 * since) * float(_through_design(path))
     count = count - n0 + _whole((expected - x0) / period)
     found = np.empty_like(x)
     found[order] = count
@@ -166,11 +162,8 @@ def signs(e: Array, rate: Array, path: Path) -> tuple[Array, bool]:
         e: Euler parameters, either sign, shape (4, n, ...); NaN if unknown.
         rate: angular velocity [rad/s], shape (3, n, ...); NaN if unknown.
     """
-    order = np.argsort(path.times, kind="stable")
-    t, e, rate = path.times[order], e[:, order], rate[:, order]
-    t = np.broadcast_to(t.reshape(-1, *(1,) * (e.ndim - 2)), e.shape[1:])
-    known = np.isfinite(e.sum(axis=0))
-    before = _known_before(known)
+    order, t, before, first = _in_time(path, np.isfinite(e.sum(axis=0)))
+    e, rate = e[:, order], rate[:, order]
     last, rate_there = (np.take_along_axis(each, before[None], 1) for each in (e, rate))
     change = quat(e) * quat(last).conjugate()
     mean = 0.5 * (rate + rate_there)
@@ -178,8 +171,6 @@ def signs(e: Array, rate: Array, path: Path) -> tuple[Array, bool]:
     # nothing contradicts what is unknown
     doubt = bool((np.isfinite(mean.sum(axis=0)) & (np.abs(agrees) < DOUBTFUL)).any())
     sign = np.cumprod(np.where(agrees < 0.0, -1.0, 1.0), axis=0)
-    nearest = np.argsort(np.abs(path.times[order]), kind="stable")
-    first = nearest[np.argmax(known[nearest], axis=0)][None]
     e0, rate0 = (np.take_along_axis(each, first[None], 1) for each in (e, rate))
     since = np.take_along_axis(t, first, 0) * float(_through_design(path))
     own = np.where(agreement(quat(e0), rate0, since) < 0.0, -1.0, 1.0)
@@ -197,8 +188,18 @@ def _whole(x: Array) -> Array:
     return np.nan_to_num(np.rint(x))
 
 
-def _known_before(known: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the index of the last known sample before each sample, along the first axis."""
-    indices = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
-    last = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
-    return np.concatenate([last[:1], last[:-1]])
+def _in_time(
+    path: Path, known: NDArray[np.bool_]
+) -> tuple[NDArray[np.intp], Array, NDArray[np.int64], NDArray[np.intp]]:
+    """Return the order of samples in time; and in this order, along the first axis, their times,
+    the index of the last known sample before each, and that of the known one nearest to time zero.
+    """
+    order = np.argsort(path.times, kind="stable")
+    times, known = path.times[order], known[order]
+    shape = (-1, *(1,) * (known.ndim - 1))
+    last = np.where(known, np.arange(len(known)).reshape(shape), 0)
+    last = np.maximum.accumulate(last, axis=0)
+    nearest = np.argsort(np.abs(times), kind="stable")
+    first = nearest[np.argmax(known[nearest], axis=0)][None]
+    before = np.concatenate([last[:1], last[:-1]])
+    return order, np.broadcast_to(times.reshape(shape), known.shape), before, first

@@ -74,12 +74,10 @@ LENGTHS: Mapping[str, Unit] = {
     "foot": Unit("foot", 0.3048, lambda x: x * 0.3048),
 }
 FORCES: Mapping[str, Unit] = {
-    "N": Unit("N", 1.0, lambda x: x),
-    "kN": Unit("kN", 1e3, lambda x: x * 1e3),
+    name: Unit(name, size, size.__mul__) for name, size in (("N", 1.0), ("kN", 1e3))
 }
 TORQUES: Mapping[str, Unit] = {
-    "Nm": Unit("Nm", 1.0, lambda x: x),
-    "kNm": Unit("kNm", 1e3, lambda x: x * 1e3),
+    f"{name}m": Unit(f"{name}m", unit.size, unit.convert) for name, unit in FORCES.items()
 }
 ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
 
@@ -154,7 +152,7 @@ def in_units(unit: str, length: Unit, angle: Unit) -> tuple[str, float]:
     the size of one of it [SI]: N m with mm is N mm, a thousandth.
     """
     size, powers = 1.0, (1, *[-1] * unit.count("/"))
-    parts: list[str] = []
+    parts = list[str]()
     for part, power in zip(unit.split("/"), powers, strict=True):
         names = [{"m": length, "rad": angle}.get(name, name) for name in part.split(" ")]
         for name in names:

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from ..errors import KincheckError
+from ..errors import KincheckError, refuse
 from ..extras import ENVIRONMENTS
 from ..harness.resource_limits import TIMEOUT
 from ..options import destination, option, options, positive, whole
@@ -34,13 +34,12 @@ class CompareSteppers(Command):
 
     about: ClassVar[str] = "measure how well engines step the free motion of closed loops"
     engine: tuple[str, ...] = option(
-        "engines to step with; default: all", metavar="NAME", several="together", default=()
+        "engines to step with; default: all", metavar="NAME", several="together"
     )
     case: tuple[str, ...] = option(
         "built-in cases or files with [free]; default: all built-in ones",
         metavar="NAME",
         several="together",
-        default=(),
     )
     out: Path = destination(
         "folder for the site: index.html, board.json, and a folder for each row",
@@ -75,22 +74,21 @@ class CompareSteppers(Command):
         from ..studies.board.page import report
         from ..studies.board.results import Board, earlier_rows
         from ..studies.board.truth import truth_of
-        from .destinations import Destinations
 
         assert registry.stepper_files is not None
         if (folder := os.environ.get(ENVIRONMENTS)) and not Path(folder).is_dir():
             raise KincheckError(
                 f"{ENVIRONMENTS}: there is no folder {folder}; make it, or unset it"
             )
-        wanted, to = run.steppers(self.engine), Destinations.of(self)
-        if unwritable := to.problems(["board.json", "index.html"]):
-            raise KincheckError("\n".join(unwritable))
+        wanted = run.steppers(self.engine)
+        refuse(self.unwritable("board.json", "index.html"))
         unread = dict[str, str]()
         cases = registry.find_cases(self.case, unread, driven=False)
         if not self.case:
             every = map(registry.case, registry.cases())
             cases = [case for case in every if case.free is not None]
-        problems = [*unread.values()]
+        refuse(unread.values())
+        problems = list[str]()
         make, file = registry.stepper_files, self.out / "board.json"
 
         def files(engine: str, truth: Truth) -> Mapping[str, str]:
@@ -122,6 +120,5 @@ class CompareSteppers(Command):
                 problems += write_all([(file, to_json(found)), (self.out / "index.html", text)])
         if found.rows:
             print_report(report(found), sys.stdout)
-        if problems:
-            raise KincheckError("\n".join(dict.fromkeys(problems)))
+        refuse(dict.fromkeys(problems))
         return Status.DEVIATES if worse else Status.WITHIN

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from ..case.io.escape import file_name, visible
-from ..errors import KincheckError
+from ..errors import KincheckError, refuse
 from ..options import (
     CASES,
     argument,
@@ -101,7 +101,7 @@ class CheckEngine(Command):
             KincheckError: there is no such engine, or a member of the engine protocol is missing.
         """
         from ..harness.standard import STANDARD
-        from ..recorded.program import ProgramEngine
+        from ..recorded.engine import ProgramEngine
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine
 
@@ -111,8 +111,7 @@ class CheckEngine(Command):
         engine = ProgramEngine(program) if program is not None else self.engine
         problems = list[str]()
         found = registry.find_engines([engine], problems)
-        if problems:
-            raise KincheckError("\n".join(problems))
+        refuse(problems)
         cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}
         native = registry.engine(STANDARD)
         return check_engine(found[0], native, cases, tol=TOL, progress=progress([]))
@@ -162,30 +161,16 @@ class ProveReferences(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import unwritable, written
+        from ..case.io.atomic_files import written
         from ..harness.record import to_json
         from ..report.terminal import indented, page
         from ..studies.verified_reference import prove_case
 
         unread: dict[str, str] = {}
         cases = registry.find_cases(self.case or [*registry.cases()], unread)
-        problems = [*unread.values()]
-        if self.out is not None:
-            try:
-                self.out.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                problems.append(
-                    f"--out {self.out}: cannot be made a folder ({error.strerror}); give"
-                    " another one"
-                )
         names = [f"{file_name(case.name)}.reference.json" for case in cases]
-        if self.out is not None:
-            problems += unwritable(
-                (case.name, self.out / name) for case, name in zip(cases, names, strict=True)
-            )
-        if problems:
-            raise KincheckError("\n".join(problems))
-        complete = True
+        refuse([*unread.values(), *self.unwritable(*names)])
+        complete, problems = True, list[str]()
         for case, name in zip(cases, names, strict=True):
             numbers = "decimal" if self.decimal else "double"
             found, errors = prove_case(case, digits=self.digits, numbers=numbers, tol=TOL)
@@ -196,8 +181,7 @@ class ProveReferences(Command):
                 page(None).print(indented(_table(errors)))
             if self.out is not None:
                 problems += written(self.out / name, to_json(found))
-        if problems:
-            raise KincheckError("\n".join(problems))
+        refuse(problems)
         return Status.WITHIN if complete else Status.DEVIATES
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError
+from ..errors import KincheckError, refuse
 from ..options import (
     argument,
     destination,
@@ -69,8 +69,7 @@ class Compare(Command):
                 not reach all samples.
         """
         designs, beyond, unsolved = self._compared(registry)
-        if unsolved:
-            raise KincheckError("\n".join(unsolved))
+        refuse(unsolved)
         return replace(designs, exceeded=tuple(beyond))
 
     def _compared(self, registry: Registry) -> tuple[Designs, list[str], list[str]]:
@@ -92,7 +91,7 @@ class Compare(Command):
                 f"{', '.join(each.name for each in cases)}: have no output in common: {apart}."
                 " Compare designs with the same outputs."
             ]
-            raise KincheckError("\n".join(unsolved))
+            refuse(unsolved)
         if self.command:
             tell_left_out(cases)
             complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
@@ -104,11 +103,9 @@ class Compare(Command):
         from ..case.io.table_file import WRITERS, Kind
         from ..report import designs as views
         from ..report.sections import deliver
-        from .destinations import Destinations
+        from .destinations import curves_of
 
-        to = Destinations.of(self)
-        if problems := to.problems(PAGE):
-            raise KincheckError("\n".join(problems))
+        refuse(self.unwritable(*PAGE))
         designs, beyond, unsolved = self._compared(registry)
         columns = views.side_by_side(designs)
         rows = [*zip(*columns.values(), strict=True)]
@@ -116,11 +113,11 @@ class Compare(Command):
         deliver(
             views.comparison(designs, beyond),
             designs.results,
-            out=to.out,
-            json=to.json,
+            out=self.out,
+            json=self.json,
             files=[
                 (file, lambda path, kind=kind: WRITERS[kind](path, kinds, [rows]))
-                for kind, file in to.curves.items()
+                for kind, file in curves_of(self).items()
             ],
             problems=unsolved,
         )
@@ -150,8 +147,7 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
             cases.append(registry.find_case(each, options.supplied))
         except KincheckError as error:
             problems.append(str(error))
-    if problems:
-        raise KincheckError("\n".join(problems))
+    refuse(problems)
     several = len({case.name for case in cases}) < len(cases)
     first = cases[0].sweep
     for k, (name, case) in enumerate(zip(names, cases, strict=True)):

@@ -6,10 +6,9 @@ import os
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, TypeAlias
+from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 
 from ..case.io.atomic_files import Content, Named, unwritable
 from ..case.io.table_file import WRITERS, lack
@@ -25,75 +24,46 @@ REPORT = ("results.json", "report.html")
 """File names in a folder of results."""
 
 
-@dataclass(frozen=True)
-class Destinations:
-    """Destinations of results; None for an unwanted one.
+FILES = ("json", "junit", "markdown", "store", "plot", "export")
+"""Options with a file to write, in every command that has them, besides those for curves."""
 
-    Attributes:
-        out: folder for the results and the report.
-        json: a file, or "-" for standard output, which then holds nothing else.
-        junit: a file.
-        markdown: a file, for the matrix of cases and engines.
-        store: a file, for values in bulk.
-        csv, parquet, xlsx: files, for the curves.
-        long: whether curves of hardpoint tables have a row per output and sample too.
+
+def files_of(options: object) -> dict[str, str | Path]:
+    """Return the requested files by their options."""
+    given: dict[str, Any] = {name: vars(options).get(name) for name in (*FILES, *WRITERS)}
+    kinds = {name: str if name == "json" else Path for name in given}
+    return {name: file for name, file in given.items() if isinstance(file, kinds[name])}
+
+
+def curves_of(options: object) -> dict[str, Path]:
+    """Return the requested files for curves by their kinds."""
+    return {kind: Path(file) for kind, file in files_of(options).items() if kind in WRITERS}
+
+
+def unwritable_of(options: object, names: Sequence[str]) -> list[str]:
+    """Create the folder of --out, and return messages on unwritable destinations of a command,
+    before the work starts.
+
+    Args:
+        names: files of the folder; with none, --out is a file.
     """
-
-    out: Path | None = None
-    json: str | None = None
-    junit: Path | None = None
-    markdown: Path | None = None
-    store: Path | None = None
-    csv: Path | None = None
-    parquet: Path | None = None
-    xlsx: Path | None = None
-    long: bool = False
-
-    @classmethod
-    def of(cls, options: object) -> Destinations:
-        """Return the destinations named by a command's options."""
-        names = [each.name for each in fields(cls)]
-        return cls(**{name: value for name, value in vars(options).items() if name in names})
-
-    @property
-    def wanted(self) -> bool:
-        """Return whether any destination is wanted."""
-        return self != Destinations(long=self.long)
-
-    @property
-    def curves(self) -> dict[str, Path]:
-        """Return the files for the curves by their kinds."""
-        files = {kind: getattr(self, kind) for kind in WRITERS}
-        return {kind: file for kind, file in files.items() if file is not None}
-
-    def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
-        """Create the folder, and return messages on unwritable destinations, before the work
-        starts.
-
-        Args:
-            names: files of the folder.
-        """
-        found, files = list[str](), list[Named]()
-        if self.out is not None:
-            try:
-                self.out.mkdir(parents=True, exist_ok=True)
-                files += [("--out", self.out / name) for name in names]
-            except OSError as error:
-                found.append(
-                    f"--out {self.out}: cannot be made a folder ({error.strerror}); give"
-                    " another one"
-                )
-        files += [
-            ("--json", self.json),
-            ("--junit", self.junit),
-            ("--markdown", self.markdown),
-            ("--store", self.store),
-        ]
-        for kind, file in self.curves.items():
-            files.append((f"--{kind}", file))
-            missing = lack(kind, f"--{kind} {file}", "or give --csv FILE")
-            found += [missing] if missing else []
-        return found + unwritable(files, history)
+    found, files = list[str](), list[Named]()
+    out: Path | None = vars(options).get("out")
+    if out is not None and names:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            files += [("--out", out / name) for name in names]
+        except OSError as error:
+            found.append(
+                f"--out {out}: cannot be made a folder ({error.strerror}); give another one"
+            )
+    for name, file in files_of(options).items():
+        files.append((f"--{name}", file))
+        missing = lack(name, f"--{name} {file}", "or give --csv FILE") if name in WRITERS else None
+        found += [missing] if missing else []
+    if out is not None and not names:
+        files.append(("--out", out))
+    return found + unwritable(files, vars(options).get("history"))
 
 
 @contextmanager
@@ -119,7 +89,7 @@ def json_only() -> Generator[None]:
 def deliver(
     results: Results,
     problems: list[str],
-    to: Destinations,
+    options: object,
     *,
     show: Callable[[Results, TextIO], None] | None = None,
     precision: Mapping[str, Sequence[Effort]] | None = None,
@@ -128,6 +98,7 @@ def deliver(
     """Print the results and write as many of the requested files as possible.
 
     Args:
+        options: of the command.
         show: prints the results; default: `print_table`.
         precision: error against time at several efforts, by case, for the report.
         history: reads the trends for the report, after all other files; None without a history.
@@ -135,27 +106,29 @@ def deliver(
     from ..report import terminal
     from ..report.table import print_table, to_markdown
 
-    encoded = to_json(results) if to.out is not None or to.json is not None else b""
+    given = vars(options)
+    out, json, junit, markdown = (given.get(name) for name in ("out", "json", "junit", "markdown"))
+    encoded = to_json(results) if out is not None or json is not None else b""
     contents = list[tuple[Path, Content]]()  # several destinations may be one pipe
-    if to.junit is not None:
+    if junit is not None:
         from ..report.junit import to_junit
 
-        contents.append((to.junit, lambda path: path.write_bytes(to_junit(results))))
-    if to.markdown is not None:
-        contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
-    if to.curves:
+        contents.append((junit, lambda path: path.write_bytes(to_junit(results))))
+    if markdown is not None:
+        contents.append((markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
+    if curves := curves_of(options):
         from ..report.curves import write_curves
 
         contents += [
-            (file, partial(write_curves, results, kind=kind, long=to.long))
-            for kind, file in to.curves.items()
+            (file, partial(write_curves, results, kind=kind, long=bool(given.get("long"))))
+            for kind, file in curves.items()
         ]
-    if to.out is not None:
-        contents.append((to.out / "results.json", encoded))
+    if out is not None:
+        contents.append((out / "results.json", encoded))
         contents.append(
-            (to.out / "report.html", lambda path: _write_page(results, path, precision, history))
+            (out / "report.html", lambda path: _write_page(results, path, precision, history))
         )
-    problems += terminal.deliver(contents, encoded, to.json, partial(show or print_table, results))
+    problems += terminal.deliver(contents, encoded, json, partial(show or print_table, results))
 
 
 def _write_page(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+from ..errors import refuse
 from ..options import (
     json_file,
     options,
@@ -35,17 +36,16 @@ class Doctor(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..harness.standard import STANDARD
-        from ..report.terminal import page, with_json
+        from ..report.terminal import with_json
         from .installation import examine
 
-        require_writable([("--json", self.json)])
+        refuse(self.unwritable())
         found = examine(
             registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines, registry.apart
         )
-        with with_json(found, self.json):
-            (_print_verdict if self.quiet else _print)(found, page(self.json))
+        with with_json(found, self.json) as console:
+            (_print_verdict if self.quiet else _print)(found, console)
         return Status.WITHIN if found.able else Status.FAILED
 
 

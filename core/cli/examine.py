@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, number_of, unknown
+from ..errors import KincheckError, number_of, refuse, unknown
 from ..options import (
     ONE_CASE,
     argument,
@@ -30,6 +29,8 @@ from .registry import Registry, Status, given
 from .shared_options import TOL, driver_value
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..case.case import Case
     from ..kinematics import Curve, Event
     from ..studies.assemblies import Survey
@@ -78,15 +79,14 @@ class Explain(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
-        from ..report.terminal import page, with_json
+        from ..report.terminal import with_json
         from ..studies.diagnosis.text import print_diagnosis
 
-        require_writable([("--json", self.json)])
+        refuse(self.unwritable())
         found = self.answer(registry)
         how = {"quiet": self.quiet, "verbose": self.verbose}
-        with with_json(found, self.json):
-            print_diagnosis(found, page(self.json), **how)
+        with with_json(found, self.json) as console:
+            print_diagnosis(found, console, **how)
         return Status.DEVIATES if found.findings else Status.WITHIN
 
 
@@ -111,7 +111,6 @@ class Trace(Command):
     driver: str | None = option(
         "driver whose value follows from the motion; default: the swept driver",
         metavar="NAME",
-        default=None,
     )
     length: float = option(
         "length in each direction [mechanism sizes and radians]; default %(default)s",
@@ -125,7 +124,6 @@ class Trace(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..kinematics import trace
         from ..report.terminal import with_json
 
@@ -134,16 +132,17 @@ class Trace(Command):
         driver = self.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
         if driver not in drivers:
             raise KincheckError(unknown("driver", driver, drivers))
-        require_writable([("--json", self.json)])
+        refuse(self.unwritable())
         curves = [trace(case.mechanism, driver, length=self.length)]
         if not curves[0].closed:
             curves.append(trace(case.mechanism, driver, length=self.length, direction=-1))
         design = case.mechanism.design_value(driver)
         unit = "rad" if case.mechanism.driver(driver).turns else "m"
-        out = sys.stderr if self.json == "-" else sys.stdout
-        with with_json(_facts(case.name, curves, design, unit), self.json):
+        with with_json(_facts(case.name, curves, design, unit), self.json) as console:
             for direction, curve in zip((1, -1), curves, strict=False):
-                print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
+                print(
+                    *_lines(case.name, curve, direction, design, unit), sep="\n", file=console.file
+                )
         return Status.DEVIATES if any(curve.message for curve in curves) else Status.WITHIN
 
 
@@ -215,7 +214,6 @@ class ListAssemblies(Command):
         " design position",
         measured,
         "VALUE",
-        default=None,
     )
     samples: int = option(
         "number of random starts; default %(default)s", whole(1), "N", default=200
@@ -236,7 +234,6 @@ class ListAssemblies(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..report.terminal import with_json
         from ..studies.assemblies import survey, written
 
@@ -244,7 +241,7 @@ class ListAssemblies(Command):
             raise KincheckError(
                 f"{found}: only an export uses it. Add --export FORMAT, or leave it out."
             )
-        require_writable([("--json", self.json), ("--out", self.out)])
+        refuse(self.unwritable())
         if self.export is not None and self.export not in registry.writers:
             raise KincheckError(unknown("format", self.export, registry.writers))
         case = registry.case_of(self)
@@ -254,8 +251,8 @@ class ListAssemblies(Command):
             samples=self.samples,
             seed=self.seed,
         )
-        with with_json(found.report(), self.json):
-            _print(found, self.json)
+        with with_json(found.report(), self.json) as console:
+            _print(found, console)
             if self.export is not None:
                 number: int = self.number or 1
                 texts = written(found, registry.writer(self.export), number)
@@ -263,10 +260,10 @@ class ListAssemblies(Command):
         return Status.WITHIN if found.assemblies.found else Status.DEVIATES
 
 
-def _print(found: Survey, json: str | None) -> None:
-    from ..report.terminal import columns, page
+def _print(found: Survey, console: Console) -> None:
+    from ..report.terminal import columns
 
-    console, listed = page(json), found.assemblies
+    listed = found.assemblies
     values = ", ".join(f"{name} = {value:.9g}" for name, value in found.drivers.items())
     count, starts = len(listed.found), listed.starts
     console.print(
@@ -371,16 +368,16 @@ class MoveFreely(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable, write
+        from ..case.io.atomic_files import write
         from ..report.progress import complain
         from ..report.terminal import with_json
 
-        require_writable([("--csv", self.csv), ("--json", self.json)])
+        refuse(self.unwritable())
         found = self.answer(registry)
         if self.csv:
             write("--csv", self.csv, found.write_csv)
         complain([*found.notes, *filter(None, [found.message])])
-        with with_json(found.facts, self.json):
+        with with_json(found.facts, self.json) as console:
             print(
                 f"{found.case}: {len(found.times)} samples to {found.times[-1]:.9g} s,"
                 f" {number_of(found.freedoms, 'degree of freedom', 'degrees of freedom')},"
@@ -390,6 +387,6 @@ class MoveFreely(Command):
                 f"  change of energy less work: {found.energy_error:.1e} J; largest gap:"
                 f" {found.gap:.1e} of the mechanism's size",
                 sep="\n",
-                file=sys.stderr if self.json == "-" else sys.stdout,
+                file=console.file,
             )
         return Status.DEVIATES if found.message else Status.WITHIN

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..case.io.escape import file_name
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..options import (
     ONE_CASE,
     argument,
@@ -30,7 +30,6 @@ from .shared_options import driver_value, return_cases
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.models.undriven import Undriven
-    from ..studies.same import Comparison
 
 
 FORMATS = {
@@ -117,8 +116,7 @@ def keep_texts(
         problems += failed
         if not failed:
             print(file, file=sys.stderr if json == "-" else sys.stdout)
-    if problems:
-        raise KincheckError("\n".join(problems))
+    refuse(problems)
 
 
 @options
@@ -139,11 +137,11 @@ class Import(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable, to_standard_output, write
+        from ..case.io.atomic_files import to_standard_output, write
         from ..case.io.case_file import case_text
         from ..case.io.schema import SCHEMA_FILE
 
-        require_writable([("--out", self.out)])
+        refuse(self.unwritable())
         files, supplied = return_cases(self.case, self.supplied)
         if len(files) != 1:
             raise KincheckError(
@@ -163,6 +161,14 @@ class Import(Command):
 
 STATUS = {"same": Status.WITHIN, "differs": Status.DEVIATES, "not judged": Status.FAILED}
 """Exit status by verdict."""
+NO_MOTION: Mapping[str, Any] = {
+    "largest_m": None,
+    "allowed_by_digits_m": None,
+    "freedoms": [],
+    "lost": [],
+    "poses": 0,
+}
+"""Findings on files one of which cannot be read."""
 CONVERTERS = ("mujoco",)
 """Simulators that save models, for the help: adapters load later."""
 NO_CONVERTERS = {
@@ -194,31 +200,27 @@ class Same(Command):
         "a link of the first file and its partner in the others, if names and places do not tell",
         metavar="LINK=LINK",
         several="repeated",
-        default=(),
     )
     converted_by: tuple[str, ...] = option(
         "compare with what a simulator makes of the first file: it loads and saves the file;"
         " drake and pinocchio save no model, and say so",
         choices=(*CONVERTERS, *NO_CONVERTERS),
         several="repeated",
-        default=(),
     )
     without: tuple[str, ...] = option(
         "elements to leave out of all models, by tag, name or TAG/NAME; a note says so",
         metavar="NAME",
         several="repeated",
-        default=(),
     )
     json: str | None = json_file("the verdict")
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..case.models.files import require_used
-        from ..report.terminal import page, with_json
+        from ..report.terminal import with_json
         from ..studies.same import compare
 
-        require_writable([("--json", self.json)])
+        refuse(self.unwritable())
         for name in self.converted_by:
             if name in NO_CONVERTERS:
                 raise KincheckError(
@@ -238,17 +240,19 @@ class Same(Command):
             require_used(Path(names[0]), self.without, used)
             others += [_converted(name, Path(names[0]), registry) for name in self.converted_by]
         except KincheckError as error:
-            with with_json(_unread(names, str(error)), self.json):
+            unread = {"files": [*names], "verdict": "not judged", "reason": str(error)}
+            with with_json({**unread, **NO_MOTION}, self.json):
                 raise
         found = [compare(first, other, given) for other in others]
-        with with_json(_report(found), self.json):
-            console = page(self.json)
+        status, worst = max(((STATUS[each.verdict], each) for each in found), key=lambda x: x[0])
+        pairs = {"pairs": [each.report() for each in found]} if len(found) > 1 else {}
+        with with_json({**worst.report(), **pairs}, self.json) as console:
             for each in found:
                 several = f"{' and '.join(each.files)}: " if len(found) > 1 else ""
                 console.print(f"{several}{each.text}", soft_wrap=True)
                 for note in each.notes:
                     console.print(f"  {note}", soft_wrap=True)
-        return max(STATUS[each.verdict] for each in found)
+        return status
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -278,26 +282,6 @@ def _converted(name: str, file: Path, registry: Registry) -> Undriven:
         out = Path(folder) / f"{file.stem} by {name}.xml"
         out.write_text(text, encoding="utf-8")
         return undriven_file(out)
-
-
-def _unread(names: Sequence[str], reason: str) -> dict[str, Any]:
-    """Return the report on files one of which cannot be read."""
-    none: dict[str, Any] = {
-        "largest_m": None,
-        "allowed_by_digits_m": None,
-        "freedoms": [],
-        "lost": [],
-        "poses": 0,
-    }
-    return {"files": [*names], "verdict": "not judged", "reason": reason, **none}
-
-
-def _report(found: Sequence[Comparison]) -> dict[str, Any]:
-    """Return the comparisons as JSON: the worst, and all of them if there are several."""
-    worst = max(found, key=lambda each: STATUS[each.verdict]).report()
-    if len(found) > 1:
-        worst["pairs"] = [each.report() for each in found]
-    return worst
 
 
 @options

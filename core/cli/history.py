@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..options import argument, destination, json_file, option, options, switch, verbosity, whole
 from ..report.progress import complain
 from .parser import Command
@@ -52,7 +52,6 @@ class ListRuns(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.io.atomic_files import require_writable
         from ..history.queries import read
         from ..history.store import Store
 
@@ -60,26 +59,29 @@ class ListRuns(Command):
             raise KincheckError(
                 f"history: no file is given. Give --history FILE, or set {HISTORY}."
             )
-        require_writable([("--plot", self.plot), ("--export", self.export)], self.history)
+        refuse(self.unwritable())
         with Store(Path(self.history), writable=bool(self.remove)) as store:
             for run in self.remove:
                 store.remove(run)
                 print(f"run {run} is removed")
             chosen: dict[str, Any] = {"cases": self.case, "engines": self.engine}
-            _check_names(store, **chosen)
+            plans = [pair for row in store.runs() for pair in row.plan]
+            for place, (what, names) in enumerate((("case", self.case), ("engine", self.engine))):
+                known = sorted({pair[place] for pair in plans})
+                for name in names:
+                    if name not in known:
+                        raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
             history = read(store, last=self.last or None, **chosen)
             if self.case or self.engine:
                 _print_trends(history)
             else:
                 _print_runs(store, store.runs()[: self.last or None])
             if self.plot is not None:
-                from ..report.trends import write_plot
+                from ..case.io.atomic_files import write
+                from ..report.trends import page
 
-                write_plot(
-                    history,
-                    self.plot,
-                    title=f"{Path(self.history).name}: errors and times over the runs",
-                )
+                title = f"{Path(self.history).name}: errors and times over the runs"
+                write("--plot", self.plot, page(history, title).encode())
                 print(
                     f"{self.plot}: trends of {len(history.pairs)} pairs over {len(history.runs)}"
                     " runs"
@@ -91,15 +93,6 @@ class ListRuns(Command):
                 print(f"{self.export}: {count} rows")
             complain(store.damage)
             return Status.FAILED if store.damage else Status.WITHIN
-
-
-def _check_names(store: Store, cases: Sequence[str], engines: Sequence[str]) -> None:
-    plans = [pair for row in store.runs() for pair in row.plan]
-    for what, place, names in (("case", 0, cases), ("engine", 1, engines)):
-        known = sorted({pair[place] for pair in plans})
-        for name in names:
-            if name not in known:
-                raise KincheckError(f"history {store.path}: {unknown(what, name, known)}")
 
 
 def _print_runs(store: Store, rows: Sequence[RunRow]) -> None:
@@ -229,10 +222,9 @@ class ReportChanges(Command):
         from ..history.store import Store
         from ..report.regressions import print_regressions, to_markdown
         from ..report.terminal import deliver
-        from .destinations import Destinations
 
-        if problems := Destinations.of(self).problems(OUT, self.history):
-            raise KincheckError("\n".join(problems))
+        refuse(self.unwritable(*OUT))
+        problems = list[str]()
         with ExitStack() as open_files:
             store = (
                 open_files.enter_context(Store(Path(self.history), writable=False))

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..case.io.reader_options import HARDPOINTS, Supplied
-from ..errors import KincheckError
+from ..errors import KincheckError, refuse
 from ..options import (
     argument,
     destination,
@@ -68,7 +67,6 @@ class MeasureCompliance(Isolated):
         " travel; may be repeated",
         metavar="NAME=A:B:N",
         several="repeated",
-        default=(),
     )
     bushings: Path | None = option(
         "bushings of the joints, in SI: TOML, for a table of hardpoints by role,"
@@ -76,14 +74,12 @@ class MeasureCompliance(Isolated):
         " [joints.NAME.bushings.X] as in case files",
         Path,
         "FILE",
-        default=None,
     )
     engine: tuple[str, ...] = option(
         "check the equilibria by these engines: each finds them by its own kinematics, gravity"
         " and rows, exudyn-static by its own solver, and gets a verdict against native",
         metavar="NAME",
         several="together",
-        default=(),
     )
     history: Path | None = destination(
         "store the records of native and of these engines in this file, as kincheck run does", Path
@@ -105,12 +101,10 @@ class MeasureCompliance(Isolated):
         from ..report.table import print_table
         from ..report.terminal import with_json
         from ..studies.compliance import study, views
-        from .destinations import Destinations
 
         problems = shared_options.contradictions(self)
         engines = self._engines(registry, problems)
-        if problems := problems or shared_options.unreachable(self):
-            raise KincheckError("\n".join(problems))
+        refuse(problems or shared_options.unreachable(self))
         typed, axle = self.supplied.travel, self.supplied.axle
         travel = None if typed is None else _values("--travel", typed, LENGTHS)
         table = os.path.isfile(self.case) and is_table(Path(self.case))
@@ -127,31 +121,27 @@ class MeasureCompliance(Isolated):
             from ..case.io.mechanism_sections import with_bushings
 
             case = with_bushings(case, self.bushings)
-        to = Destinations.of(self)
-        if unwritable := to.problems(["kc.html", *(["results.json"] if engines else [])]):
-            raise KincheckError("\n".join(unwritable))
+        refuse(self.unwritable("kc.html", *(["results.json"] if engines else [])))
         loads = dict(map(_load, self.load))
         results = study.compliance(case, travel, loads, axle or study.AxleMotion.HEAVE)
-        if to.csv is not None:
-            write("--csv", to.csv, views.table(results).encode())
+        if self.csv is not None:
+            write("--csv", self.csv, views.table(results).encode())
         if engines:
             results = replace(results, checked=self._checked(engines, results.cases, problems))
         checked = results.checked
-        if to.out is not None:
+        if self.out is not None:
             if checked is not None:
-                write("--out", to.out / "results.json", to_json(checked))
-            write("--out", to.out / "kc.html", views.page(results).encode())
-        out = sys.stderr if self.json == "-" else sys.stdout
-        with with_json(views.as_data(results), self.json):
-            print(*views.lines(results), sep="\n", file=out)
+                write("--out", self.out / "results.json", to_json(checked))
+            write("--out", self.out / "kc.html", views.page(results).encode())
+        with with_json(views.as_data(results), self.json) as console:
+            print(*views.lines(results), sep="\n", file=console.file)
             if checked is not None:
-                print_table(checked, out, reactions=True)
+                print_table(checked, console.file, reactions=True)
             complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
         named = [each.name for each in engines if each.name != STANDARD]
         problems += views.failures(results)
         problems += lacking(checked, (), named) if checked else []
-        if problems:
-            raise KincheckError("\n".join(problems))
+        refuse(problems)
         bad = checked is not None and any(each.outcome.bad for each in checked.records)
         return Status.DEVIATES if bad else Status.WITHIN
 

@@ -6,12 +6,12 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..extras import how_to_install
 from ..options import (
     argument,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..studies.bench.engines import Bench
     from ..studies.stress.families import Family
-    from ..studies.stress.results import Stress
+    from ..studies.stress.run import Stress
 
 
 SEED = 943745
@@ -92,6 +92,8 @@ class BenchEngines(Command):
 
 
 def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -> int:
+    from msgspec.structs import replace
+
     from ..extras import THREADS
     from ..harness.record import Outcome
     from ..report.sections import deliver
@@ -102,8 +104,13 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
     from .destinations import json_only
 
     if not any(name in os.environ for name in THREADS):
-        return _with_one_thread(options.command, THREADS)
-    problems = _destinations(options, bench_engines.NAME)
+        # Run the command again in a new process whose linear algebra uses one thread: libraries
+        # read the number when they are loaded. The native engine has one thread. With threads that
+        # wait for each other, the simulators' times would depend on the machine's load.
+        words = [sys.executable, "-P", "-c", _MAIN, *shlex.split(options.command)[1:]]
+        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
+        return subprocess.run(words, env=environment, check=False).returncode
+    problems = options.unwritable(*_files(bench_engines.NAME))
     unread: dict[str, str] = {}
     names = registry.cases() if [*options.cases] == ["all"] else options.cases
     cases = {name: found for name in names for found in registry.find_cases([name], unread)}
@@ -115,12 +122,9 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
             [name for name in known if name in options.engine or not options.engine], problems, mode
         )
     ]
-    others = [
-        name for name in options.engine if name not in (*registry.engines, *registry.simulations)
-    ]
+    others = [name for name in options.engine if name not in registry.every_engine]
     engines += registry.find_engines(others, problems)  # errors of the user, with a message
-    if problems:
-        raise KincheckError("\n".join(problems))
+    refuse(problems)
     with (
         json_only() if options.json == "-" else nullcontext(),
         Meter("bench", quiet=options.quiet, every=1.0) as meter,
@@ -137,7 +141,7 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
         if formulation:
             meter("formulation", 1.0)
             rows = bench_formulation.measure(registry.case(STRUT), SEED, bench_formulation.STATES)
-            found = bench_engines.with_formulation(found, rows)
+            found = replace(found, formulation=rows)
     deliver(report(found), found, out=options.out, json=options.json)
     missing = {
         entry.engine
@@ -151,23 +155,8 @@ def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -
     return Status.FAILED if missing else Status.WITHIN
 
 
-def _with_one_thread(command: str, variables: Sequence[str]) -> int:
-    """Run the command again in a new process whose linear algebra uses one thread. Libraries read
-    the number of threads when they are loaded.
-
-    The native engine has one thread. With threads that wait for each other, the simulators' times
-    would depend on the machine's load.
-    """
-    environment = {**os.environ, **dict.fromkeys(variables, "1")}
-    return subprocess.run(
-        [sys.executable, "-P", "-c", _MAIN, *shlex.split(command)[1:]], env=environment, check=False
-    ).returncode
-
-
-def _destinations(options: BenchEngines | BenchFormulation, name: str) -> list[str]:
-    from .destinations import Destinations
-
-    return Destinations.of(options).problems([f"{name}.{kind}" for kind in ("json", "html")])
+def _files(name: str) -> list[str]:
+    return [f"{name}.{kind}" for kind in ("json", "html")]
 
 
 @options
@@ -190,8 +179,7 @@ class BenchFormulation(Command):
         from ..report import sections as bench
         from ..studies.paper import formulation as bench_formulation
 
-        if problems := _destinations(self, bench_formulation.NAME):
-            raise KincheckError("\n".join(problems))
+        refuse(self.unwritable(*_files(bench_formulation.NAME)))
         found = bench_formulation.measure(registry.case(STRUT), self.seed, bench_formulation.STATES)
         bench.deliver(bench_formulation.report(found), found, out=self.out, json=self.json)
         return Status.WITHIN
@@ -216,8 +204,8 @@ class BenchCompliance(Command):
         from ..studies.bench.compliance import lines, measure
 
         found = measure(registry.find_case(self.case, driven=False), self.rounds)
-        with with_json(found, self.json):
-            print(*lines(found), sep="\n", file=sys.stderr if self.json == "-" else sys.stdout)
+        with with_json(found, self.json) as console:
+            print(*lines(found), sep="\n", file=console.file)
         return Status.WITHIN
 
 
@@ -257,39 +245,28 @@ class StressEngines(Command):
     """
 
     about: ClassVar[str] = "stress-test engines with random degenerate mechanisms"
-    family: tuple[str, ...] = option(
-        "default: all families", metavar="NAME", several="together", default=()
-    )
-    list: bool = switch("list the families", default=False)
+    family: tuple[str, ...] = option("default: all families", metavar="NAME", several="together")
+    list: bool = switch("list the families")
     samples: int | None = option(
         f"number of samples over all families; default {SAMPLES}",
         whole(1),
         "N",
-        default=None,
     )
-    seed: int | None = option(
-        "seed of the random mechanisms; default 0", whole(0), "S", default=None
-    )
-    engine: tuple[str, ...] = option(
-        "default: native", metavar="NAME", several="together", default=()
-    )
-    mode: str | None = option(MODE, choices=MODES, default=None)
+    seed: int | None = option("seed of the random mechanisms; default 0", whole(0), "S")
+    engine: tuple[str, ...] = option("default: native", metavar="NAME", several="together")
+    mode: str | None = option(MODE, choices=MODES)
     out: Path | None = destination(
         "write the tables there, and the smallest bad cases as reduced case files", Path, "DIR"
     )
     json: str | None = json_file()
     no_proofs: bool = switch(
         "skip the proof of a share of the reference motions, which needs python-flint",
-        default=False,
     )
-    replay: tuple[Path, ...] = option(
-        "judge case files instead", Path, "FILE", several="together", default=()
-    )
+    replay: tuple[Path, ...] = option("judge case files instead", Path, "FILE", several="together")
     tol: float | None = option(
         f"largest accepted constraint residual of replayed files; default {TOL:g}",
         positive,
         "X",
-        default=None,
     )
     quiet: bool = verbosity("print no progress")
 
@@ -301,7 +278,7 @@ class StressEngines(Command):
         from ..studies.stress.families import FAMILIES
         from ..studies.stress.report import idle, markdown, report
         from ..studies.stress.verdicts import BAD
-        from . import destinations as delivery
+        from .destinations import json_only
 
         if self.list:
             if found := given(
@@ -320,8 +297,7 @@ class StressEngines(Command):
                 problems.append(
                     f"--replay judges files, which belong to no family. Leave out {found}."
                 )
-            if problems:
-                raise KincheckError("\n".join(problems))
+            refuse(problems)
             return _replay(self, registry, engines)
         if self.tol is not None:
             problems.append(
@@ -330,10 +306,8 @@ class StressEngines(Command):
             )
         wanted = dict.fromkeys(self.family or FAMILIES)
         problems += [unknown("family", name, FAMILIES) for name in wanted if name not in FAMILIES]
-        problems += delivery.Destinations.of(self).problems(FILES)
-        if problems:
-            raise KincheckError("\n".join(problems))
-        with delivery.json_only() if self.json == "-" else nullcontext():
+        refuse([*problems, *self.unwritable(*FILES)])
+        with json_only() if self.json == "-" else nullcontext():
             found = _run(self, [FAMILIES[name] for name in wanted], engines, problems)
         made = report(found)
         problems += [

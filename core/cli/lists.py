@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
@@ -56,7 +57,7 @@ class List(Command):
             return Status.WITHIN
         cases = registry.cases()
         if self.quiet:
-            print(*cases, *dict.fromkeys((*registry.engines, *registry.simulations)), sep="\n")
+            print(*cases, *registry.every_engine, sep="\n")
             return Status.WITHIN
         print_line("cases:")
         for name in cases:
@@ -94,7 +95,16 @@ def _print_references(options: List, console: Console) -> None:
     if options.schema:
         lines = [*_keys()]
         if console.width < SOURCE_WIDTH:
-            lines = [part for line in _joined(lines) for part in _hung(line, console.width)]
+            whole: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
+            lines = [
+                part
+                for line in _joined(lines)
+                # aligned below its text
+                for part in textwrap.wrap(
+                    line, console.width, subsequent_indent=" " * _start(line), **whole
+                )
+                or [""]
+            ]
         console.print(*lines, sep="\n", soft_wrap=True)
     if console.width >= LOG_WIDTH:
         lines = [
@@ -151,62 +161,15 @@ def _start(line: str) -> int:
     return found.end() if found else 0
 
 
-def _hung(line: str, width: int) -> list[str]:
-    """Return the line in parts that fit the width, aligned below its text."""
-    parts = textwrap.wrap(
-        line,
-        width,
-        subsequent_indent=" " * _start(line),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return parts or [""]
-
-
-def _case() -> dict[str, Any]:
-    from ..case.io.catalogue import case_schema
-
-    return case_schema()
-
-
-def _variation() -> dict[str, Any]:
-    from ..studies.variation.variation_schema import variation_schema
-
-    return variation_schema()
-
-
-def _results() -> dict[str, Any]:
-    from ..harness.record import Results
-
-    return msgspec.json.schema(Results)
-
-
-def _regression() -> dict[str, Any]:
-    from ..history.findings import Regressions
-
-    return msgspec.json.schema(Regressions)
-
-
-def _live() -> dict[str, Any]:
-    from ..live.protocol import live_schema
-
-    return live_schema()
-
-
-def _board() -> dict[str, Any]:
-    from ..studies.board.results import Board
-
-    return msgspec.json.schema(Board)
-
-
-SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
-    "case": _case,
-    "variation": _variation,
-    "results": _results,
-    "regression": _regression,
-    "live": _live,
-    "board": _board,
+SCHEMAS = {
+    "case": "case.io.catalogue:case_schema",
+    "variation": "studies.variation.variation_schema:variation_schema",
+    "results": "harness.record:Results",
+    "regression": "history.findings:Regressions",
+    "live": "live.protocol:live_schema",
+    "board": "studies.board.results:Board",
 }
+"""The type of each file, or the function that returns its schema, as modules of core."""
 
 
 @options
@@ -225,8 +188,11 @@ class PrintSchema(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        found = msgspec.json.encode(SCHEMAS[self.name]())
-        to_standard_output(msgspec.json.format(found, indent=2) + b"\n")
+        module, _, name = SCHEMAS[self.name].partition(":")
+        found = getattr(import_module(f"...{module}", __name__), name)
+        schema = msgspec.json.schema(found) if isinstance(found, type) else found()
+        text = msgspec.json.format(msgspec.json.encode(schema), indent=2)
+        to_standard_output(text + b"\n")
         return Status.WITHIN
 
 
@@ -266,10 +232,7 @@ class Completion(Command):
         from .main import parser
 
         names = {
-            **{
-                each: [*dict.fromkeys((*registry.engines, *registry.simulations))]
-                for each in ENGINES
-            },
+            **dict.fromkeys(ENGINES, registry.every_engine),
             "family": [*FAMILIES],
             "template": [*TEMPLATES],
             "to": [*registry.writers],

@@ -140,6 +140,16 @@ class Command:
         """Do the work of the command line, and return the exit status."""
         raise NotImplementedError
 
+    def unwritable(self, *names: str) -> list[str]:
+        """Return messages on destinations that cannot be written, before the work starts.
+
+        Args:
+            names: files in the folder of --out; with none, --out is a file.
+        """
+        from .destinations import unwritable_of
+
+        return unwritable_of(self, names)
+
 
 def add_command(commands: Any, name: str, cls: type[Command], given: Collection[str] = ()) -> None:
     """Add a command to the parser.

@@ -68,6 +68,11 @@ class Registry:
     apart: Mapping[str, str] = field(default_factory=dict[str, str])
     stepper_files: Callable[..., Mapping[str, str]] | None = None
 
+    @property
+    def every_engine(self) -> list[str]:
+        """The names of the engines of both modes."""
+        return [*dict.fromkeys((*self.engines, *self.simulations))]
+
     def case_of(self, options: Any, *, driven: bool = True) -> Case:
         """Return the case that options name, and print what is left out of another tool's file."""
         case = self.find_case(options.case, options.supplied, driven=driven)
@@ -200,43 +205,28 @@ class Registry:
                 continue
             if name in names[:k]:
                 continue
+            given, loaded = name, None
             if WHERE.fullmatch(name):
-                self._add(engines, name, problems, mode)
-                continue
-            modes = [
-                each
-                for each, known in (("projection", self.engines), ("simulate", self.simulations))
-                if name in known
-            ]
+                try:
+                    loaded = load_engine(name)
+                except KincheckError as error:
+                    problems.append(str(error))
+                    continue
+                modes = [loaded.mode]
+            else:
+                given = repr(name)
+                by_mode = {"projection": self.engines, "simulate": self.simulations}
+                modes = [each for each, known in by_mode.items() if name in known]
             if not modes:
-                problems.append(
-                    unknown("engine", name, [*dict.fromkeys((*self.engines, *self.simulations))])
-                )
+                problems.append(unknown("engine", name, self.every_engine))
             elif mode not in (None, *modes):
                 problems.append(
-                    f"engine {name!r} has the mode {modes[0]!r}, not {mode!r}. Leave out --mode or"
+                    f"engine {given} has the mode {modes[0]!r}, not {mode!r}. Leave out --mode or"
                     " the engine."
                 )
             else:
-                engines.append(self._loaded(name, mode or modes[0]))
+                engines.append(loaded or self._loaded(name, mode or modes[0]))
         return engines
-
-    def _add(
-        self, engines: list[Engine], where: str, problems: list[str], mode: str | None
-    ) -> None:
-        """Add the engine at MODULE:CLASS, or a problem."""
-        try:
-            found = load_engine(where)
-        except KincheckError as error:
-            problems.append(str(error))
-            return
-        if mode not in (None, found.mode):
-            problems.append(
-                f"engine {where} has the mode {found.mode!r}, not {mode!r}. Leave out --mode or the"
-                " engine."
-            )
-        else:
-            engines.append(found)
 
     def baseline(self, engines: Sequence[Engine]) -> Engine | None:
         """Return the native engine as the standard; None if it is among the engines."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import MOST_NAMED, KincheckError, SolveError, shortened
+from ..errors import MOST_NAMED, KincheckError, SolveError, refuse, shortened
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
     from ..history.runs import Keeping
-    from .destinations import Destinations, Trends
+    from .destinations import Trends
 
 
 @dataclass(frozen=True)
@@ -173,9 +173,8 @@ class Run(Isolated, WithRecordings):
         """
         from ..harness import run as running
         from ..harness.scene import with_scenes
-        from .destinations import Destinations
 
-        plan = _planned(self, registry, Destinations())
+        plan = _planned(self, registry)
         solver, _ = shared_options.solver(self, plan.engines)
         how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver}
         return with_scenes(running.run(plan.cases, plan.engines, tol=self.tol, **how), plan.cases)
@@ -184,16 +183,16 @@ class Run(Isolated, WithRecordings):
         """Do the work of the command line."""
         from . import destinations as delivery
 
-        self, to = _with_cases(self, registry), delivery.Destinations.of(self)
-        plan = _planned(self, registry, to)
+        self = _with_cases(self, registry)
+        plan = _planned(self, registry)
         precision: Any = None
         if self.bench is not None:
             from ..studies.bench.engines import efforts_in
 
             precision = efforts_in(self.bench)
-        with delivery.json_only() if to.json == "-" else nullcontext():
+        with delivery.json_only() if self.json == "-" else nullcontext():
             results, problems, keeping, stopped = _solved(self, plan)
-        if to.out or to.json or keeping:
+        if self.out or self.json or keeping:
             from ..harness.scene import with_scenes
 
             results = with_scenes(results, plan.cases)
@@ -205,11 +204,13 @@ class Run(Isolated, WithRecordings):
         if self.history is not None:
             history = partial(past, keeping, problems) if keeping else lambda: None
         delivery.deliver(
-            results, problems, to, show=_shown(self), precision=precision, history=history
+            results, problems, self, show=_shown(self), precision=precision, history=history
         )
         if self.explain:
             print(
-                *_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout
+                *_explained(plan.cases),
+                sep="\n",
+                file=sys.stderr if self.json == "-" else sys.stdout,
             )
         problems += lacking(results, plan.required, plan.named) + uncompared(results)
         complain(problems)
@@ -237,12 +238,14 @@ def _shown(options: Run) -> Callable[[Results, TextIO], None]:
     return print_matrix if options.joints else print_table
 
 
-def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
+def _planned(options: Run, registry: Registry) -> _Plan:
     """Return the plan of the run. Print messages on unreadable cases before any computation.
 
     Raises:
         KincheckError: all problems, if no case is readable or an option is wrong.
     """
+    from .destinations import REPORT, files_of
+
     problems: list[str] = shared_options.contradictions(options)
     if options.resume and options.history is None:
         problems.append(f"--resume needs a history. Give --history FILE, or set {HISTORY}.")
@@ -299,12 +302,13 @@ def _planned(options: Run, registry: Registry, to: Destinations) -> _Plan:
         for name, mode in keys
         if keys.count((name, mode)) > 1
     ][:1]
-    problems += to.problems(history=options.history)
+    problems += options.unwritable(*REPORT)
     problems = problems or shared_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does
     # not look like the previous run.
-    if problems or not (cases or to.wanted or options.history is not None):
-        raise KincheckError("\n".join([*unread.values(), *problems]))
+    kept = options.out is not None or options.history is not None or files_of(options)
+    if problems or not (cases or kept):
+        refuse([*unread.values(), *problems])
     tell(line for message in (*unread.values(), *unused) for line in message.splitlines())
     return _Plan(
         cases,
@@ -394,12 +398,11 @@ def _with_cases(options: Run, registry: Registry) -> Run:
     """Return the options with the cases among the values of options that take several names:
     `run --engine native my_case.toml`.
     """
-    known = (*registry.engines, *registry.simulations)
     swallowed = [
         name
         for name in (*several(options.engines), *options.require)
         if isinstance(name, str)
-        and name not in known
+        and name not in registry.every_engine
         and not WHERE.fullmatch(name)
         and (name in registry.cases() or Path(name).suffix)
     ]
@@ -419,6 +422,11 @@ def _cases(options: Run, registry: Registry, unread: dict[str, str]) -> list[Cas
     """Return the cases to solve; unreadable ones go to `unread`, or in Python raise."""
     from ..case.joint_probe import probes
 
+    if options.joints and options.reactions:
+        raise KincheckError(
+            "--reactions: the loops of --joints have no masses and no forces, so all reactions are"
+            " zero. Leave out one of both."
+        )
     named = several(options.cases) or ([] if options.joints else registry.cases())
     found = [*probes()] if options.joints else []
     supplied = replace(options.supplied, recorded=bool(options.recorded))

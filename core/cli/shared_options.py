@@ -248,8 +248,8 @@ def foreign_engines(
     """
     if not (options.engine_command or options.fmu):
         return []
+    from ..recorded.engine import ProgramEngine
     from ..recorded.fmu import read_fmu
-    from ..recorded.program import ProgramEngine
 
     if options.fmu and len(cases) != 1:
         raise KincheckError(
@@ -283,8 +283,7 @@ def recorded_engines(
 
     from ..recorded.engine import RecordedEngine
     from ..recorded.meaning import Meaning, Reader, read_accuracy
-    from ..recorded.readers import read_recording
-    from ..recorded.recording import Head
+    from ..recorded.readers import Head, read_recording
     from ..recorded.samples import samples_of
     from ..recorded.sweep import at_samples
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError, refuse, unknown
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     ONE_CASE,
@@ -166,8 +166,7 @@ class Sweep(Command):
         whole = registry.case_of(self)
         case = only(whole, self.output, problems)
         problems = problems or shared_options.unreachable(self)
-        if problems:
-            raise KincheckError("\n".join(problems))
+        refuse(problems)
         variation = limited(self, read_variation(Path(self.variation), whole), whole, case)
         if self.replay and self.samples is None:
             samples = variation.count or 0
@@ -197,11 +196,9 @@ class Sweep(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from .destinations import Destinations
-
         problems: list[str] = []
         names = ("results.json", "report.html") if self.replay else FILES
-        problems += Destinations.of(self).problems(names)
+        problems += self.unwritable(*names)
         if self.scheduler is not None and self.jobs is not None:
             problems.append(
                 "--scheduler: the cluster decides the number of threads. Leave out --jobs."
@@ -401,7 +398,7 @@ def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | No
     """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
     from ..harness.standard import STANDARD
-    from . import destinations as delivery
+    from .destinations import deliver
 
     for index in options.replay:
         if study.samples and index >= study.samples:
@@ -420,7 +417,7 @@ def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | No
         solver=checking_solver(options, engines[-1]),
     )
     problems: list[str] = []
-    delivery.deliver(results, problems, delivery.Destinations.of(options))
+    deliver(results, problems, options)
     if engine is not None:
         problems += lacking(results, [], [engine.name]) + uncompared(results)
     complain(problems)

@@ -151,11 +151,6 @@ class Failure:
         kind = error.kind if isinstance(error, KincheckError) else None
         return Failure(Outcome.ERROR, error_text(error), kind=kind)
 
-    @property
-    def harmful(self) -> bool:
-        """Return whether the failure may leave the process in a corrupt state."""
-        return self.outcome.bad
-
 
 @dataclass(frozen=True, eq=False)
 class Attempt:

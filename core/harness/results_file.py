@@ -5,9 +5,9 @@ reader checks all of it, and no later step can fail.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 
@@ -72,6 +72,10 @@ class _Details(msgspec.Struct):
     program: dict[str, dict[str, int | float | str | None]] | None = None
 
 
+Checks: TypeAlias = Iterator[tuple[str, bool, str]]
+"""Keys of results, whether they are sound, and what is wrong if they are not."""
+
+
 def read_results(file: Path) -> Results:
     """Return the results in a file.
 
@@ -84,160 +88,120 @@ def read_results(file: Path) -> Results:
         results = from_json(text.encode())
     except (msgspec.DecodeError, RecursionError) as error:
         raise fault(file, "", f"found {error}, expected results; {_ADVICE}") from None
-    for key, kind in _FACTS.items():
-        if key in results.run:
-            _convert(file, f"run.{key}", results.run[key], kind)
-    samples: dict[str, int] = {}
-    for k, record in enumerate(results.records):
-        _check_record(file, f"records[{k}]", record, samples)
-    for case, outputs in results.references.items():
-        for name, series in outputs.items():
-            _check_series(
-                file,
-                join(join("references", case), name),
-                series,
-                samples.get(case, len(series.position)),
-            )
-    for case, scene in results.scenes.items():
-        _check_scene(file, join("scenes", case), scene)
+    for key, sound, problem in _checks(results):
+        if not sound:
+            raise fault(file, key, f"{problem}; {_ADVICE}")
     return results
 
 
-def _convert(file: Path, key: str, value: object, kind: Any) -> None:
+def _checks(results: Results) -> Checks:
+    for key, kind in _FACTS.items():
+        if key in results.run:
+            yield _converted(f"run.{key}", results.run[key], kind)
+    samples: dict[str, int] = {}
+    for k, record in enumerate(results.records):
+        yield from _record_checks(f"records[{k}]", record, samples)
+    for case, outputs in results.references.items():
+        for name, series in outputs.items():
+            count = samples.get(case, len(series.position))
+            yield from _series_checks(join(join("references", case), name), series, count)
+    for case, scene in results.scenes.items():
+        yield from _scene_checks(join("scenes", case), scene)
+
+
+def _converted(key: str, value: object, kind: Any) -> tuple[str, bool, str]:
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
-        raise fault(file, key, f"found {shown(value)}: {error}; {_ADVICE}") from None
+        return key, False, f"found {shown(value)}: {error}"
+    return key, True, ""
 
 
-def _check(file: Path, key: str, holds: bool, problem: str) -> None:
-    if not holds:
-        raise fault(file, key, f"{problem}; {_ADVICE}")
-
-
-def _check_record(file: Path, key: str, record: Record, samples: dict[str, int]) -> None:
-    _check(
-        file,
-        f"{key}.truth",
-        record.truth in set(Truth),
-        f"found {shown(record.truth)}, expected one of {', '.join(Truth)}",
-    )
-    _convert(file, f"{key}.details", record.details, _Details)
+def _record_checks(key: str, record: Record, samples: dict[str, int]) -> Checks:
+    kinds = f"found {shown(record.truth)}, expected one of {', '.join(Truth)}"
+    yield f"{key}.truth", record.truth in set(Truth), kinds
+    yield _converted(f"{key}.details", record.details, _Details)
     if record.driver:
         count = samples.setdefault(record.case, len(next(iter(record.driver.values()))))
         for name, values in record.driver.items():
-            _check_numbers(file, join(f"{key}.driver", name), values, count)
+            yield from _number_checks(join(f"{key}.driver", name), values, count)
     count = samples.get(record.case, 0)
     moved = record.driver or not (record.outputs or record.outcome is Outcome.FAIL)
-    _check(file, f"{key}.driver", bool(moved), "found none, expected values of drivers")
+    yield f"{key}.driver", bool(moved), "found none, expected values of drivers"
     for name, series in record.outputs.items():
-        _check_series(file, join(f"{key}.outputs", name), series, count)
+        yield from _series_checks(join(f"{key}.outputs", name), series, count)
     for name, deviations in record.errors.items():
         for quantity, found in deviations.items():
             place = f"{join(f'{key}.errors', name)}.{quantity}"
             given = record.outputs.get(name)
             known = given is not None and getattr(given, quantity) is not None
-            _check(
-                file,
-                place,
-                known,
-                f"found a deviation of a missing quantity, expected {quantity} in outputs",
-            )
-            _check(
-                file,
-                f"{place}.worst_step",
-                0 <= found.worst_step < count,
-                f"found no sample, expected one of {count}",
-            )
-            _check_sizes(file, place, (found.max_abs, found.rms, found.tolerance))
-    numbers = [record.residual_max, record.us_per_step]
-    numbers += [] if record.seconds is None else [*msgspec.structs.astuple(record.seconds)]
-    _check_sizes(file, key, numbers)
+            lack = f"found a deviation of a missing quantity, expected {quantity} in outputs"
+            yield place, known, lack
+            there = 0 <= found.worst_step < count
+            yield f"{place}.worst_step", there, f"found no sample, expected one of {count}"
+            yield _size_check(place, (found.max_abs, found.rms, found.tolerance))
+    times = () if record.seconds is None else msgspec.structs.astuple(record.seconds)
+    yield _size_check(key, (record.residual_max, record.us_per_step, *times))
 
 
-def _check_series(file: Path, key: str, series: OutputSeries, count: int) -> None:
+def _series_checks(key: str, series: OutputSeries, count: int) -> Checks:
     for quantity in QUANTITIES:
         values: Sequence[float | None] | None = getattr(series, quantity)
         if values is not None:
-            _check_numbers(file, f"{key}.{quantity}", values, count)
+            yield from _number_checks(f"{key}.{quantity}", values, count)
 
 
-def _check_numbers(file: Path, key: str, values: Sequence[float | None], count: int) -> None:
-    _check(
-        file,
-        key,
-        len(values) == count,
-        f"found {len(values)} numbers, expected {count}, the number of samples of the case",
-    )
-    _check(
-        file,
-        key,
-        all(each is None or abs(each) <= LARGEST for each in values),
-        f"found a number beyond {LARGEST:g}",
-    )
+def _number_checks(key: str, values: Sequence[float | None], count: int) -> Checks:
+    lengths = f"found {len(values)} numbers, expected {count}, the number of samples of the case"
+    yield key, len(values) == count, lengths
+    bounded = all(each is None or abs(each) <= LARGEST for each in values)
+    yield key, bounded, f"found a number beyond {LARGEST:g}"
 
 
-def _check_sizes(file: Path, key: str, values: Iterable[float | None]) -> None:
+def _size_check(key: str, values: Iterable[float | None]) -> tuple[str, bool, str]:
     usable = all(each is None or 0.0 <= each <= LARGEST for each in values)
-    _check(
-        file,
-        key,
-        usable,
-        f"found a negative number or one beyond {LARGEST:g}, expected errors and times",
-    )
+    wrong = f"found a negative number or one beyond {LARGEST:g}, expected errors and times"
+    return key, usable, wrong
 
 
-def _check_scene(file: Path, key: str, scene: Scene) -> None:
-    bodies: Mapping[str, Any] = {body.name: body for body in scene.bodies}
-    _check(
-        file,
-        f"{key}.bodies",
-        len(bodies) == len(scene.bodies) and GROUND not in bodies,
-        "found a name twice, or the ground",
-    )
+def _scene_checks(scene_key: str, scene: Scene) -> Checks:
+    bodies = {body.name for body in scene.bodies}
+    known, key = {GROUND, *bodies}, f"{scene_key}.bodies"
+    once = len(bodies) == len(scene.bodies) and GROUND not in bodies
+    yield key, once, "found a name twice, or the ground"
     for body in scene.bodies:
-        rows = [
-            (3, body.origin),
-            (4, body.euler_parameters),
-            *((3, each) for each in body.r),
-            *((4, each) for each in body.p),
-        ]
-        _check_rows(file, f"{key}.bodies", rows)
+        yield from _row_checks(key, 3, [body.origin])
+        yield from _row_checks(key, 4, [body.euler_parameters])
+        yield from _row_checks(key, 3, body.r)
+        yield from _row_checks(key, 4, body.p)
         counts = {len(body.r), len(body.p)}
-        _check(
-            file,
-            f"{key}.bodies",
-            counts <= {len(scene.frames)} or counts == {0},
-            "found other poses than frames",
-        )
-    known = {GROUND, *bodies}
+        posed = counts <= {len(scene.frames)} or counts == {0}
+        yield key, posed, "found other poses than frames"
+    key = f"{scene_key}.joints"
     for joint in scene.joints:
         there = len(joint.bodies) == 2 and known.issuperset(joint.bodies)
-        _check(file, f"{key}.joints", there, f"found {shown(joint.bodies)}, expected two bodies")
-        places = (*joint.points, *joint.axes, *[joint.far] * bool(joint.far))
-        _check_rows(file, f"{key}.joints", [(3, each) for each in places])
+        yield key, there, f"found {shown(joint.bodies)}, expected two bodies"
+        far = [joint.far] if joint.far else []
+        yield from _row_checks(key, 3, [*joint.points, *joint.axes, *far])
         directions = all(1e-100 < math.hypot(*axis) < 1e100 for axis in joint.axes)
-        _check(file, f"{key}.joints", directions, f"found {shown(joint.axes)}, expected directions")
+        yield key, directions, f"found {shown(joint.axes)}, expected directions"
+    key = f"{scene_key}.points"
     for point in scene.points:
-        _check(
-            file,
-            f"{key}.points",
-            point.body in known,
-            f"found {shown(point.body)}, expected a body",
-        )
-        _check_rows(file, f"{key}.points", [(3, point.position)])
-    names = {point.name for point in scene.points}
+        yield key, point.body in known, f"found {shown(point.body)}, expected a body"
+        yield from _row_checks(key, 3, [point.position])
+    key = f"{scene_key}.springs"
     for spring in scene.springs:
         there = len(spring.bodies) == len(spring.points) == 2 and known.issuperset(spring.bodies)
-        _check(file, f"{key}.springs", there, f"found {shown(spring.bodies)}, expected two bodies")
-        _check_rows(file, f"{key}.springs", [(3, each) for each in spring.points])
+        yield key, there, f"found {shown(spring.bodies)}, expected two bodies"
+        yield from _row_checks(key, 3, spring.points)
+    key, names = f"{scene_key}.wheels", {point.name for point in scene.points}
     for wheel in scene.wheels:
         there = len(wheel.kingpin) in (0, 2) and names.issuperset(wheel.kingpin)
-        _check(file, f"{key}.wheels", there, f"found {shown(wheel.kingpin)}, expected two points")
-        _check_rows(file, f"{key}.wheels", [(3, each) for each in (wheel.middle,) if each])
+        yield key, there, f"found {shown(wheel.kingpin)}, expected two points"
+        yield from _row_checks(key, 3, [wheel.middle] if wheel.middle else [])
 
 
-def _check_rows(file: Path, key: str, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
-    for count, row in rows:
+def _row_checks(key: str, count: int, rows: Iterable[Sequence[float]]) -> Checks:
+    for row in rows:
         sound = len(row) == count and all(abs(each) < 1e100 for each in row)
-        _check(file, key, sound, f"found {shown(row)}, expected {count} numbers")
+        yield key, sound, f"found {shown(row)}, expected {count} numbers"

@@ -20,7 +20,7 @@ from ..mechanism.loads import SpringDamper
 from ..mechanism.mechanism import Vector
 from ..mechanism.motions import PointCoordinate
 from ..trajectory import Array, BodyMotion
-from .record import Record, Results
+from .record import Results
 from .scene_record import (
     Scene,
     SceneBody,
@@ -47,7 +47,7 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
     Poses over the sweep are solved here only if the results hold an answer of the native engine,
     possibly from a separate process: such a case can neither hang nor end this process.
     """
-    answered = {record.case for record in results.records if _answers(record)}
+    answered = {each.case for each in results.records if each.engine == STANDARD and each.solved}
     requested = any(record.engine == STANDARD for record in results.records)
     shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
     return msgspec.structs.replace(
@@ -57,10 +57,6 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
             for case in shown
         },
     )
-
-
-def _answers(record: Record) -> bool:
-    return record.engine == STANDARD and bool(record.solved)
 
 
 def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:

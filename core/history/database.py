@@ -227,11 +227,8 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
                 " restore a copy of the file, or remove the run: kincheck history --history"
                 f" {shlex.quote(str(path))} --remove {run}",
             ) from error
-        advice = (
-            ""
-            if isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError)
-            else _advice(str(error))
-        )
+        own = isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError)
+        advice = "" if own else _advice(str(error))
         raise HistoryError(f"history {path}: cannot be {what}: {bounded(error)}{advice}") from error
 
 

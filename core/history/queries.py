@@ -350,8 +350,12 @@ def _rows(
             entries_of(store, row.id)
     now = {row.id: row.status for row in store.runs()}
     with store.explained("read"):
-        if store.passed_over:
-            _leave_out(store)
+        if store.passed_over:  # the view without unreadable runs
+            query = "SELECT sql FROM sqlite_master WHERE name = 'measured'"
+            (view,) = store.connection.execute(query).fetchone()
+            listed = ", ".join(map(str, store.passed_over))
+            spared = view.replace("FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1)
+            store.connection.execute(spared.replace("CREATE VIEW", "CREATE TEMP VIEW", 1))
         values = [name for _, wanted in chosen for name in wanted]
         cursor = store.connection.execute(f"SELECT * FROM measured WHERE {where}", values)
         names = tuple(name for name, *_ in cursor.description)
@@ -359,12 +363,3 @@ def _rows(
         run, status = (names.index(name) for name in ("run", "status"))
         while rows := cursor.fetchmany(ROWS):
             yield [(*row[:status], now[row[run]], *row[status + 1 :]) for row in rows]
-
-
-def _leave_out(store: Store) -> None:
-    """Exclude unreadable runs from the view."""
-    query = "SELECT sql FROM sqlite_master WHERE name = 'measured'"
-    (view,) = store.connection.execute(query).fetchone()
-    listed = ", ".join(map(str, store.passed_over))
-    spared = view.replace("FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1)
-    store.connection.execute(spared.replace("CREATE VIEW", "CREATE TEMP VIEW", 1))

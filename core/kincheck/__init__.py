@@ -33,10 +33,6 @@ if TYPE_CHECKING:
     )
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-_BY_NAME = (
-    *("check_engine", "compare", "compliance", "explain", "free", "live"),
-    *("load", "report", "run", "sweep"),
-)
 __all__ = [
     "check_engine",
     "compare",
@@ -62,7 +58,7 @@ if not TYPE_CHECKING:  # otherwise type checkers would accept any name
         if name == "primitives":
             found = import_module("kincheck.primitives")
         else:
-            module = import_module("kincheck.by_name") if name in _BY_NAME else core
+            module = core if name in core.__all__ else import_module("kincheck.by_name")
             found = getattr(module, name)
         globals()[name] = found
         return found

@@ -101,6 +101,9 @@ def report(results: Results, file: str | Path) -> None:
     """Write results as the report of `kincheck run --out`: one HTML file, worst first.
 
     Raises:
+        KincheckError: these are no results.
         OSError: the file cannot be written.
     """
+    if not isinstance(results, Results):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise KincheckError(f"report: found {results!r}, expected what kincheck.run returns")
     write_report(results, Path(file))

@@ -74,7 +74,15 @@ if TYPE_CHECKING:
         describe_screws,
         freeing,
     )
-    from .followed import DOUBTFUL, agreement, in_doubt, near_design
+    from .followed import (
+        DOUBTFUL,
+        agreement,
+        followed_angle,
+        followed_attitude,
+        follower,
+        in_doubt,
+        near_design,
+    )
     from .forces.reactions import forces_of, motion_defects, with_forces
     from .formulation.acceptance_criteria import (
         LONGEST_TURN,
@@ -88,8 +96,9 @@ if TYPE_CHECKING:
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
     from .free_dynamics import FreeMotion, free_motion
     from .free_poses import FreePoses, Poses, Walked
+    from .motion_solver import Solver
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
-    from .one_design import Solver, followed_angle, followed_attitude, follower, solve
+    from .one_design import solve
     from .replay import (
         TURN,
         Needed,
@@ -123,7 +132,9 @@ _NAMES = {
     "diagnosis.rank": (
         "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws freeing"
     ),
-    "followed": "DOUBTFUL agreement in_doubt near_design",
+    "followed": (
+        "DOUBTFUL agreement followed_angle followed_attitude follower in_doubt near_design"
+    ),
     "forces.reactions": "forces_of motion_defects with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
@@ -132,7 +143,8 @@ _NAMES = {
     "free_dynamics": "FreeMotion free_motion",
     "free_poses": "FreePoses Poses Walked",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
-    "one_design": "Solver followed_angle followed_attitude follower solve",
+    "motion_solver": "Solver",
+    "one_design": "solve",
     "replay": (
         "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces replayed"
         " residuals"

@@ -32,7 +32,8 @@ from .compiled.routes import SAME_TIME, Route, recent_route
 from .continuation.walk import FINER, ROOM, march
 from .formulation.acceptance_criteria import doubtful
 from .formulation.parameters import every_place, placed, places
-from .one_design import ONE_PROGRAM, asked, driving, prepare, start_notes
+from .motion_solver import ONE_PROGRAM
+from .one_design import asked, driving, prepare, start_notes
 from .structure.degrees_of_freedom import require_driven
 
 # Steps of the straight way from the design to a start away from it: a sixteenth of it is a step

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..forces import Forces
-from ..mechanism.mechanism import Mechanism
 from ..trajectory import Array, BodyMotion, Motions, Trajectory
 from .compiled.compiled_model import Model, compile_model
-from .compiled.request import FORCE_SIGMA, SIGMA, Request
+from .compiled.request import FORCE_SIGMA, SIGMA
 from .compiled.routes import Route
-from .compiled.traced_forces import can_trace
 from .design_batch import Variants, solve_variants, variant_of
+from .followed import follower
 from .forces.reactions import forces_of
 from .forces.wanted import WantedForces
-from .one_design import ONE_PROGRAM, follower, motion_only, prepare
+from .motion_solver import ONE_PROGRAM
+from .one_design import motion_only, prepare
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,90 +55,57 @@ class ForcesOfDesigns:
         return np.where(self.solved, found, np.nan)
 
 
-def compile_with_forces(mechanism: Mechanism, request: Request) -> Model:
-    """Return the programs of a request, with the forces that it wants if they can be traced.
-
-    Raises:
-        SolveError: as `compile_model`.
-    """
-    if request.forces is None or can_trace(mechanism):
-        return compile_model(mechanism, request)
-    return compile_model(mechanism, replace(request, forces=None))
-
-
-class DesignForces:
-    """Computes the forces of designs that a model has solved.
+def forces_of_designs(
+    route: Route, wanted: WantedForces, found: Variants, geometry: Array, tol: float
+) -> ForcesOfDesigns:
+    """Return the forces of solved designs.
 
     Args:
-        route: the path made ready for the model.
-        wanted: the forces wanted; the model has them if they can be traced.
+        route: the path made ready for their model, which has the forces if they can be traced.
+        wanted: the forces wanted.
+        found: what `solve_variants` returns for the geometry.
+        geometry: as for `solve_variants`.
     """
+    model, traced = route.model, route.model.forces
+    # the program decides where all samples are far from singular poses
+    decided = np.full(found.solved.shape[1], fill_value=traced is not None, dtype=np.bool_)
+    together: Forces | None = None
+    if traced is not None:
+        for name in {SIGMA, FORCE_SIGMA} & model.rows.keys():
+            # NaN where a sample is missing
+            decided &= (found.kept[model.rows[name].start] > traced.least).all(axis=0)
+        if decided.any():
+            kept = found.kept if decided.all() else found.kept[:, :, decided]
+            together = traced.of(kept.reshape(len(kept), -1).T)
+    others = np.flatnonzero(~decided & found.solved.any(axis=0))
+    alone = _alone(route, wanted, geometry[:, others], tol) if len(others) else ()
+    by_number = dict(zip(others.tolist(), alone, strict=True))
+    return ForcesOfDesigns(found.solved, together, decided, by_number)
 
-    def __init__(self, route: Route, wanted: WantedForces) -> None:
-        self._route, self._wanted = route, wanted
-        self._bodies: Route | None = None
 
-    def along(self, route: Route) -> DesignForces:
-        """Return the same forces on another path of the same drivers."""
-        return DesignForces(route, self._wanted)
-
-    def of(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns:
-        """Return the forces of solved designs.
-
-        Args:
-            found: what `solve_variants` returns for the geometry.
-            geometry: as for `solve_variants`.
-        """
-        decided = self._decided(found)
-        together = self._together(found, decided)
-        others = np.flatnonzero(~decided & found.solved.any(axis=0))
-        alone = dict(zip(others.tolist(), self._alone(geometry[:, others], tol), strict=True))
-        return ForcesOfDesigns(found.solved, together, decided, alone)
-
-    def _decided(self, found: Variants) -> NDArray[np.bool_]:
-        """Return which designs the program decides: all samples are far from singular poses."""
-        model, count = self._route.model, int(found.solved.shape[1])
-        forces = model.forces
-        decided = np.full(count, fill_value=forces is not None, dtype=np.bool_)
-        for name in (SIGMA, FORCE_SIGMA):
-            if forces is not None and name in model.rows:
-                # NaN where a sample is missing
-                decided &= (found.kept[model.rows[name].start] > forces.least).all(axis=0)
-        return decided
-
-    def _together(self, found: Variants, decided: NDArray[np.bool_]) -> Forces | None:
-        forces = self._route.model.forces
-        if forces is None or not decided.any():
-            return None
-        kept = found.kept if decided.all() else found.kept[:, :, decided]
-        return forces.of(kept.reshape(len(kept), -1).T)
-
-    def _alone(self, geometry: Array, tol: float) -> Sequence[Forces]:
-        count = geometry.shape[1]
-        if not count:
-            return ()
-        model, path = self._route.model, self._route.path
-        names = {*self._wanted.joints, *self._wanted.drivers, *self._wanted.elements}
-        request = replace(model.request, forces=self._wanted)
-        each = [variant_of(model, numbers) for numbers in geometry.T]
-        if len(model.frame.moving) > ONE_PROGRAM:  # as their motion, by themselves
-            plain = replace(request, varied=())
-            return [_known(prepare(mechanism, plain, path)(tol).forces) for mechanism in each]
-        if self._bodies is None:
-            motion = motion_only(model.mechanism, replace(request, points=()))
-            self._bodies = Route(compile_model(model.mechanism, motion), path)
-        route = self._bodies
-        found = solve_variants(route, geometry, tol)
-        return [
-            forces_of(
-                mechanism,
-                path,
-                _motion(route.model, found, k),
-                names,
-                follower(mechanism, path, found.solved[:, k]),
-            )
-            for k, mechanism in enumerate(each)
-        ]
+def _alone(route: Route, wanted: WantedForces, geometry: Array, tol: float) -> Sequence[Forces]:
+    model, path = route.model, route.path
+    names = {*wanted.joints, *wanted.drivers, *wanted.elements}
+    request = replace(model.request, forces=wanted)
+    each = [variant_of(model, numbers) for numbers in geometry.T]
+    if len(model.frame.moving) > ONE_PROGRAM:  # as their motion, by themselves
+        plain = replace(request, varied=())
+        return [_known(prepare(mechanism, plain, path)(tol).forces) for mechanism in each]
+    motion = motion_only(model.mechanism, replace(request, points=()))
+    bodies = route.bound(
+        ("bodies of", wanted), lambda: Route(compile_model(model.mechanism, motion), path)
+    )
+    found = solve_variants(bodies, geometry, tol)
+    return [
+        forces_of(
+            mechanism,
+            path,
+            _motion(bodies.model, found, k),
+            names,
+            follower(mechanism, path, found.solved[:, k]),
+        )
+        for k, mechanism in enumerate(each)
+    ]
 
 
 def _motion(model: Model, found: Variants, k: int) -> Trajectory:

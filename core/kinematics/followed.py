@@ -10,27 +10,25 @@ sign is continuous, so that rotations beyond half a turn differ from those the o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeAlias, cast
+from typing import Protocol, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import IDENTITY, ZERO, Quat, angle_about, quat, vec
+from ..algebra import ZERO, Quat, quat, vec
 from ..caches import keep_last
 from ..errors import SolveError
-from ..joints.base import unit
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..primitives.base import Pose
 from ..trajectory import Array, Trajectory
 from .compiled.request import Request
 from .compiled.routes import start_of
-from .forces.reactions import Follow
+from .forces.reactions import TURN, Follow, expected_change, joint_angle
+from .motion_solver import prepare_motion
 
-Prepare: TypeAlias = Callable[[Mechanism, Request, Path], Callable[[float], Trajectory]]
-"""Makes a mechanism ready to be solved along a path, to a tolerance."""
+Indices: TypeAlias = NDArray[np.intp]
 
 # Way of the drivers between two samples [rad, or half the mechanism's size]: as far as turns are
 # read from the samples alone, and in the parts of longer ways, finer from one try to the next.
@@ -62,12 +60,40 @@ class Followed(Protocol):
         ...
 
     def counted(
-        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
-    ) -> tuple[Array, bool]:
-        """Return the value at each sample, counted both ways from the value `at` the start and NaN
-        if not reached, and whether no change is in doubt.
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, order: Indices
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the values at ordered samples but for turns, shape (m, ...), the turns between
+        them, NaN where any number may be, and where they are in doubt, shape (m - 1,).
         """
         ...
+
+    def turns(self, value: Array, near: Array) -> float:
+        """Return the turns that bring a value near to another."""
+        ...
+
+    def turned(self, values: Array, turns: Array) -> Array:
+        """Return values after numbers of turns."""
+        ...
+
+
+def _counted(
+    what: Followed, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
+) -> tuple[Array, bool]:
+    """Return the value at each sample, counted both ways from the value `at` the start and NaN if
+    not reached, and whether no change is in doubt.
+    """
+    found = np.full((len(times), *at.shape), np.nan)
+    reached = np.flatnonzero(motion.solved)
+    order = reached[np.argsort(times[reached], kind="stable")]
+    if not len(order):
+        return found, True
+    values, changes, doubtful = what.counted(mechanism, times, motion, order)
+    first = int(np.argmin(np.abs(times[order] - start)))
+    turns = np.full(len(order), what.turns(values[first], at))
+    turns[first + 1 :] += np.cumsum(changes[first:])
+    turns[:first] -= np.cumsum(changes[:first][::-1])[::-1]
+    found[order] = what.turned(values, turns)
+    return found, not doubtful.any()
 
 
 def near_design(mechanism: Mechanism, path: Path) -> bool:
@@ -82,24 +108,21 @@ def near_design(mechanism: Mechanism, path: Path) -> bool:
     return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
 
 
-def followed(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     """Return values at the samples of a path, turns counted on the way from the design; NaN if a
     sample is not reached or its turns are in doubt.
 
     None if the native solver has no solution of the mechanism.
-
-    Args:
-        prepare: makes the mechanism ready for a path.
     """
     # motions of other classes may change, or have no hash
-    return (_recent if path.is_builtin else _finer)(prepare, mechanism, path, what)
+    return (_recent if path.is_builtin else _finer)(mechanism, path, what)
 
 
-def _finer(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+def _finer(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     found: Array | None = None
     for part in PARTS:
         try:
-            found, sure = _followed(prepare, mechanism, path, what, part)
+            found, sure = _followed(mechanism, path, what, part)
         except SolveError:
             return None
         if sure:
@@ -110,39 +133,35 @@ def _finer(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -
 _recent = keep_last(32)(_finer)
 
 
-def _followed(
-    prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed, part: float
-) -> tuple[Array, bool]:
+def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> tuple[Array, bool]:
     """Return the values by further samples, and whether no number of turns is in doubt."""
     start = start_of(mechanism, path)
     times = _divided(mechanism, path, _sorted(path, start.time), part)
     # the samples first: they decide where the motion starts
     fine = replace(path, times=np.concatenate([path.times, times]))
-    motion = _motion(prepare, mechanism, fine, what)
+    motion = _motion(mechanism, fine, what)
     taken = motion.details.get("start", {"time": 0.0, "lead": {}})
     at_start, sure = what.at_design, True
     if any(taken["lead"].values()):
         lead = path.lead_in(taken["time"])
         lead = replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
-        led = _motion(prepare, mechanism, lead, what)
-        values, sure = what.counted(mechanism, lead.times, led, 0.0, at_start)
+        led = _motion(mechanism, lead, what)
+        values, sure = _counted(what, mechanism, lead.times, led, 0.0, at_start)
         at_start = np.asarray(values[-1])
-    found, certain = what.counted(mechanism, fine.times, motion, taken["time"], at_start)
+    found, certain = _counted(what, mechanism, fine.times, motion, taken["time"], at_start)
     return found[: len(path.times)], sure and certain
 
 
-def _motion(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
+def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
     """Return the motion of all bodies, which others ask for next, or if it is long of its own."""
     bodies = tuple(body.name for body in mechanism.moving)
     if len(bodies) * len(path.times) > MOST_POSES:
         bodies = what.bodies(mechanism)
-    return (_recent_motion if path.is_builtin else _solved)(prepare, mechanism, path, bodies)
+    return (_recent_motion if path.is_builtin else _solved)(mechanism, path, bodies)
 
 
-def _solved(
-    prepare: Prepare, mechanism: Mechanism, path: Path, bodies: tuple[str, ...]
-) -> Trajectory:
-    return prepare(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
+def _solved(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajectory:
+    return prepare_motion(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
 
 
 _recent_motion = keep_last(2)(_solved)
@@ -180,9 +199,6 @@ def _divided(mechanism: Mechanism, path: Path, times: Array, part: float) -> Arr
     return np.concatenate([*pieces, times[-1:]])
 
 
-TURN = 2.0 * math.pi
-
-
 def in_doubt(x: Array, v: Array, times: Array) -> bool:
     """Return whether a change from sample to sample contradicts the rates by its turns.
 
@@ -193,25 +209,23 @@ def in_doubt(x: Array, v: Array, times: Array) -> bool:
     order = np.flatnonzero(known)[np.argsort(times[known], kind="stable")]
     t, x, v = times[order].reshape(-1, *(1,) * (x.ndim - 1)), x[order], v[order]
     # nothing contradicts what is unknown
-    return bool((np.abs(_expected_change(v, t) - np.diff(x, axis=0)) > DOUBT).any())
+    return bool((np.abs(expected_change(v, t) - np.diff(x, axis=0)) > DOUBT).any())
 
 
-def followed_angle(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Array | None:
+def followed_angle(mechanism: Mechanism, path: Path, joint: str) -> Array | None:
     """Return a joint's angle [rad] at the samples of a path, zero at design, turns counted on the
     way from there; shape (n,). See `followed`.
     """
-    return followed(prepare, mechanism, path, _OfJoint(joint))
+    return followed(mechanism, path, _OfJoint(joint))
 
 
-def follower(
-    prepare: Prepare, mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]
-) -> Follow:
+def follower(mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]) -> Follow:
     """Return the function that corrects the turns of angles at the solved samples of a path."""
 
     def follow(joint: str, angle: Array, rate: Array) -> Array:
         if near_design(mechanism, path) and not in_doubt(angle, rate, path.times[solved]):
             return angle
-        if (found := followed_angle(prepare, mechanism, path, joint)) is None:
+        if (found := followed_angle(mechanism, path, joint)) is None:
             return angle
         return angle + TURN * np.round((found[solved] - angle) / TURN)
 
@@ -235,64 +249,36 @@ class _OfJoint:
         return tuple(name for name in mechanism.joint(self.joint).bodies if name in moving)
 
     def counted(
-        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
-    ) -> tuple[Array, bool]:
-        """Return the angle with its turns; see `Followed`."""
-        found = np.full(len(times), np.nan)
-        reached = np.flatnonzero(motion.solved)
-        order = reached[np.argsort(times[reached], kind="stable")]
-        if not len(order):
-            return found, True
-        angle, rate = _angle(mechanism, self.joint, motion)
-        t, x = times[order], angle[order]
-        change, expected = np.diff(x), _expected_change(rate[order], t)
-        change += TURN * np.rint((expected - change) / TURN)
-        smallest = change - TURN * np.rint(change / TURN)
-        doubtful = np.abs(expected - change) > DOUBT
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, order: Indices
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the angle but for turns; see `Followed`."""
+        angle, rate = (x[order] for x in joint_angle(mechanism, self.joint, motion))
+        change, expected = np.diff(angle), expected_change(rate, times[order])
+        turns, fewest = np.rint((expected - change) / TURN), -np.rint(change / TURN)
+        doubtful = np.abs(expected - change - TURN * turns) > DOUBT
         # rates have no bound towards a fold, but short steps change little
-        change[doubtful] = np.where(np.abs(smallest) > DOUBT, np.nan, smallest)[doubtful]
-        first = int(np.argmin(np.abs(t - start)))
-        counted = np.full(len(order), x[first] + TURN * np.rint((at - x[first]) / TURN))
-        counted[first + 1 :] += np.cumsum(change[first:])
-        counted[:first] -= np.cumsum(change[:first][::-1])[::-1]
-        found[order] = counted
-        return found, not doubtful.any()
+        near = np.abs(change + TURN * fewest) <= DOUBT
+        turns[doubtful] = np.where(near, fewest, np.nan)[doubtful]
+        return angle, turns, doubtful
 
+    def turns(self, value: Array, near: Array) -> float:
+        """Return whole turns."""
+        return float(np.rint((near - value) / TURN))
 
-def _angle(mechanism: Mechanism, joint: str, motion: Trajectory) -> tuple[Array, Array]:
-    """Return the angle of a joint but for whole turns [rad], and its rate, shape (n,)."""
-    bodies: Any = mechanism.joint(joint)
-    axis = vec([*unit(bodies.axis)])
-    turns, spins = [IDENTITY] * 2, [ZERO] * 2
-    for k, name in enumerate(bodies.bodies):
-        if (moved := motion.bodies.get(name)) is None:
-            continue
-        assert moved.v is not None
-        pose = quat(moved.p.T)
-        turns[k] = pose * quat(mechanism.body(name).euler_parameters).conjugate()
-        spins[k] = Pose.of(ZERO, pose).turn(vec([*moved.v.T[3:]]))
-    i, j = turns
-    rate = Pose.of(ZERO, i).turn(axis) @ (spins[1] - spins[0])
-    still = np.zeros(len(motion.solved))
-    return angle_about(axis, i.conjugate() * j) + still, rate + still
-
-
-def _expected_change(rate: Array, times: Array) -> Array:
-    """Return the changes between samples that the rates tell [rad]."""
-    return 0.5 * (rate[1:] + rate[:-1]) * np.diff(times, axis=0)
+    def turned(self, values: Array, turns: Array) -> Array:
+        """Return the angle with its turns."""
+        return values + TURN * turns
 
 
 DOUBTFUL = float(np.cos(0.5 * DOUBT))
 """Agreement less than this, of either sign, might be another number of turns."""
 
 
-def followed_attitude(
-    prepare: Prepare, mechanism: Mechanism, path: Path, body: str
-) -> Array | None:
+def followed_attitude(mechanism: Mechanism, path: Path, body: str) -> Array | None:
     """Return Euler parameters of a moving body's rotation since design at the samples of a path,
     their sign continuous on the way from there; global axes, shape (n, 4). See `followed`.
     """
-    return followed(prepare, mechanism, path, _OfBody(body))
+    return followed(mechanism, path, _OfBody(body))
 
 
 def agreement(change: Quat, rate: Array, dt: Array) -> Array:
@@ -328,31 +314,29 @@ class _OfBody:
         return (self.body,)
 
     def counted(
-        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
-    ) -> tuple[Array, bool]:
-        """Return the parameters with a continuous sign; see `Followed`."""
-        found = np.full((len(times), 4), np.nan)
-        reached = np.flatnonzero(motion.solved)
-        order = reached[np.argsort(times[reached], kind="stable")]
-        if not len(order):
-            return found, True
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, order: Indices
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the parameters but for their sign, and where it changes; see `Followed`."""
         moved = motion.bodies[self.body]
         assert moved.v is not None
         design = quat(mechanism.body(self.body).euler_parameters)
         pose = quat(moved.p[order].T)
         e = np.array([*(pose * design.conjugate())])
-        t, spin = times[order], vec([*moved.v[order].T[3:]])
-        rate = np.array([*Pose.of(ZERO, pose).turn(spin)])
+        rate = np.array([*Pose.of(ZERO, pose).turn(vec([*moved.v[order].T[3:]]))])
         change = quat(e[:, 1:]) * quat(e[:, :-1]).conjugate()
-        agrees = agreement(change, 0.5 * (rate[:, 1:] + rate[:, :-1]), np.diff(t))
+        mean = 0.5 * (rate[:, 1:] + rate[:, :-1])
+        agrees = agreement(change, mean, np.diff(times[order]))
         smallest = cast("Array", np.asarray(change.e0))
         doubtful = np.abs(agrees) < DOUBTFUL
         # rates have no bound towards a fold, but short steps change little
-        kept = np.sign(np.where(doubtful, smallest, agrees))
-        kept[doubtful & (np.abs(smallest) < DOUBTFUL)] = np.nan
-        first = int(np.argmin(np.abs(t - start)))
-        sign = np.full(len(order), np.sign(e[:, first] @ at))
-        sign[first + 1 :] *= np.cumprod(kept[first:])
-        sign[:first] *= np.cumprod(kept[:first][::-1])[::-1]
-        found[order] = (sign * e).T
-        return found, not doubtful.any()
+        turns = np.where(np.where(doubtful, smallest, agrees) < 0.0, 1.0, 0.0)
+        turns[doubtful & (np.abs(smallest) < DOUBTFUL)] = np.nan
+        return e.T, turns, doubtful
+
+    def turns(self, value: Array, near: Array) -> float:
+        """Return one for the other sign."""
+        return float(value @ near < 0.0)
+
+    def turned(self, values: Array, turns: Array) -> Array:
+        """Return the parameters, of the other sign after an odd number of turns."""
+        return (1.0 - 2.0 * (turns % 2.0))[:, None] * values

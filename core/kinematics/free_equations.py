@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,24 +20,26 @@ from ..algebra import ZERO, quat, vec
 from ..errors import SolveError, unknown
 from ..mechanism.mechanism import Mechanism, coordinates
 from ..mechanism.motions import Driver
-from ..primitives.base import GROUND_TWIST, Drive, Pose, Twist
-from ..program import Plan, Tape, program
+from ..primitives.base import GROUND_POSE, GROUND_TWIST, Drive
+from ..program import Plan, Tape
 from ..program.llvm.compiler import available
 from ..program.llvm.executor import bind
 from ..program.llvm.jit import LlvmCode
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
-from .compiled.request import Layout
+from .compiled.request import Layout, slots_of
 from .compiled.traced_forces import angles
-from .forces.equations import BodyStates, ForceEquations, Wrench, arm_of_center, at_work, inertial
+from .forces.equations import BodyStates, ForceEquations, arm_of_center, inertial
 from .formulation.cartesian import COLUMNS, Cartesian
-from .formulation.constraints import constraints, frames
+from .formulation.constraints import frames
 from .formulation.formulation import (
     GROUND_ACCELERATION,
     Acceleration,
+    Configuration,
     motion_of_frame,
     motion_of_point,
 )
-from .formulation.state_vectors import jacobian
+from .formulation.state_vectors import columns_of, jacobian
+from .statics.equations import moved_most
 
 # Singular values below this part of the largest are zero, as for `structure.redundancy`.
 RANK = 1e-9
@@ -64,8 +67,7 @@ class FreeEquations:
                 " determine no motion; give bodies mass, center_of_mass and inertia"
             )
         self.frame = frames(mechanism)
-        found = constraints(self.mechanism, self.frame, {}, named=angles(mechanism))
-        self.formulation = Cartesian(found, self.frame.moving)
+        self.formulation = Cartesian.of(self.mechanism, self.frame, named=angles(mechanism))
         self.unknowns, self.bodies = self.formulation.unknowns, len(self.formulation.bodies)
         self.design = np.concatenate([*self.formulation.design.values()])
         self.evaluations = 0
@@ -89,15 +91,13 @@ class FreeEquations:
             name: [tape.input(k) for k in layout.vector(name, len(values))]
             for name, values in formulation.design.items()
         }
+        self._vectors = {name: layout.vectors[name] for name in state}
         v = [tape.input(k) for k in layout.vector("v", self.unknowns)]
-        inputs = len(layout.slots)
+        self._inputs = range(len(layout.slots))
         at = formulation.configuration(state)
         still = dict.fromkeys(formulation.bodies, GROUND_ACCELERATION)
         states = BodyStates(self.frame, at.poses, formulation.twists(at, v), still)
-        applied = at_work(self.mechanism, states, lambda joint: at.state[f"x {joint}.rotation"][0])
-        equations = ForceEquations(
-            self.mechanism, formulation, at, states, applied, Cartesian((), ())
-        )
+        equations = ForceEquations.traced(self.mechanism, formulation, at, states)
         gravity, power = vec(self.mechanism.gravity), list[Any]()
         mass = dict[tuple[int, int], Any]()
         for body in self.mechanism.moving:
@@ -108,15 +108,12 @@ class FreeEquations:
             power.append(body.mass * (velocity @ gravity))
             for k in range(COLUMNS):
                 unit = [float(k == other) for other in range(COLUMNS)]
-                moved = BodyStates(
-                    self.frame,
-                    at.poses,
-                    {body.name: GROUND_TWIST},
-                    {body.name: Acceleration(vec(unit[:3]), vec(unit[3:]))},
-                )
-                for row, value in enumerate(self._column(inertial(body, moved, ZERO))):
-                    mass[first + row, first + k] = value
-        power += [-(each.stored + each.lost) for each in applied.values()]
+                moved = Acceleration(vec(unit[:3]), vec(unit[3:]))
+                one = {body.name: GROUND_TWIST}, {body.name: moved}
+                wrench = inertial(body, BodyStates(self.frame, at.poses, *one), ZERO)
+                column = [*(self.frame.unit * wrench.force), *wrench.torque]
+                mass |= {(first + row, first + k): value for row, value in enumerate(column)}
+        power += [-(each.stored + each.lost) for each in equations.applied.values()]
         rows = formulation.rows(at)
         self.count = len(rows)
         entries = {(i, k): x for i, row in enumerate(rows) for k, x in row.items()}
@@ -128,21 +125,13 @@ class FreeEquations:
             "demand": equations.demand,
             "power": [sum(power, 0.0)],
         }
-        outputs = {
-            slot: value
-            for name, values in wanted.items()
-            for slot, value in zip(layout.vector(name, len(values)), values, strict=True)
-        }
-        plan = Plan({"free": program("free", tape, outputs)}, layout.slots)
+        plan = Plan({"free": layout.program("free", tape, wanted)}, layout.slots)
         self._executor = bind(plan, 1, LlvmCode(plan) if available() else None)
-        self._inputs, self._outputs = range(inputs), [*outputs]
-        ends = np.cumsum([len(values) for values in wanted.values()])
-        self._parts = dict(zip(wanted, zip([0, *ends], ends, strict=False), strict=True))
+        self._outputs = slots_of(layout.vectors, wanted)
+        ends = [0, *np.cumsum([len(values) for values in wanted.values()]).tolist()]
+        self._parts = [slice(*each) for each in pairwise(ends)]
         self._at_rows = tuple(np.array([*entries], np.intp).reshape(-1, 2).T)
         self._at_mass = tuple(np.array([*mass], np.intp).reshape(-1, 2).T)
-
-    def _column(self, wrench: Wrench) -> list[Any]:
-        return [*(self.frame.unit * wrench.force), *wrench.torque]
 
     def evaluate(self, y: Array) -> Evaluated:
         """Return the equations at a state."""
@@ -151,11 +140,10 @@ class FreeEquations:
         executor.put(self._inputs, y[:-1, None])
         executor.run("free")
         values = executor.get(self._outputs)[:, 0]
-        part = {name: values[slice(*ends)] for name, ends in self._parts.items()}
+        entries, masses, phi, gamma, demand, power = (values[part] for part in self._parts)
         rows, mass = np.zeros((self.count, self.unknowns)), np.zeros((self.unknowns,) * 2)
-        rows[self._at_rows], mass[self._at_mass] = part["rows"], part["mass"]
-        power = float(part["power"][0])
-        return Evaluated(rows, mass, part["phi"], part["gamma"], part["demand"], power)
+        rows[self._at_rows], mass[self._at_mass] = entries, masses
+        return Evaluated(rows, mass, phi, gamma, demand, float(power[0]))
 
     def rate(self, _: float, y: Array) -> Array:
         """Return the rate of a state."""
@@ -190,7 +178,7 @@ class FreeEquations:
         if light.any():
             scaled = self.scale * (np.abs(at.demand) + np.abs(at.mass) @ np.abs(particular))
             if (np.abs(acting[light]) > RANK * np.linalg.norm(scaled)).any():
-                name = self._lightest(free @ ways[:, 0])
+                name, _ = moved_most(self.formulation.columns, free @ ways[:, 0])
                 raise SolveError(
                     f"mechanism {self.mechanism.name!r}: a load acts on a motion of body {name!r}"
                     " that has no inertia, so that its acceleration is infinite; give the body"
@@ -198,11 +186,6 @@ class FreeEquations:
                 )
         motion = np.where(light, 0.0, acting / np.where(light, 1.0, sizes))
         return particular + free @ (ways @ motion)
-
-    def _lightest(self, way: Array) -> str:
-        """Return the body that moves most."""
-        sizes = np.linalg.norm(way[: 6 * self.bodies].reshape(-1, 6), axis=1)
-        return self.formulation.bodies[int(sizes.argmax())]
 
     def split(self, rows: Array, right: Array) -> tuple[Array, Array]:
         """Return a solution x of rows x = right, and a basis of all others beside it, shape
@@ -286,39 +269,29 @@ class FreeEquations:
         ]
         return float(np.abs(np.linalg.eigvals(np.array(columns, np.float64))).max())
 
-    def _states(self, states: Array) -> dict[str, tuple[Pose, Twist]]:
-        n, lanes = self.bodies, states.T
-        v = lanes[len(self.design) :]
-        return {
-            name: (
-                Pose.of(
-                    vec([*lanes[3 * k : 3 * k + 3]]),
-                    quat(lanes[3 * n + 4 * k : 3 * n + 4 * k + 4]),
-                ),
-                Twist(vec([*v[6 * k : 6 * k + 3]]), vec([*v[6 * k + 3 : 6 * k + 6]])),
-            )
-            for k, name in enumerate(self.formulation.bodies)
-        }
+    def _at(self, states: Array) -> Configuration:
+        return self.formulation.configuration(
+            {name: [*states.T[slots]] for name, slots in self._vectors.items()}
+        )
 
     def trajectory(self, states: Array) -> Trajectory:
         """Return the motion of points and bodies over states, shape (m, numbers)."""
-        every = self._states(states)
-        a = np.array([self.accelerations(self.evaluate(y)) for y in states]).T
-        count = len(states)
-
-        def table(values: Sequence[Any]) -> Array:
-            return np.stack([x + np.zeros(count) for x in values], axis=1)
-
-        def carried(body: str) -> tuple[Pose, Twist, Acceleration]:
-            pose, twist = every[body]
-            k = self.formulation.columns[body]
-            return pose, twist, Acceleration(vec([*a[k : k + 3]]), vec([*a[k + 3 : k + 6]]))
+        at, frame, count = self._at(states), self.frame, len(states)
+        v = [*states.T[len(self.design) : -1]]
+        a = [*np.array([self.accelerations(self.evaluate(y)) for y in states]).T]
+        twists = self.formulation.twists(at, v)
+        accelerations = self.formulation.accelerations(at, v, a)
 
         def moving(body: str, position: Sequence[float]) -> list[Array]:
-            if body not in every:
-                return [np.tile(x, (count, 1)) for x in (position, np.zeros(3), np.zeros(3))]
-            arm, unit = self.frame.arm(body, position), self.frame.unit
-            return [table([*each]) for each in motion_of_point(position, arm, unit, *carried(body))]
+            found = motion_of_point(
+                position,
+                frame.arm(body, position),
+                frame.unit,
+                at.poses.get(body, GROUND_POSE),
+                twists.get(body, GROUND_TWIST),
+                accelerations.get(body, GROUND_ACCELERATION),
+            )
+            return [columns_of(each, count) for each in found]
 
         points = {
             point.name: PointMotion(*moving(point.body, point.position))
@@ -326,11 +299,12 @@ class FreeEquations:
         }
         bodies = dict[str, BodyMotion]()
         for body in self.mechanism.moving:
-            r, v, r_tt = moving(body.name, body.origin)
-            p, w, w_t = motion_of_frame(quat(body.euler_parameters), *carried(body.name))
-            bodies[body.name] = BodyMotion(
-                r, table([*p]), np.hstack([v, table([*w])]), np.hstack([r_tt, table([*w_t])])
+            r, v, r_tt = moving(name := body.name, body.origin)
+            own = motion_of_frame(
+                quat(body.euler_parameters), at.poses[name], twists[name], accelerations[name]
             )
+            p, w, w_t = (columns_of(each, count) for each in own)
+            bodies[name] = BodyMotion(r, p, np.hstack([v, w]), np.hstack([r_tt, w_t]))
         solved = np.ones(count, np.bool_)
         return Trajectory(points, solved, np.zeros(count, np.int64), 0.0, bodies=bodies)
 
@@ -339,7 +313,7 @@ class FreeEquations:
         parameters, doubled [rad].
         """
         mechanism, found = self.mechanism, [0.0]
-        every = [self._states(states) for states in (one, other)]
+        every = [self._at(states).poses for states in (one, other)]
         places = [(point.body, point.position) for point in mechanism.points]
         for joint in mechanism.joints:
             places += [(body, at) for body in joint.bodies for at in joint.points_on(body)]
@@ -347,7 +321,7 @@ class FreeEquations:
             if body not in every[0]:
                 continue
             arm = self.frame.arm(body, position)
-            a, b = (each[body][0].u + each[body][0].swing(arm) for each in every)
+            a, b = (each[body].u + each[body].swing(arm) for each in every)
             d = b - a
             found.append(self.frame.unit * float(np.sqrt(d @ d).max()))
         n = self.bodies
@@ -426,7 +400,6 @@ def _driven_row(
     frame = equations.frame
     drive = Drive(0.0, rate if driver.turns else rate / frame.unit, 0.0, 1.0, 0.0)
     driven = replace(mechanism, drivers=(driver,))
-    found = constraints(driven, frame, {driver.name: drive}, named=angles(mechanism))
-    formulation = Cartesian(found, frame.moving)
+    formulation = Cartesian.of(driven, frame, {driver.name: drive}, named=angles(mechanism))
     right = formulation.nu(formulation.configuration(formulation.design))
     return jacobian(formulation)[-1], float(right[-1])

@@ -13,14 +13,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import Quat, quat, vec
 from ..mechanism.mechanism import Mechanism
 from ..primitives.base import Pose
 from ..trajectory import Array
 from .formulation.cartesian import COLUMNS, Cartesian
 from .formulation.constraints import frames
 from .formulation.formulation import Configuration
-from .formulation.state_vectors import displaced, state_of
+from .formulation.state_vectors import columns_of, dense, displaced, placed_bodies, state_of
 
 Bools: TypeAlias = NDArray[np.bool_]
 Poses: TypeAlias = Mapping[str, Array]
@@ -140,18 +139,8 @@ class FreePoses:
 
     def _rows(self, at: Configuration) -> tuple[Array, Array]:
         """Return the residuals and the Jacobian, shapes (n, rows) and (n, rows, unknowns)."""
-        f, lanes = self.formulation, self._lanes(at)
-        none = np.zeros(lanes)
-        rows = f.rows(at)
-        found = np.zeros((lanes, len(rows), f.unknowns))
-        for k, row in enumerate(rows):
-            for column, value in row.items():
-                found[:, k, column] = value
-        residuals = [x + none for x in f.phi(at)]
-        return np.stack(residuals, axis=1) if residuals else np.zeros((lanes, 0)), found
-
-    def _lanes(self, at: Configuration) -> int:
-        return len(next(iter(at.state.values()))[0])
+        f, lanes = self.formulation, len(next(iter(at.state.values()))[0])
+        return columns_of(f.phi(at), lanes), dense(f.rows(at), f.unknowns, lanes)
 
     def _moved(self, at: Configuration, step: Array) -> Configuration:
         return self.formulation.configuration(self.formulation.retract(at, [*step.T]))
@@ -172,13 +161,9 @@ class FreePoses:
         return at, np.abs(residuals).max(axis=1, initial=0.0)
 
     def _poses(self, at: Configuration) -> Poses:
-        found: dict[str, Array] = {}
-        for body in self.mechanism.moving:
-            pose, arm = at.poses[body.name], self.frame.arm(body.name, body.origin)
-            r = vec(body.origin) + self.unit * (pose.u + pose.swing(arm))
-            p: Quat = pose.q * quat(body.euler_parameters)
-            found[body.name] = np.stack([*r, p.e0, *p.e], axis=1)
-        return found
+        lanes = len(next(iter(at.state.values()))[0])
+        found = placed_bodies(self.mechanism, self.frame, at.poses, lanes)
+        return {name: np.hstack(pair) for name, pair in found.items()}
 
     def _in_order(self, found: Sequence[Poses], kept: Bools) -> Poses:
         """Return the kept poses walk by walk, after the design."""

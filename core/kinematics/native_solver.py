@@ -20,11 +20,13 @@ from .compiled.routes import Route, Start
 from .compiled.step_programs import ALONE, JOINED
 from .continuation.walk import marcher
 from .design_batch import RECYCLED, Variants, solve_variants
+from .forces.wanted import WantedForces, wanted_forces
 from .formulation.constraints import Style
-from .one_design import Solver, by_blocks, by_motion, by_program, motion_only, prepare, start_notes
+from .motion_solver import Solver, by_blocks
+from .one_design import by_motion, by_program, motion_only, prepare, start_notes
 
 if TYPE_CHECKING:
-    from .design_forces import DesignForces, ForcesOfDesigns
+    from .design_forces import ForcesOfDesigns
 
 
 class Method(StrEnum):
@@ -78,19 +80,12 @@ class NativeSolver:
             SolveError: drivers and degrees of freedom do not match, or the mechanism does not close
                 at the design position.
         """
-        request = self._request(path, points, bodies)
-        if forces:
-            from .forces.wanted import wanted_forces  # most motions are without forces
-
-            request = replace(request, forces=wanted_forces(mechanism, forces))
+        request = self._request(mechanism, path, points, bodies, forces)
         if self.method is Method.BY_SIZE:
             return prepare(mechanism, request, path)
         if self.method is Method.ONE_PROGRAM:
             return by_program(
-                mechanism,
-                request,
-                path,
-                lambda each: Route(compile_model(mechanism, each), path),
+                mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
             )
         by_components = self.method is Method.BY_COMPONENTS
         make = by_blocks(mechanism, motion_only(mechanism, request), by_components=by_components)
@@ -120,16 +115,14 @@ class NativeSolver:
         Raises:
             SolveError: as `prepare`.
         """
-        request = self._request(path, points, bodies, varied)
-        if not forces:
-            return PreparedDesigns(Route(compile_model(mechanism, request), path))
-        from .design_forces import DesignForces, compile_with_forces  # most studies are without
-        from .forces.wanted import wanted_forces
+        request = self._request(mechanism, path, points, bodies, forces, varied)
+        wanted = request.forces
+        if wanted is not None:
+            from .compiled.traced_forces import can_trace  # most studies are without
 
-        wanted = wanted_forces(mechanism, forces)
-        model = compile_with_forces(mechanism, replace(request, order=2, forces=wanted))
-        route = Route(model, path)
-        return PreparedDesigns(route, DesignForces(route, wanted))
+            traced = wanted if can_trace(mechanism) else None
+            request = replace(request, order=2, forces=traced)
+        return PreparedDesigns(Route(compile_model(mechanism, request), path), wanted)
 
     def program_size(
         self,
@@ -143,7 +136,8 @@ class NativeSolver:
         Raises:
             SolveError: as `prepare`.
         """
-        return ProgramSize.of(self._model(mechanism, path, points, bodies))
+        request = self._request(mechanism, path, points, bodies)
+        return ProgramSize.of(compile_model(mechanism, request))
 
     def loops(
         self,
@@ -160,7 +154,8 @@ class NativeSolver:
             SolveError: as `prepare`; and in the call, a step has to be divided, which is not done
                 in the loops.
         """
-        route = Route(self._model(mechanism, path, points, bodies), path)
+        request = self._request(mechanism, path, points, bodies)
+        route = Route(compile_model(mechanism, request), path)
         track = marcher(route, tol, crossing=False).track
 
         def work() -> Array:
@@ -175,20 +170,13 @@ class NativeSolver:
 
         return work
 
-    def _model(
+    def _request(
         self,
         mechanism: Mechanism,
         path: Path,
         points: Sequence[str],
-        bodies: Sequence[str] = (),
-    ) -> Model:
-        return compile_model(mechanism, self._request(path, points, bodies))
-
-    def _request(
-        self,
-        path: Path,
-        points: Sequence[str],
         bodies: Sequence[str],
+        forces: Collection[str] = (),
         varied: Sequence[str] = (),
     ) -> Request:
         return Request(
@@ -200,6 +188,7 @@ class NativeSolver:
             self.compiled,
             varied=tuple(varied),
             last_iteration=self.last_iteration,
+            forces=wanted_forces(mechanism, forces) if forces else None,
         )
 
 
@@ -256,16 +245,15 @@ class PreparedDesigns:
 
     Attributes:
         route: the path made ready for the compiled model.
-        loads: computes the forces that are wanted; None without any.
+        wanted: the forces that are wanted; None without any.
     """
 
     route: Route
-    loads: DesignForces | None = None
+    wanted: WantedForces | None = None
 
     def along(self, path: Path) -> PreparedDesigns:
         """Return the same programs on another path of the same drivers."""
-        route = Route(self.route.model, path)
-        return PreparedDesigns(route, self.loads and self.loads.along(route))
+        return replace(self, route=Route(self.route.model, path))
 
     @property
     def start(self) -> Start:
@@ -311,7 +299,11 @@ class PreparedDesigns:
         Args:
             found: what `solve` returns for the geometry.
         """
-        return self.loads and self.loads.of(found, geometry, tol)
+        if self.wanted is None:
+            return None
+        from .design_forces import forces_of_designs  # most studies are without
+
+        return forces_of_designs(self.route, self.wanted, found, geometry, tol)
 
     def iterations(self, found: Variants) -> Array:
         """Return Newton's iterations of each sample, shape (n, V)."""

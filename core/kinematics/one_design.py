@@ -1,16 +1,6 @@
 """Solve a mechanism over a sweep: from the description to the motion of points and bodies.
 
-Its size decides on the blocks: one program, components one after the other, or one sparse system.
 Forces come from the program of the mechanism, or from the motion of all its bodies.
-
-The solutions and verdicts are the same to round-off. One program costs least for each sample, and
-most to trace and compile: its size grows faster than the mechanism. Components share programs, so a
-chain of thousands is made ready in seconds. An indivisible mechanism too large for one program is a
-sparse system. Measured on chains of four-bars, one program (first interpreted, and compiled if it
-runs often) against components: 21 bodies 2.3 (0.5) and 3.1 us a sample, made ready in 0.1 and 0.3
-s; 41 bodies 4.4 (0.9) and 3.8 us, in 0.3 and 0.3 s. On rings of loops, one program against a sparse
-system: 31 bodies 21 and 70 us, made ready in 0.6 and 0.04 s; 39 bodies 42 and 85 us, in 0.8 and
-0.06 s.
 """
 
 from __future__ import annotations
@@ -18,33 +8,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..caches import keep_last
 from ..driving import Driving
 from ..errors import SolveError
-from ..failures import FailureKind
-from ..input_checks import finite, names_of, no_such, real, require_kind
+from ..input_checks import finite, names_of, real, require_kind, require_known
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
-from . import followed
-from .compiled.compiled_model import is_builtin
 from .compiled.request import Request
 from .compiled.routes import Route, recent_route, start_of
 from .continuation.sweep import follow
-from .formulation.constraints import Style, frames
+from .forces.wanted import wanted_forces
+from .formulation.constraints import Style
+from .motion_solver import Solver, in_blocks, prepare_motion
 from .structure.degrees_of_freedom import require_driven
-
-if TYPE_CHECKING:
-    from .blocks.component_lanes import ComponentLanes
-    from .blocks.sparse_lanes import SparseLanes
-    from .structure.components import Component
-
-Solver = Callable[[float], Trajectory]
-"""Solves what it was made for, to a tolerance."""
 
 
 def motion_only(mechanism: Mechanism, request: Request) -> Request:
@@ -61,6 +40,7 @@ def by_motion(mechanism: Mechanism, request: Request, path: Path, motion: Solver
     if wanted is None:
         return motion
     # most motions are asked for without forces: they need not wait for the import
+    from .followed import follower
     from .forces.reactions import with_forces
 
     names = {*wanted.joints, *wanted.drivers, *wanted.elements}
@@ -104,14 +84,6 @@ def by_program(
     return solve
 
 
-# Moving bodies up to which one program is made ready in a second, and as fast as components before
-# it is compiled. Larger rings are so near to singular that the estimate of sigma by one program
-# leaves all their samples in doubt.
-ONE_PROGRAM = 40
-# Moving bodies of a component up to which it is made ready in a third of a second.
-COMPONENT = 20
-
-
 def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """Make a mechanism ready to be solved along a path.
 
@@ -122,16 +94,10 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
             the design position.
     """
-    if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
-        known = is_builtin(mechanism) and path.is_builtin
-        make = (_recent_blocks if known else by_blocks)(mechanism, motion_only(mechanism, request))
-        return by_motion(mechanism, request, path, make(path))
+    if request.forces is None or in_blocks(mechanism, request):
+        motion = prepare_motion(mechanism, motion_only(mechanism, request), path)
+        return by_motion(mechanism, request, path, motion)
     return by_program(mechanism, request, path, lambda each: recent_route(mechanism, each, path))
-
-
-followed_angle = partial(followed.followed_angle, prepare)
-followed_attitude = partial(followed.followed_attitude, prepare)
-follower = partial(followed.follower, prepare)
 
 
 def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
@@ -142,60 +108,6 @@ def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) 
     if start.stands and not start.ambiguous:
         return []
     return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
-
-
-def by_blocks(
-    mechanism: Mechanism, request: Request, *, by_components: bool | None = None
-) -> Callable[[Path], Solver]:
-    """Return a solver by components, or by a sparse system; the size of the components decides,
-    unless it is given.
-    """
-    # few mechanisms are so large: the others need not wait for the import
-    from .blocks.sparse_lanes import SparseLanes
-    from .blocks.sweep import BlockSweep
-    from .structure.components import components
-
-    parts = None
-    if by_components is None:
-        try:
-            # couplers tie components together
-            parts = [] if mechanism.couplers else components(mechanism, frames(mechanism))
-        except SolveError:
-            require_driven(mechanism)  # which names what can still move
-            raise
-        by_components = 0 < max((len(part.bodies) for part in parts), default=0) <= COMPONENT
-    lanes = _lanes(mechanism, request, parts) if by_components else SparseLanes(mechanism, request)
-
-    def along(path: Path) -> Solver:
-        return BlockSweep(lanes, path).solve
-
-    again = keep_last(1)(along)
-    return lambda path: (again if path.is_builtin else along)(path)
-
-
-def _lanes(
-    mechanism: Mechanism, request: Request, parts: Sequence[Component] | None
-) -> ComponentLanes | SparseLanes:
-    """Return the lanes of the components, or of a sparse system if one of them lacks rows.
-
-    Redundant rows may be matched with its unknowns, and the rows it needs with those of others.
-    """
-    from .blocks.component_lanes import ComponentLanes
-    from .blocks.sparse_lanes import SparseLanes
-
-    try:
-        return ComponentLanes(mechanism, request, parts)
-    except SolveError as error:
-        if error.kind is not FailureKind.LOCKED or parts is None:
-            raise
-        try:
-            return SparseLanes(mechanism, request)
-        except SolveError:
-            raise error from None
-
-
-# One only, and of its paths the last: they fill much of the memory. A thread solves it in place.
-_recent_blocks = keep_last(1, per_thread=True)(by_blocks)
 
 
 def solve(
@@ -263,8 +175,6 @@ def solve(
     )
     moved = partial(driving, mechanism, path, driver, np.array(values, dtype=float))
     if forces is not False:
-        from .forces.wanted import wanted_forces  # most motions are without forces
-
         names = None if forces is True else forces
         request = replace(request, forces=wanted_forces(mechanism, names))
     return prepare(mechanism, request, path)(tol).along(moved)
@@ -312,17 +222,11 @@ def asked(
     problem = _problem(driver, values, motions, rate, order, tol)
     if problem:
         raise SolveError(f"{who}: {problem}")
-    for what, names, known in (
-        ("driver", (driver, *motions), mechanism.drivers),
-        ("point", wanted, mechanism.points),
-        ("body", bodies, mechanism.bodies),
-    ):
-        there = [each.name for each in known]
-        for name in names:
-            if name not in there:
-                # a mechanism that nothing drives is the better explanation
-                require_driven(mechanism)
-                raise no_such(who, what, name, there)
+    # a mechanism that nothing drives is the better explanation
+    driven = partial(require_driven, mechanism)
+    require_known(who, "driver", (driver, *motions), mechanism.drivers, driven)
+    require_known(who, "point", wanted, mechanism.points, driven)
+    require_known(who, "body", bodies, mechanism.bodies, driven)
     design = {name: value for name in (driver, *motions) if (value := mechanism.design_value(name))}
     with np.errstate(over="ignore"):
         times = (values - design.get(driver, 0.0)) / rate

@@ -4,9 +4,9 @@ the forces that such a motion needs: reactions of joints, and forces without a b
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -17,14 +17,13 @@ from ..forces import Forces
 from ..mechanism.mechanism import GROUND, Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import QUANTITIES, Array, BodyMotion, Trajectory
-from .forces.reactions import ForceRows, MotionLanes, forces_of
+from .forces.reactions import TURN, ForceRows, forces_of, with_rates
 from .formulation.cartesian import Cartesian
 from .formulation.constraints import Constraint, frames
 from .formulation.formulation import Relation
 
 WIDTHS = {"poses": 7, "velocities": 6, "accelerations": 6}
 """Numbers of a body, by argument of `residuals`."""
-TURN = 2.0 * np.pi
 # Angles are this near to zero at one sample as at another: rounding must not decide [rad].
 NEAR = 1e-3
 SMALL = 1e-9
@@ -173,7 +172,7 @@ def replayed(
     if not motions:
         raise SolveError("residuals: there is no pose of a body; give those of some")
     part, not_judged = judged_part(mechanism, motions)
-    orders = min(1 + (m.v is not None) * (1 + (m.a is not None)) for m in motions.values())
+    orders, _ = with_rates(motions)
     rows = _Rows(part, orders, angles or {})
     with np.errstate(invalid="ignore"):
         left = rows.left(motions)
@@ -243,7 +242,7 @@ class _Rows:
         self.turns: dict[str, Array] = {}
         self.whole: dict[str, int] = {}
         self.formulation = Cartesian.of(mechanism, frames(mechanism))
-        self.bodies = [self._bodies(c) for _, c in _numbered(self.formulation)]
+        self.bodies = [*map(self._bodies, self.formulation.of_rows)]
 
     def _bodies(self, c: Constraint | Relation) -> tuple[str, ...]:
         """Return the moving bodies of a row."""
@@ -254,28 +253,12 @@ class _Rows:
 
     def left(self, motions: Mapping[str, BodyMotion]) -> list[Array]:
         """Return what motions leave of the rows, shape (n, rows) each [m, m/s, m/s^2]."""
-        count = len(next(iter(motions.values())).r)
-        none = np.zeros((count, 6))
-        rated = {
-            name: BodyMotion(m.r, m.p, none if m.v is None else m.v, none if m.a is None else m.a)
-            for name, m in motions.items()
-        }
-        solved, path = np.ones(count, dtype=np.bool_), Path({}, np.zeros(count))
-        still = Trajectory({}, solved, np.zeros(count, dtype=np.int64), 0.0, bodies=rated)
-        lines = ForceRows(MotionLanes(self.mechanism, path, still))
-        f, states, unit = lines.formulation, lines.lanes.at, lines.lanes.frame.unit
-        at = f.configuration(self._turned({**lines.equations.at.state}))
-        found = [f.phi(at)]
-        if self.orders > 1:
-            rows = f.rows(at)
-            v = [x for k in f.bodies for x in (*states.twists[k].v, *states.twists[k].w)]
-            own, velocity = _less(f, f.nu(at), rows, v)
-            found.append(velocity)
-            if self.orders > 2:
-                a = [states.accelerations[k] for k in f.bodies]
-                a = [x for each in a for x in (*each.v_t, *each.w_t)]
-                found.append(_less(f, f.gamma(at, [*v, *own]), rows, a)[1])
-        return [unit * lines.stacked(each) if each else np.zeros((count, 0)) for each in found]
+        _, rated = with_rates(motions)
+        count = len(next(iter(rated.values())).r)
+        lines = _force_rows(self.mechanism, rated, np.zeros(count))
+        formulation, unit = lines.formulation, lines.frame.unit
+        at = formulation.configuration(self._turned({**lines.equations.at.state}))
+        return [unit * each for each, _ in islice(lines.left(at), self.orders)]
 
     def _turned(self, state: dict[str, Any]) -> dict[str, Any]:
         """Return a state with all turns of coupled joints."""
@@ -361,43 +344,19 @@ class _Rows:
         return groups
 
 
-def _numbered(formulation: Cartesian) -> Iterator[tuple[int, Constraint | Relation]]:
-    """Yield number and constraint of every row."""
-    every = (
-        c
-        for c in formulation.constraints
-        for _ in range(c.primitive.n if isinstance(c, Constraint) else 1)
-    )
-    yield from enumerate(every)
+def _force_rows(mechanism: Mechanism, motions: Mapping[str, BodyMotion], times: Array) -> ForceRows:
+    return ForceRows(mechanism, Path({}, times), _trajectory(motions, len(times)))
+
+
+def _trajectory(motions: Mapping[str, BodyMotion], n: int) -> Trajectory:
+    solved, none = np.ones(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
+    return Trajectory({}, solved, none, 0.0, bodies=motions)
 
 
 def _joined(motions: Sequence[BodyMotion]) -> BodyMotion:
     """Return the lanes of several motions, one after the other."""
     parts = [[getattr(each, key) for each in motions] for key in ("r", "p", "v", "a")]
     return BodyMotion(*(None if each[0] is None else np.concatenate(each) for each in parts))  # pyright: ignore[reportArgumentType]
-
-
-def _less(
-    formulation: Cartesian,
-    right: Sequence[Any],
-    rows: Sequence[Mapping[int, Any]],
-    rates: Sequence[Any],
-) -> tuple[list[Any], list[Any]]:
-    """Return the rates of the joints' coordinates, by their measuring rows, and J times all rates
-    less the right-hand sides.
-    """
-    bodies = len(rates)
-    left = [
-        sum((x * rates[c] for c, x in row.items() if c < bodies), -b)
-        for row, b in zip(rows, right, strict=True)
-    ]
-    own: list[Any] = [0.0] * (formulation.unknowns - bodies)
-    for k, c in _numbered(formulation):
-        if isinstance(c, Constraint) and c.coordinate:
-            column = formulation.coordinates[c.coordinate]
-            own[column - bodies] = -left[k] / rows[k][column]
-    coordinates = (sum(x * own[c - bodies] for c, x in row.items() if c >= bodies) for row in rows)
-    return own, [x + y for x, y in zip(left, coordinates, strict=True)]
 
 
 # Of the largest singular value of the rows, what is none.
@@ -431,14 +390,11 @@ def needed_forces(mechanism: Mechanism, motions: Mapping[str, BodyMotion], times
     Raises:
         SolveError: the motion lacks a body or its accelerations.
     """
-    count = len(times)
-    solved, none = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.int64)
-    motion, path = Trajectory({}, solved, none, 0.0, bodies=motions), Path({}, times)
     passive = replace(mechanism, drivers=())
     with np.errstate(divide="ignore", invalid="ignore"):  # a spring without a length, for once
-        demand = ForceRows(MotionLanes(passive, path, motion)).demand
-        lines = ForceRows(MotionLanes(mechanism, path, motion))
-    left, unit = np.array(demand), lines.lanes.frame.unit
+        demand = _force_rows(passive, motions, times).demand
+        lines = _force_rows(mechanism, motions, times)
+    left, unit = np.array(demand), lines.frame.unit
     if lines.matrix.shape[1]:
         _, sizes, right = np.linalg.svd(lines.matrix, full_matrices=False)
         held = sizes > REDUNDANT * sizes[:, :1]
@@ -449,5 +405,6 @@ def needed_forces(mechanism: Mechanism, motions: Mapping[str, BodyMotion], times
     bodies = demand[:, : 6 * len(columns)]
     known = np.abs(bodies)[np.isfinite(bodies)]
     largest = float(known.max(initial=0.0)) / unit
-    forces = forces_of(passive, path, motion) if passive.joints else None
+    motion = _trajectory(motions, len(times))
+    forces = forces_of(passive, Path({}, times), motion) if passive.joints else None
     return Needed(forces, free, largest)

@@ -31,7 +31,7 @@ from ..extras import library
 from ..harness.record import Record, Results
 from ..harness.scene import with_scenes
 from ..report.curves import write_curves
-from ..report.page_model import judged, worst
+from ..report.page_model import worst_of
 from ..report.report import write_report
 from ..report.sections import SCENE_SCRIPTS, script_of, style_sheet
 from .model import LiveModel
@@ -405,8 +405,7 @@ def _file(results: Results, case: Case, name: str) -> bytes:
 
 def _verdict(number: int, record: Record, *, last: bool) -> Verdict:
     """Return the summary of a record."""
-    found = judged([record])
-    most = worst(found) if found else None
+    most = worst_of(record)
     return Verdict(
         id=number,
         engine=record.engine,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
@@ -367,7 +367,7 @@ def drawn(
         for body in stands.bodies
     ]
     posed = msgspec.structs.replace(stands, frames=frames, bodies=bodies, message="")
-    return asdict(drawing(posed, axis, values))
+    return msgspec.structs.asdict(drawing(posed, axis, values))
 
 
 def sweep_axis(case: Case) -> Axis:

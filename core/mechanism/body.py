@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..errors import MechanismError
-from ..input_checks import finite, held, plain, require_finite, triple
+from ..input_checks import finite, finite_numbers, plain
 from ..joints.base import Kind
 from ..trajectory import Array
 
@@ -83,21 +83,6 @@ def inertia_matrix(inertia: Inertia) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
 
 
-def checked_mass(body: str, mass: Any) -> float:
-    """Return a mass [kg].
-
-    Raises:
-        MechanismError: it is negative or not finite.
-    """
-    mass = plain(mass)
-    if not finite(mass) or mass < 0.0:
-        raise MechanismError(
-            f"body {body!r}: mass is {mass!r}, expected a number of kg, zero or more",
-            f"bodies.{body}.mass",
-        )
-    return float(mass)
-
-
 def checked_inertia(body: str, inertia: Any, unit: str = str(INERTIA)) -> Inertia:
     """Return the inertia about the centre of mass, in the unit it is given in.
 
@@ -106,8 +91,7 @@ def checked_inertia(body: str, inertia: Any, unit: str = str(INERTIA)) -> Inerti
             sum of the two others.
     """
     what, key = f"body {body!r}: inertia", f"bodies.{body}.inertia"
-    numbers = held(what, inertia, 6, SIX_NUMBERS)
-    require_finite(what, numbers, SIX_NUMBERS)
+    numbers = finite_numbers(what, inertia, 6, SIX_NUMBERS)
     found: Inertia = tuple(float(x) for x in numbers)  # pyright: ignore[reportAssignmentType]
     least, middle, most = (float(x) for x in np.linalg.eigvalsh(inertia_matrix(found)))
     principal = f"its principal moments are {least:.6g}, {middle:.6g} and {most:.6g} {unit}"
@@ -153,26 +137,41 @@ class Body:
     inertia: Inertia | None = None
 
     def __post_init__(self) -> None:
-        who = f"body {self.name!r}: origin"
-        object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
-        require_finite(who, self.origin, Kind.POSITION.value)
-        p = held(
-            who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS
-        )
-        require_finite(who, p, FOUR_NUMBERS)
+        who = f"body {self.name!r}"
+        origin = finite_numbers(f"{who}: origin", self.origin, 3, Kind.POSITION.value)
+        object.__setattr__(self, "origin", origin)
+        p = finite_numbers(f"{who}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS)
         length = math.sqrt(sum(e * e for e in p))
         # Tables print Euler parameters to about four digits: a longer defect is a mistake, a
         # shorter one rounding.
         if not abs(length - 1.0) < 1e-3:
             raise MechanismError(
-                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected"
+                f"{who}: euler_parameters {[*p]} have length {length:.6g}, expected"
                 " four numbers of length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
             )
         if abs(length - 1.0) > NORMALISED:
             p = tuple(e / length for e in p)
         object.__setattr__(self, "euler_parameters", p)
-        if self.mass != 0.0 or self.center_of_mass is not None or self.inertia is not None:
-            self._check_mass()
+        if self.mass == 0.0 and self.center_of_mass is None and self.inertia is None:
+            return
+        mass = plain(self.mass)
+        if not finite(mass) or mass < 0.0:
+            raise MechanismError(
+                f"{who}: mass is {mass!r}, expected a number of kg, zero or more",
+                f"bodies.{self.name}.mass",
+            )
+        object.__setattr__(self, "mass", float(mass))
+        center = self.origin if self.center_of_mass is None else self.center_of_mass
+        center = finite_numbers(f"{who}: center_of_mass", center, 3, Kind.POSITION.value)
+        object.__setattr__(self, "center_of_mass", center)
+        if self.inertia is None:
+            return
+        object.__setattr__(self, "inertia", checked_inertia(self.name, self.inertia))
+        if self.mass == 0.0:
+            raise MechanismError(
+                f"{who}: has an inertia, but no mass; give mass, or leave inertia out",
+                f"bodies.{self.name}.inertia",
+            )
 
     def in_frame(self, place: Callable[[Any], Any], unit: float = 1.0) -> Body:
         """Return the body with its points passed to a function, and its inertia in kg and a unit of
@@ -183,19 +182,3 @@ class Body:
             return moved
         scaled = self.inertia and tuple(INERTIA.in_kg_and_s(x, unit) for x in self.inertia)
         return replace(moved, center_of_mass=place(self.center_of_mass), inertia=scaled)
-
-    def _check_mass(self) -> None:
-        who = f"body {self.name!r}"
-        object.__setattr__(self, "mass", checked_mass(self.name, self.mass))
-        center = self.origin if self.center_of_mass is None else self.center_of_mass
-        what = f"{who}: center_of_mass"
-        object.__setattr__(self, "center_of_mass", triple(what, center, Kind.POSITION.value))
-        require_finite(what, self.center_of_mass or (), Kind.POSITION.value)
-        if self.inertia is None:
-            return
-        object.__setattr__(self, "inertia", checked_inertia(self.name, self.inertia))
-        if self.mass == 0.0:
-            raise MechanismError(
-                f"{who}: has an inertia, but no mass; give mass, or leave inertia out",
-                f"bodies.{self.name}.inertia",
-            )

@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Any, ClassVar, Self, cast
 
 from ..errors import MechanismError, Phrase
-from ..input_checks import finite, held, plain, require_direction, require_finite, triple
+from ..input_checks import finite, finite_numbers, held, plain, require_direction
 from ..joints.base import Joint, Kind, position, positions, unit
 from .body import (
     ANGLE,
@@ -24,6 +24,7 @@ from .body import (
     TORQUE,
     TURNING_DAMPING,
     TURNING_STIFFNESS,
+    Dimension,
     dimension_of,
     quantity,
 )
@@ -104,21 +105,23 @@ class ForceElement:
     def _numbers(self) -> None:
         """Make the quantities finite numbers, of zero or more unless they are angles."""
         for each in fields(self):
-            if (dimension := dimension_of(each)) is None:
-                continue
-            value, signed = plain(getattr(self, each.name)), dimension is ANGLE
-            if not finite(value) or (value < 0.0 and not signed):
-                more = "" if signed else ", zero or more"
-                raise MechanismError(
-                    f"{self}: {each.name} is {value!r}, expected a number of {dimension}{more}",
-                    self._key(each.name),
-                )
-            object.__setattr__(self, each.name, float(value))
+            if (dimension := dimension_of(each)) is not None:
+                value = plain(getattr(self, each.name))
+                more = None if dimension is ANGLE else ", zero or more"
+                object.__setattr__(self, each.name, self._number(each.name, value, dimension, more))
+
+    def _number(self, what: str, value: Any, dimension: Dimension, more: str | None) -> float:
+        """Return a finite number; it may be negative if no more is said."""
+        if not finite(value) or (value < 0.0 and more is not None):
+            raise MechanismError(
+                f"{self}: {what} is {value!r}, expected a number of {dimension}{more or ''}",
+                self._key(what),
+            )
+        return float(value)
 
     def _vector(self, what: str, kind: str) -> None:
-        who = f"{self}: {what}"
-        object.__setattr__(self, what, triple(who, getattr(self, what), kind))
-        require_finite(who, getattr(self, what), kind)
+        found = finite_numbers(f"{self}: {what}", getattr(self, what), 3, kind)
+        object.__setattr__(self, what, found)
 
 
 @dataclass(frozen=True)
@@ -149,9 +152,7 @@ class SpringDamper(ForceElement):
     def __post_init__(self) -> None:
         who = f"{self}: points"
         pair = held(who, self.points, 2, Kind.POSITIONS.value)
-        points = tuple(triple(who, each, Kind.POSITIONS.value) for each in pair)
-        for each in points:
-            require_finite(who, each, Kind.POSITIONS.value)
+        points = tuple(finite_numbers(who, each, 3, Kind.POSITIONS.value) for each in pair)
         object.__setattr__(self, "points", points)
         if self.i == self.j:
             raise MechanismError(
@@ -333,8 +334,8 @@ class Bushing(ForceElement):
         self._vector("point", Kind.POSITION.value)
         self._axes()
         for each in fields(self):
-            if dimension_of(each) is not None:
-                self._three(each.name, str(dimension_of(each)))
+            if (dimension := dimension_of(each)) is not None:
+                self._three(each.name, dimension)
         self._curves()
         try:
             object.__setattr__(self, "law", Law(self.law))
@@ -359,9 +360,10 @@ class Bushing(ForceElement):
     def _axes(self) -> None:
         who = f"{self}: axes"
         expected = "two directions [[x, y, z], [x, y, z]] at right angles"
-        pair = [triple(who, each, expected) for each in held(who, self.axes, 2, expected)]
+        pair = [
+            finite_numbers(who, each, 3, expected) for each in held(who, self.axes, 2, expected)
+        ]
         for each in pair:
-            require_finite(who, each, expected)
             require_direction(who, each)
         given = [math.hypot(*each) for each in pair]
         first, second = (unit(each) for each in pair)
@@ -379,18 +381,13 @@ class Bushing(ForceElement):
         second = unit([*(second - off * first)])
         object.__setattr__(self, "axes", (tuple(first), tuple(second)))
 
-    def _three(self, what: str, unit_of: str) -> None:
+    def _three(self, what: str, dimension: Dimension) -> None:
         given = plain(getattr(self, what))
         values = (given,) * 3 if finite(given) else given
-        values = held(f"{self}: {what}", values, 3, f"a number of {unit_of}, or three")
-        for value in values:
-            if not finite(value) or (value < 0.0 and what != "preload"):
-                more = "" if what == "preload" else ", zero or more (a falling force needs a curve)"
-                raise MechanismError(
-                    f"{self}: {what} is {value!r}, expected a number of {unit_of}{more}",
-                    self._key(what),
-                )
-        object.__setattr__(self, what, tuple(map(float, values)))
+        values = held(f"{self}: {what}", values, 3, f"a number of {dimension}, or three")
+        more = None if what == "preload" else ", zero or more (a falling force needs a curve)"
+        found = tuple(self._number(what, value, dimension, more) for value in values)
+        object.__setattr__(self, what, found)
 
     def _curves(self) -> None:
         if self.curve is None:

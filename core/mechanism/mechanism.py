@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any
 
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
-from ..input_checks import held, require_finite, triple
+from ..input_checks import finite_numbers, held
 from ..joints import Distance
 from ..joints.base import AxialJoint, Joint, Kind, unit
 from ..joints.coupler import Coupler
@@ -42,8 +42,8 @@ class Point:
 
     def __post_init__(self) -> None:
         who = f"point {self.name!r}: position"
-        object.__setattr__(self, "position", triple(who, self.position, Kind.POSITION.value))
-        require_finite(who, self.position, Kind.POSITION.value)
+        position = finite_numbers(who, self.position, 3, Kind.POSITION.value)
+        object.__setattr__(self, "position", position)
 
 
 @dataclass(frozen=True)
@@ -120,34 +120,28 @@ class Mechanism:
                         f"{who} has {each!r}, expected {one}; check the order of the arguments"
                     )
             object.__setattr__(self, what, members)
-            _unique(what, [each.name for each in getattr(self, what)])
+            twice = [name for name, k in Counter(x.name for x in members).items() if k > 1]
+            if twice:
+                raise MechanismError(
+                    f"{what}: the name {min(twice)!r} is used more than once; names must be unique",
+                    what,
+                )
         if any(body.name == GROUND for body in self.bodies):
             raise MechanismError(
                 f"body {GROUND!r} exists by itself; give the fixed body another name or leave"
                 " it out",
                 "bodies",
             )
-        known = {GROUND: None} | dict.fromkeys(body.name for body in self.bodies)
         for joint in self.joints:
             for name in joint.bodies:
-                _known(
-                    f"joint {joint.name!r} ({joint.type})",
-                    "body",
-                    name,
-                    known,
-                    f"joints.{joint.name}.bodies",
-                )
+                self._require_body(str(joint), name, f"joints.{joint.name}.bodies")
         self._leave_out_grounded()
         for point in self.points:
-            _known(f"point {point.name!r}", "body", point.body, known, f"points.{point.name}.body")
+            self._require_body(f"point {point.name!r}", point.body, f"points.{point.name}.body")
         for coupler in self.couplers:
+            who, key = str(coupler), f"joints.{coupler.name}.joints"
             for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
-                who, key = (
-                    f"joint {coupler.name!r} ({coupler.type})",
-                    f"joints.{coupler.name}.joints",
-                )
-                _known(who, "joint", name, self._named["joints"], key)
-                joint = self.joint(name)
+                joint = self._require("joint", who, name, key)
                 if freedom not in joint.freedoms:
                     raise MechanismError(
                         f"{who}: joint {name!r} is {joint.type} and has no {freedom} to couple; "
@@ -156,20 +150,18 @@ class Mechanism:
                     )
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
-                key = f"drivers.{driver.name}.point"
-                _known(f"driver {driver.name!r}", "point", driver.point, self._named["points"], key)
-                if self.is_fixed(self.point(driver.point).body):
+                who, key = f"driver {driver.name!r}", f"drivers.{driver.name}.point"
+                point = self._require("point", who, driver.point, key)
+                if self.is_fixed(point.body):
                     raise MechanismError(
-                        f"driver {driver.name!r}: point {driver.point!r} is on"
-                        f" {self.point(driver.point).body!r}, which is fixed; drive a point of a"
-                        " moving body",
+                        f"{who}: point {driver.point!r} is on {point.body!r}, which is fixed; drive"
+                        " a point of a moving body",
                         key,
                     )
             elif isinstance(driver, JointDriver):
-                key = f"drivers.{driver.name}.joint"
-                _known(f"driver {driver.name!r}", "joint", driver.joint, self._named["joints"], key)
-                driver.check(self.joint(driver.joint))
-        self._check_loads(known)
+                who, key = f"driver {driver.name!r}", f"drivers.{driver.name}.joint"
+                driver.check(self._require("joint", who, driver.joint, key))
+        self._check_loads()
 
     def __repr__(self) -> str:
         """Return the names of the members in one line; a point that the case reader adds is none
@@ -216,27 +208,41 @@ class Mechanism:
         fixed = {each.name for each in self.bodies if each.fixed} | {GROUND}
         return view(title, spots, rods, fixed)
 
-    def _check_loads(self, bodies: Mapping[str, None]) -> None:
-        what = "gravity"
-        object.__setattr__(self, what, triple(what, self.gravity, "three numbers [m/s^2]"))
-        require_finite(what, self.gravity, "three numbers [m/s^2]")
+    def _check_loads(self) -> None:
+        gravity = finite_numbers("gravity", self.gravity, 3, "three numbers [m/s^2]")
+        object.__setattr__(self, "gravity", gravity)
         for force in self.forces:
             key = f"forces.{force.name}"
             if isinstance(force, TorsionSpringDamper):
-                _known(str(force), "joint", force.joint, self._named["joints"], f"{key}.joint")
-                force.check(self.joint(force.joint))
+                force.check(self._require("joint", str(force), force.joint, f"{key}.joint"))
                 continue
             key = f"{key}.{'body' if len(force.bodies) == 1 else 'bodies'}"
             for name in force.bodies:
-                _known(str(force), "body", name, bodies, key)
+                self._require_body(str(force), name, key)
 
         for bushing in self.bushings:
             key = f"joints.{bushing.joint}.bushings"
-            _known(str(bushing), "joint", bushing.joint, self._named["joints"], key)
+            rod = self._require("joint", str(bushing), bushing.joint, key)
             for name in bushing.bodies:
-                _known(str(bushing), "body", name, bodies, key)
-            if isinstance(rod := self.joint(bushing.joint), Distance):
+                self._require_body(str(bushing), name, key)
+            if isinstance(rod, Distance):
                 end_of(rod, bushing)
+
+    def _require_body(self, who: str, name: str, key: str) -> None:
+        if name != GROUND:
+            self._require("body", who, name, key)
+
+    def _require(self, what: str, who: str, name: str, key: str) -> Any:
+        """Return a member that something names.
+
+        Raises:
+            MechanismError: there is none.
+        """
+        known = self._named["bodies" if what == "body" else f"{what}s"]
+        if name in known:
+            return known[name]
+        names = [GROUND, *known] if what == "body" else known
+        raise MechanismError(f"{who}: {unknown(what, name, names)}", key)
 
     def released(self) -> Mechanism:
         """Return the mechanism with the bushings of joints as force elements in their place.
@@ -300,11 +306,7 @@ class Mechanism:
             for driver in self.drivers
             if isinstance(driver, JointDriver)
         }
-        needed |= {
-            name: f"joint {coupler.name!r} ({coupler.type})"
-            for coupler in self.couplers
-            for name in coupler.joints
-        }
+        needed |= {name: str(coupler) for coupler in self.couplers for name in coupler.joints}
         for joint in still:
             who = f"{joint}: {joint.i!r} and {joint.j!r} are both fixed"
             if joint.name in needed:
@@ -506,20 +508,6 @@ def coordinates(mechanism: Mechanism) -> dict[str, Driver]:
         if len(joint.freedoms) == 1:
             found[joint.name] = found[f"{joint.name}.{joint.freedoms[0]}"]
     return found | {each.name: each for each in mechanism.drivers}
-
-
-def _unique(what: str, names: Sequence[str]) -> None:
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
-        raise MechanismError(
-            f"{what}: the name {min(twice)!r} is used more than once; names must be unique", what
-        )
-
-
-def _known(who: str, what: str, name: str, known: Mapping[str, Any], key: str) -> None:
-    if name in known:
-        return
-    raise MechanismError(f"{who}: {unknown(what, name, known)}", key)
 
 
 def with_equivalents(mechanism: Mechanism, known: Collection[type[Joint]]) -> Mechanism:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MechanismError
-from ..input_checks import finite, held, require_direction, require_finite, triple
+from ..input_checks import finite, finite_numbers, held, require_direction
 from ..joints.base import Joint, Kind
 from ..trajectory import Array
 from .formula import jet_of
@@ -388,9 +388,9 @@ class PointCoordinate(Driver):
 
     def __post_init__(self) -> None:
         who = f"driver {self.name!r}: direction"
-        object.__setattr__(self, "direction", triple(who, self.direction, Kind.DIRECTION.value))
-        require_finite(who, self.direction, Kind.DIRECTION.value)
-        require_direction(who, self.direction)
+        direction = finite_numbers(who, self.direction, 3, Kind.DIRECTION.value)
+        object.__setattr__(self, "direction", direction)
+        require_direction(who, direction)
 
 
 @dataclass(frozen=True)

@@ -154,11 +154,14 @@ class Primitive(ABC):
     """Whether dpi, w and wdot of rows, gamma and twists are in body axes (the paper's) rather than
     global ones.
     """
+    paper: ClassVar[type[Primitive] | None] = None
+    conventional: ClassVar[type[Primitive] | None] = None
+    """Classes with the same fields and the rows of another style, if there are any."""
 
     def __init_subclass__(cls) -> None:
         """Reset the forms in other styles: a base class's do not fit a subclass's own rows."""
         super().__init_subclass__()
-        for form in ("paper_form", "conventional_form"):
+        for form in ("paper", "conventional", "paper_form", "conventional_form"):
             if form not in vars(cls):
                 setattr(cls, form, getattr(Primitive, form))
 
@@ -216,10 +219,7 @@ class Primitive(ABC):
         Raises:
             NoFormError: the primitive has none.
         """
-        raise NoFormError(
-            f"{type(self).__name__} has no rows in the styles paper and conventional; use the style"
-            " native, or write its paper_form"
-        )
+        return self._as(self.paper)
 
     def conventional_form(self) -> tuple[Primitive, ...]:
         """Return the primitives that replace this one in the conventional row style.
@@ -227,7 +227,15 @@ class Primitive(ABC):
         Raises:
             NoFormError: the primitive has none.
         """
-        return self.paper_form()
+        return self._as(self.conventional) if self.conventional else self.paper_form()
+
+    def _as(self, kind: type[Primitive] | None) -> tuple[Primitive, ...]:
+        if kind is None:
+            raise NoFormError(
+                f"{type(self).__name__} has no rows in the styles paper and conventional; use the"
+                " style native, or write its paper_form"
+            )
+        return (kind(**{each.name: getattr(self, each.name) for each in fields(self)}),)
 
 
 class _Derivation:

@@ -57,12 +57,6 @@ class ConstantVelocity(Primitive):
         f, g = (i.turn(a) @ j.turn(b) for a, b in ((self.f_i, self.f_j), (self.g_i, self.g_j)))
         return (f + g,)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperConstantVelocity(self.f_i, self.g_i, self.f_j, self.g_j),)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return (ConventionalConstantVelocity(self.f_i, self.g_i, self.f_j, self.g_j),)
-
 
 class PaperConstantVelocity(ConstantVelocity):
     """The difference of two dot10 in body axes."""
@@ -84,3 +78,7 @@ class ConventionalConstantVelocity(ConstantVelocity):
     def pair(self) -> tuple[Dot10, Dot10]:
         """The two dot10 that are subtracted."""
         return ConventionalDot10(self.f_i, self.g_j), ConventionalDot10(self.g_i, self.f_j)
+
+
+ConstantVelocity.paper = PaperConstantVelocity
+ConstantVelocity.conventional = ConventionalConstantVelocity

@@ -59,9 +59,6 @@ class Distance(Primitive):
             ),
         )
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDistance(self.s_i, self.s_j, self.d0, self.length, self.design_length),)
-
 
 class PaperDistance(Distance):
     """The rows in body axes."""
@@ -77,3 +74,6 @@ class PaperDistance(Distance):
         d_t = (vj.v + j.A @ cross(vj.w, self.s_j)) - (vi.v + i.A @ cross(vi.w, self.s_i))
         bent = j.A @ vj.centripetal(self.s_j) - i.A @ vi.centripetal(self.s_i)
         return (-((d_t @ d_t + d @ bent) * (1.0 / self.length)),)
+
+
+Distance.paper = PaperDistance

@@ -54,12 +54,6 @@ class Dot10(Primitive):
         n_dot = cross(cross(vi.w, a), b) + cross(a, cross(vj.w, b))
         return (n_dot @ (vj.w - vi.w),)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDot10(self.a, self.b),)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return (ConventionalDot10(self.a, self.b),)
-
 
 class PaperDot10(Dot10):
     """Eqs (8)-(12) in body axes."""
@@ -93,3 +87,6 @@ class ConventionalDot10(PaperDot10):
         a, b = self.a, self.b
         turning = A_ji @ vi.centripetal(a) + vj.centripetal(A_ji @ a)
         return (2.0 * (cross(vj.w, b) @ (A_ji @ cross(a, vi.w))) - b @ turning,)
+
+
+Dot10.paper, Dot10.conventional = PaperDot10, ConventionalDot10

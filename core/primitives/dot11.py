@@ -55,9 +55,6 @@ class Dot11(Primitive):
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (i.turn(self.h) @ j.turn(self.h),)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDot11(self.f, self.g, self.h),)
-
     def conventional_form(self) -> tuple[Primitive, ...]:
         return ParallelTest(self.g, self.h), ConventionalDot10(self.f, self.h)
 
@@ -87,3 +84,6 @@ class ParallelTest(ConventionalDot10):
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.b @ (relative(i, j) @ self.b),)
+
+
+Dot11.paper = PaperDot11

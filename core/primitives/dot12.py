@@ -48,9 +48,6 @@ class Dot12(Primitive):
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return 0.0, 0.0, 0.0
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDot12(),)
-
     def conventional_form(self) -> tuple[Primitive, ...]:
         return LockTest(Y, Z), ConventionalDot10(Z, X), ConventionalDot10(X, Y)
 
@@ -86,3 +83,6 @@ class LockTest(ConventionalDot10):
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         A_ij = relative(i, j)
         return (A_ij.x.x + A_ij.y.y + A_ij.z.z - 2.0,)
+
+
+Dot12.paper = PaperDot12

@@ -74,12 +74,6 @@ class Dot20(Primitive):
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDot20(self.a, self.s_i, self.s_j, self.d0, self.drive),)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return (ConventionalDot20(self.a, self.s_i, self.s_j, self.d0, self.drive),)
-
 
 class PaperDot20(Dot20):
     """Eq. (22) in body axes."""
@@ -138,3 +132,6 @@ class ConventionalDot20(Dot20):
             self.s_i @ bent + self.s_j @ vj.centripetal(A_ji @ a) + (i.A.T @ self._d(i, j)) @ bent
         )
         return (self.drive.c_tt + 2.0 * sliding - turning,)
+
+
+Dot20.paper, Dot20.conventional = PaperDot20, ConventionalDot20

@@ -57,9 +57,6 @@ class Dot21(Primitive):
         turning = (cross(vi.w, i.turn(a)) for a in (self.f, self.g))
         return tuple(-(cross(vi.w, a_t) @ e + 2.0 * (a_t @ e_t)) for a_t in turning)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDot21(self.f, self.g, self.e0),)
-
     def conventional_form(self) -> tuple[Primitive, ...]:
         return tuple(ConventionalDot20(a, ZERO, ZERO, self.e0) for a in (self.f, self.g))
 
@@ -81,3 +78,6 @@ class PaperDot21(Dot21):
         y, y_t = i.A.T @ (self.e0 + (j.u - i.u)), i.A.T @ (vj.v - vi.v)
         turning = 2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y))
         return tuple(a @ turning for a in (self.f, self.g))
+
+
+Dot21.paper = PaperDot21

@@ -56,9 +56,6 @@ class DrivenCoordinate(Primitive):
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDrivenCoordinate(self.k, self.s, self.drive),)
-
 
 @dataclass(frozen=True)
 class DrivenAngle(Primitive):
@@ -88,9 +85,6 @@ class DrivenAngle(Primitive):
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperDrivenAngle(self.h, self.drive),)
-
 
 class PaperDrivenCoordinate(DrivenCoordinate):
     """The rows in body axes."""
@@ -111,3 +105,6 @@ class PaperDrivenAngle(DrivenAngle):
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         return (Row(ZERO, -self.h, ZERO, self.h),)
+
+
+DrivenCoordinate.paper, DrivenAngle.paper = PaperDrivenCoordinate, PaperDrivenAngle

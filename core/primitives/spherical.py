@@ -42,9 +42,6 @@ class Spherical(Primitive):
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(vi.centripetal(i.turn(self.s_i)) - vj.centripetal(j.turn(self.s_j)))
 
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperSpherical(self.s_i, self.s_j, self.d0),)
-
 
 class PaperSpherical(Spherical):
     """Rows of (24) in body axes."""
@@ -63,3 +60,6 @@ def _arm_rows(A: Mat3, s: Vec3) -> tuple[Vec3, Vec3, Vec3]:
     """Return the rows of A skew(s)."""
     # row k of A, times skew(s), is a_k x s
     return cross(A.x, s), cross(A.y, s), cross(A.z, s)
+
+
+Spherical.paper = PaperSpherical

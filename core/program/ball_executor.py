@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 from ..errors import KincheckError
 from ..extras import library
 from .straight_line import Program
+from .tape import OPERATIONS
 
 Ball: TypeAlias = Any
 """A `flint.arb`, or a `flint.arb_series`."""
@@ -57,10 +58,6 @@ def _larger(a: Ball, b: Ball) -> bool:
     raise UndecidedError(f"|{a}| and |{b}| cannot be told apart; raise the precision")
 
 
-def _over(a: Ball, b: Ball) -> Ball:
-    return a / b
-
-
 def _minimum(a: Ball, b: Ball) -> Ball:
     return a.min(b)
 
@@ -73,22 +70,15 @@ def _where(m: bool, p: Ball, q: Ball) -> Ball:
     return p if m else q
 
 
-_ARITHMETIC: dict[str, Any] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": _over,
-    "neg": operator.neg,
-}
-_OWN: dict[str, Any] = {name: operator.methodcaller(name) for name in ("sqrt", "sin", "cos")}
-_CHOICES: dict[str, Any] = {
-    "abs": abs,
+_OPERATIONS: Mapping[str, Callable[..., Any]] = {
+    **OPERATIONS,
+    "sin": operator.methodcaller("sin"),
+    "cos": operator.methodcaller("cos"),
     "min": _minimum,
     "max": _maximum,
     "larger": _larger,
     "where": _where,
 }
-_OPERATIONS: Mapping[str, Callable[..., Any]] = {**_ARITHMETIC, **_OWN, **_CHOICES}
 
 
 def evaluate(program: Program, inputs: Sequence[Ball]) -> dict[int, Ball]:
@@ -99,13 +89,4 @@ def evaluate(program: Program, inputs: Sequence[Ball]) -> dict[int, Ball]:
     Raises:
         UndecidedError: two balls compared by "larger" overlap.
     """
-    arb = flint().arb
-    values: list[Any] = []
-    for op, *rest in program.nodes:
-        if op == "input":
-            values.append(inputs[int(rest[0])])
-        elif op == "const":
-            values.append(arb(rest[0]))
-        else:
-            values.append(_OPERATIONS[op](*[values[int(k)] for k in rest]))
-    return {slot: values[k] for slot, k in program.outputs.items()}
+    return program.run(_OPERATIONS, inputs, flint().arb)

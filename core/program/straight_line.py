@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -66,6 +67,30 @@ class Program:
     def size(self) -> dict[str, int]:
         """Operations of one lane (with inputs and constants), and its flops."""
         return {"operations": len(self.nodes), "flops": self.flops}
+
+    def run(
+        self,
+        operations: Mapping[str, Callable[..., Any]],
+        inputs: Any,
+        lift: Callable[[float], Any],
+    ) -> dict[int, Any]:
+        """Return the outputs by slot, over any kind of scalar, from its inputs by slot.
+
+        Args:
+            operations: the operations of the kind.
+            lift: conversion of constants to the kind.
+        """
+        values: list[Any] = []
+        for op, *rest in self.nodes:
+            if op == "input":
+                values.append(inputs[int(rest[0])])
+            elif op == "const":
+                values.append(lift(rest[0]))
+            elif len(rest) == 2:  # most operations; a call with any number takes twice as long
+                values.append(operations[op](values[int(rest[0])], values[int(rest[1])]))
+            else:
+                values.append(operations[op](*(values[int(k)] for k in rest)))
+        return {slot: values[k] for slot, k in self.outputs.items()}
 
 
 def program(

@@ -384,7 +384,7 @@ def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, Scalar]) ->
             _, *sizes = tape.nodes[int(rest[0])]
             new[number] = where_larger(*(new[int(k)] for k in (*sizes, *rest[1:])))
         elif op != "larger":  # which "where" reads itself
-            new[number] = _AGAIN[str(op)](*(new[int(k)] for k in rest))
+            new[number] = OPERATIONS[str(op)](*(new[int(k)] for k in rest))
     return [new[each.number] if isinstance(each, Traced) else each for each in values]
 
 
@@ -392,7 +392,7 @@ def _over(a: Scalar, b: Scalar) -> Scalar:
     return a / b
 
 
-_AGAIN: Mapping[str, Any] = {
+OPERATIONS: Mapping[str, Any] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
@@ -405,3 +405,4 @@ _AGAIN: Mapping[str, Any] = {
     "min": minimum,
     "max": maximum,
 }
+"""Operations on any scalars but for choices, by name."""

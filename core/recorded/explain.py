@@ -116,7 +116,7 @@ def explained(
     ]
     off = [each for each in every if not each.fits(each.values - each.true)]
     held = {each.output.name: each.held for each in every}
-    known: dict[str, list[tuple[str, str]]] = {}
+    known = dict[str, list[tuple[str, str]]]()
     for each in off:
         name = each.output.name
         others = {key: other for key, other in held.items() if key != name}
@@ -136,68 +136,64 @@ def explained(
     all_known = sum(map(len, known.values())) == len(off)
     if not off or lead not in stated:
         return sentences
-    free = not all_known
-    phrases = dict.fromkeys(_of_driver(case, off, stated, lead, sweep, solve, free=free))
+    change = _Change(off, stated, lead, sweep, solve, not all_known)
+    turns = sweep.driver != TIME and case.mechanism.driver(sweep.driver).turns
+    phrases = dict.fromkeys(change.phrases(turns=turns))
     readings = sorted(phrases, key=lambda text: (text.count(MAP), len(text)))  # the simplest first
     if not readings:
         return sentences
     return [*sentences * all_known, f"{' or '.join(readings[:_NAMED])}: say so if it is meant"]
 
 
-def _of_driver(
-    case: Case,
-    off: Sequence[_Off],
-    stated: Mapping[str, Stated],
-    lead: str,
-    sweep: Sweep,
-    solve: Solve,
-    *,
-    free: bool,
-) -> Iterator[str]:
-    """Yield phrases on a zero, sign and unit of the driver with all outputs in tolerance.
-
-    Args:
-        free: whether outputs with a column may also have the other sign and another zero.
-    """
-    own = stated[lead]
-    x = sweep.values
-    if len(x) < _TRIED or not np.ptp(x):
-        return
-    turns = sweep.driver != TIME and case.mechanism.driver(sweep.driver).turns
-    reach = math.pi if turns else float(np.ptp(x))
-    change = _Change(case, off, stated, lead, sweep, solve, free)
-    for unit, size in {own.unit: own.size, **_UNITS.get(own.si, {})}.items():
-        for sign in (1.0,) if lead == TIME else (1.0, -1.0):
-            factor = sign * size / own.size
-            zeros = [0.0]
-            if size == own.size:
-                if unit != own.unit:
-                    continue
-                grid = np.linspace(-reach, reach, _ZEROS)
-                ends = float((factor * x).min()) - reach, float((factor * x).max()) + reach
-                dense = np.linspace(*ends, _DENSE)
-                curves = change.curves(dense)
-                left = [change.left(curves, dense, factor * x + zero) for zero in grid.tolist()]
-                around = [math.inf, *left, math.inf]
-                lowest = [k for k, x in enumerate(left) if math.inf > x <= min(around[k : k + 3])]
-                best = sorted(lowest, key=left.__getitem__)
-                zeros = [float(grid[k]) for k in best[:_TRIED]]
-            for zero in zeros:
-                if found := change.refined(unit, factor, zero, reach * max(1.0, abs(factor))):
-                    yield found
-
-
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """A change of a driver, factor * value + zero."""
+    """A change of a driver, factor * value + zero.
 
-    case: Case
+    Attributes:
+        free: whether outputs with a column may also have the other sign and another zero.
+    """
+
     off: Sequence[_Off]
     stated: Mapping[str, Stated]
     lead: str
     sweep: Sweep
     solve: Solve
     free: bool
+
+    def phrases(self, *, turns: bool) -> Iterator[str]:
+        """Yield phrases on a zero, sign and unit of the driver with all outputs in tolerance.
+
+        Args:
+            turns: whether the sweep's driver is an angle.
+        """
+        own, x = self.stated[self.lead], self.sweep.values
+        if len(x) < _TRIED or not np.ptp(x):
+            return
+        reach = math.pi if turns else float(np.ptp(x))
+        for unit, size in {own.unit: own.size, **_UNITS.get(own.si, {})}.items():
+            for sign in (1.0,) if self.lead == TIME else (1.0, -1.0):
+                factor = sign * size / own.size
+                zeros = [0.0]
+                if size == own.size:
+                    if unit != own.unit:
+                        continue
+                    zeros = self._zeros(factor * x, reach)
+                for zero in zeros:
+                    if found := self.refined(unit, factor, zero, reach * max(1.0, abs(factor))):
+                        yield found
+
+    def _zeros(self, x: Array, reach: float) -> list[float]:
+        """Return zeros of a driver of these values that leave less than those beside them, the best
+        first.
+        """
+        grid = np.linspace(-reach, reach, _ZEROS)
+        dense = np.linspace(float(x.min()) - reach, float(x.max()) + reach, _DENSE)
+        curves = self.curves(dense)
+        left = [self.left(curves, dense, x + zero) for zero in grid.tolist()]
+        around = [math.inf, *left, math.inf]
+        lowest = [k for k, each in enumerate(left) if math.inf > each <= min(around[k : k + 3])]
+        best = sorted(lowest, key=left.__getitem__)
+        return [float(grid[k]) for k in best[:_TRIED]]
 
     def curves(self, values: Array) -> Mapping[str, Series]:
         """Return the outputs at other values of the driver."""
@@ -249,7 +245,7 @@ class _Change:
         None if unknown.
         """
         curves = self.curves(factor * self.sweep.values + zero)
-        rest: list[tuple[_Off, float, float, Array, Array]] = []
+        rest = list[tuple[_Off, float, float, Array, Array]]()
         for each in self.off:
             curve = curves.get(each.output.name)
             if curve is None or curve.velocity is None or not np.isfinite(curve.position).all():

@@ -29,8 +29,8 @@ from ..harness.trajectory_check import Reported
 from ..trajectory import Array
 from ..unit_text import value_text
 from .engine import RecordedEngine
-from .meaning import MAP, Accuracy, Meaning, Reader, Use, inputs_of, unit_of
-from .recording import Column, Head, Recording
+from .meaning import MAP, Meaning, Reader, Use, inputs_of, unit_of
+from .readers import Column, Head, Recording
 from .samples import samples_of
 from .sweep import as_is
 
@@ -127,13 +127,13 @@ class FmuEngine:
         }
         recording = Recording(self.file, columns, self.tool, notes=notes)
         samples = samples_of(case, recording, Meaning(outputs, {}), whole=True)
-        return RecordedEngine(self.name, samples, as_is(case), Accuracy({}, {})).report(case)
+        return RecordedEngine(self.name, samples, as_is(case)).report(case)
 
     def _notes(self, case: Case, driven: Sequence[str]) -> list[str]:
         """Return notes on inputs at their start values, and drivers without an input."""
         taken = {self._uses[name].column for name in driven}
         left = [v.head.name for k, v in enumerate(self.variables) if v.free and k not in taken]
-        notes: list[str] = []
+        notes = list[str]()
         if left:
             listed = shortened(left, MOST_NAMED)
             notes.append(f"{self.name}: inputs without a driver keep their start values: {listed}")
@@ -321,7 +321,7 @@ def _variables(root: Element) -> list[Variable]:
         for kind in types.children
         for real in ([kind] if kind.tag == "Float64Type" else kind.only("Real"))
     }
-    found: list[Variable] = []
+    found = list[Variable]()
     for each in (v for variables in root.only("ModelVariables") for v in variables.children):
         kinds = [each] if each.tag in _REALS else [e for e in each.children if e.tag in _REALS]
         own = each.attributes

@@ -1,4 +1,5 @@
-"""Meaning of the columns of a recording: time, drivers, outputs, and poses of bodies.
+"""Meaning of the columns of a recording: time, drivers, outputs, and poses of bodies, whose
+attitudes are Euler angles of any sequence, or quaternions, of body to global or the inverse.
 
 Known by their names, or as the user states it by --map: an equation NAME=COLUMN+OFFSET or
 COLUMN=NAME+OFFSET for a number, and for a body BODY=PREFIX: X Y Z, ATTITUDE, ...
@@ -9,16 +10,83 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, reduce
+from itertools import product
+from operator import mul
 from pathlib import Path
 
-from ..case.case import TIME, Case
+import numpy as np
+
+from ..algebra import Quat, Vec3, X, Y, Z, quat
+from ..case.case import TIME, Case, Quantity
 from ..case.io.document import decimal, fault, shown, unknown_name
 from ..case.io.reference_samples import DERIVATIVES, known_columns
 from ..case.io.table import read_unit, required_unit
 from ..errors import MOST_NAMED, brief, shortened
-from ..trajectory import QUANTITIES
-from .attitudes import ORDERS, SEQUENCES, Reading
-from .recording import Column, Head, Recording
+from ..trajectory import QUANTITIES, Array
+from .readers import Column, Head, Recording
+
+SEQUENCES = tuple(
+    "".join(each) for each in product("123", repeat=3) if each[0] != each[1] != each[2]
+)
+"""The twelve sequences of axes; 1 is x."""
+ORDERS = ("wxyz", "xyzw")
+_AXIS_OF: dict[str, Vec3] = {"1": X, "2": Y, "3": Z}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The meaning of the numbers of an attitude.
+
+    Attributes:
+        order: of the axes of three angles, or of the parts of a quaternion.
+        fixed: whether the angles are about fixed axes, and not about those of the body.
+        inverted: whether they turn global axes into those of the body.
+    """
+
+    order: str
+    fixed: bool = False
+    inverted: bool = False
+
+    @property
+    def angles(self) -> bool:
+        """Whether the numbers are angles."""
+        return self.order in SEQUENCES
+
+    def __str__(self) -> str:
+        """Return its words in --map."""
+        kind = "euler" if self.angles else "quaternion"
+        words = [kind, self.order, *["fixed"] * self.fixed, *["inverted"] * self.inverted]
+        return " ".join(words)
+
+    def parameters(self, numbers: Sequence[Array]) -> Array:
+        """Return Euler parameters of body -> global, shape (n, 4).
+
+        Args:
+            numbers: three angles [rad], or four parts of any length but zero, shape (n,) each.
+        """
+        if self.angles:
+            turns = [
+                Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * _AXIS_OF[axis])
+                for axis, angle in zip(self.order, numbers, strict=True)
+            ]
+            q = reduce(mul, turns[::-1] if self.fixed else turns)
+        else:
+            w = self.order.index("w")
+            q = quat((numbers[w], *(x for k, x in enumerate(numbers) if k != w)))
+        q = q.conjugate() if self.inverted else q
+        found = np.stack([q.e0, *q.e], axis=-1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return found / np.linalg.norm(found, axis=1)[:, None]
+
+
+def readings(count: int) -> list[Reading]:
+    """Return all readings of three angles or of four parts of a quaternion."""
+    flags = (False, True)
+    if count == 4:
+        return [Reading(order, inverted=inverted) for order in ORDERS for inverted in flags]
+    return [Reading(*each) for each in product(SEQUENCES, flags, flags)]
+
 
 MAP = "--map"
 EVENT = "event"
@@ -121,13 +189,6 @@ def inputs_of(case: Case) -> dict[str, str]:
     return units
 
 
-def targets_of(case: Case) -> dict[str, str]:
-    """Return the possible names of a column, with their SI units."""
-    joints = case.mechanism.joints if case.mechanism.has_loads else ()
-    reactions = {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
-    return inputs_of(case) | reactions | known_columns(case.outputs)
-
-
 @dataclass
 class Reader:
     """Reads the meaning of the columns of a file for a case, by the texts of --map."""
@@ -135,10 +196,14 @@ class Reader:
     file: Path
     case: Case
     heads: Sequence[Head]
-    targets: Mapping[str, str] = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.targets = targets_of(self.case)
+    @cached_property
+    def targets(self) -> Mapping[str, str]:
+        """The possible names of a column, with their SI units."""
+        case = self.case
+        joints = case.mechanism.joints if case.mechanism.has_loads else ()
+        reactions = {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
+        return inputs_of(case) | reactions | known_columns(case.outputs)
 
     def read(self, texts: Sequence[str]) -> Meaning:
         """Return the meaning.
@@ -147,8 +212,8 @@ class Reader:
             CaseError: a text has another form, a name is unknown or twice, or no column means
                 anything.
         """
-        numbers: dict[str, Use] = {}
-        bodies: dict[str, Pose] = {}
+        numbers = dict[str, Use]()
+        bodies = dict[str, Pose]()
         event = ""
         prefixes = {body.name: body.name for body in self.case.mechanism.moving}
         for text in texts:
@@ -185,7 +250,7 @@ class Reader:
 
     def _named(self, stated: Collection[str], taken: Collection[int]) -> dict[str, Use]:
         """Return the columns with names of quantities, but for capitals and separators."""
-        found: dict[str, Use] = {}
+        found = dict[str, Use]()
         names = {_normal(name): name for name in self.targets}
         for k, head in enumerate(self.heads):
             # Adams names the abscissa time.TIME
@@ -236,7 +301,7 @@ class Reader:
 
     def _pose(self, text: str) -> Pose:
         prefix, colon, rest = text.partition(":")
-        groups: dict[str, tuple[Use, ...]] = {}
+        groups = dict[str, tuple[Use, ...]]()
         reading, turned = Reading("123"), list[str]()
         frame: tuple[float, ...] | None = ()
         for part in (rest if colon else text).split(","):
@@ -380,18 +445,19 @@ class Accuracy:
         sizes: in SI.
     """
 
-    shares: Mapping[str, float]
-    sizes: Mapping[str, float]
+    shares: Mapping[str, float] = field(default_factory=dict[str, float])
+    sizes: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def of_rows(self, quantity: str, largest: float) -> float:
         """Return the accuracy of a quantity of bodies [m, m/s or m/s^2]."""
         return self.shares.get(quantity, 0.0) * largest + self.sizes.get(quantity, 0.0)
 
-    def of_output(self, name: str, quantity: str, unit: str, largest: float) -> float:
-        """Return the accuracy of an output [unit, per s or s^2]."""
-        own = name if quantity == "position" else f"{name}.{quantity}"
+    def of_output(self, output: Quantity, quantity: str, values: Array) -> float:
+        """Return the accuracy of an output with these values [unit, per s or s^2]."""
+        largest = float(np.abs(np.nan_to_num(values)).max(initial=0.0))
+        own = output.name if quantity == "position" else f"{output.name}.{quantity}"
         shares = max(self.shares.get(own, 0.0), self.shares.get(quantity, 0.0))
-        size = self.sizes.get(quantity, 0.0) if unit == "m" else 0.0
+        size = self.sizes.get(quantity, 0.0) if output.unit == "m" else 0.0
         return shares * largest + max(self.sizes.get(own, 0.0), size)
 
 
@@ -402,8 +468,8 @@ def read_accuracy(file: Path, case: Case, texts: Sequence[str]) -> Accuracy:
         CaseError: a text has another form, or names neither a quantity nor an output.
     """
     units = known_columns(case.outputs) | _ROW_UNITS
-    shares: dict[str, float] = {}
-    sizes: dict[str, float] = {}
+    shares = dict[str, float]()
+    sizes = dict[str, float]()
     for text in texts:
         name, _, right = (part.strip() for part in text.partition("="))
         if name not in units:

@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import ZERO, Vec3, cross, quat, triple, vec
+from ..algebra import ZERO, Vec3, cross, quat, vec
 from ..case.case import TIME, Case, Quantity
 from ..case.curves import even_steps, multiples
 from ..case.io.document import fault, shown
-from ..case.measures import JointAngle, JointDisplacement
-from ..case.quantity import Output, with_markers
+from ..case.measures import coordinate_of
+from ..case.quantity import with_markers
 from ..errors import MOST_NAMED, number_of, shortened
 from ..jet import Jet
-from ..joints.base import unit
 from ..kinematics import count_turns
 from ..mechanism.body import Body
 from ..mechanism.mechanism import Mechanism
@@ -30,7 +29,7 @@ from ..primitives.base import Pose as Placed
 from ..primitives.base import Twist
 from ..trajectory import Array, BodyMotion, PointMotion
 from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
-from .recording import Column, Recording
+from .readers import Column, Recording
 
 # Two steps may be equal by chance.
 FEWEST = 3
@@ -98,8 +97,8 @@ def samples_of(
         notes += _assumed(recording, meaning)
         kept = replace(recording, columns=_kept(case, recording, meaning, notes))
     numbers = {name: si_values(kept, use) for name, use in meaning.numbers.items()}
-    motions: dict[str, BodyMotion] = {}
-    moved: dict[str, list[BodyMotion]] = {}
+    motions = dict[str, BodyMotion]()
+    moved = dict[str, list[BodyMotion]]()
     for name, pose in meaning.bodies.items():
         body = case.mechanism.body(name)
         columns = {
@@ -253,7 +252,6 @@ def motion_of(
     frame = Placed.of(ZERO, quat(p.T))
     arm = frame.turn(Placed.of(ZERO, back).turn(vec(body.origin) - vec(r_0)))
     q = quat(p.T) * back * quat(body.euler_parameters)
-    found = [r + _rows(arm), np.stack([q.e0, *q.e], axis=-1)]
     rates: list[Array | None] = [None, None]
     if "velocity" in given:
         none = np.zeros((3, len(r)))
@@ -263,13 +261,25 @@ def motion_of(
             else vec([*given.get(what, none)])
             for what in ("omega", "alpha")
         )
-        twist = Twist(vec(given["velocity"]), w)
         own = Placed.of(ZERO, q.conjugate())
-        rates[0] = np.hstack([_rows(twist.of(arm)), _rows(own.turn(w))])
-        if "acceleration" in given:
-            a = vec(given["acceleration"]) + cross(w_t, arm) + twist.centripetal(arm)
-            rates[1] = np.hstack([_rows(a), _rows(own.turn(w_t))])
-    return BodyMotion(found[0], found[1], *rates)
+        a = vec(given["acceleration"]) if "acceleration" in given else None
+        at_end = _at_end(arm, Twist(vec(given["velocity"]), w), a, w_t)
+        turning = (_rows(own.turn(each)) for each in (w, w_t))
+        rates = [
+            None if x is None else np.hstack([x, y]) for x, y in zip(at_end, turning, strict=True)
+        ]
+    return BodyMotion(r + _rows(arm), np.stack([q.e0, *q.e], axis=-1), *rates)
+
+
+def _at_end(arm: Vec3, twist: Twist, a: Vec3 | None, w_t: Vec3) -> list[Array | None]:
+    """Return velocity and acceleration at the end of a turned arm, shape (n, 3) each.
+
+    Args:
+        a, w_t: acceleration of its other end, None if it is unknown, and of rotation.
+    """
+    if a is None:
+        return [_rows(twist.of(arm)), None]
+    return [_rows(twist.of(arm)), _rows(a + cross(w_t, arm) + twist.centripetal(arm))]
 
 
 def _rows(a: Any) -> Array:
@@ -290,14 +300,12 @@ def point_motion(
     body, frame = mechanism.body(point.body), Placed.of(ZERO, quat(motion.p.T))
     back = Placed.of(ZERO, quat(body.euler_parameters).conjugate())
     arm = frame.turn(back.turn(vec(point.position) - vec(body.origin)))
-    rates: list[Array | None] = [None, None]
-    if motion.v is not None:
-        twist = Twist(Vec3(*motion.v[:, :3].T), frame.turn(Vec3(*motion.v[:, 3:].T)))
-        rates[0] = _rows(twist.of(arm))
-        if motion.a is not None:
-            turning = cross(frame.turn(Vec3(*motion.a[:, 3:].T)), arm)
-            rates[1] = _rows(Vec3(*motion.a[:, :3].T) + turning + twist.centripetal(arm))
-    return PointMotion(motion.r + _rows(arm), *rates)
+    if motion.v is None:
+        return PointMotion(motion.r + _rows(arm), None, None)
+    twist = Twist(Vec3(*motion.v[:, :3].T), frame.turn(Vec3(*motion.v[:, 3:].T)))
+    a = None if motion.a is None else motion.a.T
+    linear, turning = (None, ZERO) if a is None else (Vec3(*a[:3]), frame.turn(Vec3(*a[3:])))
+    return PointMotion(motion.r + _rows(arm), *_at_end(arm, twist, linear, turning))
 
 
 def jet_of(
@@ -309,7 +317,7 @@ def jet_of(
     Args:
         mechanism: with the markers of the quantity.
     """
-    at: dict[str, Vec3] = {}
+    at = dict[str, Vec3]()
     for name in measure.points:
         motion = point_motion(mechanism, motions, name, count)
         if motion is None:
@@ -346,15 +354,9 @@ def driver_motion(samples: Samples, mechanism: Mechanism, driver: Driver) -> Jet
 
     Turns are counted from sample to sample, from the one nearest to the design.
     """
-    given: Any = (driver.name, 0.0, 0.0, "")
-    if isinstance(driver, PointCoordinate):
-        name, *others = given
-        along = triple(unit(driver.direction))
-        measure: Quantity = Output(name, driver.point, along, True, *others)
-    elif isinstance(driver, JointDriver):
-        measure = (JointAngle if driver.turns else JointDisplacement)(*given, joint=driver.joint)
-    else:
+    if not isinstance(driver, PointCoordinate | JointDriver):
         return None
+    measure = coordinate_of(driver)
     marked = with_markers(mechanism, [measure])
     found = jet_of(marked, samples.motions, measure, samples.count)
     if found is None:

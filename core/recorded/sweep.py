@@ -160,7 +160,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
 
 def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
     """Return the recorded motions of drivers, of columns or else of poses."""
-    found: dict[str, Drive] = {}
+    found = dict[str, Drive]()
     begun = begun_turns(case.mechanism, samples.motions)
     for driver in case.mechanism.drivers:
         columns = [
@@ -217,7 +217,7 @@ def _motions(
     Args:
         moved: drivers, and which of value, rate and acceleration is moved by its digits.
     """
-    found: dict[str, Motion] = {}
+    found = dict[str, Motion]()
     for name, each in followed.items():
         design = case.mechanism.design_value(name)
         orders = [*each.orders]

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, TypeAlias
+
+import msgspec
 
 from ..algebra import Vec3, quat, rotation_less_identity, vec
 from ..harness.scene_record import Scene, SceneBody, SceneForce, SceneJoint, SceneWheel
@@ -37,11 +38,11 @@ SAME = 1e-6
 
 
 Numbers: TypeAlias = list[float]
+Nodes: TypeAlias = tuple[int, int]
 Wheel: TypeAlias = tuple[int, Numbers, Numbers, Numbers, float, list[int], Numbers]
 
 
-@dataclass
-class Drawing:
+class Drawing(msgspec.Struct):
     """A drawing as the page's script reads it; a node is an index of `nodes`, a body an index of
     `bodies`.
 
@@ -68,26 +69,20 @@ class Drawing:
         caption: the source of the poses, or the reason why there are none.
     """
 
-    bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    nodes: list[tuple[int, float, float, float]] = field(
-        default_factory=list[tuple[int, float, float, float]]
-    )
-    links: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
-    rods: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
-    marks: list[tuple[int, str, list[float] | None, bool]] = field(
-        default_factory=list[tuple[int, str, list[float] | None, bool]]
-    )
-    labels: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
-    springs: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
-    tubes: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
-    wheels: list[Wheel] = field(default_factory=list[Wheel])
-    arrows: list[tuple[int, Numbers, str, list[Numbers | None]]] = field(
-        default_factory=list[tuple[int, Numbers, str, list["Numbers | None"]]]
-    )
-    paths: list[int] = field(default_factory=list[int])
-    steps: list[str] = field(default_factory=list[str])
+    bodies: list[dict[str, Any]] = []
+    nodes: list[tuple[int, float, float, float]] = []
+    links: list[Nodes] = []
+    rods: list[Nodes] = []
+    marks: list[tuple[int, str, Numbers | None, bool]] = []
+    labels: list[tuple[int, int, str]] = []
+    springs: list[tuple[int, int, str]] = []
+    tubes: list[Nodes] = []
+    wheels: list[Wheel] = []
+    arrows: list[tuple[int, Numbers, str, list[Numbers | None]]] = []
+    paths: list[int] = []
+    steps: list[str] = []
     start: int = 0
-    joints: list[tuple[str, str, str]] = field(default_factory=list[tuple[str, str, str]])
+    joints: list[tuple[str, str, str]] = []
     caption: str = ""
 
 
@@ -213,7 +208,7 @@ class _Draughtsman:
                 self._node(j, joint.far)
                 self._mark(self._node(i, joint.far), kind, axis, i, j)
 
-    def _mark(self, node: int, kind: str, axis: list[float] | None, *bodies: str) -> None:
+    def _mark(self, node: int, kind: str, axis: Numbers | None, *bodies: str) -> None:
         self.drawn.marks.append(
             (node, kind, axis, any(self.bodies[self.numbers[name]].fixed for name in bodies))
         )
@@ -233,10 +228,15 @@ class _Draughtsman:
         """
         body = self.bodies[number]
         if not body.fixed:
+            own = [wheel for wheel in self.drawn.wheels if wheel[0] == number]
             mine = [
                 k
                 for k, (other, *place) in enumerate(self.drawn.nodes)
-                if other == number and not self._on_road(number, place)
+                if other == number
+                # a place on the road belongs to the tyre
+                and not any(
+                    abs(math.dist(place, at) - high) < SAME for _, at, _, _, high, *_ in own
+                )
             ]
             # the global origin is the default, not a given origin
             if len(mine) == 1 and any(body.origin):
@@ -245,13 +245,6 @@ class _Draughtsman:
         frame = self._frame([vec(place) for other, *place in self.drawn.nodes if other == number])
         r, p = body.r or [body.origin], body.p or [body.euler_parameters]
         return {"name": body.name, "fixed": body.fixed, "frame": frame, "r": r, "p": p}
-
-    def _on_road(self, number: int, place: Sequence[float]) -> bool:
-        """Return whether a place of a body is as far from a wheel's centre as the tyre is high."""
-        return any(
-            wheel[0] == number and abs(math.dist(place, wheel[1]) - wheel[4]) < SAME
-            for wheel in self.drawn.wheels
-        )
 
     def _link(self, number: int, nodes: Sequence[int]) -> None:
         if len(nodes) <= ALL_JOINED:

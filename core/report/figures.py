@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from ..harness.labels import output_label
@@ -26,6 +26,7 @@ Values: TypeAlias = Sequence[float | None]
 MARKERS = 9  # markers per curve, staggered, so that coincident curves stay distinguishable
 # digits: one more than the page shows at the pointer
 DIGITS = 10
+REFERENCE = "reference"
 THIN = 1 / 2000  # a band narrower than this fraction of the curve's range is less than a pixel
 
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
@@ -75,6 +76,45 @@ class Style:
         }
 
 
+@dataclass(frozen=True)
+class OverDriver:
+    """Curves over a driver, whose axis is vertical if `axis.up` is not 0."""
+
+    axis: Axis
+    traces: list[Figure] = field(default_factory=list[Figure])
+
+    def add(self, values: Values, driver: Any = "driver", **look: Any) -> None:
+        """Add a curve, by default a line at the kept samples."""
+        x, y = (values, driver) if self.axis.up else (driver, values)
+        self.traces.append({"type": "scatter", "mode": "lines", "x": x, "y": y, **look})
+
+    def add_band(self, low: Values, high: Values, **look: Any) -> None:
+        """Add the area between two curves, where both are known."""
+        ends = [
+            (a, b, d)
+            for a, b, d in zip(low, high, self.axis.shown, strict=False)
+            if a is not None and b is not None
+        ]
+        ways = [d for *_, d in ends]
+        around = [a for a, _, _ in ends] + [b for _, b, _ in reversed(ends)]
+        look |= {"fill": "toself", "line": {"width": 0}, "hoverinfo": "skip"}
+        self.add(around, ways + ways[::-1], **look)
+
+    def figure(self, title: str, **value_axis: Any) -> Figure:
+        """Return the figure with the title of its values."""
+        moved_axis: Figure = {"title": {"text": self.axis.title}, "hoverformat": ".6~g"}
+        moved_axis |= {"zeroline": True} | ticks(self.axis)
+        if self.axis.up < 0:
+            moved_axis["autorange"] = "reversed"
+        moved, value = ("y", "x") if self.axis.up else ("x", "y")
+        layout = {
+            f"{moved}axis": moved_axis,
+            f"{value}axis": {"title": {"text": title}, **value_axis},
+            "hovermode": f"{moved} unified",
+        }
+        return {"data": self.traces, "layout": layout}
+
+
 def output_figure(
     output: str,
     axis: Axis,
@@ -90,90 +130,35 @@ def output_figure(
         band: the values compared with, and the tolerance; drawn if it is wide enough to be seen.
     """
     unit, scale = DISPLAY.get(curves[0][1].unit, (curves[0][1].unit, 1.0))
-    traces: list[Figure] = []
-
-    def curve(values: Sequence[float | None], driver: Any = "driver", **options: Any) -> Figure:
-        x, y = (values, driver) if axis.up else (driver, values)
-        return {"type": "scatter", "x": x, "y": y, **options}
-
+    drawn = OverDriver(axis)
     if band is not None and not band_is_thin(*band):
         standard, tolerance = taken(band[0].position, axis.kept, scale), scale * band[1]
-        known = [(v, d) for v, d in zip(standard, axis.shown, strict=False) if v is not None]
-        around = [v - tolerance for v, _ in known] + [v + tolerance for v, _ in reversed(known)]
-        there = [d for _, d in known]
-        look: Figure = {
-            "mode": "lines",
-            "fill": "toself",
-            "line": {"width": 0},
-            "hoverinfo": "skip",
-            "uid": "band",
-        }
-        traces.append(
-            curve(
-                around,
-                there + there[::-1],
-                **look,
-                fillcolor="rgba(128,128,128,0.18)",
-                meta="reference",
-            )
+        low, high = (
+            [None if v is None else v + off for v in standard] for off in (-tolerance, tolerance)
         )
+        drawn.add_band(low, high, uid="band", fillcolor="rgba(128,128,128,0.18)", meta=REFERENCE)
     if truth is not None:
-        values = taken(truth.position, axis.kept, scale)
-        line = {"width": 6, "color": "rgba(128,128,128,0.45)"}
-        traces.append(
-            curve(
-                values, mode="lines", line=line, name="reference", uid="reference", meta="reference"
-            )
-        )
+        line: Figure = {"width": 6, "color": "rgba(128,128,128,0.45)"}
+        named = {"name": REFERENCE, "uid": REFERENCE, "meta": REFERENCE}
+        drawn.add(taken(truth.position, axis.kept, scale), line=line, **named)
     for index, (style, series) in enumerate(curves):
         values = taken(series.position, axis.kept, scale)
         line = {"width": 2, "color": style.colour, "dash": style.dash}
-        traces.append(
-            curve(
-                values,
-                mode="lines",
-                line=line,
-                name=style.name,
-                uid=style.key,
-                meta=style.name,
-            )
-        )
+        drawn.add(values, line=line, name=style.name, uid=style.key, meta=style.name)
         stride = max(len(curves), len(values) // MARKERS)
-        some = range(index * stride // len(curves), len(values), stride)
-        marker = {"size": 9, "symbol": style.symbol, "color": style.colour, "line": {"width": 1.8}}
-        look = {
-            "mode": "markers",
-            "marker": marker,
-            "hoverinfo": "skip",
-            "uid": f"{style.key}-markers",
-            "meta": style.name,
-        }
-        traces.append(curve([values[k] for k in some], [axis.shown[k] for k in some], **look))
-    value_axis: Figure = {
-        "title": {"text": with_unit(output_label(output), unit)},
-        "hoverformat": ".9g",
-        "zeroline": True,
-    }
+        some = slice(index * stride // len(curves), None, stride)
+        look = _marks(f"{style.key}-markers", style.name, 9, style.symbol, style.colour, 1.8)
+        drawn.add(values[some], axis.shown[: len(values)][some], **look)
+    value_axis: Figure = {"hoverformat": ".9g", "zeroline": True}
     if band is not None:
         value_axis |= _flat_range([series.position for _, series in curves], *band, scale)
-    return {"data": traces, "layout": layout_over(axis, value_axis)}
+    return drawn.figure(with_unit(output_label(output), unit), **value_axis)
 
 
-def layout_over(axis: Axis, value_axis: Figure) -> Figure:
-    """Return the layout of curves over a driver, whose axis is vertical if `axis.up` is not 0."""
-    moved_axis: Figure = {
-        "title": {"text": axis.title},
-        "hoverformat": ".6~g",
-        "zeroline": True,
-    } | ticks(axis)
-    if axis.up < 0:
-        moved_axis["autorange"] = "reversed"
-    moved, value = ("y", "x") if axis.up else ("x", "y")
-    return {
-        f"{moved}axis": moved_axis,
-        f"{value}axis": value_axis,
-        "hovermode": f"{moved} unified",
-    }
+def _marks(uid: str, meta: str, size: int, symbol: str, colour: str, width: float) -> Figure:
+    """Return the look of marks without a line, which have no values at the pointer."""
+    marker = {"size": size, "symbol": symbol, "color": colour, "line": {"width": width}}
+    return {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": uid, "meta": meta}
 
 
 def _flat_range(
@@ -196,12 +181,14 @@ def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
     return not known or 2 * tolerance < THIN * (max(known) - min(known))
 
 
-def taken(values: Values, kept: Sequence[int], scale: float) -> list[float | None]:
+def taken(
+    values: Values, kept: Sequence[int], scale: float, digits: int = DIGITS
+) -> list[float | None]:
     """Return the kept values for drawing, scaled and rounded."""
     # JSON has neither NaN nor infinity; null stands for a value that cannot be drawn.
     taken = (values[k] if k < len(values) else None for k in kept)
     return [
-        float(f"{scale * v:.{DIGITS}g}") if v is not None and math.isfinite(v) else None
+        float(f"{scale * v:.{digits}g}") if v is not None and math.isfinite(v) else None
         for v in taken
     ]
 
@@ -236,7 +223,11 @@ def error_figure(
     """
     traces: list[Figure] = []
     for style, values, _ in curves:
-        errors = taken(absolute_errors(values, standard), axis.kept, 1.0)
+        off = [
+            None if a is None or b is None else abs(a - b)
+            for a, b in zip(values, standard, strict=True)
+        ]
+        errors = taken(off, axis.kept, 1.0)
         # three digits suffice for an error, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
         curve = style.curve("driver", rounded, width=1.2, size=5)
@@ -244,22 +235,9 @@ def error_figure(
         traces.append(curve)
     worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
     if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
-        place = {
-            "x": [axis.scale * axis.values[worst.worst_step]],
-            "y": [worst.max_abs],
-            "hoverinfo": "skip",
-        }
-        ring = {"size": 15, "symbol": "circle-open", "color": "#7f7f7f", "line": {"width": 2}}
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                **place,
-                "marker": ring,
-                "uid": "worst",
-                "meta": "worst",
-            }
-        )
+        place = {"x": [axis.scale * axis.values[worst.worst_step]], "y": [worst.max_abs]}
+        ring = _marks("worst", "worst", 15, "circle-open", "#7f7f7f", 2)
+        traces.append({"type": "scatter", **place, **ring})
     tolerance = worst.tolerance
     positive = [e for trace in traces for e in trace["y"] if e]
     ends = positive + ([tolerance] if tolerance else [])
@@ -312,14 +290,6 @@ def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
         "ticktext": ["exactly 0", *powers],
     }
     return axis, 10.0**first
-
-
-def absolute_errors(values: Values, standard: Values) -> list[float | None]:
-    """Return the distance from the standard at each sample; None if a value is unknown."""
-    return [
-        None if a is None or b is None else abs(a - b)
-        for a, b in zip(values, standard, strict=True)
-    ]
 
 
 TIMES = "time per sample [µs]"
@@ -406,10 +376,14 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     drawn = _styles((each.engine for each in history), styles)
     lines = [_line(each) for each in marks(history)]
 
-    def figure(values: Mapping[tuple[str, str], float | None]) -> Figure:
+    def figure(values: Sequence[float | None]) -> Figure:
+        known = {
+            (each.engine, each.run): _finite(value)
+            for each, value in zip(history, values, strict=True)
+        }
         # one category per run: on a time axis, the runs of one night would coincide
         curves = [
-            style.curve(runs, [values.get((style.name, run)) for run in runs]) for style in drawn
+            style.curve(runs, [known.get((style.name, run)) for run in runs]) for style in drawn
         ]
         return {
             "data": curves,
@@ -422,8 +396,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
 
     made: dict[str, Figure] = {}
     for motion in QUANTITIES:
-        errors = {(each.engine, each.run): each.errors.get(motion) for each in history}
-        each = figure({where: _finite(error) for where, error in errors.items()})
+        each = figure([past.errors.get(motion) for past in history])
         if _has_values(each) or (motion == "position" and any(past.bad for past in history)):
             each = floored(each, f"largest {motion} error [tolerances]", 1.0)
             floor = each["layout"]["meta"]["floor"]
@@ -431,7 +404,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
             failures = (_failures(history, style, motion) for style in drawn)
             each["data"] += [trace for trace in failures if trace["x"]]
             made[f"{motion}-error"] = each
-    times = figure({(each.engine, each.run): _finite(each.us_per_step) for each in history})
+    times = figure([past.us_per_step for past in history])
     drawn_times = [value for trace in times["data"] for value in trace["y"] if value]
     times["layout"]["yaxis"] = ticked_axis(TIMES, drawn_times) | _decade(drawn_times)
     return made | ({"time": times} if _has_values(times) else {})
@@ -472,16 +445,8 @@ def _failures(history: Sequence[Past], style: Style, motion: str) -> Figure:
         and max(past.errors.values(), default=0.0) <= 1.0
     }
     found = over | untold
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "x": [*found],
-        "y": [*found.values()],
-        "hoverinfo": "skip",
-        "uid": "failed",
-        "meta": style.name,
-        "marker": {"size": 15, "symbol": "x-open", "color": "var(--fail)", "line": {"width": 2.5}},
-    }
+    look = _marks("failed", style.name, 15, "x-open", "var(--fail)", 2.5)
+    return {"type": "scatter", "x": [*found], "y": [*found.values()], **look}
 
 
 def ticked_axis(title: str, values: Sequence[float]) -> Figure:

@@ -10,7 +10,8 @@ from ..harness.evidence import REFERENCE
 from ..harness.labels import UNMADE, notes, suspects
 from ..harness.record import Deviations, Outcome, Record, Results
 from ..harness.standard import STANDARD
-from ..history.findings import Finding, Kind, Regressions
+from ..history.findings import Kind, Regressions
+from ..history.store import Pair
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -38,18 +39,17 @@ def to_junit(results: Results) -> bytes:
         suite = ElementTree.SubElement(root, "testsuite", name=case)
         for record in results.records:
             if record.case == case:
+                subject = results.suspects[case].subject if results.explains(record) else ""
+                suspicion = f"; {SUSPECTED[subject]}" if subject in SUSPECTED else ""
+                warm = record.seconds.warm if record.seconds else None
                 for output, deviations in record.errors.items():
-                    subject = results.suspects[case].subject if results.explains(record) else ""
-                    _test(suite, record, output, deviations, SUSPECTED.get(subject, ""))
+                    test = _test(suite, record.pair, output, warm or 0.0)
+                    verdict, message = _verdict(record, output, deviations)
+                    if verdict:
+                        ElementTree.SubElement(test, verdict, message=message + suspicion)
         for name, engine, mode in results.missing:
             if name == case:
-                test = ElementTree.SubElement(
-                    suite,
-                    "testcase",
-                    classname=f"{case}.{engine}.{mode}",
-                    name="not run",
-                    time="0.000000",
-                )
+                test = _test(suite, (case, engine, mode), "not run")
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
         lines = [f"note: {note}" for named, note in notes(results.run) if named == case]
         lines += [f"suspect: {why}" for named, why in suspects(results) if named == case]
@@ -72,24 +72,10 @@ def count_tests(suite: ElementTree.Element) -> None:
 
 
 def _test(
-    suite: ElementTree.Element,
-    record: Record,
-    output: str,
-    deviations: Deviations,
-    suspicion: str,
-) -> None:
-    seconds = record.seconds.warm if record.seconds and record.seconds.warm is not None else 0.0
-    test = ElementTree.SubElement(
-        suite,
-        "testcase",
-        classname=f"{record.case}.{record.engine}.{record.mode}",
-        name=output,
-        time=f"{seconds:.6f}",
-    )
-    verdict, message = _verdict(record, output, deviations)
-    if verdict:
-        message += f"; {suspicion}" if suspicion else ""
-        ElementTree.SubElement(test, verdict, message=message)
+    suite: ElementTree.Element, pair: Pair, name: str, seconds: float = 0.0
+) -> ElementTree.Element:
+    place = {"classname": ".".join(pair), "name": name, "time": f"{seconds:.6f}"}
+    return ElementTree.SubElement(suite, "testcase", place)
 
 
 def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
@@ -133,27 +119,20 @@ def to_regression_junit(results: Results, found: Regressions) -> bytes:
     suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
     unmade = set(results.missing)
     for finding in found.regressions:
-        pair = (finding.case, finding.engine, finding.mode)
-        if finding.kind is Kind.FAILURE or pair in unmade:  # the XML has these already
+        if finding.kind is Kind.FAILURE or finding.pair in unmade:  # the XML has these already
             continue
-        place = ".".join(pair)
-        name = finding.output or str(finding.kind)
+        place, name = ".".join(finding.pair), finding.output or str(finding.kind)
         if finding.case not in suites:  # a case of the earlier run only
             suites[finding.case] = ElementTree.SubElement(root, "testsuite", name=finding.case)
         if (place, name) not in tests:
-            tests[place, name] = ElementTree.SubElement(
-                suites[finding.case], "testcase", classname=place, name=name, time="0.000000"
-            )
-        _fail(tests[place, name], finding)
+            tests[place, name] = _test(suites[finding.case], finding.pair, name)
+        test = tests[place, name]
+        message = FORBIDDEN.sub("\ufffd", f"{finding.kind}: {finding.message}")
+        verdict = test.find("failure")
+        if verdict is None:
+            verdict = ElementTree.SubElement(test, "failure")
+        verdict.set("message", "; ".join(filter(None, (verdict.get("message"), message))))
     for suite in suites.values():
         count_tests(suite)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-
-
-def _fail(test: ElementTree.Element, finding: Finding) -> None:
-    message = FORBIDDEN.sub("\ufffd", f"{finding.kind}: {finding.message}")
-    verdict = test.find("failure")
-    if verdict is None:
-        verdict = ElementTree.SubElement(test, "failure")
-    verdict.set("message", "; ".join(filter(None, (verdict.get("message"), message))))

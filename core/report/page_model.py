@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from ..case.case import Truth
 from ..harness.evidence import Evidence
-from ..harness.labels import against, engine_name, motion_unit, number, output_label
+from ..harness.labels import against, engine_name, motion_unit, number, output_label, product
 from ..harness.record import Deviation, OutputSeries, Record, Results
 from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
@@ -71,9 +72,14 @@ def judged(records: Sequence[Record]) -> list[Judged]:
     ]
 
 
-def worst(deviations: Sequence[Judged]) -> Judged | None:
+def worst(deviations: Iterable[Judged]) -> Judged | None:
     """Return the deviation closest to its tolerance, or farthest beyond it."""
     return max(deviations, key=lambda each: each.ratio, default=None)
+
+
+def worst_of(record: Record, motion: str | None = None) -> Judged | None:
+    """Return the worst deviation of a record, in one motion or any."""
+    return worst(each for each in judged([record]) if motion in (None, each.motion))
 
 
 @dataclass(frozen=True)
@@ -141,33 +147,35 @@ class CaseView:
 @dataclass(frozen=True)
 class Material:
     """The material of a report: a run, further data by case, and further limits, each a title and a
-    sentence.
+    sentence; and its figures, so far.
     """
 
     results: Results
     history: Mapping[str, Sequence[Past]]
     precision: Mapping[str, Sequence[Effort]]
     limits: Sequence[tuple[str, str]] = ()
+    figures: dict[str, Figure] = field(default_factory=dict[str, Figure])
+
+    @cached_property
+    def styles(self) -> dict[str, Style]:
+        """The styles of the engines, those without any record last."""
+        never = sorted({product(engine, mode) for _, engine, mode in self.results.missing})
+        names = dict.fromkeys([*map(engine_name, self.results.records), *never])
+        return {name: Style.number(index, name) for index, name in enumerate(names)}
 
 
-def case_view(
-    given: Material, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]
-) -> CaseView:
-    """Return one case of the page; add its figures to `figures`."""
+def case_view(given: Material, name: str, anchor: str) -> CaseView:
+    """Return one case of the page; add its figures to those of the page."""
     results = given.results
     records = [record for record in results.records if record.case == name]
     facts: Mapping[str, Any] = results.run.get("cases", {}).get(name, {})
     deviations = judged(records)
     axis = driver_axis(facts, records, (each.deviation.worst_step for each in deviations))
-    references = results.references.get(name, {})
+    names = dict.fromkeys(output for record in records for output in record.outputs)
     outputs: list[OutputView] = []
-    for index, output in enumerate(
-        dict.fromkeys(output for record in records for output in record.outputs)
-    ):
+    for index, output in enumerate(names):
         here = [each for each in deviations if each.output == output]
-        outputs.append(
-            _output(output, f"{anchor}-{index}", here, records, axis, references, styles, figures)
-        )
+        outputs.append(_output(given, output, f"{anchor}-{index}", here, records, axis))
     return CaseView(
         name=name,
         anchor=anchor,
@@ -184,9 +192,9 @@ def case_view(
         scene=drawing(results.scenes[name], axis, _values(records))
         if name in results.scenes
         else None,
-        trends=_trends(anchor, given.history.get(name, ()), styles, figures),
+        trends=_trends(given, name, anchor),
         marks=marks(given.history.get(name, ())),
-        precision=_precision(anchor, given.precision.get(name, ()), styles, figures),
+        precision=_precision(given, name, anchor),
     )
 
 
@@ -202,15 +210,14 @@ def _values(records: Sequence[Record]) -> dict[str, Sequence[float | None]]:
 
 
 def _output(
+    given: Material,
     output: str,
     key: str,
     deviations: Sequence[Judged],
     records: Sequence[Record],
     axis: Axis,
-    references: Mapping[str, OutputSeries],
-    styles: Mapping[str, Style],
-    figures: dict[str, Figure],
 ) -> OutputView:
+    styles, references = given.styles, given.results.references.get(records[0].case, {})
     curves = [(styles[engine_name(r)], r.outputs[output]) for r in records if output in r.outputs]
     label, truth = output_label(output), references.get(output)
     errors, compared = list[Plot](), list[str]()
@@ -227,11 +234,11 @@ def _output(
         title = f"{word} difference of {label} against {axis.name}, log axis"
         compared.append(motion)
         errors.append(Plot(f"{key}-{motion}", title, _worst_caption(here, axis)))
-        figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)
+        given.figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)
     positions = [each for each in deviations if each.motion == "position"]
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
-    figures[key] = output_figure(output, axis, curves, truth, band)
+    given.figures[key] = output_figure(output, axis, curves, truth, band)
     sentences = [
         f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
     ]
@@ -257,14 +264,13 @@ def _constant(curves: Sequence[Values], tolerance: float) -> bool:
     return max(known) - min(known) <= max(tolerance, ROUND_OFF * max(map(abs, known)))
 
 
-def _trends(
-    anchor: str, history: Sequence[Past], styles: Mapping[str, Style], figures: dict[str, Figure]
-) -> list[Plot]:
+def _trends(given: Material, case: str, anchor: str) -> list[Plot]:
+    history = given.history.get(case, ())
     runs = len(dict.fromkeys(each.run for each in history))
     if runs < 2:  # the report's own run
         return []
-    made = trend_figures(history, styles)
-    figures.update({f"{anchor}-trend-{what}": figure for what, figure in made.items()})
+    made = trend_figures(history, given.styles)
+    given.figures.update({f"{anchor}-trend-{what}": figure for what, figure in made.items()})
     return [
         Plot(
             f"{anchor}-trend-{what}",
@@ -275,13 +281,12 @@ def _trends(
     ]
 
 
-def _precision(
-    anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Style], figures: dict[str, Figure]
-) -> list[Plot]:
-    plots: list[Plot] = []
+def _precision(given: Material, case: str, anchor: str) -> list[Plot]:
+    plots, efforts = list[Plot](), given.precision.get(case, ())
     for mode in dict.fromkeys(each.mode for each in efforts):
         key = f"{anchor}-precision-{mode}"
-        figures[key] = precision_figure([each for each in efforts if each.mode == mode], styles)
+        own = [each for each in efforts if each.mode == mode]
+        given.figures[key] = precision_figure(own, given.styles)
         caption = (
             f"Mode {mode}. Left is faster, down is more accurate; a point is one effort setting."
         )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
 from markupsafe import Markup
+from msgspec.structs import asdict
 
 from ..case.case import Truth
 from ..harness.evidence import REFERENCE
@@ -28,8 +28,8 @@ from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
 from .axis import SAMPLES
 from .curves import downloads
-from .figures import Effort, Figure, Past, Style
-from .page_model import CaseView, Judged, Material, case_view, judged, worst
+from .figures import Effort, Past
+from .page_model import CaseView, Material, case_view, judged, worst_of
 from .sections import environment, figure_parts, packed
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
@@ -82,20 +82,22 @@ def caveats(results: Results) -> list[tuple[str, str]]:
             f"Not run: {len(pairs)}",
             f"The run ended before them. There are no results for {named(pairs, '; ')}.",
         )
+    reasons: dict[str, dict[str, None]] = {}
+    answered = [record for record in records if record.outcome in ANSWERED]
     for record in records:
-        if (
-            record.solved is not None
-            and record.samples is not None
-            and record.solved < record.samples
-        ):
+        if None not in (record.solved, record.samples) and record.solved != record.samples:
             add(
                 _pair(record),
                 f"{record.solved} of {record.samples} samples were solved; the others have no"
                 " results.",
             )
-    for reason, pairs in _uncompared(results).items():
-        add(f"Not judged: {named(pairs)}", reason)
-    if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
+    for record in answered:
+        for errors in record.errors.values():
+            if errors.reason:
+                reasons.setdefault(errors.reason, {})[_pair(record)] = None
+    for reason, pairs in reasons.items():
+        add(f"Not judged: {named([*pairs])}", reason)
+    if len({record.mode for record in answered}) > 1:
         add(
             "Modes",
             "Projection and simulate are separate products; their times and errors form no"
@@ -120,18 +122,6 @@ def caveats(results: Results) -> list[tuple[str, str]]:
 
 def _pair(record: Record) -> str:
     return f"{engine_name(record)} on {record.case}"
-
-
-def _uncompared(results: Results) -> dict[str, list[str]]:
-    reasons: dict[str, list[str]] = {}
-    for record in results.records:
-        if record.outcome not in ANSWERED:
-            continue
-        for reason in dict.fromkeys(
-            errors.reason for errors in record.errors.values() if errors.reason
-        ):
-            reasons.setdefault(reason, []).append(_pair(record))
-    return reasons
 
 
 NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
@@ -186,19 +176,11 @@ def render(given: Material, changes: Markup | None = None) -> str:
     """Return the report as HTML text."""
     records = given.results.records
     never = {(case, product(engine, mode)) for case, engine, mode in given.results.missing}
-    names = dict.fromkeys(
-        [*(engine_name(record) for record in records), *sorted(name for _, name in never)]
-    )
-    styles = {name: Style.number(index, name) for index, name in enumerate(names)}
-    figures: dict[str, Figure] = {}
-    case_names = dict.fromkeys(record.case for record in records)
-    cases = [
-        case_view(given, name, f"case-{index}", styles, figures)
-        for index, name in enumerate(case_names)
-    ]
+    names = dict.fromkeys(record.case for record in records)
+    cases = [case_view(given, name, f"case-{index}") for index, name in enumerate(names)]
     curves = downloads(given.results, {each.anchor: each.name for each in cases if each.outputs})
     templates = environment()
-    cast("dict[str, Any]", templates.filters).update(model=_model, worst=_worst_of)
+    cast("dict[str, Any]", templates.filters).update(model=_model, worst=worst_of)
     return templates.get_template("report.html").render(
         headline=headline(given.results),
         changes=changes,
@@ -226,7 +208,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
         },
         unread=given.results.unread,
         settings=_settings(records),
-        styles=styles,
+        styles=given.styles,
         cases=cases,
         references=given.results.references,
         caveats=[*given.limits, *caveats(given.results)],
@@ -240,7 +222,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
         curves=curves,
         packed_curves=packed(json.dumps(curves)),
         **figure_parts(
-            figures,
+            given.figures,
             drivers={case.anchor: case.axis.shown for case in cases},
             scenes={case.anchor: asdict(case.scene) for case in cases if case.scene},
         ),
@@ -298,13 +280,6 @@ def _fault(record: Record, tol: float) -> str:
     return next(what for (_, _, what), true in zip(FAULTS, holds, strict=True) if true)
 
 
-def _worst_of(record: Record, motion: str | None = None) -> Judged | None:
-    """Return the deviation of a record, in one motion or any, that is closest to its tolerance or
-    farthest beyond it.
-    """
-    return worst([each for each in judged([record]) if motion in (None, each.motion)])
-
-
 def severity(case: CaseView) -> float:
     """Return the sort key of the overview: incomplete pairs first, then errors in tolerances."""
     broken = any(record.outcome in BROKEN for record in case.records)
@@ -343,11 +318,10 @@ def _settings(records: Sequence[Record]) -> list[tuple[str, dict[str, Any], list
     """Return each engine's distinct settings, with the cases that share them."""
     groups: dict[str, tuple[str, dict[str, Any], list[str]]] = {}
     for record in records:
-        group = groups.setdefault(
-            f"{engine_name(record)} {record.settings}", (engine_name(record), record.settings, [])
-        )
+        name = engine_name(record)
+        group = groups.setdefault(f"{name} {record.settings}", (name, record.settings, []))
         group[2].append(record.case)
-    return list(groups.values())
+    return [*groups.values()]
 
 
 def _count(records: Sequence[Record], *outcomes: Outcome) -> int:

@@ -20,7 +20,7 @@ from rich.text import Text
 
 from ..case.io.atomic_files import Content
 from ..case.io.escape import file_name
-from ..errors import KincheckError
+from ..errors import refuse
 from ..harness.labels import against, engine_name, known, named, number, output_label
 from ..harness.record import to_json
 from ..unit_text import value_text, with_unit
@@ -209,8 +209,7 @@ def deliver(
             *((out / name, text.encode()) for name, text in beside.items()),
         ]
     written = terminal.deliver(contents, encoded, json, partial(print_report, report))
-    if problems := [*problems, *written]:
-        raise KincheckError("\n".join(problems))
+    refuse([*problems, *written])
 
 
 def print_report(report: Report, file: TextIO) -> None:

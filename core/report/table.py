@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import groupby
-from typing import Any, TextIO
+from typing import IO, Any, TextIO
 
 from rich.cells import cell_len
 from rich.console import Console
@@ -63,7 +63,7 @@ def _heads(reactions: bool) -> tuple[str, ...]:
     return "engine", "outcome", *errors, ">us/step"
 
 
-def print_table(results: Results, file: TextIO, *, reactions: bool = False) -> None:
+def print_table(results: Results, file: IO[str], *, reactions: bool = False) -> None:
     """Print the sign conventions, a line per record, every message, and outcome counts.
 
     If the console is too narrow for a line per record, the records stand below their case.

@@ -115,7 +115,7 @@ def print_no_more(file: IO[str]) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), file.fileno())
 
 
-def console(file: TextIO) -> Console:
+def console(file: IO[str]) -> Console:
     """Return a console for unchanged text: rich would read square brackets and colons in names as
     colours and emoji.
     """
@@ -168,9 +168,9 @@ def indented(table: FittingTable) -> Padding:
 
 
 @contextmanager
-def with_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> Generator[None]:
-    """Write the answer as JSON to a file, or for "-" to standard output, then print in the block:
-    the reader of the tables may end early.
+def with_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> Generator[Console]:
+    """Write the answer as JSON to a file, or for "-" to standard output, then print in the block
+    on the console of `page`: the reader of the tables may end early.
 
     Raises:
         KincheckError: the file cannot be written; after the block.
@@ -183,7 +183,7 @@ def with_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> Ge
             write("--json", Path(json), to_json(found))
     except KincheckError as error:
         problem = error
-    yield
+    yield page(json)
     if problem:
         raise problem
 

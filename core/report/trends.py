@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from ..case.io.atomic_files import write
 from ..harness.labels import motion_unit, product
 from ..history.queries import Entry, History, unit_of
 from ..history.steps import steps
@@ -75,17 +72,8 @@ def largest_errors(entry: Entry, case: str, row: RunRow) -> dict[str, float]:
     return found
 
 
-def write_plot(history: History, path: Path, *, title: str) -> None:
-    """Write the page: errors and time of each engine on each case, over the runs.
-
-    Raises:
-        KincheckError: the file cannot be written.
-    """
-    write("--plot", path, page(history, title=title).encode())
-
-
-def page(history: History, *, title: str) -> str:
-    """Return the page as HTML text."""
+def page(history: History, title: str) -> str:
+    """Return the page as HTML text: errors and time of each engine on each case, over the runs."""
     by_case = trends(history)
     names = dict.fromkeys(past.engine for each in by_case.values() for past in each)
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}

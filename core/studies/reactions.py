@@ -31,9 +31,12 @@ def with_reactions(case: Case, tol: float) -> Case:
     """
     mechanism = case.mechanism
     if not mechanism.has_loads:
+        remedy = "Give bodies mass, center_of_mass and inertia, or add [forces.NAME]."
+        if case.hardpoints:
+            remedy = f"Write a case file, kincheck import TABLE > case.toml, and there: {remedy}"
         raise KincheckError(
             f"{case.name}: no body has mass and no force element acts, so all reactions are zero."
-            " Give bodies mass, center_of_mass and inertia, or add [forces.NAME]."
+            f" {remedy}"
         )
     load = largest_load(mechanism, size(case), pace(case))
     scales = {False: default(load, "N"), True: default(load * size(case), "N m")}

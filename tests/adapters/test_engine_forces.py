@@ -315,7 +315,7 @@ MISTAKES = {
     "gravity upwards, mujoco": ("mujoco.mujoco.MuJoCoModel.set_loads", upwards),
     "gravity upwards, dart": ("dart.dart.DartModel.set_loads", upwards),
     "gravity upwards, drake": ("drake.drake.DrakeModel.set_loads", upwards),
-    "gravity upwards, simbody": ("simbody.simbody.LoadedSimbody.set_loads", upwards),
+    "gravity upwards, simbody": ("simbody.simbody.SimbodyModel.set_loads", upwards),
     "no gyroscopic term, drake": ("shared.tree_forces.demand_of", still),
     "no gyroscopic term, simbody": ("shared.tree_forces.demand_of", still),
     "inertia in other axes, pinocchio": ("pinocchio.pinocchio.mass_properties", other_axes),

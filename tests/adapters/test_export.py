@@ -31,6 +31,7 @@ from kincheck.core.cli.files import FORMATS
 from kincheck.core.kinematics import NativeSolver, largest_residual
 from kincheck.core.mechanism.tree import Branch, SpanningTree, spanning_tree
 from kincheck.core.trajectory import BodyMotion
+from scipy.spatial.transform import Rotation
 
 from ..oracles.naive import A
 from ..support.exported import READERS, read
@@ -306,20 +307,10 @@ def carried(case: Case, again: Case) -> dict[str, BodyMotion]:
         turns = [A(p) @ A(np.array(other.euler_parameters)).T for p in motion.p]
         arm = np.subtract(body.origin, other.origin)
         r = np.array([at + turn @ arm for at, turn in zip(motion.r, turns, strict=True)])
-        p = np.array([quaternion(turn @ A(np.array(body.euler_parameters))) for turn in turns])
+        at_design = A(np.array(body.euler_parameters))
+        p = Rotation.from_matrix([turn @ at_design for turn in turns]).as_quat(scalar_first=True)
         motions[body.name] = BodyMotion(r, p, None, None)
     return motions
-
-
-def quaternion(R: np.ndarray) -> np.ndarray:
-    """Return the Euler parameters of a rotation matrix: the largest column of their products."""
-    e = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
-    products = np.empty((4, 4))
-    products[0, 0] = 1.0 + np.trace(R)
-    products[0, 1:] = products[1:, 0] = e
-    products[1:, 1:] = R + R.T + (1.0 - np.trace(R)) * np.eye(3)
-    column = products[:, np.argmax(np.diag(products))]
-    return column / np.linalg.norm(column)
 
 
 @pytest.mark.parametrize(("name", "kind"), PAIRS)

@@ -13,8 +13,7 @@ from kincheck.core.studies.stress.families import FAMILIES
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, polar, slider_crank
 from kincheck.core.studies.stress.run import specimen
-from kincheck.core.studies.stress.solving import once
-from kincheck.core.studies.stress.verdicts import Verdict, judged
+from kincheck.core.studies.stress.verdicts import Verdict, judged, once
 from kincheck.core.studies.truth.fold import first_fold
 from kincheck.core.studies.truth.motion import Reach, followed
 

@@ -307,6 +307,15 @@ def test_sweeps_to_one_side_only_or_of_one_sample(name, values):
     assert worst(found)[0] <= 1e-6
 
 
+@pytest.mark.parametrize("name", adapters.SIMULATIONS)
+def test_samples_may_be_repeated(name):
+    case = slide([0.0, -0.1, -0.1, -0.2])
+    if "not equidistant" in (simulation(name).unsupported(case) or ""):
+        return
+    found = record(case, simulation(name))
+    assert (found.solved, worst(found)[0]) == (4, pytest.approx(0.0, abs=1e-6)), found.message
+
+
 @pytest.mark.parametrize("name", ["exudyn", "exudyn-alpha"])
 def test_a_motion_may_begin_with_an_acceleration(name):
     """The sine of 90 degrees: 0.5 (2 pi)^2 m/s^2 at once; an integrator that begins without is off

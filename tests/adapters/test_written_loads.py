@@ -108,8 +108,7 @@ def twisting(each):
 
 def turned(vector):
     """Return a vector turned about the axis by the angle of the start."""
-    c, s = np.cos(ANGLE), np.sin(ANGLE)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ vector
+    return Rotation.from_rotvec(ANGLE * AXIS).apply(vector)
 
 
 def start(springs, loads, bushing=None, clock=SPRINGS[1]):
@@ -357,11 +356,9 @@ WHERE = {"base": 0.4}
 
 
 def turn(axis, angle, point):
-    """The displacement by a turn, as a matrix of homogeneous coordinates (Rodrigues)."""
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    """The displacement by a turn, as a matrix of homogeneous coordinates."""
     T = np.eye(4)
-    T[:3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    T[:3, :3] = Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis)).as_matrix()
     T[:3, 3] = np.array(point) - T[:3, :3] @ point
     return T
 

@@ -18,6 +18,7 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
 
 from ..oracles.rods import Carrier
+from ..support.case_texts import complains
 from ..support.rods_of_templates import RODS as ALL_RODS
 from ..support.rods_of_templates import solved
 
@@ -193,38 +194,38 @@ def changed(folder, edit):
 FAULTS = {
     "other side": (
         lambda data: data["outputs"]["left_toe"].update(side="middle"),
-        [r"outputs.left_toe", "'middle'", "left, right"],
+        "outputs.left_toe ... 'middle' ... left, right",
     ),
     "no other": (
         lambda data: data["suspension"].pop("other"),
-        ["outputs.right_toe.side", "found 'right'", "expected left", "add [suspension.other]"],
+        ("outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]"),
     ),
     "no other for an axle": (
         lambda data: (
             data["suspension"].pop("other"),
             data.update(outputs={"track": {"type": "track"}}),
         ),
-        ["suspension.other: missing", "outputs.track of type 'track'", "add [suspension.other]"],
+        ("suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]"),
     ),
     "one wheel twice": (
         lambda data: data["suspension"]["other"].update(wheel_center="left_wheel_center"),
-        ["suspension.other.side", "'right'", "on the other side"],
+        "suspension.other.side ... 'right' ... on the other side",
     ),
     "no point": (
         lambda data: data["suspension"]["other"].update(wheel_center="right_wheel_centre"),
-        ["suspension.other.wheel_center", "'right_wheel_center'"],
+        "suspension.other.wheel_center ... 'right_wheel_center'",
     ),
     "upside down": (
         lambda data: data["suspension"]["other"]["kingpin"].reverse(),
-        ["suspension.other.kingpin", "the lower point, then the upper"],
+        "suspension.other.kingpin ... the lower point, then the upper",
     ),
     "no driver": (
         lambda data: data["suspension"]["other"].update(travel="right_strike"),
-        ["suspension.other.travel", "'right_stroke'"],
+        "suspension.other.travel ... 'right_stroke'",
     ),
     "side of an axle": (
         lambda data: data["outputs"]["track"].update(side="left"),
-        ["outputs.track", "side"],
+        "outputs.track ... side",
     ),
 }
 
@@ -232,10 +233,7 @@ FAULTS = {
 @pytest.mark.parametrize("kind", FAULTS)
 def test_faults(tmp_path, kind):
     edit, fragments = FAULTS[kind]
-    file = changed(tmp_path, edit)
-    with pytest.raises(CaseError) as caught:
-        load_case(file)
-    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+    complains(changed(tmp_path, edit), fragments)
 
 
 def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
@@ -253,17 +251,13 @@ def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
 @pytest.mark.parametrize(
     ("supplied", "fragments"),
     [
-        ({"axle": "pitch"}, ["--axle", "'pitch'", "heave"]),
-        ({"axle": "steer", "wheelbase": "two"}, ["--wheelbase", "'two'", "a length"]),
-        ({"axle": "steer", "wheelbase": "-2"}, ["--wheelbase", "-2 m"]),
+        ({"axle": "pitch"}, "--axle ... 'pitch' ... heave"),
+        ({"axle": "steer", "wheelbase": "two"}, "--wheelbase ... 'two' ... a length"),
+        ({"axle": "steer", "wheelbase": "-2"}, "--wheelbase ... -2 m"),
     ],
 )
 def test_faults_of_options(tmp_path, supplied, fragments):
-    file = tmp_path / "car.csv"
-    file.write_text(sample_table(TEMPLATES["mcpherson"]))
-    with pytest.raises(CaseError) as caught:
-        load(file, Supplied(**supplied))
-    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+    complains(table(tmp_path, "mcpherson"), fragments, Supplied(**supplied))
 
 
 def test_signs_of_sae(tmp_path):
@@ -349,26 +343,24 @@ def test_without_data_of_the_vehicle_there_are_no_anti_values(tmp_path):
 
 
 STEERING_FAULTS = {
-    "position": ({"position": "frnt"}, ["--position", "'frnt'", "'front'"]),
-    "height": ({"cg_height": "half"}, ["--cg-height", "'half'", "a length"]),
-    "negative height": ({"cg_height": "-0.5"}, ["--cg-height", "-0.5 m"]),
-    "percent": ({"brake_share": "60"}, ["--brake-share", "'60'", "0 to 1"]),
-    "no share": ({"drive_share": "all"}, ["--drive-share", "'all'", "0 to 1"]),
-    "rack": ({"rack": "40"}, ["--rack", "'40'", "up to 1 m"]),
-    "words": ({"rack": "left"}, ["--rack", "'left'", "START:STOP"]),
-    "rack twice": ({"rack": "0.04", "axle": "steer"}, ["--rack", "beside --axle steer"]),
-    "travel in mm": ({"travel": "50"}, ["--travel", "'50'", "up to 1 m"]),
-    "nowhere": ({"travel": "0.1:0.1:5"}, ["--travel", "'0.1:0.1:5'"]),
-    "backwards": ({"travel": "-0.05"}, ["--travel", "'-0.05'"]),
+    "position": ({"position": "frnt"}, "--position ... 'frnt' ... 'front'"),
+    "height": ({"cg_height": "half"}, "--cg-height ... 'half' ... a length"),
+    "negative height": ({"cg_height": "-0.5"}, "--cg-height ... -0.5 m"),
+    "percent": ({"brake_share": "60"}, "--brake-share ... '60' ... 0 to 1"),
+    "no share": ({"drive_share": "all"}, "--drive-share ... 'all' ... 0 to 1"),
+    "rack": ({"rack": "40"}, "--rack ... '40' ... up to 1 m"),
+    "words": ({"rack": "left"}, "--rack ... 'left' ... START:STOP"),
+    "rack twice": ({"rack": "0.04", "axle": "steer"}, "--rack ... beside --axle steer"),
+    "travel in mm": ({"travel": "50"}, "--travel ... '50' ... up to 1 m"),
+    "nowhere": ({"travel": "0.1:0.1:5"}, "--travel ... '0.1:0.1:5'"),
+    "backwards": ({"travel": "-0.05"}, "--travel ... '-0.05'"),
 }
 
 
 @pytest.mark.parametrize("kind", STEERING_FAULTS)
 def test_faults_of_steering(tmp_path, kind):
     supplied, fragments = STEERING_FAULTS[kind]
-    with pytest.raises(CaseError) as caught:
-        load(table(tmp_path), Supplied(**supplied))
-    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+    complains(table(tmp_path), fragments, Supplied(**supplied))
 
 
 def test_a_rack_needs_a_tie_rod(tmp_path):
@@ -448,21 +440,19 @@ def test_side_is_stated_in_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("corner", "above", "own", "fragments"),
     [
-        ("FR", ["# side: left"], {}, ["y = -750 mm", "side says left"]),
-        ("FL", [], {"side": "right"}, ["y = 750 mm", "--side says right"]),
-        ("FL", ["# side: left"], {"side": "right"}, ["--side: found right", "left side"]),
-        ("FL", [], {"side": "lft"}, ["--side: found 'lft'", "'left'"]),
-        ("FR", [], {"axes": "forward,right,down", "units": "mm"}, ["above"]),
-        ("FL", [], {"axes": "forward,right,up"}, ["left-handed", "--side right"]),
-        ("FL", [], {"corner": "FR"}, ["--corner: found no point of FR"]),
-        ("FL", [], {"corner": "front"}, ["--corner: found no point of front"]),
-        ("FL", [], {"corner": "nose"}, ["--corner: found 'nose'", "FL, FR, RL, RR"]),
+        ("FR", ["# side: left"], {}, "y = -750 mm ... side says left"),
+        ("FL", [], {"side": "right"}, "y = 750 mm ... --side says right"),
+        ("FL", ["# side: left"], {"side": "right"}, "--side: found right ... left side"),
+        ("FL", [], {"side": "lft"}, "--side: found 'lft' ... 'left'"),
+        ("FR", [], {"axes": "forward,right,down", "units": "mm"}, "above"),
+        ("FL", [], {"axes": "forward,right,up"}, "left-handed ... --side right"),
+        ("FL", [], {"corner": "FR"}, "--corner: found no point of FR"),
+        ("FL", [], {"corner": "front"}, "--corner: found no point of front"),
+        ("FL", [], {"corner": "nose"}, "--corner: found 'nose' ... FL, FR, RL, RR"),
     ],
 )
 def test_contradicted_sides_are_refused(tmp_path, corner, above, own, fragments):
-    with pytest.raises(CaseError) as caught:
-        load(plain(tmp_path, "mcpherson", corner, *above), of("mcpherson", **own))
-    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+    complains(plain(tmp_path, "mcpherson", corner, *above), fragments, of("mcpherson", **own))
 
 
 WORDS = {"FL": "Front,Left", "FR": "Front,Right", "RL": "Rear,Left", "RR": "Rear,Right"}

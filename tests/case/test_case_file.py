@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.case import Case, Truth
+from kincheck.core.case.case import Truth
 from kincheck.core.case.io.atomic_files import write_all, written
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
@@ -32,7 +32,7 @@ from ..support.case_texts import BASE, INLINE, edited, write
 EXAMPLES = sorted((Path(__file__).parents[1] / "data" / "case_files").glob("*.toml"))
 
 
-def same(a: Case, b: Case) -> None:
+def same(a, b):
     assert (a.name, a.source, a.truth) == (b.name, b.source, b.truth)
     assert a.mechanism == b.mechanism
     assert a.outputs == b.outputs
@@ -50,7 +50,7 @@ def test_all_examples_are_here():
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
-def test_examples_are_read(file: Path):
+def test_examples_are_read(file):
     text = tomllib.loads(file.read_text())
     case = load_case(str(file))
     assert case.name == file.stem
@@ -67,13 +67,13 @@ def test_examples_are_read(file: Path):
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
-def test_json_is_the_same(file: Path, tmp_path: Path):
+def test_json_is_the_same(file, tmp_path):
     data = json.dumps(tomllib.loads(file.read_text()))
     same(load_case(write(tmp_path, data, "case.json")), load_case(file))
     same(load_case(write(tmp_path, data, "case")), load_case(file))  # told by its brace
 
 
-def test_every_value_lands_where_it_belongs(tmp_path: Path):
+def test_every_value_lands_where_it_belongs(tmp_path):
     case = load_case(write(tmp_path, BASE + INLINE))
     assert (case.name, case.source, case.truth) == (
         "slider",
@@ -100,7 +100,7 @@ def test_every_value_lands_where_it_belongs(tmp_path: Path):
     assert series.acceleration is None
 
 
-def test_millimetres_and_degrees_are_the_same_case(tmp_path: Path):
+def test_millimetres_and_degrees_are_the_same_case(tmp_path):
     """Four joints, both kinds of driver: every number of the millimetre file is 1000 times that of
     the metre file.
     """
@@ -170,7 +170,7 @@ def test_millimetres_and_degrees_are_the_same_case(tmp_path: Path):
     assert tie.length == 0.52
 
 
-def test_displacements_are_lengths(tmp_path: Path):
+def test_displacements_are_lengths(tmp_path):
     millimetres = load_case(
         write(
             tmp_path,
@@ -181,7 +181,7 @@ def test_displacements_are_lengths(tmp_path: Path):
     assert millimetres.sweep.rate == 2e-3
 
 
-def test_design_value_of_an_absolute_point_driver(tmp_path: Path):
+def test_design_value_of_an_absolute_point_driver(tmp_path):
     absolute = 'type = "point_coordinate"\npoint = "tip"\ndirection = [0, 3, 4]\nrelative = false'
     text = edited(('type = "joint_displacement"\njoint = "guide"', absolute))
     case = load_case(write(tmp_path, text))
@@ -192,7 +192,7 @@ def test_design_value_of_an_absolute_point_driver(tmp_path: Path):
     )
 
 
-def test_default_outputs_say_that_they_are(tmp_path: Path):
+def test_default_outputs_say_that_they_are(tmp_path):
     case = load_case(write(tmp_path, BASE[: BASE.index("[outputs")]))
     assert [output.name for output in case.outputs] == ["tip.x", "tip.y", "tip.z"]
     assert [output.direction for output in case.outputs] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -202,7 +202,7 @@ def test_default_outputs_say_that_they_are(tmp_path: Path):
     )
 
 
-def test_an_output_without_tolerance_gets_the_default(tmp_path: Path):
+def test_an_output_without_tolerance_gets_the_default(tmp_path):
     (output,) = load_case(
         write(tmp_path, edited(('atol = 1e-9\nwhy = "made up for this test"', "")))
     ).outputs
@@ -210,7 +210,7 @@ def test_an_output_without_tolerance_gets_the_default(tmp_path: Path):
 
 
 @pytest.mark.parametrize("where", ["named", "all"])
-def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path: Path, where: str):
+def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path, where):
     """The tip is 5 um from the joint: a nanometre would let pass what is wrong in the fourth
     digit.
     """
@@ -224,7 +224,7 @@ def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path: P
     assert load_case(write(tmp_path, text)).outputs[0].atol == pytest.approx(5e-12, rel=1e-9)
 
 
-def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path: Path):
+def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path):
     (output,) = load_case(write(tmp_path, BASE)).outputs
     assert (output.atol, output.rtol) == (1e-9, 0.0)
 
@@ -233,9 +233,7 @@ def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path: Path):
     ("start", "stop", "steps", "values"),
     [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.2", "1", [0.2])],
 )
-def test_sweeps_may_run_down_or_have_one_sample(
-    tmp_path: Path, start: str, stop: str, steps: str, values: list[float]
-):
+def test_sweeps_may_run_down_or_have_one_sample(tmp_path, start, stop, steps, values):
     text = edited(
         ("start = -0.1", f"start = {start}"),
         ("stop = 0.1", f"stop = {stop}"),
@@ -244,11 +242,11 @@ def test_sweeps_may_run_down_or_have_one_sample(
     assert load_case(write(tmp_path, text)).sweep.values.tolist() == values
 
 
-def test_rate_is_one_unless_given(tmp_path: Path):
+def test_rate_is_one_unless_given(tmp_path):
     assert load_case(write(tmp_path, edited(("rate = 2.0\n", "")))).sweep.rate == 1.0
 
 
-def test_a_new_joint_type_can_be_named_at_once(tmp_path: Path):
+def test_a_new_joint_type_can_be_named_at_once(tmp_path):
     @dataclass(frozen=True)
     class Offset(Spherical):
         type = "offset_of_test_casefile"
@@ -272,7 +270,7 @@ def test_a_new_joint_type_can_be_named_at_once(tmp_path: Path):
         del Joint.registry[Offset.type]
 
 
-def test_byte_order_mark_and_windows_lines_are_read(tmp_path: Path):
+def test_byte_order_mark_and_windows_lines_are_read(tmp_path):
     same(
         load_case(write(tmp_path, "\ufeff" + BASE.replace("\n", "\r\n"))),
         load_case(write(tmp_path, BASE, "b.toml")),
@@ -347,7 +345,7 @@ steps = 9
 """
 
 
-def test_couplers_and_joints_without_geometry(tmp_path: Path):
+def test_couplers_and_joints_without_geometry(tmp_path):
     """A steering column turns a pinion by a gear, that moves a rack, and lifts a nut by a
     thread.
     """
@@ -395,7 +393,7 @@ values = [10, 20]
 """
 
 
-def test_motions_are_in_the_units_of_the_file(tmp_path: Path):
+def test_motions_are_in_the_units_of_the_file(tmp_path):
     sweep = COUPLED[COUPLED.index("[sweep]") :]
     text = edited((sweep, MOTION + "start = 0\nstop = 1.5\nsteps = 4\n"), base=COUPLED)
     case = load_case(write(tmp_path, text))
@@ -414,7 +412,7 @@ def test_motions_are_in_the_units_of_the_file(tmp_path: Path):
     same(named, case)
 
 
-def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path: Path):
+def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path):
     """2.1 m at 0.7 m/s take 3.0000000000000004 s, more than the table has."""
     motion = MOTION[MOTION.index("[drivers.hang]") :].replace("[0, 1.5]", "[-3, 3]")
     push = edited(
@@ -450,7 +448,7 @@ steps = 7
 """  # noqa: E501
 
 
-def test_a_polynomial_is_in_the_units_of_the_file(tmp_path: Path):
+def test_a_polynomial_is_in_the_units_of_the_file(tmp_path):
     """Millimetres by powers of degrees, between the freedoms that the joints have."""
     case = load_case(write(tmp_path, CURVED))
     (knee,) = case.mechanism.couplers

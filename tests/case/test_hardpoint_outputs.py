@@ -11,6 +11,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_tab
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
+from ..support.case_texts import complains
 from ..support.rods_of_templates import CLOSE, DATA, RODS, expected, solved
 
 
@@ -75,19 +76,19 @@ def test_without_a_radius_nothing_is_at_the_road():
 @pytest.mark.parametrize(
     ("supplied", "extra", "fragments"),
     [
-        ({"wheel_radius": "30 deg"}, "", ["--wheel-radius", "'30 deg'", "a length"]),
+        ({"wheel_radius": "30 deg"}, "", "--wheel-radius ... '30 deg' ... a length"),
         (
             {"wheel_radius": "300"},
             "",
-            ["--wheel-radius", "300 m", "0.02 to 3 m", "say its unit: 300mm"],
+            "--wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm",
         ),
-        ({"wheel_radius": "-0.3"}, "", ["found -0.3 m", "correct it"]),
-        ({"wheelbase": "2600"}, "", ["--wheelbase", "0.1 to 20 m", "2600mm"]),
-        ({"cg_height": "500"}, "", ["--cg-height", "0.005 to 6 m", "500mm"]),
-        ({"rack_per_turn": "50"}, "", ["--rack-per-turn", "0.001 to 1 m", "50mm"]),
-        ({"wheel_radius": "0.3"}, "wheel_contact,0,612,0\n", ["--wheel-radius", "wheel_contact"]),
-        ({}, "wheel_contact,0,612,220\n", ["wheel_contact", "0.008 m"]),
-        ({}, "wheel_axis,0,412,228\n", ["wheel_axis", "inboard", "mirror"]),
+        ({"wheel_radius": "-0.3"}, "", "found -0.3 m ... correct it"),
+        ({"wheelbase": "2600"}, "", "--wheelbase ... 0.1 to 20 m ... 2600mm"),
+        ({"cg_height": "500"}, "", "--cg-height ... 0.005 to 6 m ... 500mm"),
+        ({"rack_per_turn": "50"}, "", "--rack-per-turn ... 0.001 to 1 m ... 50mm"),
+        ({"wheel_radius": "0.3"}, "wheel_contact,0,612,0\n", "--wheel-radius ... wheel_contact"),
+        ({}, "wheel_contact,0,612,220\n", "wheel_contact ... 0.008 m"),
+        ({}, "wheel_axis,0,412,228\n", "wheel_axis ... inboard ... mirror"),
     ],
 )
 def test_faults(tmp_path, supplied, extra, fragments):
@@ -98,9 +99,7 @@ def test_faults(tmp_path, supplied, extra, fragments):
         if role != "wheel_contact"
     ]
     file.write_text("name,x,y,z\n" + "".join(rows) + extra)
-    with pytest.raises(CaseError) as caught:
-        load(file, Supplied("double_wishbone", "mm", "iso", **supplied))
-    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+    complains(file, fragments, Supplied("double_wishbone", "mm", "iso", **supplied))
 
 
 def test_templates_prints_tables_that_run(tmp_path, capsys):

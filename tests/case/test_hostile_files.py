@@ -26,7 +26,7 @@ TABLE = ("--template", "double_wishbone", "--units", "mm", "--axes", "adams")
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def folders(tmp_path_factory):
     """A folder of what the case files name, and one outside it with a file that would do."""
     inside, outside = tmp_path_factory.mktemp("inside"), tmp_path_factory.mktemp("outside")
     (inside.parent / "outside").symlink_to(outside)
@@ -46,7 +46,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
-def results(folders: tuple[Path, Path]) -> dict[str, dict[str, object]]:
+def results(folders):
     """What came of all the files, read one after the other in one process with limits."""
     inside, outside = folders
     lines: list[str] = []
@@ -92,7 +92,7 @@ def results(folders: tuple[Path, Path]) -> dict[str, dict[str, object]]:
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_hostile_files_are_refused(kind: str, results: dict[str, dict[str, object]]):
+def test_hostile_files_are_refused(kind, results):
     found, (_, _, fragment) = results[kind], TEXTS[kind]
     said = str(found["said"])
     assert found["status"] == 2, said[-2000:]
@@ -105,7 +105,7 @@ def test_hostile_files_are_refused(kind: str, results: dict[str, dict[str, objec
     assert found["opened"] == []
 
 
-def test_marks_and_line_ends_of_other_systems_are_read(tmp_path: Path):
+def test_marks_and_line_ends_of_other_systems_are_read(tmp_path):
     for text in ("\ufeff" + BASE, BASE.replace("\n", "\r\n")):
         (tmp_path / "case.toml").write_bytes(text.encode())
         assert case_file.load_case(tmp_path / "case.toml").name == "slider"
@@ -122,9 +122,7 @@ PLACES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 @pytest.mark.parametrize("kind", PLACES)
 @pytest.mark.parametrize("end", [".toml", ".json", ".csv", ".sub", ".xml"])
-def test_what_is_no_file_is_refused(
-    kind: str, end: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-):
+def test_what_is_no_file_is_refused(kind, end, tmp_path, capsys):
     from kincheck.core.cli.main import main
 
     make, said = PLACES[kind]

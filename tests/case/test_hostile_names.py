@@ -15,7 +15,7 @@ import pytest
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.escape import cell, file_name, visible
 from kincheck.core.case.io.table_file import csv_text
-from kincheck.core.harness.record import Outcome, Record, Results, to_json
+from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.page_model import Material
 from kincheck.core.report.progress import complain, progress
@@ -44,14 +44,14 @@ NAMES = {
 
 
 @pytest.fixture(params=NAMES)
-def name(request: pytest.FixtureRequest) -> str:
+def name(request):
     return NAMES[request.param]
 
 
-def run(name: str) -> Results:
+def run(name):
     """Everything that is a name or a message is called so."""
 
-    def renamed(record: Record, **changes: object) -> Record:
+    def renamed(record, **changes):
         outputs = [
             msgspec.structs.replace(each, unit=name, sense=name, reason=name)
             for each in record.outputs.values()
@@ -90,7 +90,7 @@ def run(name: str) -> Results:
 
 
 @pytest.mark.parametrize("show", [print_table, print_matrix])
-def test_terminals_show_names_and_obey_none(name: str, show):
+def test_terminals_show_names_and_obey_none(name, show):
     show(run(name), text := io.StringIO())
     said = text.getvalue()
     assert all(line.isprintable() for line in said.replace("\t", " ").split("\n"))
@@ -99,9 +99,7 @@ def test_terminals_show_names_and_obey_none(name: str, show):
         assert name in said
 
 
-def test_messages_and_progress_are_lines_that_obey_nothing(
-    name: str, capsys: pytest.CaptureFixture[str], tmp_path
-):
+def test_messages_and_progress_are_lines_that_obey_nothing(name, capsys, tmp_path):
     complain(
         [
             str(
@@ -120,7 +118,7 @@ def test_messages_and_progress_are_lines_that_obey_nothing(
     assert all(line.isprintable() for line in lines)
 
 
-def test_markdown_is_a_table_and_text_and_nothing_else(name: str):
+def test_markdown_is_a_table_and_text_and_nothing_else(name):
     text = to_markdown(run(name))
     text.encode()
     tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(text)
@@ -144,7 +142,7 @@ def test_markdown_is_a_table_and_text_and_nothing_else(name: str):
         assert shown.count(name) >= 3
 
 
-def test_junit_is_xml(name: str):
+def test_junit_is_xml(name):
     root = ElementTree.fromstring(to_junit(run(name)))
     assert {element.tag for element in root.iter()} <= {
         "testsuites",
@@ -159,11 +157,11 @@ def test_junit_is_xml(name: str):
 
 
 @cache
-def plain_page() -> Page:
+def plain_page():
     return Page(render(Material(run("name"), {}, {})))
 
 
-def test_pages_show_names_and_obey_none(name: str):
+def test_pages_show_names_and_obey_none(name):
     text = render(Material(run(name), {}, {}))
     page, plain = Page(text), plain_page()
     assert sorted(tag for tag, _ in page.tags) == sorted(tag for tag, _ in plain.tags)
@@ -175,13 +173,13 @@ def test_pages_show_names_and_obey_none(name: str):
     assert re.findall(r"(inner|outer)HTML *=|insertAdjacentHTML|document\.write", text) == []
 
 
-def test_json_is_read_again_as_it_was(name: str):
+def test_json_is_read_again_as_it_was(name):
     # UTF-8 cannot hold it; circumstances and messages are cleaned where they are made
     if name != NAMES["undecodable"]:
         assert msgspec.json.decode(to_json(run(name)), type=Results) == run(name)
 
 
-def test_spreadsheets_compute_nothing(name: str):
+def test_spreadsheets_compute_nothing(name):
     _, row = csv.reader(io.StringIO(csv_text(["head"], [[name]])))
     assert len(row) == 1
     assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")

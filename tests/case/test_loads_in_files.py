@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 from io import StringIO
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -94,7 +93,7 @@ vector = [0.0, 700.5, 0.0]
 ALL = PLAIN.replace("[units]", "gravity = [0.0, 0.0, -9806.65]\n[units]") + MASS + FORCES
 
 
-def test_units_of_a_file_in_millimetres_and_degrees(tmp_path: Path):
+def test_units_of_a_file_in_millimetres_and_degrees(tmp_path):
     """kg, s and N are the same everywhere; each number is that of the file in SI, rounded once."""
     mechanism = load_case(write(tmp_path, ALL)).mechanism
     assert mechanism.gravity == (0.0, 0.0, -9.80665)
@@ -122,7 +121,7 @@ def test_units_of_a_file_in_millimetres_and_degrees(tmp_path: Path):
     assert mechanism.force("twist") == Torque("twist", "arm", (0.0, 0.7005, 0.0))
 
 
-def test_numbers_in_si_are_taken_as_they_are(tmp_path: Path):
+def test_numbers_in_si_are_taken_as_they_are(tmp_path):
     in_si = ALL.replace('length = "mm"\nangle = "deg"', "")
     mechanism = load_case(write(tmp_path, in_si)).mechanism
     assert mechanism.gravity == (0.0, 0.0, -9806.65)
@@ -130,7 +129,7 @@ def test_numbers_in_si_are_taken_as_they_are(tmp_path: Path):
     assert mechanism.force("clock") == TorsionSpringDamper("clock", "pin", 900.0, 18.0, -45.0)
 
 
-def test_what_is_left_out(tmp_path: Path):
+def test_what_is_left_out(tmp_path):
     """A mass is a point at the body's origin, a spring is as long as at design."""
     short = ALL.replace(MASS, "mass = 2.5\norigin = [10.0, 0.0, 0.0]\n")
     short = short.replace("free_length = 290.1\n", "").replace("damping = 1.7\n", "")
@@ -142,86 +141,86 @@ def test_what_is_left_out(tmp_path: Path):
 
 
 WRONG = {
-    "negative mass": ("mass = 2.5", "mass = -1", ["bodies.arm.mass", "found -1", "not negative"]),
-    "mass that is no number": ("mass = 2.5", "mass = nan", ["bodies.arm.mass", "nan"]),
-    "centre of two": ("[150.0, 0.0, 0.0]", "[1, 2]", ["bodies.arm.center_of_mass", "[x, y, z]"]),
+    "negative mass": ("mass = 2.5", "mass = -1", "bodies.arm.mass ... found -1 ... not negative"),
+    "mass that is no number": ("mass = 2.5", "mass = nan", "bodies.arm.mass ... nan"),
+    "centre of two": ("[150.0, 0.0, 0.0]", "[1, 2]", "bodies.arm.center_of_mass ... [x, y, z]"),
     "inertia of three": (
         "[250.0, 7300.0, 7400.0, 3.0, -20.0, 0.125]",
         "[1, 1, 1]",
-        ["bodies.arm.inertia", "six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]"],
+        "bodies.arm.inertia ... six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]",
     ),
     "inertia that breaks the triangle": (
         "[250.0, 7300.0, 7400.0, ",
         "[250.0, 7300.0, 17400.0, ",
-        ["bodies.arm.inertia", "17400.0", "triangle inequality", " kg mm^2, "],
+        "bodies.arm.inertia ... 17400.0 ... triangle inequality ...  kg mm^2, ",
     ),
     "negative inertia": (
         "[250.0, 73",
         "[-250.0, 73",
-        ["bodies.arm.inertia", "not positive definite", " kg mm^2, "],
+        "bodies.arm.inertia ... not positive definite ...  kg mm^2, ",
     ),
     "inertia without mass": (
         "mass = 2.5",
         "mass = 0",
-        ["bodies.arm.inertia", "has an inertia, but no mass"],
+        "bodies.arm.inertia ... has an inertia, but no mass",
     ),
-    "gravity of one": ("[0.0, 0.0, -9806.65]", "-9806.65", ["gravity", "three numbers"]),
-    "infinite gravity": ("-9806.65", "inf", ["gravity[2]", "inf"]),
-    "unknown type": ('"torque"', '"torqe"', ["forces.twist.type", "did you mean 'torque'?"]),
-    "no type": ('type = "torque"', "", ["forces.twist.type", "missing"]),
-    "unknown key": ("damping = 1.7", "dampin = 1.7", ["forces.spring.dampin", "'damping'"]),
-    "no stiffness": ("stiffness = 25.3", "", ["forces.spring.stiffness", "missing"]),
-    "negative stiffness": ("= 25.3", "= -2", ["forces.spring.stiffness", "found -2"]),
-    "negative damping": ("= 18.0", "= -2.0", ["forces.clock.damping", "not negative"]),
-    "negative length": ("= 290.1", "= -2.0", ["forces.spring.free_length", "not negative"]),
+    "gravity of one": ("[0.0, 0.0, -9806.65]", "-9806.65", "gravity ... three numbers"),
+    "infinite gravity": ("-9806.65", "inf", "gravity[2] ... inf"),
+    "unknown type": ('"torque"', '"torqe"', "forces.twist.type ... did you mean 'torque'?"),
+    "no type": ('type = "torque"', "", "forces.twist.type ... missing"),
+    "unknown key": ("damping = 1.7", "dampin = 1.7", "forces.spring.dampin ... 'damping'"),
+    "no stiffness": ("stiffness = 25.3", "", "forces.spring.stiffness ... missing"),
+    "negative stiffness": ("= 25.3", "= -2", "forces.spring.stiffness ... found -2"),
+    "negative damping": ("= 18.0", "= -2.0", "forces.clock.damping ... not negative"),
+    "negative length": ("= 290.1", "= -2.0", "forces.spring.free_length ... not negative"),
     "one point": (
         "[[100.0, 0.0, 300.0], [100.0, 0.0, 0.0]]",
         "[100.0, 0.0, 300.0]",
-        ["forces.spring.points", "two points"],
+        "forces.spring.points ... two points",
     ),
     "spring of no length": (
         "[[100.0, 0.0, 300.0], ",
         "[[100.0, 0.0, 0.0], ",
-        ["forces.spring.points", "coincide at x = 100.0 mm, y = 0.0 mm", "two ends"],
+        "forces.spring.points ... coincide at x = 100.0 mm, y = 0.0 mm ... two ends",
     ),
     "spring on one body": (
         'bodies = ["ground", "arm"]\npoints',
         'bodies = ["arm", "arm"]\npoints',
-        ["forces.spring.bodies", "two different bodies"],
+        "forces.spring.bodies ... two different bodies",
     ),
     "spring on an unknown body": (
         'bodies = ["ground", "arm"]\npoints',
         'bodies = ["ground", "amr"]\npoints',
-        ["forces.spring.bodies", "did you mean 'arm'?"],
+        "forces.spring.bodies ... did you mean 'arm'?",
     ),
-    "unknown joint": ('"pin"\nstiff', '"pn"\nstiff', ["forces.clock.joint", "mean 'pin'?"]),
-    "unknown body": ('"arm"\nvector', '"am"\nvector', ["forces.twist.body", "mean 'arm'?"]),
-    "unknown frame": ('frame = "body"', 'frame = "local"', ["forces.push.frame", '"global" or']),
-    "vector of four": ("[0.0, 700.5, 0.0]", "[0, 1, 2, 3]", ["forces.twist.vector", "[x, y, z]"]),
-    "no table": ("[forces.twist]", "[forces]\ntwist = 3\n[x]", ["x", "unknown key"]),
+    "unknown joint": ('"pin"\nstiff', '"pn"\nstiff', "forces.clock.joint ... mean 'pin'?"),
+    "unknown body": ('"arm"\nvector', '"am"\nvector', "forces.twist.body ... mean 'arm'?"),
+    "unknown frame": ('frame = "body"', 'frame = "local"', 'forces.push.frame ... "global" or'),
+    "vector of four": ("[0.0, 700.5, 0.0]", "[0, 1, 2, 3]", "forces.twist.vector ... [x, y, z]"),
+    "no table": ("[forces.twist]", "[forces]\ntwist = 3\n[x]", "x ... unknown key"),
 }
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_wrong_loads_are_one_message(name: str, tmp_path: Path):
+def test_wrong_loads_are_one_message(name, tmp_path):
     old, new, fragments = WRONG[name]
     assert ALL.count(old) == 1
     complains(write(tmp_path, ALL.replace(old, new)), fragments)
 
 
-def test_a_joint_that_does_not_turn_has_no_torsion_spring(tmp_path: Path):
+def test_a_joint_that_does_not_turn_has_no_torsion_spring(tmp_path):
     rail = '[joints.rod]\ntype = "spherical"\nbodies = ["ground", "arm"]\npoint = [0, 0, 0]\n'
     text = ALL.replace('joint = "pin"\nstiff', 'joint = "rod"\nstiff') + rail
-    complains(write(tmp_path, text), ["forces.clock.joint", "has no rotation"])
+    complains(write(tmp_path, text), "forces.clock.joint ... has no rotation")
 
 
-def test_wrong_loads_are_exit_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_wrong_loads_are_exit_status_2(tmp_path, capsys):
     file = write(tmp_path, ALL.replace("mass = 2.5", "mass = -2.5"))
     assert main(["run", str(file), "--engine", "native"]) == 2
     assert "bodies.arm.mass: found -2.5" in capsys.readouterr().err
 
 
-def of(mechanism) -> Case:
+def of(mechanism):
     sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
     return with_all_coordinates(
         Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
@@ -257,7 +256,7 @@ def inertia(draw):
 
 @settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
-def test_what_is_written_reads_as_the_same(tmp_path: Path, data: st.DataObject):
+def test_what_is_written_reads_as_the_same(tmp_path, data):
     draw = data.draw
     mass = draw(size)
     body = {"mass": mass, "center_of_mass": draw(vector)}

@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.case import Case, Sweep
+from kincheck.core.case.case import Sweep
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.measures import (
     Angle,
@@ -15,7 +14,6 @@ from kincheck.core.case.measures import (
     Distance,
     JointAngle,
     JointDisplacement,
-    Measure,
     Orientation,
 )
 from kincheck.core.case.quantity import with_markers
@@ -30,7 +28,7 @@ from ..support.measure_cases import AXIS, RATE, arm
 TOLERANCE = (1e-9, 0.0, "test")
 
 
-def series(case: Case, *outputs: Measure):
+def series(case, *outputs):
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
     engine = Native()
     trajectory = engine.solve(engine.build(case), case, 1e-12)
@@ -221,7 +219,7 @@ OUTPUT = (
 MM = BASE.replace(OUTPUT, '[units]\nlength = "mm"\nangle = "deg"\n')
 
 
-def test_a_case_file_has_all_measures(tmp_path: Path):
+def test_a_case_file_has_all_measures(tmp_path):
     case = load_case(write(tmp_path, MM + MEASURES))
     length, stroke, turn, e2, wide = case.outputs
     assert length == Distance("length", length.atol, 1e-9, length.why, ("home", "tip"), True)
@@ -238,7 +236,7 @@ def test_a_case_file_has_all_measures(tmp_path: Path):
     assert outputs["length"].velocity[1] == pytest.approx(middle, rel=1e-9)
 
 
-def test_measures_are_written_and_read_again(tmp_path: Path):
+def test_measures_are_written_and_read_again(tmp_path):
     case = load_case(write(tmp_path, MM + MEASURES))
     again = load_case(write(tmp_path, case_text(case), "again.toml"))
     assert again.outputs == case.outputs
@@ -249,18 +247,18 @@ FREE = ('"joint_displacement"\njoint = "guide"\natol', '"joint_angle"\njoint = "
 NOBODY = ('body = "slider"\ncomponent = "e2"', 'body = "bed"\ncomponent = "e2"')
 FEW = ("[[1, 0, 0], [0, 0.5, 0]]", "[[1, 0, 0]]")
 WRONG = [
-    (('["home", "tip"]', '["home", "top"]'), ["outputs.length.points", "'top'", "'tip'?"]),
-    (('["home", "tip"]', '["home"]'), ["outputs.length.points", "two names", "first point"]),
-    (('joint = "guide"\natol', 'joint = "guid"\natol'), ["outputs.stroke.joint", "'guide'?"]),
-    (FREE, ["outputs.stroke.joint", "no rotation to measure", "translation"]),
-    (('component = "y"', 'component = "w"'), ["outputs.turn.component", "one of x, y, z, e0"]),
-    (NOBODY, ["outputs.e2.body", "'bed'"]),
-    (("[0, 0.5, 0]", "[0, 0, 0]"), ["outputs.open.directions", "zero"]),
-    (FEW, ["outputs.open.directions", "two directions"]),
-    (('type = "angle"', 'type = "angel"'), ["outputs.open.type", "'angle'?"]),
+    (('["home", "tip"]', '["home", "top"]'), "outputs.length.points ... 'top' ... 'tip'?"),
+    (('["home", "tip"]', '["home"]'), "outputs.length.points ... two names ... first point"),
+    (('joint = "guide"\natol', 'joint = "guid"\natol'), "outputs.stroke.joint ... 'guide'?"),
+    (FREE, "outputs.stroke.joint ... no rotation to measure ... translation"),
+    (('component = "y"', 'component = "w"'), "outputs.turn.component ... one of x, y, z, e0"),
+    (NOBODY, "outputs.e2.body ... 'bed'"),
+    (("[0, 0.5, 0]", "[0, 0, 0]"), "outputs.open.directions ... zero"),
+    (FEW, "outputs.open.directions ... two directions"),
+    (('type = "angle"', 'type = "angel"'), "outputs.open.type ... 'angle'?"),
 ]
 
 
 @pytest.mark.parametrize(("change", "fragments"), WRONG)
-def test_wrong_measures_are_refused(tmp_path: Path, change, fragments):
+def test_wrong_measures_are_refused(tmp_path, change, fragments):
     complains(write(tmp_path, edited(change, base=MM + MEASURES)), fragments)

@@ -9,11 +9,9 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.programs import without_comments
@@ -30,7 +28,7 @@ ADAMS = (DATA / "adams_front_suspension.sub").read_text()
 CHRONO = sorted(DATA.glob("chrono_*.json"))
 
 
-def poses(case: Case):
+def poses(case):
     """Return positions and Euler parameters of all bodies, shape (bodies, samples, 7)."""
     names = tuple(body.name for body in case.mechanism.moving)
     solver = NativeSolver(order=0, compiled=False)
@@ -38,7 +36,7 @@ def poses(case: Case):
     return np.array([np.hstack([each.r, each.p]) for each in found.bodies.values()])
 
 
-def same_numbers(case: Case, folder: Path):
+def same_numbers(case, folder):
     """Compare a case with what is written and read back, bit for bit.
 
     The sweep of a model is computed once in the model's coordinates and once from the design: its
@@ -53,7 +51,7 @@ def same_numbers(case: Case, folder: Path):
         assert np.allclose(one, other, rtol=0, atol=1e3 * GRID, equal_nan=True)
 
 
-def random_case(kind: str, seed: int, folder: Path) -> Case | None:
+def random_case(kind, seed, folder):
     """Return the case of a random model; None of one that does not move."""
     robot = random_robot(seed)
     made = FORMATS[kind](robot)
@@ -71,7 +69,7 @@ def random_case(kind: str, seed: int, folder: Path) -> Case | None:
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_a_random_model_is_imported_whole(kind: str, tmp_path: Path):
+def test_a_random_model_is_imported_whole(kind, tmp_path):
     found = [random_case(kind, seed, tmp_path) for seed in range(1, MODELS + 1)]
     moving = [case for case in found if case is not None]
     assert len(moving) >= 0.9 * MODELS
@@ -80,29 +78,29 @@ def test_a_random_model_is_imported_whole(kind: str, tmp_path: Path):
         same_numbers(case, tmp_path)
 
 
-def moved(rng: np.random.Generator, text: str) -> str:
+def moved(rng, text):
     """Return a text with each decimal number moved by up to 2."""
     return re.sub(
         r"-?\d+\.\d+", lambda number: f"{float(number[0]) + rng.uniform(-2, 2):.6f}", text
     )
 
 
-def plain(rng: np.random.Generator, seed: int):
+def plain(rng, seed):
     head, rows = sample_table(TEMPLATES[[*TEMPLATES][seed % len(TEMPLATES)]]).split("meaning\n")
     rows = re.sub(r",(-?\d+)(?=,)", r",\1.0", re.sub(r",(-?\d+)(?=,)", r",\1.0", rows))
     return "car.csv", f"{head}meaning\n{moved(rng, rows)}", Supplied(travel="0.01:3")
 
 
-def adams(rng: np.random.Generator, seed: int):
+def adams(rng, seed):
     head, blocks = ADAMS.split("z_value}", 1)
     options = Supplied("double_wishbone", travel="0.01:3")
     return "car.sub", f"{head}z_value}}{moved(rng, blocks)}", options
 
 
-def chrono(rng: np.random.Generator, seed: int):
+def chrono(rng, seed):
     data = json.loads(without_comments(CHRONO[seed % len(CHRONO)].read_text()))
 
-    def walk(value: Any) -> Any:
+    def walk(value):
         if isinstance(value, dict):
             return {key: walk(each) for key, each in value.items()}
         if isinstance(value, list) and len(value) == 3:
@@ -113,7 +111,7 @@ def chrono(rng: np.random.Generator, seed: int):
 
 
 @pytest.mark.parametrize("table", [plain, adams, chrono])
-def test_a_random_table_is_imported_whole(table: Any, tmp_path: Path):
+def test_a_random_table_is_imported_whole(table, tmp_path):
     for seed in range(MODELS):
         name, content, options = table(np.random.default_rng(seed), seed)
         file = tmp_path / name

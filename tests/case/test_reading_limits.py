@@ -3,7 +3,6 @@
 import io
 import zipfile
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from kincheck.core.algebra import Vec3
@@ -24,7 +23,7 @@ SHEET, STYLES = "xl/worksheets/sheet1.xml", "xl/styles.xml"
 ONE = b'<row r="1"><c r="A1"><v>1</v></c></row>'
 
 
-def book(folder: Path, part: str, content: bytes, more: int = 0) -> Path:
+def book(folder, part, content, more=0):
     """Return a workbook with another content of a part, and with more empty parts."""
     made = openpyxl.Workbook()
     made.active.append(["name", "x"])
@@ -41,7 +40,7 @@ def book(folder: Path, part: str, content: bytes, more: int = 0) -> Path:
     return file
 
 
-def refused(file: Path) -> str:
+def refused(file):
     with pytest.raises(CaseError) as caught:
         samples_of(read_table(file, None, "sheet"))
     return str(caught.value)
@@ -154,14 +153,14 @@ TIE = {
 
 
 @pytest.mark.parametrize("name", TIES)
-def test_closures_are_read_up_to_a_number(name: str, tmp_path: Path):
+def test_closures_are_read_up_to_a_number(name, tmp_path):
     file = tmp_path / name
     file.write_text(TIES[name].format(TIE[name] * (MOST_TIES + 1)))
     with pytest.raises(CaseError, match=rf"line {MOST_TIES + 3}: .*found more than"):
         load(file, Supplied(drive=("j:0:1",)))
 
 
-def test_long_chain_of_fixed_links_is_read(tmp_path: Path):
+def test_long_chain_of_fixed_links_is_read(tmp_path):
     base = LINKS.replace('"b"', '"l-1"')
     chain = "".join(
         f'<link name="l{k}"/><joint name="f{k}" type="fixed"><parent link="l{k - 1}"/>'
@@ -174,7 +173,7 @@ def test_long_chain_of_fixed_links_is_read(tmp_path: Path):
     assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
 
 
-def test_bodies_in_bodies_are_read_however_deep(tmp_path: Path):
+def test_bodies_in_bodies_are_read_however_deep(tmp_path):
     """Deeper than Python recurses."""
     deep = '<body pos="1 0 0"><frame><joint axis="0 0 1"/>'
     file = tmp_path / "deep.xml"
@@ -188,7 +187,7 @@ def test_bodies_in_bodies_are_read_however_deep(tmp_path: Path):
     assert tree.sites["tip"][1].at == Vec3(1200.0, 0.0, 0.0)
 
 
-def test_many_linkages_of_few_digits_are_read(tmp_path: Path):
+def test_many_linkages_of_few_digits_are_read(tmp_path):
     """Rows that are redundant but for digits are those of each linkage alone."""
     bars = "".join(
         f'<body name="c{k}" pos="{k} 0 0"><joint name="j{k}" axis="0 1 0"/><body name="r{k}"'
@@ -207,7 +206,7 @@ def test_many_linkages_of_few_digits_are_read(tmp_path: Path):
     assert len(case.mechanism.reduced) == 52
 
 
-def test_springs_without_a_length_are_left_out(tmp_path: Path):
+def test_springs_without_a_length_are_left_out(tmp_path):
     """A tendon between sites in one place has no direction."""
     text = BODIES.replace("<joint/>", '<joint/><site name="t"/>').replace(
         '<joint name="j"/>', '<joint name="j"/><site name="s"/>'

@@ -5,7 +5,6 @@ matched, interpolated, rounded, shorter, and judged.
 import hashlib
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +32,7 @@ from scipy.interpolate import CubicSpline
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
 
 
-def test_reference_in_a_file(tmp_path: Path):
+def test_reference_in_a_file(tmp_path):
     write(tmp_path, CSV, "tip.csv")
     case = load_case(write(tmp_path, BASE + BY_FILE))
     assert case.reference["tip_x"].position.tolist() == [1.4, 1.5, 1.6]
@@ -55,7 +54,7 @@ DIALECTS = {
 
 
 @pytest.mark.parametrize("kind", DIALECTS)
-def test_dialects_of_spreadsheets(tmp_path: Path, kind: str):
+def test_dialects_of_spreadsheets(tmp_path, kind):
     text = DIALECTS[kind]
     write(tmp_path, text, "tip.csv")
     series = load_case(write(tmp_path, BASE + BY_FILE)).reference["tip_x"]
@@ -64,7 +63,7 @@ def test_dialects_of_spreadsheets(tmp_path: Path, kind: str):
     assert series.velocity.tolist() == [2.0, 2.0, 2.0]
 
 
-def test_tables_of_recordings_have_gaps(tmp_path: Path):
+def test_tables_of_recordings_have_gaps(tmp_path):
     """And lines above them, to a last one; without gaps, an empty cell is a fault."""
     text = "run 3\nversion=1\nendheader\ntime\ta\tb\n0\t1.5\n1\tNaN\t2\n"
     file = write(tmp_path, text, "run.sto")
@@ -77,7 +76,7 @@ def test_tables_of_recordings_have_gaps(tmp_path: Path):
         reference_samples.samples_of(table)
 
 
-def test_outputs_may_lack_a_reference(tmp_path: Path):
+def test_outputs_may_lack_a_reference(tmp_path):
     more = '\n[outputs.tip_y]\npoint = "tip"\ncomponent = "y"\n'
     case = load_case(write(tmp_path, BASE + more + INLINE))
     assert [output.name for output in case.outputs] == ["tip_x", "tip_y"]
@@ -85,40 +84,43 @@ def test_outputs_may_lack_a_reference(tmp_path: Path):
 
 
 REFERENCES = [
-    (GERMAN.replace("1,5", "1.5"), ["tip.csv", "line 3", "'1.5'", "'-0,1' above", "one decimal"]),
-    (GERMAN.replace("1,5", "=B2"), ["tip.csv", "line 3, column tip_x", "'=B2'", "correct it"]),
-    ("%PDF-1.7", ["tip.csv", "found a PDF document, expected text"]),
+    (GERMAN.replace("1,5", "1.5"), "tip.csv ... line 3 ... '1.5' ... '-0,1' above ... one decimal"),
+    (GERMAN.replace("1,5", "=B2"), "tip.csv ... line 3, column tip_x ... '=B2' ... correct it"),
+    ("%PDF-1.7", "tip.csv ... found a PDF document, expected text"),
     (
         CSV.replace("\n 0.0", "\n0.01"),
-        ["tip.csv", "line 5", "0.01 m", "the nearest is 0 m", "expected 4 rows", "found 3"],
+        ("tip.csv ... line 5 ... 0.01 m ... the nearest is 0 m ... expected 4 rows ... found 3"),
     ),
-    (CSV.replace("1.5", "1_5"), ["tip.csv", "line 5", "column tip_x", "'1_5'", "correct it"]),
-    (CSV.replace("1.5", "nan"), ["tip.csv", "line 5", "column tip_x", "'nan'", "finite"]),
+    (CSV.replace("1.5", "1_5"), "tip.csv ... line 5 ... column tip_x ... '1_5' ... correct it"),
+    (CSV.replace("1.5", "nan"), "tip.csv ... line 5 ... column tip_x ... 'nan' ... finite"),
     (
         CSV.replace("1.5", "1e308"),
-        ["tip.csv", "line 5", "column tip_x", "'1e308'", "at most 1e+100"],
+        "tip.csv ... line 5 ... column tip_x ... '1e308' ... at most 1e+100",
     ),
-    (CSV.replace("1.5", ""), ["tip.csv", "line 5", "column tip_x", "expected a finite number"]),
-    (CSV.replace("1.5, ", ""), ["tip.csv", "line 5", "found 2 numbers", "expected 3"]),
-    (CSV.replace("tip_x,", "tip_z,"), ["tip.csv", "line 3", "'tip_z'", "did you mean 'tip_x'"]),
+    (CSV.replace("1.5", ""), "tip.csv ... line 5 ... column tip_x ... expected a finite number"),
+    (CSV.replace("1.5, ", ""), "tip.csv ... line 5 ... found 2 numbers ... expected 3"),
+    (CSV.replace("tip_x,", "tip_z,"), "tip.csv ... line 3 ... 'tip_z' ... did you mean 'tip_x'"),
     (
         CSV.replace("tip_x,", "tip_x.acceleration,"),
-        ["tip.csv", "'tip_x.acceleration' alone", "add the column 'tip_x'"],
+        "tip.csv ... 'tip_x.acceleration' alone ... add the column 'tip_x'",
     ),
-    (CSV.replace("tip_x.velocity", "tip_x"), ["tip.csv", "'tip_x' twice"]),
+    (CSV.replace("tip_x.velocity", "tip_x"), "tip.csv ... 'tip_x' twice"),
     (
         CSV.replace("push, ", "tip_x, "),
-        ["tip.csv", "'tip_x' first, the name of an output", "driver values", "name it otherwise"],
+        (
+            "tip.csv ... 'tip_x' first, the name of an output ... driver values ... "
+            "name it otherwise"
+        ),
     ),
-    ("push\n-0.1\n0\n0.1\n", ["tip.csv", "no column of an output"]),
-    ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", ["tip.csv", "line 1", "'1.4'", "outputs of the case"]),
-    ('push, "tip_x\n', ["tip.csv", "not valid CSV"]),
-    ("# nothing\n", ["tip.csv", "no samples"]),
+    ("push\n-0.1\n0\n0.1\n", "tip.csv ... no column of an output"),
+    ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv ... line 1 ... '1.4' ... outputs of the case"),
+    ('push, "tip_x\n', "tip.csv ... not valid CSV"),
+    ("# nothing\n", "tip.csv ... no samples"),
 ]
 
 
 @pytest.mark.parametrize(("text", "fragments"), REFERENCES)
-def test_broken_reference_files(tmp_path: Path, text: str, fragments: list[str]):
+def test_broken_reference_files(tmp_path, text, fragments):
     write(tmp_path, text, "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), fragments)
 
@@ -134,7 +136,7 @@ def test_broken_reference_files(tmp_path: Path, text: str, fragments: list[str])
         "down/tip.csv",
     ],
 )
-def test_references_outside_the_folder_are_refused(tmp_path: Path, name: str):
+def test_references_outside_the_folder_are_refused(tmp_path, name):
     folder = tmp_path / "case"
     (folder / "sub").mkdir(parents=True)
     write(tmp_path, CSV, "tip.csv")
@@ -142,27 +144,27 @@ def test_references_outside_the_folder_are_refused(tmp_path: Path, name: str):
     (folder / "down").symlink_to(tmp_path)
     text = BASE + BY_FILE.replace("tip.csv", name)
     expected = "control characters" if "u0000" in name else "folder of the case file or below"
-    complains(write(folder, text), ["case.toml", "reference.file", expected])
+    complains(write(folder, text), f"case.toml ... reference.file ... {expected}")
 
 
-def test_absolute_names_are_refused_even_inside_the_folder(tmp_path: Path):
+def test_absolute_names_are_refused_even_inside_the_folder(tmp_path):
     name = write(tmp_path, CSV, "tip.csv").as_posix()
     complains(
         write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)),
-        ["reference.file", "give its name"],
+        "reference.file ... give its name",
     )
 
 
-def test_references_below_the_folder_are_fine(tmp_path: Path):
+def test_references_below_the_folder_are_fine(tmp_path):
     (tmp_path / "data").mkdir()
     write(tmp_path / "data", CSV, "tip.csv")
     assert load_case(write(tmp_path, BASE + BY_FILE.replace("tip.csv", "data/tip.csv"))).reference
 
 
-def test_a_large_reference_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_large_reference_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(reference_samples, "LARGEST_FILE", 20)
     write(tmp_path, CSV, "tip.csv")
-    complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", "larger than 20 bytes", "thin out"])
+    complains(write(tmp_path, BASE + BY_FILE), "tip.csv ... larger than 20 bytes ... thin out")
 
 
 UNITS = {
@@ -176,7 +178,7 @@ UNITS = {
 
 @pytest.mark.parametrize("at", ["", 'at = "reference"'])
 @pytest.mark.parametrize("kind", UNITS)
-def test_units_of_columns(tmp_path: Path, kind: str, at: str):
+def test_units_of_columns(tmp_path, kind, at):
     """They go before those of the case file, also for samples taken from the reference."""
     rows = "-100, 1400, 2000\n0, 1500, 2000\n100, 1600, 2000\n"
     write(tmp_path, f"{UNITS[kind]}\n{rows}", "tip.csv")
@@ -191,7 +193,7 @@ def test_units_of_columns(tmp_path: Path, kind: str, at: str):
     assert case.origin.units == {"push": "mm", "tip_x": "mm"}
 
 
-def test_units_of_rows_in_the_case_file(tmp_path: Path):
+def test_units_of_rows_in_the_case_file(tmp_path):
     text = INLINE.replace('"push", "tip_x"', '"push [cm]", "tip_x [m]"').replace(
         "0.1, 1.", "10, 1."
     )
@@ -202,16 +204,16 @@ def test_units_of_rows_in_the_case_file(tmp_path: Path):
 @pytest.mark.parametrize(
     ("head", "fragments"),
     [
-        ("push [deg], tip_x", ["line 1", "'deg' of column 'push [deg]'", "a length: m, mm"]),
-        ("push, tip_x [parsec]", ["line 1", "'parsec'", "a length"]),
-        ("push, tip_x [mm/s]", ["line 1", "'mm/s'", "a length"]),
-        ("push, tip_x_mm [m]", ["line 1", "in 'mm' and 'm'", "one unit"]),
-        ("push, tip_y [mm]", ["line 1", "column 'tip_y [mm]'", "tip_x"]),
+        ("push [deg], tip_x", "line 1 ... 'deg' of column 'push [deg]' ... a length: m, mm"),
+        ("push, tip_x [parsec]", "line 1 ... 'parsec' ... a length"),
+        ("push, tip_x [mm/s]", "line 1 ... 'mm/s' ... a length"),
+        ("push, tip_x_mm [m]", "line 1 ... in 'mm' and 'm' ... one unit"),
+        ("push, tip_y [mm]", "line 1 ... column 'tip_y [mm]' ... tip_x"),
     ],
 )
-def test_wrong_units_of_columns(tmp_path: Path, head: str, fragments: list[str]):
+def test_wrong_units_of_columns(tmp_path, head, fragments):
     write(tmp_path, f"{head}\n-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv")
-    complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", *fragments])
+    complains(write(tmp_path, BASE + BY_FILE), f"tip.csv ... {fragments}")
 
 
 CRANK = """
@@ -254,7 +256,7 @@ EVEN = "start = -1.0\nstop = 1.0\nsteps = 21"
 AT = 'at = "reference"'
 
 
-def case_of(folder: Path, rows, sweep=EVEN, atol="1e-6", form="{:.6f}"):
+def case_of(folder, rows, sweep=EVEN, atol="1e-6", form="{:.6f}"):
     lines = ["turn,x,y", *(",".join(form.format(value) for value in row) for row in rows)]
     write(folder, "\n".join(lines) + "\n", "rig.csv")
     return load_case(write(folder, CRANK.replace("SWEEP", sweep).replace("ATOL", atol)))
@@ -377,12 +379,16 @@ def test_a_slip_of_a_rounded_reference_is_named(tmp_path):
 
 
 WRONG = [
-    (curve(OWN[:3]), EVEN, ["rig.csv", "line 4", "-0.951115 rad", "nearest is -1 rad", "found 3"]),
-    (curve(OWN + 5.0), EVEN, ["found driver values from 3.97 rad to", "-1 rad to 1 rad"]),
-    (curve([*OWN, OWN[7]]), EVEN, ["line 55", "driver value", "twice", "at = "]),
-    (curve(OWN), AT + "\nsteps = 3", ["sweep.steps", "beside at", "remove steps or at"]),
-    (curve(OWN), "start = 1\nstop = 2", ["sweep.steps", "missing", 'at = "reference"']),
-    (curve(OWN), 'at = "rig"', ["sweep.at", "'rig'", '"reference"']),
+    (
+        curve(OWN[:3]),
+        EVEN,
+        "rig.csv ... line 4 ... -0.951115 rad ... nearest is -1 rad",
+    ),
+    (curve(OWN + 5.0), EVEN, "found driver values from 3.97 rad to ... -1 rad to 1 rad"),
+    (curve([*OWN, OWN[7]]), EVEN, "line 55 ... driver value ... twice ... at = "),
+    (curve(OWN), AT + "\nsteps = 3", "sweep.steps ... beside at ... remove steps or at"),
+    (curve(OWN), "start = 1\nstop = 2", 'sweep.steps ... missing ... at = "reference"'),
+    (curve(OWN), 'at = "rig"', "sweep.at ... 'rig' ... \"reference\""),
 ]
 
 
@@ -396,7 +402,7 @@ def test_wrong_grids_are_refused(tmp_path, rows, sweep, fragments):
 
 def test_samples_of_a_missing_reference_are_refused(tmp_path):
     text = CRANK.partition("[reference]")[0].replace("SWEEP", AT).replace("ATOL", "1e-6")
-    complains(write(tmp_path, text), ["sweep.at", "no [reference]"])
+    complains(write(tmp_path, text), "sweep.at ... no [reference]")
 
 
 @pytest.mark.parametrize(
@@ -436,7 +442,7 @@ def test_driver_values_that_somebody_set_are_exact():
     assert not multiples(np.array([1e60, 3e60]), 2)
 
 
-def stripped(decimals: int):
+def stripped(decimals):
     """Return the writer of a spreadsheet that rounds to some decimals."""
     return lambda value: repr(round(float(value), decimals)).removesuffix(".0")
 
@@ -451,7 +457,7 @@ WRITERS = {
 ARM = np.array([97.31, 11.7])
 
 
-def rounded(folder: Path, form, grid, shifts):
+def rounded(folder, form, grid, shifts):
     """Return the verdict on the rounded curve of a tip at `ARM`, shifted in y."""
     lines = ["turn,x,y"]
     for t, shift in zip(grid, np.broadcast_to(shifts, len(grid)), strict=True):

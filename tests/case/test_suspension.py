@@ -2,7 +2,6 @@
 
 import csv
 import tomllib
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import islice
 
@@ -18,7 +17,6 @@ from kincheck.cases import (
     mcpherson_arm,
 )
 from kincheck.cases.jet import Jet
-from kincheck.cases.vectors import Vec
 from kincheck.core import Distance
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.outputs import with_slopes
@@ -466,13 +464,13 @@ ARMS = {
 }
 
 
-def turned(motion: Callable[[Jet], Mapping[str, Vec]], height: Jet) -> Jet:
+def turned(motion, height):
     """The arm's motion that lifts the wheel to that height: Newton's iteration for its angle, then
     twice the chain rule.
     """
     angle, still = np.zeros_like(height.x), np.zeros_like(height.x)
 
-    def z(rate: np.ndarray) -> Jet:
+    def z(rate):
         return motion(Jet(angle, rate, still))["wheel_center"].z
 
     for _ in range(8):
@@ -484,7 +482,7 @@ def turned(motion: Callable[[Jet], Mapping[str, Vec]], height: Jet) -> Jet:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_samples_by_the_closed_form_of_the_arm(name: str):
+def test_samples_by_the_closed_form_of_the_arm(name):
     case = cases.load(name)
     design = case.mechanism.point("wheel_center").position
     stroke, rack = (
@@ -492,7 +490,7 @@ def test_samples_by_the_closed_form_of_the_arm(name: str):
         for each in case.sweep.path.drive(["stroke", "rack"], case.sweep.path.times).swapaxes(0, 1)
     )
 
-    def motion(turn: Jet) -> Mapping[str, Vec]:
+    def motion(turn):
         return ARMS[name](turn, rack)
 
     turn = turned(motion, stroke + design[2])
@@ -526,7 +524,7 @@ def test_the_decompositions_have_one_truth():
 # The multi-link by five distances
 
 
-def rods(case: Case) -> list[tuple[mp.matrix, mp.matrix]]:
+def rods(case):
     """Both ends of each, the inner first; the arm is two rods from its hinge to its ball."""
     hinge, ball = case.mechanism.joint("upper_pivot"), case.mechanism.joint("upper_ball")
     found = [
@@ -541,7 +539,7 @@ def rods(case: Case) -> list[tuple[mp.matrix, mp.matrix]]:
     return [(mp.matrix([*inner]), mp.matrix([*outer])) for inner, outer in found]
 
 
-def upright(case: Case, stroke: mp.mpf, near: list) -> list:
+def upright(case, stroke, near):
     """Shift and half of the rotation's vector (Cayley's) of the upright with the wheel centre
     lifted by the stroke.
     """
@@ -561,7 +559,7 @@ def upright(case: Case, stroke: mp.mpf, near: list) -> list:
 
 
 @pytest.mark.parametrize("sample", [3, 24])
-def test_the_multi_link_by_five_distances(sample: int):
+def test_the_multi_link_by_five_distances(sample):
     case = cases.load("chrono_multi_link")
     with mp.workdps(40):
         stroke, near = mp.mpf(case.sweep.values[sample]), [0] * 6
@@ -570,7 +568,7 @@ def test_the_multi_link_by_five_distances(sample: int):
         for k, name in enumerate(("wheelbase_change", "half_track_change")):
             for order, limit in LIMITS.items():
 
-                def coordinate(t: mp.mpf, k: int = k) -> mp.mpf:
+                def coordinate(t, k=k):
                     return upright(case, t, near)[k]
 
                 expected = float(mp.diff(coordinate, stroke, list(LIMITS).index(order)))

@@ -23,6 +23,7 @@ from kincheck.core.report.report import write_report
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
 from ..studies.test_vary import HEAD
+from ..support.case_texts import refused
 from ..support.rods_of_templates import solved
 from ..support.suspension_changes import TOE, changed
 from ..support.suspension_files import STRUT, TABLE, loaded, unreferenced
@@ -32,86 +33,86 @@ ON_CHASSIS = changed("suspension", wheel_center="top") | {"points": POINTS}
 WRONG = {
     "mirrored hardpoints": (
         changed("suspension", side="left"),
-        ["suspension.side", "'left'", "0.715 m on the other side", "correct side"],
+        "suspension.side ... 'left' ... 0.715 m on the other side ... correct side",
     ),
     "another convention": (
         changed("suspension", convention="din"),
-        ["suspension.convention", "'din'", "iso8855, sae_j670"],
+        "suspension.convention ... 'din' ... iso8855, sae_j670",
     ),
-    "no convention": (changed("suspension", convention=None), ["suspension.convention", "missing"]),
-    "no forward": (changed("suspension", forward=None), ["suspension.forward", "missing"]),
+    "no convention": (changed("suspension", convention=None), "suspension.convention ... missing"),
+    "no forward": (changed("suspension", forward=None), "suspension.forward ... missing"),
     "zero forward": (
         changed("suspension", forward=[0, 0, 0]),
-        ["suspension.forward", "found zero"],
+        "suspension.forward ... found zero",
     ),
     "leaning up": (
         changed("suspension", up=[0.1, 0, 1]),
-        ["suspension.up", "right angles to forward", "correct one"],
+        "suspension.up ... right angles to forward ... correct one",
     ),
     "no such wheel": (
         changed("suspension", wheel_center="wheel"),
-        ["suspension.wheel_center", "'wheel', expected a point; known: lower_ball"],
+        "suspension.wheel_center ... 'wheel', expected a point; known: lower_ball",
     ),
     "no such kingpin": (
         changed("suspension", kingpin=["lower_ball", "strut"]),
-        ["suspension.kingpin", "did you mean 'strut_top'"],
+        "suspension.kingpin ... did you mean 'strut_top'",
     ),
     "kingpin upside down": (
         changed("suspension", kingpin=["strut_top", "lower_ball"]),
-        ["suspension.kingpin", "the lower point, then"],
+        "suspension.kingpin ... the lower point, then",
     ),
-    "wheel of the chassis": (ON_CHASSIS, ["suspension.wheel_center", "a body that moves"]),
+    "wheel of the chassis": (ON_CHASSIS, "suspension.wheel_center ... a body that moves"),
     "negative radius": (
         changed("suspension", wheel_radius=-0.3),
-        ["suspension.wheel_radius", "-0.3", "a positive length"],
+        "suspension.wheel_radius ... -0.3 ... a positive length",
     ),
     "share in percent": (
         changed("suspension", brake_share=70),
-        ["suspension.brake_share", "70", "0 to 1"],
+        "suspension.brake_share ... 70 ... 0 to 1",
     ),
     "no radius": (
         changed("suspension", wheel_radius=None),
-        ["outputs.half_track_change", "wheel_radius", 'at = "wheel_center"'],
+        'outputs.half_track_change ... wheel_radius ... at = "wheel_center"',
     ),
     "no kingpin": (
         changed("suspension", kingpin=None),
-        ["suspension.kingpin", "missing", "outputs.caster of type 'caster'"],
+        "suspension.kingpin ... missing ... outputs.caster of type 'caster'",
     ),
     "no axle": (
         changed("suspension", axle=None),
-        ["suspension.axle", "missing", "outputs.wheelbase_change"],
+        "suspension.axle ... missing ... outputs.wheelbase_change",
     ),
     "dive of the rear": (
         changed("suspension", axle="rear"),
-        ["outputs.anti_dive", "rear axle, expected a front one"],
+        "outputs.anti_dive ... rear axle, expected a front one",
     ),
     "no table": (
         {key: value for key, value in STRUT.items() if key != "suspension"},
-        ["suspension: missing", "add [suspension]"],
+        "suspension: missing ... add [suspension]",
     ),
     "unknown type": (
         STRUT | {"outputs": {"toe": {"type": "tow"}}},
-        ["outputs.toe.type", "'tow'", "did you mean 'toe'"],
+        "outputs.toe.type ... 'tow' ... did you mean 'toe'",
     ),
     "key of another type": (
         changed("outputs", toe={"type": "toe", "at": "contact"}),
-        ["outputs.toe.at", "unknown key"],
+        "outputs.toe.at ... unknown key",
     ),
     "another place": (
         changed("outputs", half_track_change={"type": "half_track_change", "at": "hub"}),
-        ["'hub'", "wheel_center, contact"],
+        "'hub' ... wheel_center, contact",
     ),
     "spring of nothing": (
         changed("outputs", motion_ratio={"type": "motion_ratio", "between": ["strut_foot", "top"]}),
-        ["outputs.motion_ratio.between", "'top', expected a point; known: lower_ball"],
+        "outputs.motion_ratio.between ... 'top', expected a point; known: lower_ball",
     ),
     "tolerance without reason": (
         changed("outputs", toe={"type": "toe", "atol": 1e-6}),
-        ["outputs.toe.why", "missing"],
+        "outputs.toe.why ... missing",
     ),
     "name of a slope": (
         changed("outputs", **{"toe.per_travel": {"type": "toe"}}),
-        ["outputs.toe.per_travel", "another name"],
+        "outputs.toe.per_travel ... another name",
     ),
 }
 
@@ -119,10 +120,7 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_refusals(name):
     data, said = WRONG[name]
-    with pytest.raises(CaseError) as error:
-        loaded(unreferenced(data))
-    for part in ("case.json", *said):
-        assert part in str(error.value)
+    refused(lambda: loaded(unreferenced(data)), f"case.json ... {said}")
 
 
 def test_quotients_of_velocities_want_a_driver_of_travel():
@@ -447,10 +445,7 @@ FAULTS = [
 
 @pytest.mark.parametrize(("changes", "key", "words"), FAULTS)
 def test_wrong_point_is_told(changes, key, words):
-    with pytest.raises(CaseError) as caught:
-        loaded(pointed(**changes))
-    assert key in str(caught.value)
-    assert words in str(caught.value)
+    refused(lambda: loaded(pointed(**changes)), f"{key} ... {words}")
 
 
 @pytest.mark.parametrize("axle", [None, "roll"])

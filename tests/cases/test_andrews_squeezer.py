@@ -38,7 +38,7 @@ LATER = (
 LATER_RATES = (1139.920302151208, -24631.76316945196), (11.03291221937134, 324102.5686413781)
 
 
-def closure(q, x_b: str) -> list:
+def closure(q, x_b):
     """The six published constraints [m]; q: beta, Theta, gamma, Phi, delta, Omega, epsilon."""
     beta, theta, gamma, phi, delta, omega, epsilon = map(mp.mpf, q)
     rr, d, ss, e, zt, zf, u = map(

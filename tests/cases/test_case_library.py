@@ -39,13 +39,13 @@ LIMITS = {"position": ROUND_OFF, "velocity": 10 * ROUND_OFF, "acceleration": 100
 
 
 @cache
-def solved(name: str):
+def solved(name):
     """A case and its motion by the native engine."""
     case, engine = CASES[name], Native()
     return case, engine.solve(engine.build(case), case, 1e-12)
 
 
-def off(case, name: str, found, reference) -> float:
+def off(case, name, found, reference):
     """The worst part of its tolerance that an output is off by."""
     (output,) = (each for each in case.outputs if each.name == name)
     series = output_series(case, output, found)
@@ -54,7 +54,7 @@ def off(case, name: str, found, reference) -> float:
 
 
 @pytest.mark.parametrize("name", COORDINATES)
-def test_the_native_engine_finds_the_truth_to_round_off(name: str):
+def test_the_native_engine_finds_the_truth_to_round_off(name):
     case, found = solved(name)
     assert found.solved.all(), found.message
     for output in case.outputs:
@@ -68,7 +68,7 @@ def test_the_native_engine_finds_the_truth_to_round_off(name: str):
 
 
 @pytest.mark.parametrize("name", COORDINATES)
-def test_a_truth_that_is_off_by_twice_the_tolerance_fails(name: str):
+def test_a_truth_that_is_off_by_twice_the_tolerance_fails(name):
     case, found = solved(name)
     for output in case.outputs:
         series = case.reference[output.name]
@@ -91,7 +91,7 @@ def test_the_truth_of_the_other_branch_fails():
 
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_closed_forms_are_differentiated_rightly(name: str):
+def test_closed_forms_are_differentiated_rightly(name):
     """By the complex step, exact to round-off: an imaginary time of 1e-30 s leaves the derivative
     in the imaginary part.
     """
@@ -121,7 +121,7 @@ def test_closed_forms_are_differentiated_rightly(name: str):
         ("gough_platform", 0),
     ],
 )
-def test_redundant_rows_are_found_and_held(name: str, redundant: int):
+def test_redundant_rows_are_found_and_held(name, redundant):
     _, found = solved(name)
     assert len(found.details["dof_account"]["redundant_rows"]) == redundant
     assert found.details["redundant_residual"] <= ROUND_OFF
@@ -130,7 +130,7 @@ def test_redundant_rows_are_found_and_held(name: str, redundant: int):
 # Published values
 
 
-def angles(*degrees: float) -> Jet:
+def angles(*degrees):
     return steady(np.radians(degrees), 1.0)
 
 

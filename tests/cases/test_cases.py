@@ -52,7 +52,7 @@ def test_unknown_names_get_a_suggestion():
 
 
 @pytest.mark.parametrize("name", cases.names())
-def test_every_output_has_a_full_reference(name: str):
+def test_every_output_has_a_full_reference(name):
     case = cases.load(name)
     assert case.name == name
     assert list(case.reference) == [output.name for output in case.outputs]
@@ -65,7 +65,7 @@ def test_every_output_has_a_full_reference(name: str):
 
 
 @pytest.mark.parametrize("name", cases.names())
-def test_at_design_the_reference_is_the_case_file(name: str):
+def test_at_design_the_reference_is_the_case_file(name):
     case = cases.load(name)
     (design,) = np.flatnonzero(np.abs(case.sweep.change) < 1e-15)
     for output in (each for each in case.outputs if isinstance(each, Output)):
@@ -79,7 +79,7 @@ def test_at_design_the_reference_is_the_case_file(name: str):
 
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_a_full_turn_comes_back(name: str):
+def test_a_full_turn_comes_back(name):
     case = cases.load(name)
     assert case.sweep.change[[0, -1]].tolist() == pytest.approx([0.0, 2 * np.pi], abs=0)
     assert len(case.sweep.values) == 181
@@ -95,35 +95,35 @@ def test_a_full_turn_comes_back(name: str):
 Points = dict[str, Sequence[mp.mpf]]
 
 
-def vec(values: Sequence[float]) -> mp.matrix:
+def vec(values):
     return mp.matrix([mp.mpf(value) for value in values])
 
 
-def cross(a: mp.matrix, b: mp.matrix) -> mp.matrix:
+def cross(a, b):
     return mp.matrix(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
 
 
-def dot(a: mp.matrix, b: mp.matrix) -> mp.mpf:
+def dot(a, b):
     return (a.T * b)[0]
 
 
-def turned(v: mp.matrix, axis: mp.matrix, angle: mp.mpf) -> mp.matrix:
+def turned(v, axis, angle):
     """Rodrigues' rotation formula."""
     n = axis / mp.norm(axis)
     return mp.cos(angle) * v + mp.sin(angle) * cross(n, v) + (1 - mp.cos(angle)) * dot(n, v) * n
 
 
-def where(case: Case, joint: str) -> mp.matrix:
+def where(case, joint):
     return vec(case.mechanism.joint(joint).point)
 
 
-def at(case: Case, point: str) -> mp.matrix:
+def at(case, point):
     return vec(case.mechanism.point(point).position)
 
 
-def solve_four_bar(case: Case, angle: mp.mpf, near: Points) -> Points:
+def solve_four_bar(case, angle, near):
     """Coupler pin: its distances from the crank pin and from the rocker's pivot, and its plane."""
     A, B, C, D = (
         where(case, joint) for joint in ("crank_pivot", "crank_pin", "coupler_pin", "rocker_pivot")
@@ -131,7 +131,7 @@ def solve_four_bar(case: Case, angle: mp.mpf, near: Points) -> Points:
     axis = vec(case.mechanism.joint("crank_pivot").axis)
     pin = A + turned(B - A, axis, angle)
 
-    def closure(*x: mp.mpf) -> list[mp.mpf]:
+    def closure(*x):
         X = mp.matrix(x)
         lengths = [dot(X - pin, X - pin) - dot(C - B, C - B), dot(X - D, X - D) - dot(C - D, C - D)]
         return [*lengths, dot(axis, X - D)]
@@ -146,17 +146,17 @@ def solve_four_bar(case: Case, angle: mp.mpf, near: Points) -> Points:
     return {"coupler_pin": list(X), "coupler_tip": list(tip)}
 
 
-def solve_rssr(case: Case, angle: mp.mpf, near: Points) -> Points:
+def solve_rssr(case, angle, near):
     """Rocker's angle: the rod keeps its length."""
     rod = case.mechanism.joint("rod")
     assert isinstance(rod, Distance)
     pin = turned(vec(rod.points[0]), vec([0, 0, 1]), angle)
     O = where(case, "rocker_pivot")  # noqa: E741
 
-    def moved(turn: mp.mpf, point: str) -> mp.matrix:
+    def moved(turn, point):
         return O + turned(at(case, point) - O, vec([1, 0, 0]), turn)
 
-    def length(turn: mp.mpf) -> mp.mpf:
+    def length(turn):
         arm = moved(turn, "rocker_pin") - pin
         return dot(arm, arm) - mp.mpf(rod.rod_length) ** 2
 
@@ -171,7 +171,7 @@ def solve_rssr(case: Case, angle: mp.mpf, near: Points) -> Points:
     }
 
 
-def solve_spatial_slider_crank(case: Case, angle: mp.mpf, near: Points) -> Points:
+def solve_spatial_slider_crank(case, angle, near):
     """Slider: the conrod keeps its length; side point: distances from both ends, and the axes of
     the universal joint.
     """
@@ -179,12 +179,12 @@ def solve_spatial_slider_crank(case: Case, angle: mp.mpf, near: Points) -> Point
     cross_axes = case.mechanism.joint("gudgeon").axes
     pin, X = A + turned(B - A, vec([1, 0, 0]), angle), vec([1, 0, 0])
 
-    def length(x: mp.mpf) -> mp.mpf:
+    def length(x):
         return dot(pin - x * X, pin - x * X) - dot(B - S, B - S)
 
     slider = mp.findroot(length, near["slider"][0]) * X
 
-    def universal(*a: mp.mpf) -> list[mp.mpf]:
+    def universal(*a):
         """The axis on the conrod: of constant length and angle to the conrod, perpendicular to the
         axis on the slider.
         """
@@ -215,13 +215,13 @@ SOLVERS: dict[str, Callable[[Case, mp.mpf, Points], Points]] = {
 
 @pytest.mark.parametrize("angle", ANGLES)
 @pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_closed_forms_solve_the_constraints(name: str, angle: float):
+def test_closed_forms_solve_the_constraints(name, angle):
     case, rate = cases.load(name), 1.7
     motion = CLOSED_FORMS[name].motion(jet.steady(np.array([angle]), rate))
     near = {point: [mp.mpf(each.x[0]) for each in xyz] for point, xyz in motion.items()}
 
     @cache
-    def solved(t: mp.mpf, prec: int) -> Points:
+    def solved(t, prec):
         """All coordinates at a time, solved once with a precision: higher derivatives take more."""
         return SOLVERS[name](case, angle + rate * t, near)
 
@@ -229,7 +229,7 @@ def test_closed_forms_solve_the_constraints(name: str, angle: float):
         for point, xyz in motion.items():
             for k, closed in enumerate(xyz):
 
-                def coordinate(t: mp.mpf, point: str = point, k: int = k) -> mp.mpf:
+                def coordinate(t, point=point, k=k):
                     return solved(t, mp.mp.prec)[point][k]
 
                 for order, found in enumerate((closed.x, closed.v, closed.a)):

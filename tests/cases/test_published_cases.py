@@ -68,7 +68,7 @@ def test_rssr_against_a_table():
     assert found == pytest.approx(np.array([*table.values()]) % 360, abs=360 * ROUND_OFF)
 
 
-def slope(x: np.ndarray, h: float) -> np.ndarray:
+def slope(x, h):
     """First derivative by seven-point central differences, of sixth order in h."""
     return (-x[:-6] + 9 * x[1:-5] - 45 * x[2:-4] + 45 * x[4:-2] - 9 * x[5:-1] + x[6:]) / (60 * h)
 

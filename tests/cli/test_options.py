@@ -8,6 +8,7 @@ import re
 import kincheck
 import pytest
 from kincheck.core.case.io.atomic_files import unwritable
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 
 VARY = """
@@ -42,6 +43,9 @@ REFUSED = [
     ("run rssr --timeout 2e9",
      "argument --timeout: '2e9' is too large. Give 1e+09 at most."),
     ("run rssr --out=", "argument --out: found an empty name; give one, or leave it out"),
+    ("run car.csv --reactions", "Write a case file, kincheck import TABLE > case.toml, and there"),
+    ("run --joints rssr --reactions", "--reactions: the loops of --joints have no masses"),
+    ("board --case four_bar nosuch --out no", "there is no case 'nosuch'"),
     ("kc rssr --travel -60mm:60mm:5", "rssr: no point is the wheel's centre"),
     ("export rssr --at -3degg --to mjcf", "'-3degg' is not a number with one of the units"),
     ("run rssrr", "did you mean 'rssr'? Case files end in"),
@@ -110,6 +114,7 @@ PYTHON = [
     (lambda: kincheck.run("rssr", static="no"), "static: found 'no', expected True or False"),
     (lambda: kincheck.sweep("rssr", "x", sampling="ltin"), "did you mean 'latin'?"),
     (lambda: kincheck.compare([]), "compare: found none, expected two or more"),
+    (lambda: kincheck.report("x", "y"), "report: found 'x', expected what kincheck.run returns"),
     (lambda: kincheck.check_engine("native", engine_command="x"), "Name one engine to check"),
     (lambda: kincheck.free("bricard", rates=[1]), "rates: found [1], expected {DRIVER or JOINT"),
     (lambda: kincheck.free("bricard", rates={"hinge": math.nan}), "hinge: found nan, expected"),
@@ -127,6 +132,7 @@ def here(tmp_path, monkeypatch):
     (tmp_path / "link").symlink_to("a")
     (tmp_path / "no").mkdir()
     (tmp_path / "vary.toml").write_text(VARY)
+    (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]))
     return tmp_path
 
 

@@ -17,7 +17,7 @@ IN_PROCESS = ["--jobs", "0"]
 """Options of `run`: simulators are solved where they are imported already."""
 
 
-def serve(address: str) -> None:
+def serve(address):
     """Answer callers until the process is ended."""
     import contextlib
     import gc
@@ -74,7 +74,7 @@ def serve(address: str) -> None:
         os._exit(0)
 
 
-def call(address: str, arguments: list[str]) -> int:
+def call(address, arguments):
     """Return the exit status of a command."""
     with socket.socket(socket.AF_UNIX) as server:
         server.connect(address)

@@ -12,7 +12,6 @@ a line for its rest.
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 LANGUAGES = {
@@ -41,7 +40,7 @@ class Block:
     shown: str | None = None
 
 
-def blocks(page: str) -> Iterator[Block]:
+def blocks(page):
     """Yield the blocks of a page; a `text` block that follows `python` directly is its output."""
     held, end = None, 0
     for found in BLOCK.finditer(page):
@@ -75,7 +74,7 @@ def blocks(page: str) -> Iterator[Block]:
         yield held
 
 
-def commands(text: str) -> Iterator[tuple[str, str]]:
+def commands(text):
     """Yield each command of a console block with the output that the page shows."""
     command, shown = "", []
     for line in text.splitlines():
@@ -88,7 +87,7 @@ def commands(text: str) -> Iterator[tuple[str, str]]:
     yield command, "\n".join(shown)
 
 
-def differences(shown: str, printed: str) -> str:
+def differences(shown, printed):
     """Return the first shown line that the output lacks, or nothing."""
     wanted, found = ([_plain(line) for line in text.splitlines()] for text in (shown, printed))
     found, free, at = [line for line in found if line], False, 0
@@ -104,10 +103,10 @@ def differences(shown: str, printed: str) -> str:
     return ""
 
 
-def _fits(line: str, found: str) -> bool:
+def _fits(line, found):
     """Return whether a shown line is the found one; " ..." at its end stands for the rest."""
     return found == line or (line.endswith(" ...") and found.startswith(line[:-4]))
 
 
-def _plain(line: str) -> str:
+def _plain(line):
     return " ".join(NUMBER.sub("#", line).split())

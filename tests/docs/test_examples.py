@@ -48,7 +48,7 @@ class Reader:
     The shell of a block has the variables of the blocks before.
     """
 
-    def __init__(self, folder: Path, commands: Path) -> None:
+    def __init__(self, folder, commands):
         self.folder = folder / "work"
         self.folder.mkdir()
         self.environment = {
@@ -61,7 +61,7 @@ class Reader:
         }
         self.names = {"__name__": "__main__"}
 
-    def types(self, script: str) -> tuple[int, str, str]:
+    def types(self, script):
         """Run a script; return exit status, standard output and standard error."""
         done = subprocess.run(
             ["bash", "-c", SHELL.format(script=script)],
@@ -74,7 +74,7 @@ class Reader:
         )
         return done.returncode, done.stdout, done.stderr
 
-    def executes(self, text: str, where: str) -> str:
+    def executes(self, text, where):
         """Execute Python and its tests; return the printed text."""
         known = set(self.names)
         with redirect_stdout(StringIO()) as printed:

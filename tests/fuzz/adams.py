@@ -2,19 +2,16 @@
 the title.
 """
 
-import re
 from pathlib import Path
 
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.adams.dataset import ARGUMENTS, KNOWN
 from kincheck.core.case.models.files import load
 
-from .fuzzing import changing, read_or_refused, written
+from .fuzzing import changing, read_or_refused, said, written
 from .trees import changed_text
 
 LONGEST = 6000
 DATA = Path(__file__).parent.parent / "data"
-SAID = re.compile(rb"drive ([^ \n]{1,40})")
 SIGNS = """TIME SIN COS SQRT STEP POLY SHF DM VR AZ WZ PI RTOD USER IF ( ) , ! & ; \\ = ** 90D 1E3
 MILLIMETER INCH SECOND POUND_MASS NEWTON MKS NONE R:T hold rest recorded without END"""
 WORDS = (*KNOWN, *(name for each in ARGUMENTS.values() for name in each.split()), *SIGNS.split())
@@ -87,14 +84,9 @@ COUPLER = COUPLED.replace(
 def one(data: bytes) -> None:
     """Read one input with the options in its title."""
     title = data.split(b"\n", 1)[0]
-    drive = SAID.search(title)
-    said = Supplied(
-        drive=(drive[1].decode("latin-1"),) if drive else (),
-        hold_rest=b"rest" in title,
-        without=("BUSHING",) if b"without" in title else (),
-        recorded=b"recorded" in title,
-    )
-    read_or_refused(lambda: load(written("deck.adm", data), said))
+    without = ("BUSHING",) if b"without" in title else ()
+    more = {"hold_rest": b"rest" in title, "without": without, "recorded": b"recorded" in title}
+    read_or_refused(lambda: load(written("deck.adm", data), said(title, hold=(), **more)))
 
 
 def seeds() -> list[bytes]:

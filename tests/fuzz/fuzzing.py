@@ -4,12 +4,16 @@ changed.
 
 import os
 import random
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import case_text
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError, KincheckError
 
 from ..support.written_again import written_again
@@ -20,6 +24,7 @@ _TEMPORARY = tempfile.TemporaryDirectory(
 )
 FOLDER = Path(_TEMPORARY.name)
 """Where inputs are written to be read: files that never reach a disk, where there are such."""
+SAID = re.compile(rb'drive(?: |=")([^ "\n]{1,40})(?: hold ([^">]{0,200}))?')
 # An excerpt of what was found (60 characters), a list of what is known, and a path; nobody reads
 # more.
 LONGEST_MESSAGE = 4000
@@ -30,6 +35,31 @@ def written(name: str, data: bytes) -> Path:
     file = FOLDER / name
     file.write_bytes(data)
     return file
+
+
+def said(data: bytes, **more: Any) -> Supplied:
+    """The options that an input states itself: "drive NAME:START:STOP:STEPS hold NAMES"; names
+    with a value or of a keyframe are a start.
+    """
+    drive, hold = found.groups() if (found := SAID.search(data)) else (None, None)
+    names = (hold or b"").decode("latin-1").split()
+    start = tuple(name for name in names if "=" in name or name.startswith("keyframe:"))
+    options = {
+        "drive": (drive.decode("latin-1"),) if drive else (),
+        "hold": tuple(name for name in names if name not in start and name != "rest"),
+        "hold_rest": "rest" in names,
+        "start": start,
+    }
+    return Supplied(**options | more)
+
+
+def reading(name: str, **more: Any) -> Callable[[bytes], None]:
+    """A function that reads one input as a file of that name, with what it says itself."""
+
+    def one(data: bytes) -> None:
+        read_or_refused(lambda: load(written(name, data), said(data, **more)))
+
+    return one
 
 
 def read_or_refused(read: Callable[[], object]) -> None:

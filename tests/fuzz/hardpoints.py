@@ -2,13 +2,9 @@
 and the cells of their sheets, trees in YAML and JSON, and assignments of scripts, onto a template.
 """
 
-import importlib.util
-import json
 import math
 from contextlib import suppress
 from dataclasses import replace
-from io import BytesIO
-from pathlib import Path
 
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import Supplied
@@ -19,10 +15,10 @@ from kincheck.core.case.models.hardpoints.rows import read_rows
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 
 from .fuzzing import FOLDER, changing, read_or_refused, written
+from .keeping import seeds_in_file
 from .trees import changed_json, changed_lines
 
 LONGEST = 8000
-DATA = Path(__file__).parent.parent / "data" / "hardpoints"
 ROLES = [
     name
     for template in TEMPLATES.values()
@@ -43,45 +39,32 @@ WORDS = (
 
 SHEET, YAML, SCRIPT = b"sheet\n", b"---\n", b"%"
 SAID = Supplied("double_wishbone", "mm", "adams")
+WORD_OF = {b"strut": "mcpherson", b"trailing": "five_link", b"rocker": "pushrod_knuckle"}
+"""Word of a table -> its template."""
 
 
 def one(data: bytes) -> None:
     """Read one input as the kind of file that it begins like."""
     if data.startswith(SHEET):
         return read_or_refused(lambda: of_cells(data.removeprefix(SHEET)))
+    template = next((of for word, of in WORD_OF.items() if word in data), "double_wishbone")
+    start, name, said = data.lstrip()[:2], "car.csv", SAID
     if data.startswith(YAML):
-        said = replace(SAID, sheet="front" if b"\nrear:" in data else None)
-        return read_or_refused(lambda: load(written("car.yaml", data), said))
-    if data.startswith(SCRIPT):
-        return read_or_refused(lambda: load(written("car.m", data), SAID))
-    if data.startswith(b"PK"):
-        said = Supplied("double_wishbone", "mm", "adams")
-        return read_or_refused(lambda: load(written("car.xlsx", data), said))
-    start = data.lstrip()[:1]
-    if data.lstrip().startswith((b"[{", b"[[")) or b'"hardpoints"' in data:
-        return read_or_refused(lambda: load(written("tree.json", data), SAID))
-    if start in (b"{", b"/"):
-        return read_or_refused(
-            lambda: load(
-                written("car.json", data),
-                Supplied(template=None if b"Template" in data else "mcpherson"),
-            )
-        )
-    template = (
-        "mcpherson"
-        if b"strut" in data
-        else "five_link"
-        if b"trailing" in data
-        else "pushrod_knuckle"
-        if b"rocker" in data
-        else "double_wishbone"
-    )
-    if start == b"[" or b"[HARDPOINT]" in data:
-        return read_or_refused(lambda: load(written("car.sub", data), Supplied(template)))
-    said = Supplied(
-        template, None if b"unit" in data else "mm", None if b"axes" in data else "adams"
-    )
-    return read_or_refused(lambda: load(written("car.csv", data), said))
+        name, said = "car.yaml", replace(SAID, sheet="front" if b"\nrear:" in data else None)
+    elif data.startswith(SCRIPT):
+        name = "car.m"
+    elif data.startswith(b"PK"):
+        name = "car.xlsx"
+    elif start in (b"[{", b"[[") or b'"hardpoints"' in data:
+        name = "tree.json"
+    elif start[:1] in (b"{", b"/"):
+        name, said = "car.json", Supplied(None if b"Template" in data else "mcpherson")
+    elif start[:1] == b"[" or b"[HARDPOINT]" in data:
+        name, said = "car.sub", Supplied(template)
+    else:
+        units, axes = (None if b"unit" in data else "mm"), (None if b"axes" in data else "adams")
+        said = Supplied(template, units, axes)
+    return read_or_refused(lambda: load(written(name, data), said))
 
 
 def of_cells(data: bytes) -> Case:
@@ -103,61 +86,8 @@ def cell_of(text: str) -> Cell:
 
 
 def seeds() -> list[bytes]:
-    """The files of the tests, and their points as tables."""
-    adams = (DATA / "adams_front_suspension.sub").read_text()
-    rows = [
-        line.replace("'", "").split()
-        for line in adams.split("z_value}")[1].split("[")[0].splitlines()
-        if line.strip().startswith("'")
-    ]
-    table = "name,x,y,z\n" + "\n".join(",".join([row[0], *row[-3:]]) for row in rows)
-    other = "# units: mm\n# axes: rearward,right,up\n" + table.replace(",", "\t")
-    german = "Car\nsep=;\nname;x [mm];y [mm];z [mm];mass;\n" + "\n".join(
-        ";".join([row[0], *row[-3:], "1;"]).replace(".", ",") for row in rows
-    )
-    variants = adams.replace(
-        "[PARAMETER]", "(VARIANTS)\n 'lca_outer' 'left/right' 1 2 3\n[PARAMETER]"
-    )
-    points = {row[0].removeprefix("hpl_"): row[-3:] for row in rows}
-    each = [f"{name}_{'xyz'[k]},{at[k]}" for name, at in points.items() for k in range(3)]
-    assigned = [f"car.{name} = [{' '.join(at)}]; % [mm]" for name, at in points.items()]
-    flow = [f"  {name}: [{', '.join(at)}]" for name, at in points.items()]
-    block = [f"  {name}: {{x: {x}, y: {y}, z: {z}}}" for name, (x, y, z) in points.items()]
-    config = "config:\n  wheel: {offset: 0, tire: {rim_diameter: 13}}\n"
-    tree = {"units": "mm", "hardpoints": {"left": points}}
-    listed = [{"name": name, "x": x, "y": y, "z": z} for name, (x, y, z) in points.items()]
-    forms = [
-        "\n".join(["parameter,value [mm]", *each]),
-        "\n".join(each).replace(",", " = "),
-        "\n".join(",".join([name, *at]) for name, at in points.items()),
-        "\n".join(" ".join([*at, name]) for name, at in points.items()),
-        "\n".join(["% units: mm", *assigned]),
-        "\n".join(["---", "hardpoints:", *flow, config]),
-        "\n".join(["---", "front:", *block, "rear: {lca_front: [1, 2, 3]}"]),
-        json.dumps(tree),
-        json.dumps(listed),
-    ]
-    return [
-        *(text.encode() for text in forms),
-        *(file.read_bytes() for file in sorted(DATA.glob("*.json"))),
-        *(text.encode() for text in (adams, table, other, variants)),
-        german.removeprefix("Car\n").encode("utf-16"),
-        german.replace("sep=;\n", "").encode(),
-        SHEET + ("units\tmm\naxes: adams\n" + table.replace(",", "\t")).encode(),
-        *workbook([line.split(",") for line in table.splitlines()]),
-    ]
-
-
-def workbook(rows: list[list[str]]) -> list[bytes]:
-    """A workbook with these rows; none where openpyxl is missing."""
-    if importlib.util.find_spec("openpyxl") is None:
-        return []
-    openpyxl = importlib.import_module("openpyxl")
-    book, stream = openpyxl.Workbook(), BytesIO()
-    for row in rows:
-        book.active.append([*map(cell_of, row)])
-    book.save(stream)
-    return [stream.getvalue()]
+    """The files of the tests, and their points as tables, trees, scripts and a workbook."""
+    return seeds_in_file("hardpoints")
 
 
 mutate = changing(changed_json, changed_lines, words=WORDS)

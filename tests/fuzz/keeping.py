@@ -2,15 +2,27 @@
 reached; NAME.defects.json.
 """
 
+import importlib.util
 import json
 from pathlib import Path
 
 KEPT = Path(__file__).parent.parent / "data" / "fuzz"
+SEEDS = Path(__file__).parent / "seeds"
 
 
 def kept(name: str) -> list[bytes]:
     """The inputs in the file of that name; none without it."""
-    file = KEPT / f"{name}.json"
+    return _inputs(KEPT / f"{name}.json")
+
+
+def seeds_in_file(name: str) -> list[bytes]:
+    """The seeds in the file of that name; workbooks where they can be read."""
+    readable = importlib.util.find_spec("openpyxl") is not None
+    inputs = _inputs(SEEDS / f"{name}.json")
+    return [each for each in inputs if readable or not each.startswith(b"PK")]
+
+
+def _inputs(file: Path) -> list[bytes]:
     return (
         [text.encode("latin-1") for text in json.loads(file.read_text())] if file.exists() else []
     )

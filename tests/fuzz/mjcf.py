@@ -5,74 +5,24 @@ of the input.
 import re
 from pathlib import Path
 
-from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
 from kincheck.core.case.models.trees.mjcf_language import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
 
-from .fuzzing import changing, read_or_refused, written
+from .fuzzing import changing, reading
 from .trees import changed_xml
 
 LONGEST = 4200
-SAID = re.compile(rb'drive ([^ "]{1,40}) hold ([^>"]{0,200})')
+SAYS = """angle eulerseq degree radian local hinge slide ball free default childclass mocap fixed
+spatial joint coef flag equality disable autolimits compiler drive hold rest keyframe:k
+out0=0.2 key qpos include replicate fromto count model world main active false x y z XYZ
+0:0.5:5 weld connect tendon springlength spring damper passive"""
 WORDS = (
     *ROOT,
     *IN_BODY,
     *MAKE_BODIES,
     *DYNAMIC,
     *(name for each in KNOWN.values() for name in each),
-    *[
-        "angle",
-        "eulerseq",
-        "degree",
-        "radian",
-        "local",
-        "hinge",
-        "slide",
-        "ball",
-        "free",
-        "default",
-        "childclass",
-        "mocap",
-        "fixed",
-        "spatial",
-        "joint",
-        "coef",
-        "flag",
-        "equality",
-        "disable",
-        "autolimits",
-        "compiler",
-        "drive",
-        "hold",
-        "rest",
-        "keyframe:k",
-        "out0=0.2",
-        "key",
-        "qpos",
-        "include",
-        "replicate",
-        "fromto",
-        "count",
-        "model",
-        "world",
-        "main",
-        "active",
-        "false",
-        "x",
-        "y",
-        "z",
-        "XYZ",
-        "0:0.5:5",
-        "weld",
-        "connect",
-        "tendon",
-        "springlength",
-        "spring",
-        "damper",
-        "passive",
-    ],
+    *SAYS.split(),
 )
-
 FOUR_BAR = b"""<mujoco model="drive crank:0:0.5:5 hold "><worldbody>
 <body name="a"><joint name="crank" axis="0 1 0"/>
 <body name="b" pos="0 0 2"><joint name="B" axis="0 1 0"/><site name="C" pos="4 0 0"/></body></body>
@@ -105,18 +55,7 @@ SPRINGS = b"""<mujoco model="drive s:0:0.1:3 hold h "><default><tendon stiffness
 </tendon></mujoco>"""  # noqa: E501
 
 
-def one(data: bytes) -> None:
-    """Read one input with what it says itself."""
-    drive, hold = found.groups() if (found := SAID.search(data)) else (b"", b"")
-    names = [name.decode("latin-1") for name in hold.split()]
-    start = tuple(name for name in names if "=" in name or name.startswith("keyframe:"))
-    said = Supplied(
-        drive=(drive.decode("latin-1"),) if drive else (),
-        hold=tuple(name for name in names if name not in start and name != "rest"),
-        hold_rest="rest" in names,
-        start=start,
-    )
-    read_or_refused(lambda: load(written("model.xml", data), said))
+one = reading("model.xml")
 
 
 def seeds() -> list[bytes]:

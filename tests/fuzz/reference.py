@@ -13,9 +13,9 @@ from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 
-from ..support.case_texts import BASE, CSV
+from ..support.case_texts import BASE
 from .fuzzing import changing, read_or_refused, written
-from .hardpoints import workbook
+from .keeping import seeds_in_file
 from .trees import changed_json, changed_lines
 
 LONGEST = 8000
@@ -50,24 +50,9 @@ PROVED = {
 CURVE = b"# curve"
 OPTIONS = CurveOptions(["Spur=-camber [deg]"])
 SUSPENSION = "mcpherson_suspension"
-WORDS = (
-    *[
-        "push",
-        "tip_x",
-        "tip_x.velocity",
-        "tip_x.acceleration",
-        "stroke",
-        "toe",
-        "camber",
-        "#",
-        "signs:",
-        "iso8855",
-        "sae_j670",
-        "time",
-        *("[mm]", "(deg)", "_deg", "[deg/mm]", "travel", "KPI", "Toe Angle", "mm", "deg", "[-]"),
-    ],
-    *PROVED,
-)
+KEYS = """push tip_x tip_x.velocity tip_x.acceleration stroke toe camber # signs: iso8855
+sae_j670 time [mm] (deg) _deg [deg/mm] travel KPI mm deg [-]"""
+WORDS = (*KEYS.split(), "Toe Angle", *PROVED)
 
 
 def one(data: bytes) -> None:
@@ -101,29 +86,8 @@ def case(table: str, suspension: bool) -> Path:
 
 
 def seeds() -> list[bytes]:
-    """A table, a proved reference, and five rows of a suspension's."""
-    lines = (kincheck.cases.FOLDER / f"{SUSPENSION}.csv").read_text().splitlines()
-    comments, (head, *rows) = (
-        [x for x in lines if x.startswith("#")],
-        [x for x in lines if not x.startswith("#")],
-    )
-    few = "\n".join(
-        [*(each for each in comments if "signs" in each), head, *rows[:: (len(rows) - 1) // 4]]
-    )
-    head, *rows = CSV.removeprefix("# made up\n\n").replace(",", ";").splitlines()
-    german = "\n".join(["sep=;", "Rig 3", head, *(row.replace(".", ",") for row in rows)])
-    rig = ["Travel [mm],toe_deg,Spur,Load (N)", "-70,0.1,0.2,3", "-20,0.2,0.4,x", "10,0,0,3"]
-    rig += ["30.5,0.3,0.21,2", "77,0.1,0.3,1"]
-    units = few.replace("stroke", "stroke [m]").replace("camber", "camber (rad)", 1)
-    below = ["# curve", "travel;toe;Spur;Load", "mm;deg;deg;N"]
-    below += [row.replace(",", ";") for row in rig[1:]]
-    sheet = workbook([str(line).split(",") for line in CSV.splitlines()])
-    return [
-        *(text.encode() for text in (CSV, json.dumps(PROVED), few, units)),
-        *("\n".join(each).encode() for each in (["# curve", *rig], below)),
-        german.encode("utf-16"),
-        *sheet,
-    ]
+    """A table, a proved reference, five rows of a suspension's, and curves of a rig."""
+    return seeds_in_file("reference")
 
 
 mutate = changing(changed_json, changed_lines, words=WORDS)

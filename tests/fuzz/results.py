@@ -5,48 +5,21 @@ from pathlib import Path
 from unittest import mock
 from xml.etree import ElementTree
 
-import kincheck.cases
-import msgspec
 from kincheck.core.harness.record import to_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.harness.scene import scene
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.page_model import Material
 from kincheck.core.report.report import render
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
-from ..support.made_up import results
 from .fuzzing import changing, read_or_refused, written
+from .keeping import seeds_in_file
 from .trees import changed_json
 
 LONGEST = 16000
-SAID = [
-    "closed_form",
-    "consensus_only",
-    "native",
-    "one",
-    "pass",
-    "fail",
-    "error",
-    "timeout",
-    "crashed",
-    "ground",
-    "half_track_change",
-]
-WORDS = (
-    *SAID,
-    "time",
-    "wheel",
-    "point_coordinate",
-    "joint_angle",
-    "rad",
-    "m",
-    "1",
-    "rad/m",
-    "dof_account",
-    "program",
-    "signs",
-)
+WORDS = """closed_form consensus_only native one pass fail error timeout crashed ground
+half_track_change time wheel point_coordinate joint_angle rad m 1 rad/m dof_account
+program signs""".split()
 
 
 def one(data: bytes) -> None:
@@ -71,19 +44,7 @@ def one(data: bytes) -> None:
 
 def seeds() -> list[bytes]:
     """Results of two engines, of few samples, with a scene."""
-    made = [
-        results(),
-        results("consensus_only", "crank"),
-        results("closed_form", driver={"name": "stroke", "type": "time"}),
-    ]
-    drawn = scene(kincheck.cases.load("planar_slider_crank"))
-    drawn = msgspec.structs.replace(
-        drawn,
-        bodies=[msgspec.structs.replace(body, r=body.r[:2], p=body.p[:2]) for body in drawn.bodies],
-        frames=drawn.frames[:2],
-    )
-    made.append(msgspec.structs.replace(results(), scenes={"strut": drawn}))
-    return [msgspec.json.encode(each) for each in made]
+    return seeds_in_file("results")
 
 
-mutate = changing(changed_json, words=WORDS)
+mutate = changing(changed_json, words=(*WORDS,))

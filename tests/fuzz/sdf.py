@@ -1,17 +1,12 @@
 """SDF models; an attribute of the root says how they are driven."""
 
-import re
-
-from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
 from kincheck.core.case.models.trees.robot_elements import STRUT
 from kincheck.core.case.models.trees.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
 
-from .fuzzing import changing, read_or_refused, written
+from .fuzzing import changing, reading
 from .trees import changed_xml
 
 LONGEST = 4200
-DRIVEN = re.compile(rb'drive ([^ "]{1,40}) hold ([^">]{0,200})"')
 WORDS = (
     *(*IN_MODEL, *IN_LINK, *IN_JOINT, *IN_AXIS, *TYPES),
     *("relative_to", "attached_to", "expressed_in", "degrees", "rotation_format", "quat_xyzw"),
@@ -42,12 +37,7 @@ TYPED = b"""<sdf version="1.11" said="drive m::s:0:0.1:3 hold m::u.1 m::u.2 m::b
 <drake:linear_spring_damper_stiffness>7</drake:linear_spring_damper_stiffness></drake:linear_spring_damper></model><model name="n"><link name="base"/></model></world></sdf>"""  # noqa: E501
 
 
-def one(data: bytes) -> None:
-    """Read one input with what it says itself."""
-    drive, hold = found.groups() if (found := DRIVEN.search(data)) else (b"", b"")
-    names = tuple(name.decode("latin-1") for name in hold.split())
-    supplied = Supplied(drive=(drive.decode("latin-1"),) if drive else (), hold=names)
-    read_or_refused(lambda: load(written("model.sdf", data), supplied))
+one = reading("model.sdf")
 
 
 def seeds() -> list[bytes]:

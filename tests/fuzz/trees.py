@@ -131,28 +131,19 @@ def changed_toml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> byt
 
 def _toml(tables: dict[str, Any]) -> str:
     """Tables two deep under headers, everything further inside in lines."""
-    lines = [
-        f"{_name(key)} = {_inline(value)}"
-        for key, value in tables.items()
-        if not isinstance(value, dict)
-    ]
+    lines = _lines(tables)
     for key, table in tables.items():
         if isinstance(table, dict):
-            lines += [
-                f"[{_name(key)}]",
-                *(
-                    f"{_name(k)} = {_inline(v)}"
-                    for k, v in table.items()
-                    if not isinstance(v, dict)
-                ),
-            ]
+            lines += [f"[{_name(key)}]", *_lines(table)]
             for name, below in table.items():
                 if isinstance(below, dict):
-                    lines += [
-                        f"[{_name(key)}.{_name(name)}]",
-                        *(f"{_name(k)} = {_inline(v)}" for k, v in below.items()),
-                    ]
+                    inside = (f"{_name(k)} = {_inline(v)}" for k, v in below.items())
+                    lines += [f"[{_name(key)}.{_name(name)}]", *inside]
     return "\n".join(lines) + "\n"
+
+
+def _lines(table: dict[str, Any]) -> list[str]:
+    return [f"{_name(k)} = {_inline(v)}" for k, v in table.items() if not isinstance(v, dict)]
 
 
 def _name(key: str) -> str:
@@ -164,19 +155,9 @@ def _inline(value: Any) -> str:
         return "{" + ", ".join(f"{_name(k)} = {_inline(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(_inline, value)) + "]"
-    return (
-        {None: '""', True: "true", False: "false"}[value]
-        if value is None or isinstance(value, bool)
-        else _scalar(value)
-    )
-
-
-def _scalar(value: Any) -> str:
-    return (
-        repr(value)
-        if isinstance(value, int | float) and not isinstance(value, bool)
-        else json.dumps(str(value))
-    )
+    if value is None or isinstance(value, bool):
+        return {None: '""', True: "true", False: "false"}[value]
+    return repr(value) if isinstance(value, int | float) else json.dumps(str(value))
 
 
 def changed_xml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:

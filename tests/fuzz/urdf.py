@@ -5,15 +5,12 @@ files.
 import html
 import re
 
-from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
 from kincheck.core.case.models.trees.urdf import CLOSING, IN_CONSTRAINT, IN_JOINT, IN_ROBOT, TYPES
 
-from .fuzzing import FOLDER, changing, read_or_refused, written
+from .fuzzing import FOLDER, changing, reading, written
 from .trees import changed_xml
 
 LONGEST = 4200
-DRIVEN = re.compile(rb'drive ([^ "]{1,40}) hold ([^"]{0,200})"')
 BESIDE = {
     ending: re.compile(rf"{kind}=(?:\"([^\"]*)\"|'([^']*)')")
     for kind, ending in (("json", ".constraints.json"), ("yaml", ".yaml"))
@@ -65,16 +62,12 @@ CLOSED = b"""<robot name="drive A:0:0.2:3 hold " json='{"schema": "kincheck-cons
 
 def one(data: bytes) -> None:
     """Read one input with what it says itself, and with the files beside it."""
-    drive, hold = found.groups() if (found := DRIVEN.search(data)) else (b"", b"")
-    names = tuple(name.decode("latin-1") for name in hold.split())
-    supplied = Supplied(drive=(drive.decode("latin-1"),) if drive else (), hold=names)
     for ending, pattern in BESIDE.items():
         (FOLDER / f"robot{ending}").unlink(missing_ok=True)
         if beside := pattern.search(data.decode("latin-1")):
             text = html.unescape(beside[1] or beside[2] or "")
             written(f"robot{ending}", text.encode("utf-8", "surrogatepass"))
-    file = written("robot.urdf", data)
-    read_or_refused(lambda: load(file, supplied))
+    reading("robot.urdf")(data)
 
 
 def seeds() -> list[bytes]:

@@ -1,6 +1,7 @@
 """What an engine's trajectory gets wrong by itself: its form, the balance of power, and bodies."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
+from kincheck.core.trajectory import Trajectory
 
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
@@ -19,166 +21,157 @@ from ..support.loaded import loaded
 NATIVE = NativeEngine(every_body=True)
 
 
-def with_point(found, **parts):
-    return changed(found, points={"tip": replace(found.points["tip"], **parts)})
-
-
-def with_force(found, **parts):
-    (name, first), *rest = found.forces.joints.items()
-    return changed(
-        found, forces=replace(found.forces, joints={name: replace(first, **parts), **dict(rest)})
-    )
-
-
-def with_body(found, **parts):
-    (name, first), *rest = found.bodies.items()
-    return changed(found, bodies={name: replace(first, **parts), **dict(rest)})
+def altered(found, part, value):
+    """The trajectory with another value of a part, by its path: of points, joints and bodies the
+    first one's; a function makes it from what is there.
+    """
+    name, _, rest = part.partition(".")
+    old = getattr(found, name)
+    if isinstance(old, Mapping) and rest:
+        key, one = next(iter(old.items()))
+        new = {**old, key: altered(one, rest, value)}
+    else:
+        new = altered(old, rest, value) if rest else value(old) if callable(value) else value
+    return (changed if isinstance(found, Trajectory) else replace)(found, **{name: new})
 
 
 FORMS = {
     "negative residual": (
-        lambda found: changed(found, residual=-1e-15),
+        ("residual", -1e-15),
         "residual is -1e-15 although 9 samples are called solved",
     ),
-    "no residual": (lambda found: changed(found, residual=math.nan), "residual is nan"),
-    "infinite residual": (lambda found: changed(found, residual=math.inf), "residual is inf"),
+    "no residual": (("residual", math.nan), "residual is nan"),
+    "infinite residual": (("residual", math.inf), "residual is inf"),
     "complex residual": (
-        lambda found: changed(found, residual=1e-15 + 0j),
+        ("residual", 1e-15 + 0j),
         "residual is of complex128, expected a real number",
     ),
     "residual of a sample": (
-        lambda found: changed(found, residual=np.zeros(SAMPLES)),
+        ("residual", np.zeros(SAMPLES)),
         "residual has shape (9,), expected ()",
     ),
     "complex positions": (
-        lambda found: with_point(found, position=found.points["tip"].position + 0j),
+        ("points.position", lambda p: p + 0j),
         "position of point 'tip' is of complex128, expected floats",
     ),
     "whole positions": (
-        lambda found: with_point(found, position=np.zeros((SAMPLES, 3), int)),
+        ("points.position", np.zeros((SAMPLES, 3), int)),
         "position of point 'tip' is of int64, expected floats",
     ),
     "objects": (
-        lambda found: with_point(found, velocity=found.points["tip"].velocity.astype(object)),
+        ("points.velocity", lambda v: v.astype(object)),
         "velocity of point 'tip' is of object, expected floats",
     ),
     "texts": (
-        lambda found: with_point(found, acceleration=np.full((SAMPLES, 3), "0")),
+        ("points.acceleration", np.full((SAMPLES, 3), "0")),
         "acceleration of point 'tip' is of <U1, expected floats",
     ),
-    "no position": (lambda found: with_point(found, position=None), "is of object"),
+    "no position": (("points.position", None), "is of object"),
     "rows of two lengths": (
-        lambda found: with_point(found, position=[[0.0, 1.0], [0.0]]),
+        ("points.position", [[0.0, 1.0], [0.0]]),
         "position of point 'tip' is no array",
     ),
     "positions turned over": (
-        lambda found: with_point(found, position=found.points["tip"].position.T),
+        ("points.position", np.transpose),
         "position of point 'tip' has shape (3, 9), expected (9, 3)",
     ),
     "a sample too few": (
-        lambda found: with_point(found, velocity=found.points["tip"].velocity[1:]),
+        ("points.velocity", lambda v: v[1:]),
         "velocity of point 'tip' has shape (8, 3), expected (9, 3)",
     ),
     "not a number": (
-        lambda found: with_point(found, position=np.full((SAMPLES, 3), math.nan)),
+        ("points.position", np.full((SAMPLES, 3), math.nan)),
         "which is called solved; 9 of 9 samples are so",
     ),
     "infinite at one sample": (
-        lambda found: with_point(
-            found, acceleration=at(3, 2, math.inf)(found.points["tip"].acceleration)
-        ),
+        ("points.acceleration", at(3, 2, math.inf)),
         "at sample 3 (angle = -0.25), which is called solved",
     ),
-    "no points": (lambda found: changed(found, points={}), "no motion of point 'tip'; found: none"),
+    "no points": (("points", {}), "no motion of point 'tip'; found: none"),
     "solved of too few": (
-        lambda found: changed(found, solved=found.solved[1:]),
+        ("solved", lambda each: each[1:]),
         "solved has shape (8,), expected (9,)",
     ),
     "numbers for solved": (
-        lambda found: changed(found, solved=np.ones(SAMPLES)),
+        ("solved", np.ones(SAMPLES)),
         "solved is of float64, expected booleans",
     ),
     "half iterations": (
-        lambda found: changed(found, iterations=np.full(SAMPLES, 2.5)),
+        ("iterations", np.full(SAMPLES, 2.5)),
         "iterations is of float64, expected whole numbers",
     ),
-    "negative iterations": (
-        lambda found: changed(found, iterations=np.full(SAMPLES, -3)),
-        "iterations has -3",
-    ),
-    "no message": (lambda found: changed(found, message=None), "message is None"),
-    "details in a list": (lambda found: changed(found, details=[1]), "details [1]"),
-    "no trajectory": (lambda found: (found.points, found.solved), "returned tuple"),
+    "negative iterations": (("iterations", np.full(SAMPLES, -3)), "iterations has -3"),
+    "no message": (("message", None), "message is None"),
+    "details in a list": (("details", [1]), "details [1]"),
 }
+
+
+def refused(answer):
+    (record,) = run([crank()], [Fake(answer=answer)], tol=1e-12).records
+    assert record.outcome is Outcome.ERROR
+    assert record.message.startswith("BadTrajectoryError: fake: ")
+    return record.message
 
 
 @pytest.mark.parametrize("breach", FORMS)
 def test_a_breach_of_the_form_is_one_message(breach):
-    change, said = FORMS[breach]
-    engine = Fake(answer=lambda case: change(solution(case)))
-    (record,) = run([crank()], [engine], tol=1e-12).records
-    assert record.outcome is Outcome.ERROR
-    assert record.message.startswith("BadTrajectoryError: fake: ")
-    assert said in record.message
+    part, said = FORMS[breach]
+    assert said in refused(lambda case: altered(solution(case), *part))
+
+
+def test_another_thing_than_a_trajectory_is_refused():
+    assert "returned tuple" in refused(lambda case: (1, 2))
 
 
 FORCES = {
     "complex moment": (
-        lambda found: with_force(found, moment=np.zeros((3, 3)) + 1j),
+        ("forces.joints.moment", np.zeros((3, 3)) + 1j),
         "moment of joint 'pin' is of complex128, expected floats",
     ),
     "whole force": (
-        lambda found: with_force(found, force=np.zeros((3, 3), int)),
+        ("forces.joints.force", np.zeros((3, 3), int)),
         "force of joint 'pin' is of int64",
     ),
     "one force for all samples": (
-        lambda found: with_force(found, force=np.zeros(3)),
+        ("forces.joints.force", np.zeros(3)),
         "force of joint 'pin' has shape (3,), expected (3, 3)",
     ),
     "infinite force": (
-        lambda found: with_force(found, force=np.full((3, 3), math.inf)),
+        ("forces.joints.force", np.full((3, 3), math.inf)),
         "force of joint 'pin' is infinite",
     ),
     "directions of forces alone": (
-        lambda found: with_force(found, free=np.zeros((3, 3, 0))),
+        ("forces.joints.free", np.zeros((3, 3, 0))),
         "free directions of joint 'pin' has shape (3, 3, 0), expected (3, 6, 'any')",
     ),
     "effort by columns": (
-        lambda found: changed(
-            found, forces=replace(found.forces, drivers={"turn": np.zeros((3, 1))})
-        ),
+        ("forces.drivers", {"turn": np.zeros((3, 1))}),
         "effort of driver 'turn' has shape (3, 1), expected (3,)",
     ),
     "element in one number": (
-        lambda found: changed(found, forces=replace(found.forces, elements={"spring": 1.0})),
+        ("forces.elements", {"spring": 1.0}),
         "force of element 'spring' has shape (), expected (3,)",
     ),
-    "power in one number": (
-        lambda found: changed(found, forces=replace(found.forces, power=0.0)),
-        "power has shape ()",
-    ),
-    "complex power": (
-        lambda found: changed(found, forces=replace(found.forces, power=np.zeros(3) + 0j)),
-        "power is of complex128",
-    ),
+    "power in one number": (("forces.power", 0.0), "power has shape ()"),
+    "complex power": (("forces.power", np.zeros(3) + 0j), "power is of complex128"),
     "a body missing": (
-        lambda found: changed(found, bodies={"crank": found.bodies["crank"]}),
+        ("bodies", lambda bodies: {"crank": bodies["crank"]}),
         "motions of bodies crank, but 'slider' is missing. Give those of all moving bodies",
     ),
     "a body too many": (
-        lambda found: changed(found, bodies={**found.bodies, "wall": found.bodies["crank"]}),
+        ("bodies", lambda bodies: {**bodies, "wall": bodies["crank"]}),
         "'wall' is no moving body",
     ),
     "angles for parameters": (
-        lambda found: with_body(found, p=np.zeros((3, 3))),
+        ("bodies.p", np.zeros((3, 3))),
         "p of body 'crank' has shape (3, 3), expected (3, 4)",
     ),
     "long parameters": (
-        lambda found: with_body(found, p=1.001 * found.bodies["crank"].p),
+        ("bodies.p", lambda p: 1.001 * p),
         "p of body 'crank' has length 1.001",
     ),
     "a body nowhere": (
-        lambda found: with_body(found, r=np.full((3, 3), math.nan)),
+        ("bodies.r", np.full((3, 3), math.nan)),
         "r of body 'crank' is [nan, nan, nan] at sample 0",
     ),
 }
@@ -196,10 +189,10 @@ def found(case):
 
 @pytest.mark.parametrize("breach", FORCES)
 def test_a_breach_of_forces_and_bodies_is_one_message(breach, case, found):
-    change, said = FORCES[breach]
+    part, said = FORCES[breach]
     check(case, "fake", found)
     with pytest.raises(BadTrajectoryError, match=r"^fake: ") as told:
-        check(case, "fake", change(found))
+        check(case, "fake", altered(found, *part))
     assert said in str(told.value)
 
 
@@ -211,9 +204,7 @@ def outcome(case, found, mode="projection"):
 
 
 def unbalanced(found, watts, sample=1):
-    power = found.forces.power.copy()
-    power[sample] += watts
-    return changed(found, forces=replace(found.forces, power=power))
+    return altered(found, "forces.power", lambda x: x + watts * (np.arange(len(x)) == sample))
 
 
 @pytest.mark.parametrize("watts", [100.0, -100.0, 1e-3])
@@ -275,18 +266,16 @@ def test_bodies_off_their_constraints_fail(fault, case, found):
 
 
 def test_points_off_their_bodies_fail(case, found):
-    (name, moved), *rest = found.points.items()
-    points = {name: replace(moved, position=moved.position + 1e-6), **dict(rest)}
-    result, message = outcome(case, changed(found, points=points))
+    result, message = outcome(case, altered(found, "points.position", lambda p: p + 1e-6))
     assert result is Outcome.FAIL
     assert "position of points on" in message
 
 
 def test_bodies_without_rates_are_judged_by_positions(case, found):
     still = {name: replace(each, v=None, a=None) for name, each in found.bodies.items()}
-    assert outcome(case, changed(found, bodies=still))[0] is Outcome.UNJUDGED
-    still["slider"] = replace(still["slider"], r=still["slider"].r + 1e-6)
-    assert outcome(case, changed(found, bodies=still))[0] is Outcome.FAIL
+    found = changed(found, bodies=still)
+    assert outcome(case, found)[0] is Outcome.UNJUDGED
+    assert outcome(case, altered(found, "bodies.r", lambda r: r + 1e-6))[0] is Outcome.FAIL
 
 
 def test_engine_with_points_alone_passes():

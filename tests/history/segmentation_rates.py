@@ -14,7 +14,6 @@ import argparse
 import importlib
 import math
 import sys
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -65,7 +64,7 @@ STEPS = {
 SIZES = (3, 5, 7, 10)
 
 
-def main(argv: Sequence[str]) -> int:
+def main(argv):
     """Print both tables."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.history.segmentation_rates",

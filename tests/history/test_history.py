@@ -10,7 +10,6 @@ import zlib
 from base64 import b64decode
 from pathlib import Path
 
-import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.errors import KincheckError
@@ -19,8 +18,9 @@ from kincheck.core.history.queries import NUMBERS, export, faultless, read
 from kincheck.core.history.store import HistoryError, Store
 from kincheck.core.report.figures import Past, trend_figures
 from kincheck.core.report.trends import trends
+from msgspec.structs import replace
 
-from ..support.nights import changed, keep, nights, records, reported, times
+from ..support.nights import changed, keep, keep_changed, nights, records, reported, times
 
 FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
 """Two runs of a crank in three and four engines, made by schema 1."""
@@ -132,9 +132,9 @@ def test_history_refuses_unknown_names_and_files(path, capsys, monkeypatch):
 
 def test_green_runs_have_passes_only(path):
     nights(path, 1)
-    keep(path, changed(records(), outcome=Outcome.TIMEOUT))
-    keep(path, changed(records(), outcome=Outcome.UNSUPPORTED))
-    keep(path, [msgspec.structs.replace(each, outcome=Outcome.UNAVAILABLE) for each in records()])
+    keep_changed(path, outcome=Outcome.TIMEOUT)
+    keep_changed(path, outcome=Outcome.UNSUPPORTED)
+    keep(path, [replace(each, outcome=Outcome.UNAVAILABLE) for each in records()])
     keep(path, records(), status="interrupted")
     with Store(path) as store:
         assert faultless(store) == {1, 3}
@@ -181,9 +181,7 @@ def test_a_velocity_fault_is_drawn_red_since_its_run(path, tmp_path):
         if night >= 4:
             fault = {"max_abs": 3e-6, "within": False}
             errors = made[1].errors["x"]
-            errors = msgspec.structs.replace(
-                errors, velocity=msgspec.structs.replace(errors.velocity, **fault)
-            )
+            errors = replace(errors, velocity=replace(errors.velocity, **fault))
             what = {"outcome": Outcome.FAIL, "version": "4.1.0"}
             made = changed(made, errors={**made[1].errors, "x": errors}, **what)
         if night == 6:
@@ -226,10 +224,7 @@ def test_zero_errors_are_drawn_on_floor(path, tmp_path):
 
 
 def test_waiting_time_is_subtracted(path):
-    made = [
-        msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, waited=0.004))
-        for each in records()
-    ]
+    made = [replace(each, seconds=replace(each.seconds, waited=0.004)) for each in records()]
     keep(path, made)
     with Store(path) as store:
         (entry,) = read(store).pairs["first", "mujoco", "projection"]
@@ -246,7 +241,7 @@ def test_quantities_without_values_are_not_drawn(path, tmp_path):
     assert [*trend_figures(past(None, 2.0), {})] == ["time"]
     assert [*trend_figures(past(0.0, None), {})] == ["velocity-error"]
     assert trend_figures(past(None, None), {}) == {}
-    keep(path, [msgspec.structs.replace(each, errors={}, us_per_step=None) for each in records()])
+    keep(path, [replace(each, errors={}, us_per_step=None) for each in records()])
     assert history(path, "--plot", tmp_path / "trends.html") == 0
     text = (tmp_path / "trends.html").read_text()
     assert "1 run, oldest first" in text
@@ -278,9 +273,9 @@ def test_rules_find_the_run_to_compare_with(path):
     keep(path, records())
     keep(path, records(), git={"commit": "b" * 40, "branch": "topic", "changed": False})
     keep(path, records(), status="interrupted")
-    keep(path, changed(records(), outcome=Outcome.FAIL))
+    keep_changed(path, outcome=Outcome.FAIL)
     keep(path, records(), git={"commit": "c" * 40, "branch": "main", "changed": True})
-    keep(path, [msgspec.structs.replace(each, case="other") for each in records()])
+    keep(path, [replace(each, case="other") for each in records()])
     keep(path, records())
     assert reported(path).against.name == "run 5 (last green)"
     assert reported(path, against="topic-baseline").against.name == "run 2 (topic baseline)"

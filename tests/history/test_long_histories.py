@@ -5,7 +5,6 @@ nothing is made up.
 import os
 from pathlib import Path
 
-import msgspec
 import pytest
 from kincheck.core.case.io.atomic_files import written
 from kincheck.core.cli import main
@@ -14,10 +13,11 @@ from kincheck.core.history.findings import Kind
 from kincheck.core.history.runs import find, find_against
 from kincheck.core.history.runs import keep as begin
 from kincheck.core.history.store import Store
+from msgspec.structs import replace
 
 from ..harness.test_unfinished import killed
 from ..support.fakes import Fake, crank
-from ..support.nights import changed, keep, nights, records, worse
+from ..support.nights import changed, keep, keep_changed, nights, records, worse
 from .test_regression import reported
 
 FIRST = ("first", "mujoco")
@@ -27,15 +27,11 @@ def held_to(factor):
     """A change of errors: all tolerances grow."""
 
     def one(deviation):
-        return deviation and msgspec.structs.replace(
-            deviation, tolerance=factor * deviation.tolerance
-        )
+        return deviation and replace(deviation, tolerance=factor * deviation.tolerance)
 
     def change(errors):
         return {
-            output: msgspec.structs.replace(
-                each, **{motion: one(deviation) for motion, deviation in each.items()}
-            )
+            output: replace(each, **{motion: one(deviation) for motion, deviation in each.items()})
             for output, each in errors.items()
         }
 
@@ -46,8 +42,7 @@ def without(motion):
     """A change of errors: a motion is not compared any more."""
     return {
         "errors": lambda errors: {
-            output: msgspec.structs.replace(each, **{motion: None})
-            for output, each in errors.items()
+            output: replace(each, **{motion: None}) for output, each in errors.items()
         }
     }
 
@@ -62,7 +57,7 @@ def test_another_tolerance_is_no_step_of_the_error(path):
     """
     tiny = worse(1e-4)
     for _ in range(3):
-        keep(path, changed(records(), **tiny))
+        keep_changed(path, **tiny)
     grown = changed(changed(records(), **tiny), **held_to(1e4))
     keep(path, grown)
     found = reported(path)
@@ -73,16 +68,14 @@ def test_another_tolerance_is_no_step_of_the_error(path):
 
 def test_results_file_is_found_in_history(path, tmp_path):
     nights(path, 1)
-    keep(path, changed(records(), **worse(450.0)))
+    keep_changed(path, **worse(450.0))
     nights(path, 1)
     with Store(path) as store:
         file = tmp_path / "results.json"
         file.write_bytes(to_json(store.results(2)))
         subject = find(str(file), store)
         assert (subject.number, find_against("last-green", subject, store)[0].number) == (2, 1)
-        other = msgspec.structs.replace(
-            store.results(2), run=store.results(2).run | {"host": "elsewhere"}
-        )
+        other = replace(store.results(2), run=store.results(2).run | {"host": "elsewhere"})
         file.write_bytes(to_json(other))
         # of another machine, and begun when run 2 was: run 3 is later
         subject = find(str(file), store)
@@ -107,7 +100,7 @@ def test_results_file_is_found_in_history(path, tmp_path):
 def test_lost_results_stay_reported(path, gone):
     nights(path, 1)
     for _ in range(62):
-        keep(path, changed(records(), **gone))
+        keep_changed(path, **gone)
     for run in ("2", "3", "63"):
         found = reported(path, run)
         assert (found.against.number, told(found)) == (1, {(Kind.LOST, *FIRST)})
@@ -120,7 +113,7 @@ def test_removed_output_is_reported_once(path):
         "outputs": lambda outputs: {"x": outputs["x"]},
     }
     for _ in range(2):
-        keep(path, changed(records(), **fewer))
+        keep_changed(path, **fewer)
     assert told(reported(path, "2")) == {(Kind.LOST, *FIRST)}
     assert told(reported(path, "3")) == set()
 
@@ -129,13 +122,13 @@ def test_small_runs_in_between_hide_nothing(path):
     nights(path, 1)
     for _ in range(62):
         keep(path, [each for each in records() if each.case == "second"])
-    keep(path, changed(records(), **worse(450.0)))
+    keep_changed(path, **worse(450.0))
     assert told(reported(path)) == {(Kind.DRIFTED, *FIRST)}
 
 
 def test_slow_drift_is_reported(path):
     for night in range(4):
-        keep(path, changed(records(), **worse(5.0**night)))
+        keep_changed(path, **worse(5.0**night))
     assert told(reported(path, "2")) == set()
     for run in ("3", "4"):
         found = reported(path, run)
@@ -148,7 +141,7 @@ def test_slow_drift_is_reported(path):
 def test_step_is_reported_once(path):
     nights(path, 3)
     for _ in range(3):
-        keep(path, changed(records(), **worse(100.0)))
+        keep_changed(path, **worse(100.0))
     assert [told(reported(path, run)) for run in ("4", "5", "6")] == [
         {(Kind.DRIFTED, *FIRST)},
         set(),
@@ -223,7 +216,7 @@ def test_other_edits_are_named(path):
 
 def test_errors_of_zero_leave_any_tolerance_loose(path):
     for _ in range(10):
-        keep(path, changed(records(), **worse(0.0)))
+        keep_changed(path, **worse(0.0))
     (loose,) = [each for each in reported(path).loose if each.largest == 0.0]
     assert (loose.case, loose.output, loose.factor) == ("first", "x", None)
 

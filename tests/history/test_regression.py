@@ -12,8 +12,20 @@ from kincheck.core.history.findings import Kind, Regressions
 from kincheck.core.history.store import Store
 from kincheck.core.report.junit import to_regression_junit
 from kincheck.core.report.regressions import headline, print_regressions, rows, to_markdown
+from msgspec.structs import replace
 
-from ..support.nights import FACTS, RESULTS, changed, keep, nights, records, reported, times, worse
+from ..support.nights import (
+    FACTS,
+    RESULTS,
+    changed,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    reported,
+    times,
+    worse,
+)
 from ..support.printed import Terminal, coloured
 
 
@@ -39,17 +51,11 @@ def test_quiet_and_noisy_nights_are_not_reported(path):
 
 def test_one_slow_machine_is_no_slow_engine(path):
     nights(path, 8)
-    slow = [
-        msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, warm=0.04))
-        for each in records()
-    ]
+    slow = [replace(each, seconds=replace(each.seconds, warm=0.04)) for each in records()]
     keep(path, slow, calibration_seconds=0.08)
     assert kinds(reported(path)) == []
     waiting = [
-        msgspec.structs.replace(
-            each, seconds=msgspec.structs.replace(each.seconds, warm=0.04, waited=0.03)
-        )
-        for each in records()
+        replace(each, seconds=replace(each.seconds, warm=0.04, waited=0.03)) for each in records()
     ]
     keep(path, waiting)
     assert kinds(reported(path)) == []
@@ -67,7 +73,7 @@ def test_scattered_times_widen_the_limit(path):
                 for each in records()
             ],
         )
-    keep(path, changed(records(), **times(3.0)))
+    keep_changed(path, **times(3.0))
     found = reported(path)
     assert found.time_limit > 3.0
     assert kinds(found) == []
@@ -77,9 +83,7 @@ def test_scattered_times_widen_the_limit(path):
 def test_microseconds_are_no_regression(path, warm):
     """From 20 us: the excess is below the floor, then above it."""
     quick = [
-        msgspec.structs.replace(
-            each, seconds=Seconds(build=0.1, first=0.1, warm=2e-5, waited=0.0, compare=0.1)
-        )
+        replace(each, seconds=Seconds(build=0.1, first=0.1, warm=2e-5, waited=0.0, compare=0.1))
         for each in records()
     ]
     for _ in range(6):
@@ -90,8 +94,8 @@ def test_microseconds_are_no_regression(path, warm):
 
 def test_round_off_that_grows_is_no_drift(path):
     nights(path, 3)
-    keep(path, changed(records(), **worse(1e-4)))
-    keep(path, changed(records(), **worse(1.8e-3)))  # from 5e-17 to 9e-16 m
+    keep_changed(path, **worse(1e-4))
+    keep_changed(path, **worse(1.8e-3))  # from 5e-17 to 9e-16 m
     assert kinds(reported(path)) == []
 
 
@@ -125,12 +129,7 @@ PLANTED = {
     "acceleration": (
         {
             "errors": lambda e: (
-                e
-                | {
-                    "y": msgspec.structs.replace(
-                        e["y"], acceleration=None, reason="the engine gives none"
-                    )
-                }
+                e | {"y": replace(e["y"], acceleration=None, reason="the engine gives none")}
             )
         },
         Kind.LOST,
@@ -159,7 +158,7 @@ PLANTED = {
 def test_planted_regressions_are_reported(path, what):
     changes, kind, message = PLANTED[what]
     nights(path, 8)
-    keep(path, changed(records(), **changes))
+    keep_changed(path, **changes)
     found = reported(path)
     assert found.regressed
     (finding,) = [each for each in found.findings if each.kind is kind]
@@ -171,8 +170,7 @@ def test_planted_regressions_are_reported(path, what):
 def test_a_changed_engine_version_is_named(path):
     nights(path, 2)
     newer = [
-        msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each
-        for each in records()
+        replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in records()
     ]
     keep(path, changed(newer, **worse(20.0)), numpy="2.1.0")
     found = reported(path)
@@ -207,12 +205,10 @@ def test_a_changed_tolerance_is_said(path):
 
     def loosened(errors):
         return errors | {
-            "x": msgspec.structs.replace(
-                errors["x"], position=msgspec.structs.replace(errors["x"].position, tolerance=1e-6)
-            )
+            "x": replace(errors["x"], position=replace(errors["x"].position, tolerance=1e-6))
         }
 
-    keep(path, changed(records(), errors=loosened))
+    keep_changed(path, errors=loosened)
     (finding,) = reported(path).findings
     assert (finding.kind, finding.message) == (Kind.TOLERANCE, "x position: 1e-9 → 1e-6")
 
@@ -224,16 +220,10 @@ def test_changed_reference_is_reported(tmp_path, capsys):
     edited = [truth.position[0] + 1e-10, *truth.position[1:]]
     references = {
         **RESULTS.references,
-        "first": (
-            RESULTS.references["first"] | {"x": msgspec.structs.replace(truth, position=edited)}
-        ),
+        "first": (RESULTS.references["first"] | {"x": replace(truth, position=edited)}),
     }
     for file, changes in zip(files, ({}, {"references": references}), strict=True):
-        file.write_bytes(
-            to_json(
-                msgspec.structs.replace(RESULTS, run={**FACTS, "started": file.name}, **changes)
-            )
-        )
+        file.write_bytes(to_json(replace(RESULTS, run={**FACTS, "started": file.name}, **changes)))
     assert main.main(f"report {files[0]} --against {files[0]}".split()) == 0
     assert "Reference changed" not in capsys.readouterr().out
     assert main.main(f"report {files[1]} --against {files[0]}".split()) == 0
@@ -257,7 +247,7 @@ def test_loose_tolerances_are_named(path):
     ]
     # 1e-9 over ten times 5e-13
     assert reported(path).loose[0].factor == pytest.approx(200.0, rel=1e-3)
-    keep(path, changed(records(), case="second", **worse(500.0)))
+    keep_changed(path, case="second", **worse(500.0))
     assert [each.case + each.output for each in reported(path).loose] == [
         "firstx",
         "firsty",
@@ -270,7 +260,7 @@ def test_loose_tolerances_are_named(path):
 
 def test_the_command_writes_every_format(path, tmp_path, capsys):
     nights(path, 6)
-    keep(path, changed(records(), **worse(20.0), message="<script>alert(1)</script> | *x*"))
+    keep_changed(path, **worse(20.0), message="<script>alert(1)</script> | *x*")
     out = tmp_path / "report"
     assert main.main(f"report --history {path} --out {out}".split()) == 1
     text = (out / "regressions.md").read_text()
@@ -324,10 +314,7 @@ def test_regression_markdown_escapes_and_folds(path):
     message = "</details> | `x` @team"
     keep(
         path,
-        [
-            msgspec.structs.replace(each, outcome=Outcome.ERROR, message=message)
-            for each in records()
-        ],
+        [replace(each, outcome=Outcome.ERROR, message=message) for each in records()],
     )
     text = to_markdown(reported(path))
     assert (
@@ -339,7 +326,7 @@ def test_regression_markdown_escapes_and_folds(path):
 
 def test_pairs_that_no_engine_can_solve_are_not_right(path):
     first, *others = records()
-    gone = [msgspec.structs.replace(each, outcome=Outcome.UNAVAILABLE) for each in others]
+    gone = [replace(each, outcome=Outcome.UNAVAILABLE) for each in others]
     keep(path, [first, *gone])
     assert f": all 1 right, {len(others)} unavailable or unsupported;" in headline(reported(path))
 
@@ -380,9 +367,9 @@ DRIVER = {"turn": [0.0, 0.5, 1.0]}
 
 def night(path, unjudged=True, driver=DRIVER, **values):
     """A run in which the first pair has that output, judged by nothing unless said otherwise."""
-    outputs = {"y": msgspec.structs.replace(SERIES, **values)}
+    outputs = {"y": replace(SERIES, **values)}
     errors = {"errors": {}} if unjudged else {}
-    keep(path, changed(records(), driver=driver, outputs=outputs, **errors))
+    keep_changed(path, driver=driver, outputs=outputs, **errors)
 
 
 def found_after(path, **now):
@@ -414,9 +401,9 @@ def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
     """Of an output without a standard, the scale is that of the outputs of its unit."""
     for moved in (0.0, off):
         force = OutputSeries(position=[9e5, 1e6, 0.0], velocity=None, acceleration=None, unit="N")
-        y = msgspec.structs.replace(SERIES, position=[0.0, 0.5 + moved, None])
+        y = replace(SERIES, position=[0.0, 0.5 + moved, None])
         outputs = {"y": y, "load": force}
-        keep(path, changed(records(), driver=DRIVER, outputs=outputs, errors={}))
+        keep_changed(path, driver=DRIVER, outputs=outputs, errors={})
     assert [each.kind for each in reported(path, against="1").findings] == kinds
 
 
@@ -452,13 +439,13 @@ def test_another_driver_is_another_sweep(path):
 
 def test_fewer_samples_are_reported_lost(path):
     keep(path, records())
-    keep(path, changed(records(), solved=2, samples=2))
+    keep_changed(path, solved=2, samples=2)
     (finding,) = reported(path, against="1").findings
     assert finding.kind is Kind.LOST
     assert finding.message == "2 of 2 samples solved, 9 of 9 before"
 
 
 def test_grown_error_is_reported_as_drift(path):
-    keep(path, changed(records(), driver=DRIVER, outputs={"x": SERIES}))
-    keep(path, changed(records(), driver=DRIVER, outputs={"x": SERIES}, **worse(20.0)))
+    keep_changed(path, driver=DRIVER, outputs={"x": SERIES})
+    keep_changed(path, driver=DRIVER, outputs={"x": SERIES}, **worse(20.0))
     assert [each.kind for each in reported(path, against="1").findings] == [Kind.DRIFTED]

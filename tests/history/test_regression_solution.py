@@ -4,13 +4,13 @@ now, pairs that are missing.
 
 import xml.etree.ElementTree as ET
 
-import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import WHY, Kind
+from msgspec.structs import replace
 
-from ..support.nights import changed, keep, nights, records, reported
+from ..support.nights import keep, keep_changed, nights, records, reported
 
 FIRST = ("first", "mujoco")
 
@@ -23,7 +23,7 @@ def of_output(output="x", **changes):
             name: each(getattr(outputs[output], name)) if callable(each) else each
             for name, each in changes.items()
         }
-        return outputs | {output: msgspec.structs.replace(outputs[output], **values)}
+        return outputs | {output: replace(outputs[output], **values)}
 
     return {"outputs": change}
 
@@ -80,8 +80,8 @@ TOLD = {
 @pytest.mark.parametrize("what", TOLD)
 def test_solution_changes_are_in_every_format(path, tmp_path, capsys, what):
     before, now, kind, message = TOLD[what]
-    keep(path, changed(records(), **before))
-    keep(path, changed(records(), **{**before, **now}))
+    keep_changed(path, **before)
+    keep_changed(path, **{**before, **now})
     found = reported(path)
     (finding,) = found.findings
     assert (finding.kind, finding.case, finding.engine) == (kind, *FIRST)
@@ -116,8 +116,8 @@ def test_solution_changes_are_in_every_format(path, tmp_path, capsys, what):
     ids=["rounding", "the last place", "less than three digits", "better", "nothing known before"],
 )
 def test_meaningless_changes_are_not_reported(path, before, now):
-    keep(path, changed(records(), **before))
-    keep(path, changed(records(), **now))
+    keep_changed(path, **before)
+    keep_changed(path, **now)
     assert reported(path).findings == []
 
 
@@ -128,13 +128,13 @@ def test_lost_samples_are_reported_once(path):
     def fewer(outputs):
         return {name: of_output(name, **all_null)["outputs"](outputs)[name] for name in outputs}
 
-    keep(path, changed(records(), outputs=fewer, solved=7))
+    keep_changed(path, outputs=fewer, solved=7)
     assert [each.kind for each in reported(path, against="1").findings] == [Kind.LOST]
 
     def one_more(outputs):
         return of_output(velocity=without(3))["outputs"](fewer(outputs))
 
-    keep(path, changed(records(), outputs=one_more, solved=7))
+    keep_changed(path, outputs=one_more, solved=7)
     found = reported(path, against="1").findings
     assert [each.kind for each in found] == [Kind.LOST, Kind.GONE]
     assert " at 1 of 9 samples " in found[1].message
@@ -164,7 +164,7 @@ def test_missing_pairs_are_failures_on_request(path, tmp_path, capsys):
 
 def test_pair_of_last_run_is_missing(path, capsys):
     keep(path, records()[:2])
-    keep(path, changed(records(), case="second", outcome=Outcome.FAIL))
+    keep_changed(path, case="second", outcome=Outcome.FAIL)
     keep(path, records()[:2])
     found = reported(path)
     assert found.against.number == 1
@@ -180,7 +180,7 @@ def test_other_command_has_no_missing_pairs(path, capsys):
     keep(path, records()[:2])
     keep(
         path,
-        [msgspec.structs.replace(each, case="mine") for each in records()],
+        [replace(each, case="mine") for each in records()],
         command="kincheck run mine.toml",
     )
     keep(path, records()[:2])
@@ -189,7 +189,7 @@ def test_other_command_has_no_missing_pairs(path, capsys):
 
 
 def test_missing_pairs_count_with_nothing_to_compare_with(path, capsys):
-    keep(path, changed(records(), outcome=Outcome.FAIL))
+    keep_changed(path, outcome=Outcome.FAIL)
     keep(path, records()[:2])
     assert main.main(["report", "--history", str(path)]) == 0
     assert "2 not in this run; nothing to compare with" in capsys.readouterr().out

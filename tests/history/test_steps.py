@@ -5,7 +5,6 @@ single slow night.
 import math
 import random
 
-import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli import main
@@ -13,8 +12,9 @@ from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
 from kincheck.core.history.steps import change_points, lasting, steps
 from kincheck.core.history.store import Store
+from msgspec.structs import replace
 
-from ..support.nights import changed, keep, nights, records, times, worse
+from ..support.nights import changed, keep, keep_changed, nights, records, times, worse
 
 
 def found(path, standing=False):
@@ -101,10 +101,7 @@ def test_error_step_names_worst_output(path):
     both = changed(changed(records(), **worse(20.0, "x")), **worse(200.0, "y"))
     keep(
         path,
-        [
-            msgspec.structs.replace(each, version="4.1.0") if each.engine == "mujoco" else each
-            for each in both
-        ],
+        [replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in both],
     )
     (step,) = found(path)
     assert (step.quantity, step.output, step.first) == ("position", "y", 4)
@@ -115,7 +112,7 @@ def test_error_step_names_worst_output(path):
 def test_outcome_step_ends_with_repair(path):
     nights(path, 2)
     for _ in range(2):
-        keep(path, changed(records(), outcome=Outcome.CRASHED, message="signal 11"))
+        keep_changed(path, outcome=Outcome.CRASHED, message="signal 11")
     assert [(each.quantity, each.first, each.worse) for each in found(path, standing=True)] == [
         ("outcome", 3, True)
     ]
@@ -165,7 +162,7 @@ def test_partly_repaired_step_stands(path):
 
 def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
     for night in range(12):
-        keep(path, changed(records(), **worse(100.0 if night == 5 else 1.0)))
+        keep_changed(path, **worse(100.0 if night == 5 else 1.0))
     assert [(each.first, each.repaired) for each in found(path) if each.worse] == [(6, 7)]
     assert found(path, standing=True) == []
 
@@ -173,7 +170,7 @@ def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
 def test_successive_error_steps_both_stand(path):
     nights(path, 4)
     for _ in range(4):
-        keep(path, changed(records(), **worse(100.0, "x")))
+        keep_changed(path, **worse(100.0, "x"))
     for _ in range(4):
         keep(path, changed(changed(records(), **worse(100.0, "x")), **worse(50.0, "y")))
     assert [(each.output, each.first) for each in found(path, standing=True)] == [
@@ -184,9 +181,9 @@ def test_successive_error_steps_both_stand(path):
 
 def test_a_missing_engine_repairs_nothing(path):
     nights(path, 2)
-    keep(path, changed(records(), outcome=Outcome.FAIL))
+    keep_changed(path, outcome=Outcome.FAIL)
     for _ in range(2):
-        keep(path, changed(records(), outcome=Outcome.UNAVAILABLE, seconds=None, errors={}))
+        keep_changed(path, outcome=Outcome.UNAVAILABLE, seconds=None, errors={})
     assert [(each.first, each.repaired) for each in found(path, standing=True)] == [(3, None)]
     nights(path, 1)
     assert [(each.first, each.worse, each.repaired) for each in found(path)] == [

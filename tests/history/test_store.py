@@ -19,6 +19,7 @@ from kincheck.core.harness.run import run
 from kincheck.core.history import database
 from kincheck.core.history.runs import digest, keep
 from kincheck.core.history.store import HistoryError, Store, alive, owner
+from msgspec.structs import replace as replaced
 
 from ..harness.test_workers import timeless
 from ..support.fakes import Fake, crank, off, partial, raising
@@ -101,7 +102,7 @@ def test_equal_references_are_stored_once(path):
 def test_pair_is_stored_once(path):
     keeping, results = kept(path, [crank()], ENGINES)
     with Store(path) as store:
-        store.add_record(keeping.run, msgspec.structs.replace(results.records[0], message="again"))
+        store.add_record(keeping.run, replaced(results.records[0], message="again"))
         assert store.records(keeping.run) == results.records
 
 

@@ -25,6 +25,7 @@ from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.kinematics import Style
+from kincheck.core.trajectory import QUANTITIES
 
 TILT, RATIO, RATE = 0.3, -1.5, 2.0
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -98,16 +99,10 @@ def test_every_formulation_turns_it(case, style):
     found = solve(case.mechanism, "turn", TURNS, rate=RATE, style=style)
     assert found.solved.all(), found.message
     for output in case.outputs:
-        motion, true, along = (
-            found.points[output.point],
-            case.reference[output.name],
-            np.array(output.direction),
-        )
-        np.testing.assert_allclose(motion.position @ along, true.position, rtol=0, atol=1e-14)
-        np.testing.assert_allclose(motion.velocity @ along, true.velocity, rtol=0, atol=1e-14)
-        np.testing.assert_allclose(
-            motion.acceleration @ along, true.acceleration, rtol=0, atol=1e-13
-        )
+        motion, true = found.points[output.point], case.reference[output.name]
+        for quantity, atol in zip(QUANTITIES, (1e-14, 1e-14, 1e-13), strict=True):
+            along = getattr(motion, quantity) @ np.array(output.direction)
+            np.testing.assert_allclose(along, getattr(true, quantity), rtol=0, atol=atol)
 
 
 def test_every_engine_turns_it(case):

@@ -11,7 +11,7 @@ from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.mechanism.motions import Path, Ramp
-from kincheck.core.studies.bench.ring import ring, tip
+from kincheck.core.studies.bench.size import ring, tip
 
 from ..support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
 from ..support.mechanisms import four_bar, slider_crank

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from kincheck.cases import load
-from kincheck.core.kinematics import NativeSolver, design_forces
+from kincheck.core.kinematics import NativeSolver
+from kincheck.core.kinematics.compiled import traced_forces
 
 PIN = "joints.crank_pin.point"
 NAMES = ("crank_pin", "gudgeon", "crank")
@@ -34,7 +35,7 @@ def test_both_ways_give_the_same_forces(case, monkeypatch, way):
     right = solved(case)
     assert right.decided.all()
     if way == "not traced":
-        monkeypatch.setattr(design_forces, "can_trace", lambda mechanism: False)
+        monkeypatch.setattr(traced_forces, "can_trace", lambda mechanism: False)
         found = solved(case)
     else:  # as if every pose were nearly singular
         found = solved(case, least=2.0)

@@ -11,7 +11,7 @@ from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import PointCoordinate
-from kincheck.core.studies.bench.ring import ring
+from kincheck.core.studies.bench.size import ring
 
 from ..support.block_structures import chain_of_hinges, torus
 

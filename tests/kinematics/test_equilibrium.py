@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.errors import SolveError
-from kincheck.core.joints import Revolute, Translational
-from kincheck.core.kinematics import LoadPoint, StaticModel
+from kincheck.core.joints import Cylindrical, Revolute, Translational
+from kincheck.core.kinematics import LoadPoint, StaticModel, with_free_coordinates
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
@@ -373,3 +373,11 @@ def test_driver_that_holds_nothing_is_refused():
     )
     with pytest.raises(SolveError, match="driver 'push' holds nothing"):
         StaticModel(mechanism)
+
+
+def test_both_free_coordinates_of_a_joint_are_driven():
+    rod = Cylindrical("rod", GROUND, "arm", ORIGIN, (0.0, 0.0, 1.0))
+    found = with_free_coordinates(replace(ARM, joints=[rod], drivers=[]))
+    assert [each.name for each in found.drivers] == ["rod.rotation", "rod.translation"]
+    held = with_free_coordinates(replace(ARM, joints=[rod], drivers=[JointAngle("turn", "rod")]))
+    assert [each.name for each in held.drivers] == ["turn", "rod"]

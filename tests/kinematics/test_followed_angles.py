@@ -134,15 +134,16 @@ def test_rates_without_bound_towards_a_fold_are_no_turns():
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-4)
 
 
-def test_angles_of_a_path_are_followed_at_once():
+def test_angles_of_a_path_are_followed_at_once(monkeypatch):
     asked: list[int] = []
 
     def prepare(mechanism: Mechanism, request: Request, path: Path):
         asked.append(len(request.bodies))
         return prepare_one(mechanism, request, path)
 
-    path = Path({"turn": Ramp(7.0)}, np.array([1.0]))
-    first, second = (followed.followed_angle(prepare, shafts(), path, joint) for joint in "ab")
+    monkeypatch.setattr(followed, "prepare_motion", prepare)
+    path = Path({"turn": Ramp(7.5)}, np.array([1.0]))
+    first, second = (followed_angle(shafts(), path, joint) for joint in "ab")
     assert asked == [2]
-    assert first == pytest.approx([7.0])
-    assert second == pytest.approx(driven([7.0]))
+    assert first == pytest.approx([7.5])
+    assert second == pytest.approx(driven([7.5]))

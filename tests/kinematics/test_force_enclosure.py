@@ -250,9 +250,11 @@ def test_a_wrong_sign_of_gravity_is_no_proof(monkeypatch):
 
 
 def test_a_wrong_torque_of_euler_parameters_is_no_proof(monkeypatch):
-    right = exact_forces._by_state
+    right = exact_forces.ExactForces._by_state
     monkeypatch.setattr(
-        exact_forces, "_by_state", lambda traced, demand: [0.5 * x for x in right(traced, demand)]
+        exact_forces.ExactForces,
+        "_by_state",
+        lambda own, demand: [0.5 * x for x in right(own, demand)],
     )
     with pytest.raises(AssertionError, match="the powers of drivers, masses and force elements"):
         proved(loaded(), [0.5])

@@ -21,6 +21,7 @@ from kincheck.core import (
     Translational,
     Universal,
 )
+from kincheck.core.failures import FailureKind
 from kincheck.core.kinematics.diagnosis.rank import free_motions
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.one_design import solve
@@ -50,13 +51,8 @@ def test_mcpherson_account():
     assert (found.bodies, found.coordinates, found.equations) == (5, 35, 34)
     assert (found.moving_coordinates, found.rows, found.rank, found.dof) == (18, 17, 17, 1)
     assert found.redundant_rows == ()
-
-
-def test_account_is_in_the_details():
     details = solve(mcpherson(), "stroke", [0.0]).details
-    assert details["dof"] == 1
-    assert details["rank"] == 17
-    assert details["dof_account"]["paper"] == "35 - 34 = 1"
+    assert details.items() >= found.details.items()
 
 
 A, B, X = (0.1, -0.2, 0.3), (0.5, 0.4, 0.9), (1.0, 2.0, -0.5)
@@ -124,12 +120,6 @@ def test_redundant_rows_that_contradict_are_not_passed_over():
     assert "the redundant rows (rod: Distance) contradict the others" in motion.message
 
 
-def test_a_pivot_out_of_parallel_locks():
-    skew = Revolute("D", "ground", "rocker", D0, (1e-6, 1.0, 0.0))
-    with pytest.raises(SolveError, match="0 degrees of freedom"):
-        solve(replace(four_bar(), joints=[*four_bar().joints[:3], skew]), "turn", [0.0, 1.0])
-
-
 def test_a_body_held_twice():
     m = mechanism_of(
         Fixed("weld", "ground", "a", A),
@@ -163,50 +153,75 @@ def rod_between_balls(count):
     )
 
 
-def test_a_rod_that_spins_is_named():
-    """It alone: the driver holds the crank."""
-    with pytest.raises(
-        SolveError, match=r"2 degrees of freedom .* 1 driver; 'con rod' can turn; .*use distance"
-    ):
-        solve(rod_between_balls(4), "turn", [0.0])
+SLIDER, STUCK, SPINNING = slider_crank(), FailureKind.LOCKED, rod_between_balls(4)
+PUSH, FREE, OVER = JointDisplacement("push", "guide"), FailureKind.FREE, FailureKind.OVERDRIVEN
+SKEW = Revolute("D", "ground", "rocker", D0, (1e-6, 1.0, 0.0))
+SHORT = Distance("rod", "crank", "slider", ((CRANK, 0.0, 0.0), (CRANK + ROD, 2.0, 0.0)), 1.0)
+AXLES = [
+    Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
+    for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
+]
+TWICE = [JointAngle("first", "a"), JointAngle("second", "a"), JointAngle("sound", "b")]
+REFUSED = {
+    "a hinge out of parallel": (
+        replace(four_bar(), joints=[*four_bar().joints[:3], SKEW]),
+        OVER,
+        "0 degrees of freedom",
+    ),
+    # it alone: the driver holds the crank
+    "a rod that spins": (
+        SPINNING,
+        FREE,
+        r"2 degrees of freedom .* 1 driver; 'con rod' can turn; .*use distance",
+    ),
+    "no drivers": (
+        replace(SPINNING, drivers=[]),
+        FREE,
+        r"0 drivers; 'crank' can turn, 'con rod' can",
+    ),
+    "no joints": (
+        Mechanism("m", [Body("a")], []),
+        FREE,
+        r"6 degrees of freedom .* 0 drivers; 'a' can move; add a driver",
+    ),
+    "a loose body": (rod_between_balls(3), FREE, "'slider' can move"),
+    "too many drivers": (
+        replace(SLIDER, drivers=[*SLIDER.drivers, PUSH]),
+        OVER,
+        r"1 degree of freedom .* 2 drivers; remove 1",
+    ),
+    # stretched out, the slider does not move the crank to first order
+    "a dead centre": (
+        replace(SLIDER, drivers=[PUSH]),
+        STUCK,
+        r"driver 'push' does not move it .*dead",
+    ),
+    "across a guide": (
+        replace(SLIDER, drivers=[PointCoordinate("lift", "end", (0.0, 0.0, 1.0))]),
+        STUCK,
+        "'lift'",
+    ),
+    "nothing moves": (Mechanism("m", [Body("a", fixed=True)], []), OVER, "no body can move"),
+    "too short a rod": (
+        replace(SLIDER, joints=[SLIDER.joint("pivot"), SHORT, SLIDER.joint("guide")]),
+        FailureKind.NOT_CLOSED,
+        r"does not close at the design position: residual .* m",
+    ),
+    "drivers of one joint": (
+        Mechanism("twice", [Body("a"), Body("b"), Body("c")], AXLES, [], TWICE),
+        STUCK,
+        r"drivers 'first', 'second' do not move it .* follows already from each other; give",
+    ),
+}
 
 
-def test_without_drivers_all_that_moves_is_named():
-    with pytest.raises(SolveError, match=r"0 drivers; 'crank' can turn, 'con rod' can"):
-        solve(replace(rod_between_balls(4), drivers=[]), "turn", [0.0])
-
-
-def test_a_body_without_joints_is_named():
-    with pytest.raises(
-        SolveError, match=r"6 degrees of freedom .* 0 drivers; 'a' can move; add a driver"
-    ):
-        solve(Mechanism("m", [Body("a")], []), "none", [0.0])
-
-
-def test_a_loose_body_is_named():
-    with pytest.raises(SolveError, match="'slider' can move"):
-        solve(rod_between_balls(3), "turn", [0.0])
-
-
-def test_too_many_drivers():
-    m = slider_crank()
-    both = replace(m, drivers=[*m.drivers, JointDisplacement("push", "guide")])
-    with pytest.raises(SolveError, match=r"1 degree of freedom .* 2 drivers; remove 1"):
-        solve(both, "turn", [0.0])
-
-
-def test_a_driver_at_its_dead_centre():
-    """Stretched out, the slider does not move the crank to first order."""
-    pushed = replace(slider_crank(), drivers=[JointDisplacement("push", "guide")])
-    with pytest.raises(SolveError, match=r"driver 'push' does not move it .*dead"):
-        solve(pushed, "push", [0.0, -0.01])
-
-
-def test_a_driver_across_the_motion():
-    """A point of the slider cannot be driven across its guide."""
-    lifted = replace(slider_crank(), drivers=[PointCoordinate("lift", "end", (0.0, 0.0, 1.0))])
-    with pytest.raises(SolveError, match="'lift'"):
-        solve(lifted, "lift", [0.0])
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_move_is_refused_by_name(case):
+    mechanism, kind, message = REFUSED[case]
+    driver = mechanism.drivers[0].name if mechanism.drivers else "none"
+    with pytest.raises(SolveError, match=message) as error:
+        solve(mechanism, driver, [0.0])
+    assert error.value.kind is kind
 
 
 def test_two_drivers_of_the_same_freedom():
@@ -222,19 +237,6 @@ def test_two_drivers_of_the_same_freedom():
         solve(same, "turn", [0.0])
 
 
-def test_nothing_can_move():
-    with pytest.raises(SolveError, match="no body can move"):
-        solve(Mechanism("m", [Body("a", fixed=True)], []), "none", [0.0])
-
-
-def test_a_mechanism_that_does_not_close():
-    """A rod too short to reach the slider's end of it wherever the slider is."""
-    m = slider_crank()
-    short = Distance("rod", "crank", "slider", ((CRANK, 0.0, 0.0), (CRANK + ROD, 2.0, 0.0)), 1.0)
-    with pytest.raises(SolveError, match=r"does not close at the design position: residual .* m"):
-        solve(replace(m, joints=[m.joint("pivot"), short, m.joint("guide")]), "turn", [0.0])
-
-
 @pytest.mark.parametrize("style", ["native", "mixed", "conventional"])
 def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_what_to_do(style):
     pushed = replace(slider_crank(), drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
@@ -244,20 +246,6 @@ def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_w
     )
     with pytest.raises(SolveError, match=said):
         solve(pushed, "push", [0.0], style=style)
-
-
-def test_drivers_that_repeat_each_other_are_named_and_no_others():
-    axles = [
-        Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
-        for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
-    ]
-    drivers = [JointAngle("first", "a"), JointAngle("second", "a"), JointAngle("sound", "b")]
-    twice = Mechanism("twice", [Body("a"), Body("b"), Body("c")], axles, [], drivers)
-    with pytest.raises(
-        SolveError,
-        match=r"drivers 'first', 'second' do not move it .* follows already from each other; give",
-    ):
-        solve(twice, "first", [0.0])
 
 
 def test_motions_that_have_nothing_to_do_with_each_other_are_not_mixed():

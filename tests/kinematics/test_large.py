@@ -23,7 +23,9 @@ from kincheck.core import (
 )
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.formulation.parameters import placed
-from kincheck.core.studies.bench.ring import ring
+from kincheck.core.studies.bench.size import ring
+
+from .test_sparse_choice import four_bar, pin_meeting
 
 Z = (0.0, 0.0, 1.0)
 
@@ -89,24 +91,9 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
     """On the driven crank of a ring a kite on its side, on hinges: three rows more than are
     needed.
     """
-    ground, start, turn = 1.2, -1.1, np.linspace(0.0, 1.6, 9)
-    pin = np.stack([np.cos(start + turn), np.sin(start + turn)], axis=-1)
-    d = np.array([ground, 0.0]) - pin
-    square = (d * d).sum(axis=-1)
-    along = 0.5 * (square + rod**2 - ground**2) / square
-    off = np.sqrt(np.maximum(rod**2 / square - along**2, 0.0))
-    meet = pin + along[:, None] * d + off[:, None] * np.stack([-d[:, 1], d[:, 0]], axis=-1)
-    at = (*meet[0].tolist(), 0.0)
-    hinges = [
-        Revolute("rest", "ground", "rocker", (ground, 0.0, 0.0), Z),
-        Revolute("pin", "crank0", "rod", (*pin[0].tolist(), 0.0), Z),
-        Revolute("end", "rod", "rocker", at, Z),
-    ]
-    whole = ring(22)
-    made = replace(
-        whole, bodies=[*whole.bodies, Body("rod"), Body("rocker")], joints=[*whole.joints, *hinges]
-    )
-    found = solve(replace(made, points=[Point("meet", "rocker", at)]), "turn", turn)
+    sizes, start, turn = (1.0, 1.2, rod, 1.2), -1.1, np.linspace(0.0, 1.6, 9)
+    _, meet = pin_meeting(*sizes, start + turn)
+    found = solve(four_bar(sizes, start, "hinges", 22), "turn", turn)
     assert "factor_entries" in found.details
     assert found.solved.sum() >= 6
     assert not found.solved[turn > end].any()

@@ -18,7 +18,7 @@ from kincheck.core.joints import Kind
 from kincheck.core.mechanism.motions import Sine
 from kincheck.core.studies.stress.families.base import bodies, swept
 from kincheck.core.studies.stress.families.loops import random_mechanism
-from kincheck.core.studies.stress.solving import interpreted
+from kincheck.core.studies.stress.verdicts import interpreted
 from scipy.spatial.transform import Rotation
 
 ENGINE = interpreted(adapters.engine("native"))

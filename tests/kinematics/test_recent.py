@@ -22,14 +22,19 @@ from .test_chain import chain
 STROKES = np.linspace(-0.05, 0.05, 21)
 
 
+def calls(monkeypatch, owner, name):
+    """The arguments of all calls from now on."""
+    every, call = [], getattr(owner, name)
+    monkeypatch.setattr(
+        owner, name, lambda *given, **named: (every.append(given), call(*given, **named))[1]
+    )
+    return every
+
+
 @pytest.fixture
 def made(monkeypatch):
-    """The requests that models were made for."""
-    requests, make = [], compiled_model.compile_model
-    monkeypatch.setattr(
-        compiled_model, "compile_model", lambda *given: (requests.append(given[1]), make(*given))[1]
-    )
-    return requests
+    """Models."""
+    return calls(monkeypatch, compiled_model, "compile_model")
 
 
 def test_the_same_mechanism_and_request_need_one_model(made):
@@ -69,14 +74,8 @@ def test_threads_share_it():
 
 @pytest.fixture
 def swept(monkeypatch):
-    """What was made of paths through components."""
-    sweeps, make = [], block_sweep.BlockSweep.__init__
-    monkeypatch.setattr(
-        block_sweep.BlockSweep,
-        "__init__",
-        lambda self, *given: (sweeps.append(self), make(self, *given))[1],
-    )
-    return sweeps
+    """Paths through components."""
+    return calls(monkeypatch, block_sweep.BlockSweep, "__init__")
 
 
 def test_of_a_chain_the_last_path_is_kept(swept):
@@ -121,12 +120,7 @@ def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
     class Hinge(Revolute):
         type = "hinge_of_mine"
 
-    made, make = [], component_lanes.ComponentLanes.__init__
-    monkeypatch.setattr(
-        component_lanes.ComponentLanes,
-        "__init__",
-        lambda self, *given: (made.append(self), make(self, *given))[1],
-    )
+    made = calls(monkeypatch, component_lanes.ComponentLanes, "__init__")
     mechanism = chain(21)
     joints = [
         Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j
@@ -156,14 +150,8 @@ def test_joints_of_a_users_own_are_made_anew(made):
 
 @pytest.fixture
 def bound(monkeypatch):
-    """What was bound to lanes, a route each."""
-    routes, bind = [], walk.Marcher.__init__
-    monkeypatch.setattr(
-        walk.Marcher,
-        "__init__",
-        lambda self, *given: (routes.append(given[0]), bind(self, *given))[1],
-    )
-    return routes
+    """Routes bound to lanes."""
+    return calls(monkeypatch, walk.Marcher, "__init__")
 
 
 def test_the_same_samples_are_laid_out_once(bound):
@@ -230,15 +218,12 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
 @pytest.mark.parametrize(
     ("large", "kind"),
     [
-        (chain(21), (component_lanes.ComponentLanes, "__init__")),
-        (circle(22).mechanism, (sparse_lanes.SparseLanes, "__init__")),
+        (chain(21), component_lanes.ComponentLanes),
+        (circle(22).mechanism, sparse_lanes.SparseLanes),
     ],
 )
 def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
-    made, make = [], getattr(*kind)
-    monkeypatch.setattr(
-        *kind, lambda self, *given, **named: (made.append(given[0]), make(self, *given, **named))[1]
-    )
+    made = calls(monkeypatch, kind, "__init__")
     values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
     first = solve(large, driver, values).points
     other = solve(large, driver, values[::2]).points

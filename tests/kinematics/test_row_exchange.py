@@ -9,7 +9,7 @@ from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation import segments, singular_samples, sweep
-from kincheck.core.kinematics.continuation.segments import Choice, Followed, chosen
+from kincheck.core.kinematics.continuation.segments import Followed, chosen, with_better_rows
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import SideWalk, march
 from kincheck.core.kinematics.one_design import solve
@@ -31,9 +31,9 @@ def test_no_more_often_than_so(monkeypatch):
 def test_few_samples_are_tried_in_vain(monkeypatch):
     tried, found, renew = list[float](), list[int](), Followed.renew
     monkeypatch.setattr(
-        Choice,
-        "anew",
-        lambda self, route, lane, path: tried.append(lane[route.model.slots["from time"]]),
+        segments,
+        "with_better_rows",
+        lambda route, lane, *_: tried.append(lane[route.model.slots["from time"]]),
     )
     monkeypatch.setattr(
         Followed,
@@ -95,11 +95,11 @@ def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
     model = recent_model(loop(), Request(("turn",), ("tracer",)))
     route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.0, 1.5])))
     lane = march(route, 1e-12, visit={1}).visited[1]
-    standing = Choice(model).anew(route, lane, route.path)
+    standing = with_better_rows(route, lane, route.path, [model])
     assert standing is None  # none are better there
     beside = replace(route, path=Path({"turn": Ramp(1.0)}, np.array([0.0, ALONG - 1e-3])))
     lane = march(beside, 1e-12, visit={1}).visited[1]
-    standing = Choice(model).anew(beside, lane, beside.path)
+    standing = with_better_rows(beside, lane, beside.path, [model])
     assert standing is not None
     before = {name: lane[model.vectors[f"from {name}"]] for name in model.state}
     sample = beside.sampled(np.array([ALONG - 1e-3]))

@@ -22,11 +22,11 @@ from kincheck.core.kinematics import Method
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.one_design import ONE_PROGRAM
+from kincheck.core.kinematics.motion_solver import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.kinematics.structure.sparse_lu import Pattern
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
-from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+from kincheck.core.studies.bench.size import LEAN, pivot, ring
 from scipy.sparse import linalg
 
 from ..support.block_structures import (
@@ -105,7 +105,7 @@ def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another()
         [-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14
     )
     lanes = SparseLanes(CRANK, Request(("turn",), ()))
-    lanes.accept(1e-12)
+    lanes.stand_at(lanes.design, 1e-12)
     lanes.depart(0.0, path)
     here = lanes.anchor(0.0)
     lanes.restore(
@@ -146,7 +146,7 @@ def test_every_crank_of_a_ring_turns_as_the_first(cranks):
 
 
 def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
-    sizes = [len(part.bodies) for part in components(ring(20), frames(ring(20)))]
+    sizes = [len(part) for part in components(ring(20), frames(ring(20)))]
     assert sorted(sizes) == [1, 38]  # the driven crank, and all others
     small, large = (
         SparseLanes(ring(n), Request(("turn",), ())).details["factor_entries"] for n in (40, 160)

@@ -20,7 +20,7 @@ from kincheck.core.kinematics.formulation.state_vectors import jacobian
 from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.kinematics.structure.sparse_lu import Blocks
 from kincheck.core.mechanism.motions import Path, Ramp
-from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+from kincheck.core.studies.bench.size import LEAN, pivot, ring
 
 from ..support.block_structures import chain_of_hinges, solve_sparse
 
@@ -41,11 +41,11 @@ def pin_meeting(crank, ground, rod, rocker, angle):
     d = np.array([ground, 0.0]) - pin
     square = (d * d).sum(axis=-1)
     along = 0.5 * (square + rod**2 - rocker**2) / square
-    off = np.sqrt(rod**2 / square - along**2)
+    off = np.sqrt(np.maximum(rod**2 / square - along**2, 0.0))
     return pin, pin + along[:, None] * d + off[:, None] * np.stack([-d[:, 1], d[:, 0]], axis=-1)
 
 
-def four_bar(sizes, start, ends):
+def four_bar(sizes, start, ends, cranks=CRANKS):
     """A four-bar on the driven crank of a ring, its rod on hinges or on universals: three rows or
     one more than are needed.
     """
@@ -61,7 +61,7 @@ def four_bar(sizes, start, ends):
             Universal("pin", "crank0", "rod", pin, (X, Z)),
             Universal("end", "rod", "rocker", meet, (Z, X)),
         ]
-    whole = ring(CRANKS)
+    whole = ring(cranks)
     bodies = [*whole.bodies, Body("rod"), Body("rocker")]
     return replace(
         whole,

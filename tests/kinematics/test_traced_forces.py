@@ -5,7 +5,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.joints import Gear, Revolute, Screw
-from kincheck.core.kinematics import Method, NativeSolver, Style, one_design, with_forces
+from kincheck.core.kinematics import Method, NativeSolver, Style, motion_solver, with_forces
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.solution import ForceTable
 from kincheck.core.kinematics.forces.wanted import wanted_forces
@@ -146,7 +146,7 @@ def test_samples_beyond_a_lock_up_have_no_forces():
 
 
 def test_large_mechanisms_have_forces_by_their_motion(monkeypatch):
-    monkeypatch.setattr(one_design, "ONE_PROGRAM", 2)
+    monkeypatch.setattr(motion_solver, "ONE_PROGRAM", 2)
     mechanism = loaded(chain(2, lean=0.31))  # known to no cache
     path = motions.Path({"turn": motions.Ramp(1.0)}, np.array([0.1, 0.2]))
     request = Request(("turn",), (), forces=wanted_forces(mechanism, ["turn"]))

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack
-from pathlib import Path
-from typing import Any
+from contextlib import ExitStack
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -16,7 +13,7 @@ from kincheck.core.cli.serve import judge_by
 from kincheck.core.live.protocol import live_schema
 from kincheck.core.live.server import LiveServer
 from kincheck.core.live.table import LiveTable
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 CAR = """\
 # template: double_wishbone
@@ -38,14 +35,14 @@ TRAVEL = Supplied(travel="0.03:21")
 
 
 @pytest.fixture
-def car(tmp_path: Path) -> Path:
+def car(tmp_path):
     path = tmp_path / "car.csv"
     path.write_text(CAR, "utf-8")
     return path
 
 
 @pytest.fixture
-def served(car: Path) -> Iterator[LiveServer]:
+def served(car):
     known = registry()
     server = LiveServer(car, lambda: LiveTable(car, TRAVEL), known.engines, judge_by(known))
     yield server
@@ -59,16 +56,16 @@ ASKED, TOLD = (Draft202012Validator({"$ref": f"#/{way}", **SCHEMA}) for way in (
 class Page:
     """A client that speaks the protocol, and checks both ways by its schema."""
 
-    def __init__(self, socket: ClientConnection) -> None:
+    def __init__(self, socket):
         self.socket = socket
         self.opening = self.told("opening")
         self.points = [each["position"] for each in self.opening["points"]]
 
-    def say(self, **message: Any) -> None:
+    def say(self, **message):
         ASKED.validate(message)
         self.socket.send(json.dumps(message))
 
-    def told(self, kind: str) -> dict[str, Any]:
+    def told(self, kind):
         """Return the next message of a kind."""
         while True:
             message = json.loads(self.socket.recv(timeout=120))
@@ -76,7 +73,7 @@ class Page:
             if message["type"] == kind:
                 return message
 
-    def moved(self, name: str, axis: int, by: float) -> list[list[float]]:
+    def moved(self, name, axis, by):
         """Return the points with one number moved."""
         rows = [[*row] for row in self.points]
         names = [each["name"] for each in self.opening["points"]]
@@ -84,7 +81,7 @@ class Page:
         return rows
 
 
-def page_of(server: LiveServer) -> AbstractContextManager[ClientConnection]:
+def page_of(server):
     """Connect to a server as its page does."""
     host = f"127.0.0.1:{server.port}"
     address = f"ws://{host}/socket?token={server.token}"
@@ -92,11 +89,11 @@ def page_of(server: LiveServer) -> AbstractContextManager[ClientConnection]:
 
 
 @pytest.fixture
-def open_page(served: LiveServer) -> Iterator[Callable[[], Page]]:
+def open_page(served):
     with ExitStack() as pages:
         yield lambda: Page(pages.enter_context(page_of(served)))
 
 
 @pytest.fixture
-def page(open_page: Callable[[], Page]) -> Page:
+def page(open_page):
     return open_page()

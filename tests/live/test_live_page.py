@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from threading import Thread
 from time import monotonic, sleep
 
@@ -26,7 +25,7 @@ FIELD = "[aria-label='uca_outer y [mm]']"
 
 
 @pytest.fixture
-def browser(tmp_path: Path):
+def browser(tmp_path):
     browser = Browser(tmp_path / "profile")
     yield browser
     complaints = browser.complaints()

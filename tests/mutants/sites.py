@@ -6,34 +6,40 @@ import io
 import tokenize
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
-BINARY = {
-    ast.Add: ("+", "-"),
-    ast.Sub: ("-", "+"),
-    ast.Mult: ("*", "/"),
-    ast.Div: ("/", "*"),
-    ast.FloorDiv: ("//", "%"),
-    ast.Mod: ("%", "//"),
-    ast.Pow: ("**", "*"),
-    ast.MatMult: ("@", "-"),
-    ast.BitAnd: ("&", "|"),
-    ast.BitOr: ("|", "&"),
-    ast.BitXor: ("^", "|"),
-    ast.LShift: ("<<", ">>"),
-    ast.RShift: (">>", "<<"),
-}
-COMPARED = {
-    ast.Lt: ("<", ("<=", ">=")),
-    ast.LtE: ("<=", ("<", ">")),
-    ast.Gt: (">", (">=", "<=")),
-    ast.GtE: (">=", (">", "<")),
-    ast.Eq: ("==", ("!=",)),
-    ast.NotEq: ("!=", ("==",)),
-    ast.Is: ("is", ("is not",)),
-    ast.IsNot: ("is not", ("is",)),
-    ast.In: ("in", ("not in",)),
-    ast.NotIn: ("not in", ("in",)),
+OPERATORS = """
+Add, +, -
+Sub, -, +
+Mult, *, /
+Div, /, *
+FloorDiv, //, %
+Mod, %, //
+Pow, **, *
+MatMult, @, -
+BitAnd, &, |
+BitOr, |, &
+BitXor, ^, |
+LShift, <<, >>
+RShift, >>, <<
+And, and, or
+Or, or, and
+Lt, <, <=, >=
+LtE, <=, <, >
+Gt, >, >=, <=
+GtE, >=, >, <
+Eq, ==, !=
+NotEq, !=, ==
+Is, is, is not
+IsNot, is not, is
+In, in, not in
+NotIn, not in, in
+"""
+"""Name of an operator's node, its text, and what stands there instead."""
+CHANGED = {
+    getattr(ast, name): (old, *new)
+    for name, old, *new in (line.split(", ") for line in OPERATORS.split("\n") if line)
 }
 UNARY = {ast.Not: "not ", ast.USub: "-", ast.UAdd: "+", ast.Invert: "~"}
 CALLED = dict(
@@ -203,28 +209,26 @@ class _Finder(ast.NodeVisitor):
             self._add(start, start, "not ")
 
     def visit_BinOp(self, node: ast.BinOp) -> None:
-        old, new = BINARY[type(node.op)]
+        old, new = CHANGED[type(node.op)]
         of_types = not self.inside and old == "|"
         if not of_types:
             self._add_token(self._end(node.left), self._start(node.right), old, new)
         self.generic_visit(node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
-        old, new = BINARY[type(node.op)]
+        old, new = CHANGED[type(node.op)]
         self._add_token(self._end(node.target), self._start(node.value), f"{old}=", f"{new}=", "=")
         self.generic_visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> None:
         sides = [node.left, *node.comparators]
-        for left, operator, right in zip(sides, node.ops, sides[1:], strict=False):
-            old, new = COMPARED[type(operator)]
-            self._add_token(self._end(left), self._start(right), old, *new)
+        for operator, (left, right) in zip(node.ops, pairwise(sides), strict=True):
+            self._add_token(self._end(left), self._start(right), *CHANGED[type(operator)])
         self.generic_visit(node)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> None:
-        old, new = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
-        for left, right in zip(node.values, node.values[1:], strict=False):
-            self._add_token(self._end(left), self._start(right), old, new)
+        for left, right in pairwise(node.values):
+            self._add_token(self._end(left), self._start(right), *CHANGED[type(node.op)])
         self.generic_visit(node)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> None:

@@ -7,7 +7,7 @@ import pytest
 from kincheck.core import primitives as p
 from kincheck.core.algebra import Quat, Vec3, cross
 from kincheck.core.primitives.dot12 import PaperDot12
-from kincheck.core.studies.paper.textbook import (
+from kincheck.core.studies.paper.operations import (
     PrintedDot11,
     PrintedDot12,
     PrintedDot21,

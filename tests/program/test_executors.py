@@ -18,6 +18,11 @@ from ..support.mechanisms import mcpherson
 from .test_tracks import COMPILED
 
 
+def bound(traced, slots, lanes, compiled):
+    plan = Plan({"f": traced}, {str(k): k for k in range(slots)})
+    return LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+
+
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
 @pytest.mark.parametrize("compiled", COMPILED)
 def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
@@ -27,8 +32,7 @@ def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
     traced = program(
         "f", tape, {10: absolute(x - y), 11: absolute(before(x, y) * 2.0)}, times=times
     )
-    plan = Plan({"f": traced}, {str(k): k for k in range(12)})
-    executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    executor = bound(traced, 12, lanes, compiled)
     values = np.random.default_rng(3).normal(size=(10, lanes))
     values[7, -1] = math.nan
     executor.put(range(10), values)
@@ -49,6 +53,13 @@ def test_flops_of_a_program_are_those_of_all_its_runs():
     assert (once.flops, five.flops) == (2, 14)  # and four times the larger of two
 
 
+def after(moves):
+    slots = list(range(300))
+    for source, target in moves:
+        slots[target] = slots[source]
+    return slots
+
+
 def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written():
     """Whatever the order: the same as taking all over one after the other."""
     pairs = [
@@ -61,11 +72,7 @@ def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written()
     moved = in_order(pairs)
     assert {*moved} == {*pairs} - {(9, 9)}
     assert moved != [pair for pair in pairs if pair != (9, 9)]
-    one, other = list(range(300)), list(range(300))
-    for slots, moves in ((one, pairs), (other, moved)):
-        for source, target in moves:
-            slots[target] = slots[source]
-    assert one == other
+    assert after(pairs) == after(moved)
 
 
 @pytest.mark.parametrize("count", range(1, 10))
@@ -73,11 +80,7 @@ def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
     pairs, width = [(k, k + 1) for k in reversed(range(count))], 8
     table = PlanInMemory(Plan({}, {}, carried=pairs), width, 20)._tables["carried"]
     assert len(table) % TOGETHER == 0
-    one, other = list(range(20)), list(range(20))
-    for slots, moves in ((one, pairs), (other, table // (8 * width))):
-        for source, target in moves:
-            slots[target] = slots[source]
-    assert one == other
+    assert after(pairs) == after(table // (8 * width))
 
 
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")
@@ -99,10 +102,8 @@ def test_tables_begin_with_a_cache_line():
 @pytest.mark.parametrize("compiled", COMPILED)
 def test_window_of_slots_is_their_memory(compiled, lanes):
     tape = Tape()
-    plan = Plan(
-        {"f": program("f", tape, {3: tape.input(1) - tape.input(2)})}, {str(k): k for k in range(4)}
-    )
-    executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    traced = program("f", tape, {3: tape.input(1) - tape.input(2)})
+    executor = bound(traced, 4, lanes, compiled)
     values = np.random.default_rng(1).normal(size=(2, lanes))
     executor.put(range(1, 3), values)
     window = executor.window(range(1, 3))
@@ -147,8 +148,7 @@ def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, mon
         7: head,
         8: late,
     }
-    plan = Plan({"f": program("f", tape, out)}, {str(k): k for k in range(9)})
-    executor = LlvmExecutor(LlvmCode(plan), 8) if compiled else NumpyExecutor(plan, 8)
+    executor = bound(program("f", tape, out), 9, 8, compiled)
     group = executor.margin if compiled else 8
     values = np.random.default_rng(5).uniform(0.2, 0.4, size=(9, 8))
     heads = np.arange(8) // group * group

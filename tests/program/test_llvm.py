@@ -5,8 +5,6 @@ vector, and the cache on disk.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -141,43 +139,11 @@ def test_a_lane_that_cannot_be_reached_is_reported_alike():
     assert messages[0] == messages[1]
 
 
-def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exchange_its_inputs():
-    tape, rng, n = Tape(), np.random.default_rng(0), 80
-    x = [tape.input(k) for k in range(n)]
-    products = [a * b for a, b in pairwise(x)]
-    back = [
-        where_larger(a, b, a - c, a * b)
-        for a, b, c in zip(products, reversed(products), reversed(x[1:]), strict=True)
-    ]
-    outputs = {
-        0: x[1],
-        1: x[0],
-        2: sum(back[1:], back[0]),
-        3: products[40],
-        70: x[30],
-        n: products[7],
-        n + 1: products[7],
-    }
-    traced = program("f", tape, outputs | {slot: back[slot] for slot in range(4, 60)})
-    plan = Plan({"f": traced}, {str(k): k for k in range(n + 2)})
-    values, found = rng.normal(size=(n, 9)), list[Any]()
-    for executor in (NumpyExecutor(plan, 9), LlvmExecutor(LlvmCode(plan), 9)):
-        executor.put(range(n), values)
-        executor.run("f")
-        found.append(executor.get(range(n + 2)))
-    # a product and a sum may be rounded once
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-13)
-
-
 def test_without_llvmlite_numpy_takes_over(monkeypatch):
     monkeypatch.setattr("kincheck.core.kinematics.compiled.compiled_model.available", lambda: False)
     mechanism = four_bar()
     model = compile_model(mechanism, Request((mechanism.drivers[0].name,), ()))
     assert isinstance(model.executor(3), NumpyExecutor)
-
-
-def test_the_width_is_that_of_the_processor():
-    assert compiler.vector_width() in (2, 4, 8)
 
 
 WAYS = {

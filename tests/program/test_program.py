@@ -3,7 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
-from operator import neg
+from operator import add, mul, neg, sub, truediv
 from pathlib import Path
 
 import kincheck.core.program
@@ -22,7 +22,7 @@ from kincheck.core.program import (
     where_larger,
 )
 
-from ..support.running import run_on
+from ..support.running import numpy_executor, run_on
 
 INPUTS = 4
 
@@ -82,66 +82,32 @@ def expressions():
     return st.recursive(LEAVES, extend, max_leaves=25)
 
 
-def evaluate(expression, inputs):
-    """The expression over any scalar, by the functions under test."""
-    if isinstance(expression, int):
-        return inputs[expression]
-    if isinstance(expression, float):
-        return expression
-    values = [evaluate(each, inputs) for each in expression.operands]
-    match expression.name:
-        case "+":
-            return values[0] + values[1]
-        case "-":
-            return values[0] - values[1]
-        case "*":
-            return values[0] * values[1]
-        case "/":
-            return values[0] / values[1]
-        case "<":
-            return minimum(*values)
-        case ">":
-            return maximum(*values)
-        case "neg":
-            return -values[0]
-        case "sqrt":
-            return root(values[0])
-        case "abs":
-            return absolute(values[0])
-        case "where":
-            return where_larger(*values)
+KINDS = {
+    "+": (add, add),
+    "-": (sub, sub),
+    "*": (mul, mul),
+    "/": (truediv, truediv),
+    "<": (minimum, min),
+    ">": (maximum, max),
+    "neg": (neg, neg),
+    "sqrt": (root, math.sqrt),
+    "abs": (absolute, abs),
+    "where": (where_larger, lambda a, b, p, q: p if abs(a) > abs(b) else q),
+}
+"""The function under test, and the same of plain floats."""
+TESTED, PLAIN = 0, 1
 
 
-def directly(expression, inputs):
-    """The expression in plain floats, nothing folded; ArithmeticError or ValueError where it is not
-    defined.
+def evaluate(expression, inputs, of):
+    """The expression; in plain floats nothing is folded: ArithmeticError or ValueError where it is
+    not defined.
     """
     if isinstance(expression, int):
         return inputs[expression]
     if isinstance(expression, float):
         return expression
-    a, *rest = (directly(each, inputs) for each in expression.operands)
-    match expression.name, rest:
-        case "+", [b]:
-            return a + b
-        case "-", [b]:
-            return a - b
-        case "*", [b]:
-            return a * b
-        case "/", [b]:
-            return a / b
-        case "<", [b]:
-            return min(a, b)
-        case ">", [b]:
-            return max(a, b)
-        case "neg", []:
-            return -a
-        case "sqrt", []:
-            return math.sqrt(a)
-        case "abs", []:
-            return abs(a)
-        case "where", [b, p, q]:
-            return p if abs(a) > abs(b) else q
+    values = (evaluate(each, inputs, of) for each in expression.operands)
+    return KINDS[expression.name][of](*values)
 
 
 numbers = st.floats(-8.0, 8.0).map(lambda x: round(x, 3)) | CONSTANTS
@@ -157,13 +123,15 @@ def test_tracing_changes_no_bit(wanted, samples):
     arithmetic.
     """
     try:
-        expected = np.array([[directly(each, sample) for sample in samples] for each in wanted])
+        expected = np.array(
+            [[evaluate(each, sample, PLAIN) for sample in samples] for each in wanted]
+        )
     except (ZeroDivisionError, ValueError):
         assume(False)
     tape = Tape()
     inputs = [tape.input(k) for k in range(INPUTS)]
     try:
-        outputs = {k: evaluate(each, inputs) for k, each in enumerate(wanted)}
+        outputs = {k: evaluate(each, inputs, TESTED) for k, each in enumerate(wanted)}
     except (ZeroDivisionError, ValueError):  # folded first, where the plain one takes the other way
         assume(False)
     block = np.array(samples).T.copy()
@@ -272,3 +240,48 @@ def test_whole_powers_are_products():
     for n in (0.5, 0, -1):
         with pytest.raises(TypeError, match=r"only whole powers from 1; write / or root"):
             x**n
+
+
+# Executing in place
+
+
+def test_programs_share_a_block():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    block = np.array([[1.0], [2.0]])
+    executor = numpy_executor(
+        [program("sum", tape, {0: x + y}), program("product", tape, {1: x * y})], block
+    )
+    for name in ("sum", "product", "sum"):
+        executor.run(name)
+    assert executor.get([0, 1])[:, 0].tolist() == [9.0, 6.0]
+
+
+def test_lanes_choose_for_themselves():
+    a, b = [1.0, -3.0, 2.0, np.nan], [2.0, 1.0, -2.0, 1.0]
+    p, q = [10.0, 20.0, 30.0, 40.0], [-10.0, -20.0, -30.0, -40.0]
+    _, found = traced(
+        lambda a, b, p, q: [where_larger(a, b, p, q), where_larger(a, b, p, 0.0)], a, b, p, q
+    )
+    assert found.tolist() == [[-10.0, 20.0, -30.0, -40.0], [0.0, 20.0, 0.0, 0.0]]
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize("extreme", [minimum, maximum])
+@pytest.mark.parametrize(("a", "b"), [(NAN, 1.0), (1.0, NAN)])
+def test_nan_is_not_lost(extreme, a, b):
+    """Of two lanes, of a lane and a number, of two numbers: a NaN residual must never look
+    converged.
+    """
+    _, found = traced(lambda x, y: [extreme(x, y), extreme(x, b), extreme(a, y)], [a], [b])
+    assert np.isnan(found).all()
+    assert math.isnan(extreme(a, b))
+
+
+def test_division_by_zero_is_a_value():
+    _, found = traced(lambda x, y: [x / y, x / 0.0, root(-x)], [1.0, -1.0], [0.0, 0.0])
+    assert found[0].tolist() == [np.inf, -np.inf]
+    assert found[1].tolist() == [np.inf, -np.inf]
+    assert np.isnan(found[2, 0])

@@ -6,18 +6,15 @@ import html
 import json
 import re
 import subprocess
-from pathlib import Path
-from typing import Any
 
 import pytest
-from kincheck.core.harness.record import Results
 from kincheck.core.report.report import write_report
 
 from ..support.browser import ACT, CHROMIUM, FLAGS
 
 
 @pytest.fixture
-def visit(tmp_path: Path) -> Any:
+def visit(tmp_path):
     """Writes a report, opens it, and does something there; what that returned. Anything on the
     console is a failure.
     """
@@ -25,7 +22,7 @@ def visit(tmp_path: Path) -> Any:
     if CHROMIUM is None:
         pytest.skip("chromium is not installed")
 
-    def opened(run: Results, act: str, **further: Any) -> Any:
+    def opened(run, act, **further):
         path = tmp_path / "report.html"
         write_report(run, path, **further)
         path.write_text(path.read_text("utf-8").replace("</body>", ACT % act), "utf-8")

@@ -6,11 +6,8 @@ import base64
 import json
 import zlib
 from html.parser import HTMLParser
-from pathlib import Path
-from typing import Any
 
 import pytest
-from kincheck.core.harness.record import Results
 from kincheck.core.report.report import write_report
 
 HEADINGS = ("h2", "h3", "summary")
@@ -21,7 +18,7 @@ class Page(HTMLParser):
     and the rows of its tables, each by the heading above.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__(convert_charrefs=True)
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: dict[str, str] = {}
@@ -32,7 +29,7 @@ class Page(HTMLParser):
         self.place = ""
         self.feed(text)
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
         self.text += " "
         if tag == "script":
@@ -48,11 +45,11 @@ class Page(HTMLParser):
             self.tables[-1][1][-1].append("")
             self.place = "cell"
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         if tag in (*HEADINGS, "td", "th"):
             self.place = ""
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if self.cdata_elem == "script":
             self.scripts[self.names[-1]] += data
         elif self.cdata_elem is None:
@@ -62,26 +59,26 @@ class Page(HTMLParser):
             elif self.place == "cell":
                 self.tables[-1][1][-1][-1] += data
 
-    def rows(self, heading: str) -> list[list[str]]:
+    def rows(self, heading):
         """Return the rows of the tables below a heading, without their heads."""
         found = [rows[1:] for above, rows in self.tables if above.startswith(heading)]
         assert found, f"no table below {heading}"
         return [row for rows in found for row in rows]
 
     @property
-    def data(self) -> Any:
+    def data(self):
         text = zlib.decompress(base64.b64decode(self.scripts["report-data"], validate=True))
         return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
-def report(run: Results, folder: Path) -> Page:
+def report(run, folder):
     path = folder / "report.html"
     write_report(run, path)
     assert path.stat().st_size < 8_000_000
     return Page(path.read_text(encoding="utf-8"))
 
 
-def traces(page: Page, figure: str, name: str, mode: str) -> list[Any]:
+def traces(page, figure, name, mode):
     return [
         trace
         for trace in page.data["figures"][figure]["data"]

@@ -6,7 +6,6 @@ import html
 import json
 import re
 import subprocess
-from pathlib import Path
 
 import pytest
 from kincheck.core.harness.labels import output_label
@@ -24,17 +23,17 @@ pytestmark = [
 ]
 
 
-def run_page(file: Path) -> None:
+def run_page(file):
     past = [Past(run, "one", {"position": 1e-3}, 10.0) for run in ("2026-11-01", "2026-11-02")]
     efforts = [Effort("one", "tol 1e-6", 1e-7, 20.0), Effort("one", "tol 1e-3", 1e-4, 9.0)]
     write_report(strut(), file, history={"strut": past}, precision={"strut": efforts})
 
 
-def many_cases_page(file: Path) -> None:
+def many_cases_page(file):
     write_report(several(), file)
 
 
-def bench_page(file: Path) -> None:
+def bench_page(file):
     figure = precision_figure([Effort("one", "default", 1e-7, 20.0)], {})
     diagram = Diagram(Plot("speed", "error against time", "."), figure, [Style.number(0, "one")])
     columns, rows = ("", output_label("toe")), [["one", "2"]]

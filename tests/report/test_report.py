@@ -9,7 +9,6 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import msgspec
 import pytest
 from kincheck.core import solve
 from kincheck.core.harness.labels import number
@@ -17,7 +16,8 @@ from kincheck.core.harness.record import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
 from kincheck.core.report.sections import parted
-from kincheck.core.studies.bench.ring import ring
+from kincheck.core.studies.bench.size import ring
+from msgspec.structs import replace
 
 from ..kinematics.test_chain import chain
 from ..support.made_up import GRID, record, results, series
@@ -44,7 +44,7 @@ def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
     assert details["dof_account"]["paper"].replace("-", "−") in page.text
 
 
-def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path: Path) -> None:
+def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path):
     run = results()
     page = report(run, tmp_path)
     words = re.sub(r"\s+", " ", page.text)
@@ -79,7 +79,7 @@ def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path: Path) -
         assert told in words, told
 
 
-def test_the_worst_case_leads(tmp_path: Path) -> None:
+def test_the_worst_case_leads(tmp_path):
     cases = [("good", 1e-11), ("bad", 5e-9), ("better", 1e-15)]
     records = [record(case, "closed_form", "one", error, GRID) for case, error in cases]
     page = report(Results(run={}, records=records), tmp_path)
@@ -90,26 +90,26 @@ def test_the_worst_case_leads(tmp_path: Path) -> None:
     ("truth", "said"),
     [("closed_form", 1), ("third_party_data", 1), ("in_house_oracle", 0), ("consensus_only", 0)],
 )
-def test_page_says_validated_for_foreign_truth(tmp_path: Path, truth: str, said: int) -> None:
+def test_page_says_validated_for_foreign_truth(tmp_path, truth, said):
     page = report(results(truth), tmp_path)
     assert len(re.findall("validated", page.text)) == said
     assert ("our own oracle is not validation" in page.text) == (truth == "in_house_oracle")
 
 
-def test_page_says_validated_positions_only(tmp_path: Path) -> None:
+def test_page_says_validated_positions_only(tmp_path):
     assert "validated, positions only" in report(results("closed_form"), tmp_path).text
 
 
-def test_text_from_files_is_escaped(tmp_path: Path) -> None:
+def test_text_from_files_is_escaped(tmp_path):
     run = results(case=HOSTILE)
-    strange = msgspec.structs.replace(
+    strange = replace(
         run.records[1],
         engine=HOSTILE,
         message=HOSTILE,
         settings={HOSTILE: HOSTILE},
         version=HOSTILE,
     )
-    named = msgspec.structs.replace(strange, outputs={HOSTILE: series(GRID)}, errors={})
+    named = replace(strange, outputs={HOSTILE: series(GRID)}, errors={})
     page = report(
         Results(
             run={**run.run, HOSTILE: HOSTILE},
@@ -139,7 +139,7 @@ def test_text_from_files_is_escaped(tmp_path: Path) -> None:
     assert HOSTILE in shown  # as text, which the script puts into text nodes
 
 
-def test_nothing_is_fetched(tmp_path: Path) -> None:
+def test_nothing_is_fetched(tmp_path):
     page = report(results(), tmp_path)
     assert not [
         tag for tag, _ in page.tags if tag in ("link", "img", "iframe", "object", "embed", "base")
@@ -155,7 +155,7 @@ def test_nothing_is_fetched(tmp_path: Path) -> None:
     assert "http" not in str(policy[0])
 
 
-def test_page_scripts_are_stripped_and_valid(tmp_path: Path) -> None:
+def test_page_scripts_are_stripped_and_valid(tmp_path):
     folder = Path(sections.__file__).parent
     assert sorted(sections.SCRIPTS) == sorted(path.name for path in folder.glob("*.js"))
     script = sections.figure_parts({})["script"]
@@ -166,13 +166,13 @@ def test_page_scripts_are_stripped_and_valid(tmp_path: Path) -> None:
         subprocess.run([node, "--check", file], check=True)
 
 
-def test_page_order_of_sections(tmp_path: Path) -> None:
+def test_page_order_of_sections(tmp_path):
     run = {
         **results().run,
         "unread": {"gone.toml": "gone.toml: schema: found 'x'"},
         "processor": "an abacus",
     }
-    text = report(msgspec.structs.replace(results(), run=run), tmp_path).text
+    text = report(replace(results(), run=run), tmp_path).text
     places = [
         text.index(words)
         for words in (
@@ -186,7 +186,7 @@ def test_page_order_of_sections(tmp_path: Path) -> None:
     assert places == sorted(places)
 
 
-def test_an_empty_run_says_so(tmp_path: Path) -> None:
+def test_an_empty_run_says_so(tmp_path):
     empty = Results(run={}, records=[])
     assert headline(empty) == "Nothing was compared"
     assert "Nothing was compared" in report(empty, tmp_path).text
@@ -201,11 +201,11 @@ def test_an_empty_run_says_so(tmp_path: Path) -> None:
         ("x" * 500, "x" * 500),  # no place to part it
     ],
 )
-def test_long_messages_unfold_and_lose_nothing(message: str, head: str, tmp_path: Path) -> None:
+def test_long_messages_unfold_and_lose_nothing(message, head, tmp_path):
     shown, rest = parted(message)
     assert (shown, shown + rest) == (head, message)
     run = results()
-    failed = msgspec.structs.replace(run.records[1], message=message)
+    failed = replace(run.records[1], message=message)
     text = report(Results(run=run.run, records=[failed]), tmp_path).text
     assert head.strip() in text
     assert rest.strip() in text

@@ -5,29 +5,28 @@ and keyboard.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 from xml.etree import ElementTree
 
-import msgspec
 import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.harness.record import Outcome, Results
 from kincheck.core.harness.scene import scene
 from kincheck.core.report.figures import Effort, Past
+from msgspec.structs import replace as replaced
 
 from ..support.made_up import GRID, distances, record, results, series
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 
 
-def strut(**changes: Any) -> Results:
+def strut(**changes):
     """Made-up results of a strut, with the mechanism of the built-in one."""
     shown = scene(cases.load("mcpherson_strut"))
-    return msgspec.structs.replace(results(), scenes={"strut": shown}, **changes)
+    return replaced(results(), scenes={"strut": shown}, **changes)
 
 
-def several() -> Results:
+def several():
     rows = [
         ("good", "one", 1e-12),
         ("good", "two", 1e-11),
@@ -42,8 +41,8 @@ def several() -> Results:
 
 
 def test_overview_filters_in_browser(
-    visit: Any,
-) -> None:
+    visit,
+):
     told = visit(
         several(),
         """
@@ -94,13 +93,13 @@ READ = """
 """  # noqa: E501
 
 
-def lies_on_a_line(pixels: Any, values: Any) -> bool:
+def lies_on_a_line(pixels, values):
     """Whether pixels are an affine function of values, to a tenth of a pixel and its rounding."""
     slope, start = np.polyfit(values, pixels, 1)
     return np.abs(slope * np.asarray(values) + start - pixels).max() < 0.1
 
 
-def test_figures_draw_numbers_in_browser(visit: Any) -> None:
+def test_figures_draw_numbers_in_browser(visit):
     run = results()
     told = visit(
         run,
@@ -139,7 +138,7 @@ def test_figures_draw_numbers_in_browser(visit: Any) -> None:
         assert float(error.replace("−", "-")) == pytest.approx(errors[k], rel=5e-3)
 
 
-def test_figures_zoom_and_save_in_browser(visit: Any) -> None:
+def test_figures_zoom_and_save_in_browser(visit):
     told = visit(
         results(),
         READ
@@ -180,7 +179,7 @@ def test_figures_zoom_and_save_in_browser(visit: Any) -> None:
     assert "var(--" not in told["file"]  # it stands by itself, in the colours of the screen
 
 
-def test_trends_are_drawn_in_browser(visit: Any) -> None:
+def test_trends_are_drawn_in_browser(visit):
     past = [
         Past(run, "one", errors, 10.0)
         for run, errors in (
@@ -219,20 +218,18 @@ def test_trends_are_drawn_in_browser(visit: Any) -> None:
     assert told["precision"] == [["one tol 1e-3: 9 µs, 0.0001 m"], ["one tol 1e-6: 20 µs, 1e−7 m"]]
 
 
-def test_hostile_text_is_text(visit: Any) -> None:
+def test_hostile_text_is_text(visit):
     shown = scene(cases.load("mcpherson_strut"))
     joints = [
-        msgspec.structs.replace(shown.joints[0], name=HOSTILE, type=HOSTILE),
+        replaced(shown.joints[0], name=HOSTILE, type=HOSTILE),
         *shown.joints[1:],
     ]
     run = results(case=HOSTILE)
-    strange = msgspec.structs.replace(
-        run.records[1], engine=HOSTILE, message=HOSTILE, version=HOSTILE
-    )
-    run = msgspec.structs.replace(
+    strange = replaced(run.records[1], engine=HOSTILE, message=HOSTILE, version=HOSTILE)
+    run = replaced(
         run,
         records=[run.records[0], strange],
-        scenes={HOSTILE: msgspec.structs.replace(shown, joints=joints, message=HOSTILE)},
+        scenes={HOSTILE: replaced(shown, joints=joints, message=HOSTILE)},
     )
     past, effort = (
         Past(HOSTILE, HOSTILE, {"position": 1e-9}, 1.0, version=HOSTILE),
@@ -257,7 +254,7 @@ def test_hostile_text_is_text(visit: Any) -> None:
     assert told["shown"] > 5
 
 
-def test_the_curves_of_a_case_are_a_file(visit: Any) -> None:
+def test_the_curves_of_a_case_are_a_file(visit):
     name, text = visit(
         strut(),
         """
@@ -273,7 +270,7 @@ def test_the_curves_of_a_case_are_a_file(visit: Any) -> None:
     assert text.startswith("case,engine,mode,output,unit,sample,driver,")
 
 
-def test_eight_engines_fit_into_a_page_of_900_px(visit: Any) -> None:
+def test_eight_engines_fit_into_a_page_of_900_px(visit):
     names = ("native", "mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody", "my_engine")
     slow = {"us_per_step": 12345.0}
     case = "a_case_of_a_rather_long_name"

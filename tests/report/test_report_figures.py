@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 
-import msgspec
 import pytest
 from kincheck.core.harness.labels import number
-from kincheck.core.harness.record import Deviation, Deviations, Outcome, Record, Results
+from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
 from kincheck.core.report.axis import SAMPLES
 from kincheck.core.report.figures import SYMBOLS, Past
 from kincheck.core.report.report import write_report
+from msgspec.structs import replace
 
 from ..support.made_up import CRANK, GRID, distances, judged, record, results, series
 from .page import report, traces
 
 
-def test_figures_hold_outputs_in_millimetres(tmp_path: Path) -> None:
+def test_figures_hold_outputs_in_millimetres(tmp_path):
     run = results()
     page = report(run, tmp_path)
     assert page.data["drivers"]["case-0"] == [1000 * d for d in GRID]
@@ -36,7 +35,7 @@ def test_figures_hold_outputs_in_millimetres(tmp_path: Path) -> None:
     assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
 
 
-def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None:
+def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path):
     page = report(results(driver=CRANK | {"name": "stroke"}), tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert curve["x"] == "driver"
@@ -45,21 +44,19 @@ def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None
     )
 
 
-def test_forces_come_first_and_constant_outputs_are_folded(tmp_path: Path) -> None:
+def test_forces_come_first_and_constant_outputs_are_folded(tmp_path):
     """A constant output that is wrong is not folded."""
 
-    def with_more(record: Record) -> Record:
+    def with_more(record):
         moving, errors = record.outputs["half_track_change"], record.errors["half_track_change"]
         still = [0.3] * len(GRID)
-        resting = msgspec.structs.replace(moving, position=still, velocity=[0.0] * len(GRID))
+        resting = replace(moving, position=still, velocity=[0.0] * len(GRID))
         right = judged(resting, resting, 1e-9, "closed_form")
-        wrong = msgspec.structs.replace(
-            right, position=msgspec.structs.replace(right.position, within=False)
-        )
-        load = msgspec.structs.replace(moving, unit="N")
+        wrong = replace(right, position=replace(right.position, within=False))
+        load = replace(moving, unit="N")
         outputs = {"x": moving, "height": resting, "depth": resting, "load": load}
         judgements = {"x": errors, "height": right, "depth": wrong, "load": errors}
-        return msgspec.structs.replace(record, outputs=outputs, errors=judgements)
+        return replace(record, outputs=outputs, errors=judgements)
 
     run = results()
     page = report(Results(run=run.run, records=[with_more(run.records[0])]), tmp_path)
@@ -76,18 +73,14 @@ def test_forces_come_first_and_constant_outputs_are_folded(tmp_path: Path) -> No
     assert {*targets} <= {tag["id"] for _, tag in page.tags if "id" in tag}
 
 
-def in_unit(found: Record, unit: str) -> Record:
-    outputs = {
-        name: msgspec.structs.replace(each, unit=unit) for name, each in found.outputs.items()
-    }
-    return msgspec.structs.replace(found, outputs=outputs)
+def in_unit(found, unit):
+    outputs = {name: replace(each, unit=unit) for name, each in found.outputs.items()}
+    return replace(found, outputs=outputs)
 
 
 @pytest.mark.parametrize("unit", ["m", "rad", "N"])
 @pytest.mark.parametrize("motion", ["position", "velocity"])
-def test_error_figures_hold_the_distances_from_the_reference(
-    tmp_path: Path, motion: str, unit: str
-) -> None:
+def test_error_figures_hold_the_distances_from_the_reference(tmp_path, motion, unit):
     made = results()
     run = Results(
         run=made.run,
@@ -121,22 +114,20 @@ def test_error_figures_hold_the_distances_from_the_reference(
 
 
 def test_figures_without_reference_show_differences(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     run = results("consensus_only")
     native, one, _ = run.records
     nothing = Deviations(
         position=None, velocity=None, acceleration=None, reason="the case has no reference"
     )
-    native = msgspec.structs.replace(
-        native, errors=dict.fromkeys(native.errors, nothing), outcome=Outcome.UNJUDGED
-    )
+    native = replace(native, errors=dict.fromkeys(native.errors, nothing), outcome=Outcome.UNJUDGED)
     output = {
         name: judged(one.outputs[name], native.outputs[name], 1e-9, "native")
         for name in one.outputs
     }
     page = report(
-        Results(run=run.run, records=[native, msgspec.structs.replace(one, errors=output)]),
+        Results(run=run.run, records=[native, replace(one, errors=output)]),
         tmp_path,
     )
     assert traces(page, "case-0-0", "reference", "lines") == []
@@ -149,15 +140,15 @@ def test_figures_without_reference_show_differences(
     assert "Not judged: native on strut the case has no reference" in words
 
 
-def test_missing_values_leave_gaps(tmp_path: Path) -> None:
+def test_missing_values_leave_gaps(tmp_path):
     run = results()
     whole = run.records[1]
     holed = [
         None if k == 4 else math.nan if k == 5 else v
         for k, v in enumerate(series(GRID, 3e-9).position)
     ]
-    output = msgspec.structs.replace(whole.outputs["half_track_change"], position=holed)
-    broken = msgspec.structs.replace(
+    output = replace(whole.outputs["half_track_change"], position=holed)
+    broken = replace(
         whole, outputs={"half_track_change": output}, solved=19, us_per_step=None, rank=None
     )
     page = report(Results(run=run.run, records=[broken], references=run.references), tmp_path)
@@ -170,7 +161,7 @@ def test_missing_values_leave_gaps(tmp_path: Path) -> None:
     assert "µs" not in overview
 
 
-def test_zero_errors_have_a_floor(tmp_path: Path) -> None:
+def test_zero_errors_have_a_floor(tmp_path):
     figure = report(results(), tmp_path).data["figures"]["case-0-0-position"]
     errors = [e for trace in figure["data"] if trace["mode"] == "lines+markers" for e in trace["y"]]
     assert 0 in errors
@@ -178,14 +169,14 @@ def test_zero_errors_have_a_floor(tmp_path: Path) -> None:
     assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
 
 
-def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
+def test_long_series_are_thinned_and_said_to_be(tmp_path):
     driver = [1e-4 * k for k in range(3 * SAMPLES)]
     spike = 1234
     found = series(driver)
     position = [
         v + (1e-7 if k == spike else 0.0) for k, v in enumerate(found.position) if v is not None
     ]
-    output = msgspec.structs.replace(found, position=position)
+    output = replace(found, position=position)
     errors = {"half_track_change": judged(output, series(driver), 1e-9, "closed_form")}
     long = record(
         "strut",
@@ -210,7 +201,7 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
     assert "Thinned figures: strut" in page.text
 
 
-def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
+def test_earlier_runs_are_drawn_where_there_are_any(tmp_path):
     runs = [
         Past(run=str(k), engine="one", errors={"position": 1.0}, us_per_step=2.0) for k in range(2)
     ]
@@ -223,7 +214,7 @@ def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
         )
 
 
-def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
+def test_every_symbol_has_a_swatch_of_its_own(tmp_path):
     """What the legend shows is what is drawn: symbols without one would all be told by the same
     cross.
     """
@@ -238,15 +229,13 @@ def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
     assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
 
 
-def test_differences_of_round_off_are_drawn_within_the_tolerance(tmp_path: Path) -> None:
+def test_differences_of_round_off_are_drawn_within_the_tolerance(tmp_path):
     """Else the round-off of an output that stays where it is looks like a motion."""
-    still = msgspec.structs.replace(series(GRID), position=[1e-17 * (k % 3) for k in range(21)])
-    errors = {
-        "x": judged(still, msgspec.structs.replace(still, position=[0.0] * 21), 1e-9, "native")
-    }
+    still = replace(series(GRID), position=[1e-17 * (k % 3) for k in range(21)])
+    errors = {"x": judged(still, replace(still, position=[0.0] * 21), 1e-9, "native")}
     run = results("consensus_only")
-    one = msgspec.structs.replace(run.records[1], outputs={"x": still}, errors=errors)
-    native = msgspec.structs.replace(run.records[0], outputs={"x": still}, errors={})
+    one = replace(run.records[1], outputs={"x": still}, errors=errors)
+    native = replace(run.records[0], outputs={"x": still}, errors={})
     figures = report(Results(run=run.run, records=[native, one]), tmp_path).data["figures"]
     assert figures["case-0-0"]["layout"]["xaxis"]["range"] == pytest.approx([-2e-6, 2e-6])
     moving = report(results(), tmp_path).data["figures"]["case-0-0"]["layout"]

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 from kincheck.core.harness.record import Deviations, Results, Seconds, to_json
 from kincheck.core.report.table import print_outputs
+from msgspec.structs import replace
 
 from ..support.made_up import ACCOUNT, GRID, results, series
 from ..support.printed import Terminal, assert_printed, assert_row, blocks, cells_of, coloured
@@ -28,24 +29,22 @@ def shown(tmp_path, monkeypatch):
     assert found.velocity
     errors = {
         "half_track_change": one.errors["half_track_change"],
-        "wheelbase_change": msgspec.structs.replace(
+        "wheelbase_change": replace(
             found,
-            position=msgspec.structs.replace(
+            position=replace(
                 found.position, max_abs=2.46e-10, worst_step=7, tolerance=3e-9, within=True
             ),
-            velocity=msgspec.structs.replace(
-                found.velocity, max_abs=1234.5, worst_step=9, within=False
-            ),
+            velocity=replace(found.velocity, max_abs=1234.5, worst_step=9, within=False),
         ),
         "load": Deviations(
-            position=msgspec.structs.replace(found.position, max_abs=0.125, worst_step=3),
+            position=replace(found.position, max_abs=0.125, worst_step=3),
             velocity=None,
             acceleration=None,
         ),
         "bare": Deviations(position=None, velocity=None, acceleration=None, reason="no reference"),
     }
-    load = msgspec.structs.replace(series(GRID), unit="N")
-    one = msgspec.structs.replace(
+    load = replace(series(GRID), unit="N")
+    one = replace(
         one,
         errors=errors,
         outputs={**one.outputs, "load": load, "bare": series(GRID)},

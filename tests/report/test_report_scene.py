@@ -18,7 +18,8 @@ from kincheck.core.harness.record import Outcome, Results, from_json, to_json
 from kincheck.core.harness.scene import FRAMES, scene, with_scenes
 from kincheck.core.harness.scene_record import Scene, SceneBody
 from kincheck.core.report.axis import driver_axis
-from kincheck.core.report.drawing import Drawing, drawing
+from kincheck.core.report.drawing import drawing
+from msgspec.structs import replace as replaced
 
 from ..oracles.naive import A
 from ..support.made_up import GRID, STROKE, record
@@ -31,7 +32,7 @@ AXIS = driver_axis(
 )
 
 
-def place(drawn: Drawing, node: int, frame: int) -> Any:
+def place(drawn, node, frame):
     """Where a hardpoint is, as the page works it out: r + A s."""
     number, *local = drawn.nodes[node]
     body = drawn.bodies[number]
@@ -106,7 +107,7 @@ def test_scene_links_hardpoints_of_bodies():
     ]
 
 
-def star(count: int) -> Scene:
+def star(count):
     """A body with so many hardpoints about its turned frame."""
     turned = [math.cos(0.4), 0.0, 0.0, math.sin(0.4)]
     body = SceneBody(name="plate", fixed=False, origin=[5.0, 0.0, 0.0], euler_parameters=turned)
@@ -134,7 +135,7 @@ def test_scene_omits_marker_points():
 
 
 @pytest.mark.parametrize(("count", "nodes", "links"), [(1, 2, 1), (2, 2, 1), (4, 4, 6), (7, 8, 7)])
-def test_scene_links_many_hardpoints_by_hub(count: int, nodes: int, links: int):
+def test_scene_links_many_hardpoints_by_hub(count, nodes, links):
     drawn = drawing(star(count), AXIS)
     assert (len(drawn.nodes), len(drawn.links)) == (nodes, links)
     assert place(drawn, 0, 0) == pytest.approx([6.0, 0.0, 0.0], abs=1e-12)
@@ -142,14 +143,14 @@ def test_scene_links_many_hardpoints_by_hub(count: int, nodes: int, links: int):
 
 def test_scene_of_single_hardpoint():
     body = SceneBody(name="plate", fixed=False, origin=[0, 0, 0], euler_parameters=[1, 0, 0, 0])
-    assert drawing(msgspec.structs.replace(star(1), bodies=[body]), AXIS).links == []
+    assert drawing(replaced(star(1), bodies=[body]), AXIS).links == []
 
 
 def test_scene_axes_of_far_origin():
     near, far = (
         drawing(star(4), AXIS),
         drawing(
-            msgspec.structs.replace(
+            replaced(
                 star(4),
                 bodies=[
                     SceneBody(
@@ -166,7 +167,7 @@ def test_scene_axes_of_far_origin():
     )
 
 
-def dead_centre() -> Case:
+def dead_centre():
     """A crank-rocker turned beyond where its rod reaches."""
     mechanism = Mechanism(
         "short",
@@ -212,9 +213,7 @@ def test_unsolved_scene_shows_design():
         ("mujoco", Outcome.PASS, 161, False),
     ],
 )
-def test_scene_poses_need_native_answer(
-    engine: str, outcome: Outcome, solved: int | None, posed: bool
-):
+def test_scene_poses_need_native_answer(engine, outcome, solved, posed):
     made = record(
         "mcpherson_strut", "closed_form", engine, 0.0, GRID, outcome=outcome, solved=solved
     )

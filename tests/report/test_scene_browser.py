@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import msgspec
 from kincheck import cases
 from kincheck.core.harness.scene import FRAMES, scene
+from msgspec.structs import replace
 
 from ..support.made_up import results
 from .test_report_browser import strut
 
 
-def test_the_mechanism_is_drawn_turned_and_moved(visit: Any) -> None:
+def test_the_mechanism_is_drawn_turned_and_moved(visit):
     told = visit(
         strut(),
         """
@@ -42,10 +40,10 @@ def test_the_mechanism_is_drawn_turned_and_moved(visit: Any) -> None:
     assert len(set(pictures)) == len(pictures), [what for what, *_ in told["looks"]]
 
 
-def test_scene_without_poses_in_browser(visit: Any) -> None:
+def test_scene_without_poses_in_browser(visit):
     shown = scene(cases.load("mcpherson_strut"), poses=False)
     told = visit(
-        msgspec.structs.replace(results(), scenes={"strut": shown}),
+        replace(results(), scenes={"strut": shown}),
         """
         const canvas = one("canvas"), seen = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
         press(" ", canvas);

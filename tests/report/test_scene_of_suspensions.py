@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from kincheck import cases, load
@@ -17,6 +14,7 @@ from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import LARGEST, POSES, scene, with_scenes
 from kincheck.core.report.axis import Axis, driver_axis
 from kincheck.core.report.drawing import drawing
+from msgspec.structs import replace
 
 from ..kinematics.test_chain import chain
 from ..oracles.naive import A
@@ -37,7 +35,7 @@ from .test_report_scene import AXIS, STRUT, UP
         ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
     ],
 )
-def test_travel_axis_of_vertical_driver(driver: dict[str, Any], up: int, name: str):
+def test_travel_axis_of_vertical_driver(driver, up, name):
     made = record(
         "strut", "closed_form", "one", 0.0, GRID, driver={"lift": GRID}, outputs={"x": series(GRID)}
     )
@@ -46,7 +44,7 @@ def test_travel_axis_of_vertical_driver(driver: dict[str, Any], up: int, name: s
 
 
 def test_large_scenes_have_fewer_frames():
-    def case(loops: int) -> Case:
+    def case(loops):
         made = chain(loops)
         return Case(
             made.name, "", Truth.CONSENSUS_ONLY, made, Sweep("turn", np.linspace(0.0, 0.1, 101)), ()
@@ -62,8 +60,8 @@ def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
     [wheel] = shown.wheels
     # a right wheel in axes x rearward, y outboard and z up, without static angles
     assert wheel.spin == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
-    aslant = msgspec.structs.replace(wheel, spin=[0.6, 0.8, 0.0])
-    drawn = drawing(msgspec.structs.replace(shown, wheels=[aslant]), AXIS)
+    aslant = replace(wheel, spin=[0.6, 0.8, 0.0])
+    drawn = drawing(replace(shown, wheels=[aslant]), AXIS)
     [(body, center, spin, up, radius, kingpin, middle)] = drawn.wheels
     assert drawn.bodies[body]["name"] == "knuckle"
     turn = A(np.array(drawn.bodies[body]["p"][0]))
@@ -77,9 +75,7 @@ def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
 
 
 def test_scene_arrows_are_output_forces():
-    shown = msgspec.structs.replace(
-        scene(cases.load("mcpherson_strut_loaded"), poses=False), frames=[0, 2]
-    )
+    shown = replace(scene(cases.load("mcpherson_strut_loaded"), poses=False), frames=[0, 2])
     components = [(force.name, force.output, force.direction) for force in shown.forces]
     assert components == [
         ("stroke", "wheel_load", [0.0, 0.0, 1.0]),
@@ -88,10 +84,10 @@ def test_scene_arrows_are_output_forces():
         ("strut_top", "strut_top_force_z", [0.0, 0.0, 1.0]),
     ]
     further = [
-        msgspec.structs.replace(shown.forces[2], output="ball_force_x", direction=[1.0, 0.0, 0.0]),
-        msgspec.structs.replace(shown.forces[2], output="aslant", direction=[0.6, 0.8, 0.0]),
+        replace(shown.forces[2], output="ball_force_x", direction=[1.0, 0.0, 0.0]),
+        replace(shown.forces[2], output="aslant", direction=[0.6, 0.8, 0.0]),
     ]
-    shown = msgspec.structs.replace(shown, forces=[*shown.forces[:3], *further])
+    shown = replace(shown, forces=[*shown.forces[:3], *further])
     values = {
         "wheel_load": [5.0, 6.0, None],
         "ball_force_x": [1.0, 2.0, 3.0],
@@ -113,7 +109,7 @@ def test_scene_arrows_are_output_forces():
     )
 
 
-def test_an_arm_has_both_pivots_of_its_table(tmp_path: Path):
+def test_an_arm_has_both_pivots_of_its_table(tmp_path):
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["double_wishbone"]), "utf-8")
     case = load(tmp_path / "car.csv")
     drawn = drawing(scene(case, poses=False), AXIS)
@@ -132,7 +128,7 @@ def test_an_arm_has_both_pivots_of_its_table(tmp_path: Path):
     assert contact not in {node for link in drawn.links for node in link}
 
 
-def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path: Path):
+def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path):
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]), "utf-8")
     drawn = drawing(scene(load(tmp_path / "car.csv"), poses=False), AXIS)
     names = [body["name"] for body in drawn.bodies]
@@ -144,9 +140,7 @@ def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path: Path):
     ("axle", "rack", "middle"),
     [(None, None, 3), (None, "0.01", 0), ("heave", None, 3), ("steer", None, 0)],
 )
-def test_steering_in_the_sweep_leaves_no_centre(
-    tmp_path: Path, axle: str | None, rack: str | None, middle: int
-):
+def test_steering_in_the_sweep_leaves_no_centre(tmp_path, axle, rack, middle):
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]), "utf-8")
     case = load(tmp_path / "car.csv", Supplied(axle=axle, rack=rack, travel="0.02:3"))
     assert [len(wheel.middle) for wheel in scene(case, poses=False).wheels] == [middle] * (

@@ -11,7 +11,6 @@ from kincheck.core.cli import main
 from kincheck.core.kinematics import solve
 from kincheck.core.report.sections import Report, Section, page
 from kincheck.core.studies.paper import formulation as bench_formulation
-from kincheck.core.studies.paper import roundoff as bench_roundoff
 from kincheck.core.studies.paper.formulation import AT_DESIGN, AWAY, BACK, DIFFERENCE
 from kincheck.core.studies.paper.operations import (
     DOTS,
@@ -23,11 +22,13 @@ from kincheck.core.studies.paper.operations import (
     Executed,
     Operations,
     Pair,
+    chain,
+    conditions,
     count_operations,
     executed,
+    skew,
     traced,
 )
-from kincheck.core.studies.paper.textbook import chain, conditions, skew
 
 SEED = 943745
 
@@ -199,18 +200,18 @@ def test_simplified_rows_gain_little(found):
 
 
 def test_round_off_depends_on_seed_only(monkeypatch):
-    first = bench_roundoff.measure_roundoff(1, 1)
-    monkeypatch.setattr(bench_roundoff, "DIGITS", 80)
-    assert bench_roundoff.measure_roundoff(1, 1) == first
-    assert bench_roundoff.measure_roundoff(2, 1) != first
-    monkeypatch.setattr(bench_roundoff, "DIGITS", 14)
-    assert bench_roundoff.measure_roundoff(1, 1) != first
+    first = bench_formulation.measure_roundoff(1, 1)
+    monkeypatch.setattr(bench_formulation, "DIGITS", 80)
+    assert bench_formulation.measure_roundoff(1, 1) == first
+    assert bench_formulation.measure_roundoff(2, 1) != first
+    monkeypatch.setattr(bench_formulation, "DIGITS", 14)
+    assert bench_formulation.measure_roundoff(1, 1) != first
 
 
 def test_all_ways_get_the_same_inputs(rng):
     """Displacement and position are the same to the last digit, though a million metres away."""
-    for distance in bench_roundoff.DISTANCES:
-        known = bench_roundoff._states(rng, 50, distance, turning=False)
+    for distance in bench_formulation.DISTANCES:
+        known = bench_formulation._states(rng, 50, distance, turning=False)
         for e, u in zip(known.e0, known.j.u, strict=True):
             assert ((e + u) - e == u).all()
             assert ((e + u) - u == e).all()
@@ -220,10 +221,10 @@ def test_all_ways_get_the_same_inputs(rng):
             for primitive in condition.simplified("paper"):
                 off = np.array(
                     primitive.phi(
-                        bench_roundoff.Pose.of(i.u, i.q), bench_roundoff.Pose.of(j.u, j.q)
+                        bench_formulation.Pose.of(i.u, i.q), bench_formulation.Pose.of(j.u, j.q)
                     )
                 )
-                assert np.abs(off).max() < 20.0 * bench_roundoff.TILT
+                assert np.abs(off).max() < 20.0 * bench_formulation.TILT
 
 
 # The whole mechanism

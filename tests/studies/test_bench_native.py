@@ -15,7 +15,6 @@ from kincheck.core.case.case import without_forces
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.bench import (
     designs,
-    native_breakdown,
     precision,
     processes,
     rounds,
@@ -50,19 +49,19 @@ def test_levels_compute_requested_orders_only():
     case = without_forces(cases.load("rssr"))
     found = {
         each.entry.setting: each.entry
-        for each in precision.contestants(case, native_breakdown.LEVELS, TOL)
+        for each in precision.contestants(case, precision.LEVELS, TOL)
     }
     assert {each.outcome for each in found.values()} == {Outcome.PASS}
     assert found["every body and point: position"].errors.velocity is None
-    assert found[native_breakdown.EVERYTHING].errors.acceleration < 1e-11
-    assert found[native_breakdown.NUMPY].loop == "python"
+    assert found[precision.EVERYTHING].errors.acceleration < 1e-11
+    assert found[precision.NUMPY].loop == "python"
 
 
 def test_forces_are_a_level_of_cases_with_masses():
     case = cases.load("double_cardan")
-    assert native_breakdown.levels(case) == native_breakdown.LEVELS
+    assert precision.levels(case) == precision.LEVELS
     case = replace(case, mechanism=loaded(case.mechanism))
-    engine = native_breakdown.levels(case)[native_breakdown.FORCES]
+    engine = precision.levels(case)[precision.FORCES]
     found = engine.solve(engine.build(case), case, TOL)
     assert [*found.forces.joints] == [joint.name for joint in case.mechanism.joints]
     assert [*found.bodies] == [body.name for body in case.mechanism.moving]
@@ -71,14 +70,14 @@ def test_forces_are_a_level_of_cases_with_masses():
 def test_loops_alone_reach_every_sample_or_say_so():
     pytest.importorskip("llvmlite")
     case = cases.load("mcpherson_strut")
-    assert np.isfinite(native_breakdown.loops_alone(case, TOL)()).all()
+    assert np.isfinite(precision.loops_alone(case, TOL)()).all()
     out_of_reach = replace(case, sweep=replace(case.sweep, values=np.linspace(0.0, 0.6, 61)))
     with pytest.raises(SolveError, match="of 61 samples"):
-        native_breakdown.loops_alone(out_of_reach, TOL)()
+        precision.loops_alone(out_of_reach, TOL)()
 
 
 def test_flops_of_a_sample():
-    size = native_breakdown.program_size(cases.load("rssr"))
+    size = precision.program_size(cases.load("rssr"))
     once, twice = (size.of_sample(n) for n in (1.0, 2.0))
     assert twice - once == size.flops["newton"]
     assert once == sum(
@@ -151,19 +150,8 @@ def test_costs_are_measured_with_residuals_and_errors():
 
 def test_growth_is_that_of_the_largest():
     timed = [(1, 1.0), (100, 2.0), (1000, 9.0), (10000, 200.0)]
-    sizes = [
-        size.Size(
-            mechanism="",
-            loops=n,
-            bodies=0,
-            engine="",
-            mode="",
-            loop="",
-            message="",
-            us_per_sample=rounds.spread([t]),
-        )
-        for n, t in timed
-    ]
+    of = dict.fromkeys(("mechanism", "engine", "mode", "loop", "message"), "")
+    sizes = [size.Size(**of, loops=n, bodies=0, us_per_sample=rounds.spread([t])) for n, t in timed]
     assert size.growth(sizes) == pytest.approx((100, 10000, 1.0))
     assert size.growth(sizes[:2]) == pytest.approx((1, 100, np.log10(2.0) / 2.0))
     assert size.growth(sizes[:1]) is None

@@ -256,36 +256,28 @@ MISTAKES = {
         "mixed style",
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
     ),
-    "a driver that pulls backwards": (
-        "driver",
-        lambda: mistaken(Cylindrical, measured=measured_backwards),
+}
+MISTAKES_OF_DRIVERS = {
+    "a driver that pulls backwards": lambda: mistaken(Cylindrical, measured=measured_backwards),
+    "a driver about the opposite axis": lambda: mistaken(
+        Revolute, measured=lambda self, *_: p.DrivenAngle(-unit(self.axis))
     ),
-    "a driver about the opposite axis": (
-        "driver",
-        lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(-unit(self.axis))),
-    ),
-    "a drive without its acceleration": (
-        "driver",
-        lambda: driving(gamma=without_own_acceleration),
-    ),
-    "a drive along a straight axis": ("driver", lambda: driving(gamma=without_bending)),
-    "a drive a thousandth slow": ("driver", lambda: driving(nu=slow)),
-    "a drive a thousandth short": ("driver", lambda: driving(phi=short)),
-    "a drive at the origin": ("driver", lambda: driving(rows=at_the_origin)),
-    "a drive beside the axis": ("driver", lambda: driving(rows=beside_the_axis)),
-    "a drive on one body": ("driver", lambda: driving(rows=on_one_body)),
-    "a drive of twice the force": (
-        "driver",
-        lambda: driving(rows=doubled_rows),
-    ),
-    "a drive that loses a turn": ("driver", lambda: driving(branch=no_branch)),
-    "a drive refused": ("driver", lambda: driving(branch=negative_branch)),
-    "a drive refused half a turn away": ("driver", lambda: driving(branch=near_design)),
-    "a drive about another axis": (
-        "driver",
-        lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(triad(self.axis)[0])),
+    "a drive without its acceleration": lambda: driving(gamma=without_own_acceleration),
+    "a drive along a straight axis": lambda: driving(gamma=without_bending),
+    "a drive a thousandth slow": lambda: driving(nu=slow),
+    "a drive a thousandth short": lambda: driving(phi=short),
+    "a drive at the origin": lambda: driving(rows=at_the_origin),
+    "a drive beside the axis": lambda: driving(rows=beside_the_axis),
+    "a drive on one body": lambda: driving(rows=on_one_body),
+    "a drive of twice the force": lambda: driving(rows=doubled_rows),
+    "a drive that loses a turn": lambda: driving(branch=no_branch),
+    "a drive refused": lambda: driving(branch=negative_branch),
+    "a drive refused half a turn away": lambda: driving(branch=near_design),
+    "a drive about another axis": lambda: mistaken(
+        Revolute, measured=lambda self, *_: p.DrivenAngle(triad(self.axis)[0])
     ),
 }
+MISTAKES |= {name: ("driver", make) for name, make in MISTAKES_OF_DRIVERS.items()}
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)

@@ -559,3 +559,14 @@ def test_python_has_verdicts_of_engines(tmp_path):
     assert kincheck.compliance(case, [0.0]).checked is None
     with pytest.raises(KincheckError, match="did you mean 'pinocchio'"):
         kincheck.compliance(case, [0.0], engines="pinochio")
+
+
+def test_values_below_their_accuracy_are_printed_as_zero(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for options, file in (("", "car.csv"), (" --bushings", "rubber.toml")):
+        assert main(f"templates mcpherson{options}".split()) == 0
+        Path(file).write_text(capsys.readouterr().out)
+    assert main("kc car.csv --bushings rubber.toml --travel=-60mm:60mm:5 --out .".split()) == 0
+    line = "wheel_center.z.per_lateral_force [mm/kN]  0  (from 0 to 0)"
+    assert line in capsys.readouterr().out
+    assert "e-24" not in Path("kc.html").read_text().partition("Compliance at design")[2]

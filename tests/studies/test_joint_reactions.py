@@ -11,9 +11,8 @@ from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.joints.base import unit
 from kincheck.core.studies.checks.findings import Verdict
-from kincheck.core.studies.checks.joint_loops import loops
-from kincheck.core.studies.checks.loaded_probe import driven, loaded, reactions, solved
-from kincheck.core.studies.stress.solving import interpreted
+from kincheck.core.studies.checks.joint_loops import driven, loaded, loops, reactions, solved
+from kincheck.core.studies.stress.verdicts import interpreted
 
 from ..support.engine_faults import changed
 from .test_check_joint_mistakes import mistaken, negative_gamma

@@ -18,7 +18,7 @@ from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
 from kincheck.core.studies.stress.reduction import fewer_samples, reduced, rounded
 from kincheck.core.studies.stress.report import headline, markdown, report
-from kincheck.core.studies.stress.results import Cell, Finding, Stress
+from kincheck.core.studies.stress.run import Cell, Finding, Stress
 from kincheck.core.studies.stress.verdicts import Verdict
 from kincheck.core.trajectory import PointMotion
 
@@ -119,21 +119,18 @@ def test_stress_without_examined_samples_has_status_2(tmp_path, capsys, monkeypa
     )
 
 
+def cell(name="one", **samples):
+    counts = dict.fromkeys(map(str, Verdict), 0) | samples
+    of = {"family": name, "engine": name, "mode": "projection", "version": "1", "settings": {}}
+    of |= {"specimens": 1, "elsewhere": 0, "worst": [None] * 4, "bad": 0, "seconds": 0.0}
+    return Cell(samples=counts, **of)
+
+
 def test_samples_without_a_verdict_are_counted_apart():
-    none = dict.fromkeys(map(str, Verdict), 0)
-    samples = none | {"right": 5, "refused, right reason": 2}
-    cell = {
-        "engine": "one",
-        "mode": "projection",
-        "version": "1",
-        "settings": {},
-        "worst": [None] * 4,
-        "seconds": 0.0,
-    }
-    cell |= {"family": "arms", "specimens": 1, "elsewhere": 0, "bad": 0}
-    found = Cell(samples=samples | {"not judged": 3, "unsupported": 4}, **cell)
+    refused, unjudged = {"refused, right reason": 2}, {"not judged": 3, "unsupported": 4}
+    found = cell(right=5, **refused, **unjudged)
     assert headline([found]) == "None of 7 samples silently wrong, 3 not judged, 4 unsupported"
-    wrong = Cell(samples=samples | {"silently wrong": 1, "not judged": 0, "unsupported": 0}, **cell)
+    wrong = cell(right=5, **refused, **{"silently wrong": 1})
     assert headline([found, wrong]) == "1 of 15 samples silently wrong, 3 not judged, 4 unsupported"
 
 
@@ -147,44 +144,20 @@ def test_families_are_listed_with_their_sizes(capsys):
 def test_text_of_files_is_no_markup():
     """Names and messages come from files and simulators."""
     evil = "<script>|*x*`"
-    cell = {
-        "engine": evil,
-        "mode": "projection",
-        "version": "1",
-        "settings": {},
-        "worst": [None] * 4,
-        "seconds": 0.0,
-    }
-    counts = dict.fromkeys(
-        [
-            "right",
-            "refused, right reason",
-            "refused, wrong reason",
-            "silently wrong",
-            "not judged",
-            "unsupported",
-        ],
-        1,
-    )
+    others = ("refused, right reason", "refused, wrong reason", "silently wrong", "not judged")
+    counts = dict.fromkeys(("right", *others, "unsupported"), 1)
+    finding = dict.fromkeys(("family", "engine", "mode", "specimen", "message"), evil)
+    finding |= {"verdict": "silently wrong", "worst": [2.0, None, None], "tol": 1e-12}
     found = Stress(
         kincheck="1",
         command="",
         seed=0,
         samples=6,
         abouts={evil: evil},
-        cells=[Cell(family=evil, specimens=1, samples=counts, elsewhere=0, bad=1, **cell)],
-        findings=[
-            Finding(
-                family=evil, engine=evil, mode="projection", verdict="silently wrong",
-                specimen=evil, number=0,
-                sample=0,
-                value=0.0, message=evil, tol=1e-12, worst=[2.0, None, None],
-            )
-        ],
-        proofs=[],
-        acceptances=[],
+        cells=[cell(evil, **counts)],
+        findings=[Finding(**finding, number=0, sample=0, value=0.0)],
         seconds={},
-    )  # fmt: skip
+    )
     text = markdown(report(found))
     assert "<script>" not in text
     assert "\\|" in text
@@ -208,20 +181,13 @@ def same_after_writing(case, folder):
     file = folder / "case.toml"
     file.write_text(case_text(case, ["what it is", "and why"]), encoding="utf-8")
     read = load_case(file)
-    assert (read.name, read.source, read.mechanism, read.outputs) == (
-        case.name,
-        case.source,
-        case.mechanism,
-        case.outputs,
-    )
-    assert read.sweep.motions == case.sweep.motions
-    assert (read.sweep.driver, read.sweep.rate, read.sweep.design) == (
-        case.sweep.driver,
-        case.sweep.rate,
-        case.sweep.design,
-    )
+    values = read.sweep.values
+    for part in ("name", "source", "mechanism", "outputs"):
+        assert getattr(read, part) == getattr(case, part)
+    for part in ("driver", "rate", "design", "motions"):
+        assert getattr(read.sweep, part) == getattr(case.sweep, part)
     # a grid in degrees is even but for its last places
-    assert np.abs(read.sweep.values - case.sweep.values).max() <= 4 * np.spacing(
+    assert np.abs(values - case.sweep.values).max() <= 4 * np.spacing(
         np.abs(case.sweep.values).max()
     )
 
@@ -263,18 +229,20 @@ def test_stress_replay_refuses_output_files(tmp_path, capsys):
 # Reduction of bad cases to small ones
 
 
+def four_bar_case(way, samples):
+    rng = np.random.default_rng(8)
+    mechanism, _ = four_bar(any_plane(rng), *crank_rocker(rng), way)
+    return as_case(mechanism, "turn", np.linspace(-1.0, 1.0, samples))
+
+
 @pytest.fixture(scope="module")
 def case():
-    rng = np.random.default_rng(8)
-    mechanism, _ = four_bar(any_plane(rng), *crank_rocker(rng), "rod")
-    return as_case(mechanism, "turn", np.linspace(-1.0, 1.0, 5))
+    return four_bar_case("rod", 5)
 
 
 def test_a_bad_case_is_made_small():
     """Bad is whatever has a crank longer than 0.1 m that is turned by more than 0.3 rad."""
-    rng = np.random.default_rng(8)
-    mechanism, _ = four_bar(any_plane(rng), *crank_rocker(rng), "revolutes")
-    case = as_case(mechanism, "turn", np.linspace(-1.0, 1.0, 41))
+    case = four_bar_case("revolutes", 41)
 
     def bad(case):
         pivot = case.mechanism.joint("pivot").point

@@ -29,10 +29,10 @@ from kincheck.core.studies.truth.motion import (
     ROUND_OFF,
     DefectError,
     Reach,
+    by_body,
     closed,
     followed,
 )
-from kincheck.core.studies.truth.path import by_body
 from kincheck.core.studies.truth.proofs import distance_from_proof
 from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 

@@ -1,9 +1,10 @@
 """A small case file, ways to change it, and what a wrong one has to give: exactly one CaseError."""
 
-from pathlib import Path
+from functools import partial
 
 import pytest
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
 BASE = """
@@ -44,13 +45,13 @@ rows = [[-0.1, 1.4, 2.0], [0.0, 1.5, 2.0], [0.1, 1.6, 2.0]]
 """
 
 
-def write(folder: Path, text: str | bytes, name: str = "case.toml") -> Path:
+def write(folder, text, name="case.toml"):
     file = folder / name
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     return file
 
 
-def edited(*edits: tuple[str, str], base: str = BASE) -> str:
+def edited(*edits, base=BASE):
     for old, new in edits:
         assert base.count(old) == 1, f"{old!r} occurs {base.count(old)} times"
         base = base.replace(old, new)
@@ -61,13 +62,20 @@ CSV = "# made up\n\npush, tip_x, tip_x.velocity\n-0.1, 1.4, 2.0\n 0.0, 1.5, 2.0\
 BY_FILE = '\n[reference]\nfile = "tip.csv"\n'
 
 
-def complains(file: Path, fragments: list[str]) -> None:
-    """Exactly a CaseError, on one line, that begins with a file and contains all the fragments."""
+def refused(act, message):
+    """The one message, on one line, of a CaseError; it has the parts of the given one, between
+    which " ... " stands for others.
+    """
     with pytest.raises(CaseError) as caught:
-        load_case(file)
-    message = str(caught.value)
+        act()
+    found = str(caught.value)
     assert caught.type is CaseError
-    assert message.startswith(str(file.parent))
-    assert "\n" not in message
-    missing = [fragment for fragment in fragments if fragment not in message]
-    assert not missing, message
+    assert "\n" not in found
+    assert [part for part in message.split(" ... ") if part not in found] == [], found
+    return found
+
+
+def complains(file, message, supplied=None):
+    """As `refused`, of a case file, or of any file with options; it begins with the folder."""
+    read = load_case if supplied is None else partial(load, supplied=supplied)
+    assert refused(lambda: read(file), message).startswith(str(file.parent))

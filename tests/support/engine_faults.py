@@ -12,7 +12,7 @@ import kincheck.adapters
 import numpy as np
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
-from kincheck.core.trajectory import Trajectory
+from kincheck.core.trajectory import QUANTITIES, Trajectory
 
 
 @dataclass
@@ -58,52 +58,51 @@ def changed(found, **parts):
     return other
 
 
-def points(**changes):
-    """A change of one quantity of all points, by a function of its values (n, 3) and the case."""
+def each_of(kind, changes):
+    """A change of quantities of all points or bodies, by functions of their values (n, 3)."""
 
     def answer(found, case):
         moved = {
-            name: replace(
-                each, **{key: change(getattr(each, key), case) for key, change in changes.items()}
-            )
-            for name, each in found.points.items()
+            name: replace(each, **{key: to(getattr(each, key)) for key, to in changes.items()})
+            for name, each in getattr(found, kind).items()
         }
-        return changed(found, points=moved)
+        return changed(found, **{kind: moved})
 
     return answer
+
+
+def points(**changes):
+    return each_of("points", changes)
+
+
+def bodies(**changes):
+    return each_of("bodies", changes)
 
 
 def forces(change):
-    """A change of the forces, by a function of them and the case."""
+    """A change of the forces, by a function of them."""
+    return lambda found, case: (
+        found if found.forces is None else changed(found, forces=change(found.forces))
+    )
 
-    def answer(found, case):
-        given = found.forces
-        return found if given is None else changed(found, forces=change(given, case))
 
-    return answer
+def members(part, change):
+    """A change of all reactions, efforts or element forces, by a function of each."""
+    return forces(
+        lambda given: replace(
+            given, **{part: {name: change(x) for name, x in getattr(given, part).items()}}
+        )
+    )
 
 
 def joints(change):
-    """A change of every reaction, by a function of it and the case."""
-    return forces(
-        lambda given, case: replace(
-            given, joints={name: change(each, case) for name, each in given.joints.items()}
-        )
-    )
+    """A change of every reaction, by a function of it."""
+    return members("joints", change)
 
 
 def of(part, change):
     """A change of force or moment of every reaction, by a function of its values."""
-    return joints(lambda each, case: replace(each, **{part: change(getattr(each, part))}))
-
-
-def members(part, change):
-    """A change of all efforts or element forces, by a function of their values."""
-    return forces(
-        lambda given, case: replace(
-            given, **{part: {name: change(x) for name, x in getattr(given, part).items()}}
-        )
-    )
+    return joints(lambda each: replace(each, **{part: change(getattr(each, part))}))
 
 
 def part(**changes):
@@ -137,7 +136,7 @@ def fewer(given):
     return dict([*given.items()][:-1])
 
 
-def about_origin(each, case):
+def about_origin(each):
     """A moment about the global origin at design."""
     arm = np.array([0.2, -0.1, 0.2])
     return replace(each, moment=each.moment + np.cross(arm, each.force))
@@ -232,12 +231,7 @@ def frozen_beyond(found, case):
     """The last pose for all samples that cannot be reached."""
     if found.solved.all():
         return found
-    moved = points(
-        **{
-            key: lambda x, case: np.nan_to_num(x)
-            for key in ("position", "velocity", "acceleration")
-        }
-    )(found, case)
+    moved = points(**dict.fromkeys(QUANTITIES, np.nan_to_num))(found, case)
     return changed(moved, solved=np.ones_like(found.solved), message="")
 
 
@@ -256,29 +250,13 @@ def without_accelerations_of_drives(given):
     return Ramp(given.amplitude * 2.0 * math.pi * given.frequency * math.cos(given.phase))
 
 
-def bodies(**changes):
-    """A change of the motions of bodies."""
-
-    def answer(found, case):
-        moved = {
-            name: replace(
-                each, **{key: change(getattr(each, key)) for key, change in changes.items()}
-            )
-            for name, each in found.bodies.items()
-        }
-        return changed(found, bodies=moved)
-
-    return answer
-
-
 def raises(found, case):
     raise FloatingPointError("overflow")
 
 
 def noise(found, case):
-    return points(position=lambda x, case: x + 1e-15 * np.random.default_rng().random(x.shape))(
-        found, case
-    )
+    random = np.random.default_rng().random
+    return points(position=lambda x: x + 1e-15 * random(x.shape))(found, case)
 
 
 class Counting:
@@ -288,37 +266,37 @@ class Counting:
 
     def __call__(self, found, case):
         self.solved += 1
-        return points(position=lambda x, case: x + 1e-15 * self.solved)(found, case)
+        return points(position=lambda x: x + 1e-15 * self.solved)(found, case)
 
 
-def undetermined(given, case):
+def undetermined(given):
     n = len(given.force)
     return replace(given, free=np.broadcast_to(np.eye(6), (n, 6, 6)).copy())
 
 
 POSITIONS = {
-    "shifted": lambda x, case: x + 1e-6,
-    "too long by a ten-millionth": lambda x, case: x * (1.0 + 1e-7),
-    "one axis negative": lambda x, case: x * np.array([1.0, -1.0, 1.0]),
-    "axes exchanged": lambda x, case: x[:, [1, 0, 2]],
-    "of the sample before": lambda x, case: late(x),
-    "reversed": lambda x, case: x[::-1].copy(),
-    "one sample wrong": lambda x, case: once(x),
-    "still": lambda x, case: np.tile(x[:1], (len(x), 1)),
-    "in millimetres": lambda x, case: 1e3 * x,
-    "displacements": lambda x, case: x - x[len(x) // 2],
-    "in single precision": lambda x, case: x.astype(np.float32),
-    "rounded to eight digits": lambda x, case: np.round(x, 8),
+    "shifted": lambda x: x + 1e-6,
+    "too long by a ten-millionth": lambda x: x * (1.0 + 1e-7),
+    "one axis negative": lambda x: x * np.array([1.0, -1.0, 1.0]),
+    "axes exchanged": lambda x: x[:, [1, 0, 2]],
+    "of the sample before": late,
+    "reversed": lambda x: x[::-1].copy(),
+    "one sample wrong": once,
+    "still": lambda x: np.tile(x[:1], (len(x), 1)),
+    "in millimetres": lambda x: 1e3 * x,
+    "displacements": lambda x: x - x[len(x) // 2],
+    "in single precision": lambda x: x.astype(np.float32),
+    "rounded to eight digits": lambda x: np.round(x, 8),
 }
 RATES = {
-    "negative": lambda x, case: -x,
-    "zero": lambda x, case: 0.0 * x,
-    "off by a thousandth": lambda x, case: 1.001 * x,
-    "off by ten millionths": lambda x, case: (1.0 + 1e-5) * x,
-    "of the sample before": lambda x, case: late(x),
-    "one axis zero": lambda x, case: x * np.array([1.0, 1.0, 0.0]),
-    "one sample wrong": lambda x, case: once(x),
-    "in degrees": lambda x, case: np.degrees(x),
+    "negative": lambda x: -x,
+    "zero": lambda x: 0.0 * x,
+    "off by a thousandth": lambda x: 1.001 * x,
+    "off by ten millionths": lambda x: (1.0 + 1e-5) * x,
+    "of the sample before": late,
+    "one axis zero": lambda x: x * np.array([1.0, 1.0, 0.0]),
+    "one sample wrong": once,
+    "in degrees": lambda x: np.degrees(x),
 }
 SERIES = {
     "negative": lambda x: -x,
@@ -345,10 +323,12 @@ OF_MOTION = {
     **{f"position {k}": answer(points(position=f)) for k, f in POSITIONS.items()},
     **{f"velocity {k}": answer(points(velocity=f)) for k, f in RATES.items()},
     **{f"acceleration {k}": answer(points(acceleration=f)) for k, f in RATES.items()},
-    "velocity complex": answer(points(velocity=lambda x, case: x + 0j)),
-    "velocity by driver unit": answer(points(velocity=lambda x, case: x / case.sweep.rate)),
+    "velocity complex": answer(points(velocity=lambda x: x + 0j)),
+    "velocity by driver unit": answer(
+        lambda x, case: points(velocity=lambda v: v / case.sweep.rate)(x, case)
+    ),
     "acceleration by driver unit": answer(
-        points(acceleration=lambda x, case: x / case.sweep.rate**2)
+        lambda x, case: points(acceleration=lambda a: a / case.sweep.rate**2)(x, case)
     ),
     "points exchanged": answer(part(points=lambda x: exchanged(dict(x)))),
     "a point missing": answer(part(points=lambda x: fewer(dict(x)))),
@@ -389,36 +369,34 @@ OF_FORCES = {
     **{f"effort {k}": answer(members("drivers", f)) for k, f in SERIES.items()},
     **{f"element {k}": answer(members("elements", f)) for k, f in SERIES.items()},
     "reaction on the first body": answer(
-        joints(lambda x, case: replace(x, force=-x.force, moment=-x.moment))
+        joints(lambda x: replace(x, force=-x.force, moment=-x.moment))
     ),
     "moment about the origin": answer(joints(about_origin)),
     "force axes exchanged": answer(of("force", lambda x: x[:, [1, 2, 0]])),
     "moment axes exchanged": answer(of("moment", lambda x: x[:, [1, 2, 0]])),
-    "force for moment": answer(joints(lambda x, case: replace(x, moment=x.force))),
-    "reactions exchanged": answer(forces(lambda x, case: replace(x, joints=exchanged(x.joints)))),
-    "a reaction missing": answer(forces(lambda x, case: replace(x, joints=fewer(x.joints)))),
-    "an effort missing": answer(forces(lambda x, case: replace(x, drivers=fewer(x.drivers)))),
-    "efforts exchanged": answer(forces(lambda x, case: replace(x, drivers=exchanged(x.drivers)))),
-    "an element missing": answer(forces(lambda x, case: replace(x, elements=fewer(x.elements)))),
-    "elements exchanged": answer(
-        forces(lambda x, case: replace(x, elements=exchanged(x.elements)))
-    ),
+    "force for moment": answer(joints(lambda x: replace(x, moment=x.force))),
+    "reactions exchanged": answer(forces(lambda x: replace(x, joints=exchanged(x.joints)))),
+    "a reaction missing": answer(forces(lambda x: replace(x, joints=fewer(x.joints)))),
+    "an effort missing": answer(forces(lambda x: replace(x, drivers=fewer(x.drivers)))),
+    "efforts exchanged": answer(forces(lambda x: replace(x, drivers=exchanged(x.drivers)))),
+    "an element missing": answer(forces(lambda x: replace(x, elements=fewer(x.elements)))),
+    "elements exchanged": answer(forces(lambda x: replace(x, elements=exchanged(x.elements)))),
     "no forces": answer(part(forces=lambda x: None)),
     "all called determined": answer(
-        joints(lambda x, case: replace(x, free=np.zeros((len(x.force), 6, 0))))
+        joints(lambda x: replace(x, free=np.zeros((len(x.force), 6, 0))))
     ),
     "all called undetermined": answer(joints(undetermined)),
-    "power off by 100 W": answer(forces(lambda x, case: replace(x, power=x.power + 100.0))),
-    "power off at one sample": answer(forces(lambda x, case: replace(x, power=once(x.power)))),
-    "power left out": answer(forces(lambda x, case: replace(x, power=x.power * math.nan))),
+    "power off by 100 W": answer(forces(lambda x: replace(x, power=x.power + 100.0))),
+    "power off at one sample": answer(forces(lambda x: replace(x, power=once(x.power)))),
+    "power left out": answer(forces(lambda x: replace(x, power=x.power * math.nan))),
     "power of nothing": answer(
-        forces(lambda x, case: replace(x, power=0.0 * x.power, largest_power=0.0 * x.power))
+        forces(lambda x: replace(x, power=0.0 * x.power, largest_power=0.0 * x.power))
     ),
     "power of drivers alone": answer(
-        forces(lambda x, case: replace(x, power=x.power + sum(x.drivers.values(), 0.0)))
+        forces(lambda x: replace(x, power=x.power + sum(x.drivers.values(), 0.0)))
     ),
     "largest power without limit": answer(
-        forces(lambda x, case: replace(x, largest_power=x.power + math.inf))
+        forces(lambda x: replace(x, largest_power=x.power + math.inf))
     ),
     "no gravity": model(other_gravity(0.0)),
     "gravity upwards": model(other_gravity(-1.0)),
@@ -447,7 +425,7 @@ FAULTS = OF_MOTION | OF_FORCES
 
 HARMLESS = {
     "velocity never given": (
-        answer(points(velocity=lambda x, case: None, acceleration=lambda x, case: None)),
+        answer(points(velocity=lambda x: None, acceleration=lambda x: None)),
         "an engine may give positions alone; the rows of rates are skipped",
     ),
     "residual zero": (answer(part(residual=lambda x: 0.0)), "no outsider knows the residual"),
@@ -460,7 +438,7 @@ HARMLESS = {
         "the rank is that of the engine's own rows, which differ",
     ),
     "power zero": (
-        answer(forces(lambda x, case: replace(x, power=0.0 * x.power))),
+        answer(forces(lambda x: replace(x, power=0.0 * x.power))),
         "the power is zero but for round-off, with right efforts",
     ),
     "parameters of the other sign": (

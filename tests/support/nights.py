@@ -5,12 +5,12 @@ them.
 import math
 import random
 
-import msgspec
 from kincheck.core.harness.record import Seconds
 from kincheck.core.harness.run import run
 from kincheck.core.history.comparison import regressions
 from kincheck.core.history.runs import find, find_against
 from kincheck.core.history.store import Store
+from msgspec.structs import replace
 
 from .fakes import Fake, crank, off
 
@@ -37,9 +37,7 @@ def records(*, noise=None):
     def timed(record):
         warm = 0.010 * (math.exp(noise.uniform(-0.1, 0.1)) if noise else 1.0)
         seconds = Seconds(build=0.1, first=0.05, warm=warm, waited=0.0, compare=0.001)
-        return msgspec.structs.replace(
-            record, seconds=seconds, us_per_step=1e6 * warm / record.samples
-        )
+        return replace(record, seconds=seconds, us_per_step=1e6 * warm / record.samples)
 
     return [timed(record) for record in RESULTS.records]
 
@@ -54,14 +52,14 @@ def changed(all_records, *, case="first", engine="mujoco", **changes):
             name: change(getattr(record, name)) if callable(change) else change
             for name, change in changes.items()
         }
-        return msgspec.structs.replace(record, **values)
+        return replace(record, **values)
 
     return [one(record) for record in all_records]
 
 
 def times(factor):
     """A change of seconds."""
-    return {"seconds": lambda seconds: msgspec.structs.replace(seconds, warm=factor * seconds.warm)}
+    return {"seconds": lambda seconds: replace(seconds, warm=factor * seconds.warm)}
 
 
 def worse(factor, output="x", motion="position"):
@@ -69,8 +67,8 @@ def worse(factor, output="x", motion="position"):
 
     def change(errors):
         deviation = getattr(errors[output], motion)
-        grown = msgspec.structs.replace(deviation, max_abs=factor * deviation.max_abs)
-        return errors | {output: msgspec.structs.replace(errors[output], **{motion: grown})}
+        grown = replace(deviation, max_abs=factor * deviation.max_abs)
+        return errors | {output: replace(errors[output], **{motion: grown})}
 
     return {"errors": change}
 
@@ -93,10 +91,13 @@ def keep(path, all_records, *, status="finished", **facts):
         for record in all_records:
             store.add_record(run_number, record)
         if status != "running":
-            store.finish(
-                run_number, msgspec.structs.replace(RESULTS, run=known, records=all_records), status
-            )
+            store.finish(run_number, replace(RESULTS, run=known, records=all_records), status)
     return run_number
+
+
+def keep_changed(path, **changes):
+    """One more run, whose records are changed as by `changed`."""
+    return keep(path, changed(records(), **changes))
 
 
 def nights(path, count, seed=1):

@@ -13,18 +13,19 @@ from ...errors import CaseError, MechanismError, SolveError, unknown
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
-from .compliance import read_resting, read_rig
 from .document import LONGEST_TEXT, Section, explained, fault, read_tables, shown, toml_table
 from .mechanism_sections import (
     free_lines,
     mechanism_lines,
     read_free,
     read_mechanism,
+    read_resting,
+    read_rig,
     read_sweep,
     sweep_lines,
     values_in_file,
 )
-from .outputs import output_lines, read_outputs, with_all_coordinates, with_slopes
+from .outputs import output_lines, read_output, with_all_coordinates, with_slopes
 from .reference import read_reference, reason_against, reference_lines
 from .schema import SCHEMA, CaseKeys, ClosureKeys, ReferenceKeys, UnitsKeys
 from .suspension_section import read_suspension, suspension_lines
@@ -148,9 +149,9 @@ def _with_outputs(root: Section, case: Case, units: FileUnits) -> Case:
         table = read_suspension(root.at("suspension"), case, units)
         wheels = tuple(each for each in (table.vehicle, table.other) if each)
         case = replace(case, wheels=wheels)
-    outputs = read_outputs(root, table, case, units)
-    if not outputs:
-        outputs = with_all_coordinates(case).outputs
+    named = root.at("outputs").each()
+    outputs = tuple(read_output(name, section, table, case, units) for name, section in named)
+    outputs = outputs or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
     slopes = table is not None and table.per_travel
     return replace(case, outputs=with_slopes(outputs, size(case))) if slopes else case

@@ -19,8 +19,7 @@ from ...mechanism.motions import Motion
 from ..measures import Measure, key_of
 from ..quantity import own_keys
 from ..suspension import SuspensionOutput
-from .compliance import RestingKeys, RigKeys
-from .mechanism_sections import DRIVERS
+from .mechanism_sections import DRIVERS, RestingKeys, RigKeys
 from .schema import (
     COORDINATE,
     SCHEMA,
@@ -156,7 +155,7 @@ def _keys(cls: type[Described]) -> str:
     """Return the keys of a type. Optional keys are in brackets; keys of motions and forces have
     units.
     """
-    names: list[str] = []
+    names = list[str]()
     for each in own_fields(cls):
         measure, dimension = each.metadata.get("measure"), dimension_of(each)
         unit = dimension.of("length", "angle") if dimension else measure and measure.value

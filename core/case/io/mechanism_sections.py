@@ -1,5 +1,5 @@
 """The mechanism and its motion in a case file: [bodies], [joints], [couplers], [points], [drivers],
-[forces] and [sweep], read in SI units and written.
+[forces] and [sweep], read in SI units and written; and [equilibrium] and [compliance].
 """
 
 from __future__ import annotations
@@ -7,13 +7,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from ...errors import CaseError, with_article
 from ...joints import Coupler, Follower, Joint, LinearCoupler
-from ...mechanism.body import ACCELERATION, INERTIA, checked_inertia
+from ...mechanism.body import ACCELERATION, INERTIA, STIFFNESS, checked_inertia
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import Body, Mechanism, Point, coordinates
 from ...mechanism.motions import (
@@ -28,7 +30,7 @@ from ...mechanism.motions import (
     Table,
 )
 from ...trajectory import Array
-from ..case import MARKER, SLOW, TIME, Case, Free, Sweep
+from ..case import MARKER, SLOW, TIME, Case, Free, Load, Resting, Rig, Sweep
 from ..units import LENGTHS, RADIAN, SECOND, FileUnits, Unit, plain
 from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
@@ -40,6 +42,7 @@ from .schema import (
     PointKeys,
     ReferenceKeys,
     SweepKeys,
+    Text,
     bushing_keys,
     keys_of,
     own_fields,
@@ -67,7 +70,7 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
             values that no such part can have.
     """
     bodies = [_body(name, section, units) for name, section in root.at("bodies").each()]
-    points: list[Point] = []
+    points = list[Point]()
     for name, section in root.at("points").each():
         point = section.typed(PointKeys)
         points.append(Point(name, point.body, units.place(point.position)))
@@ -92,7 +95,7 @@ def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> l
     """Return the bushings of joints, [joints.NAME.bushings.X]; bodies and point are by default the
     joint's.
     """
-    found: list[Bushing] = []
+    found = list[Bushing]()
     for joint in joints:
         table = root.at("joints").at(joint.name)
         if table.value is None:
@@ -100,10 +103,7 @@ def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> l
         given = table.at("bushings")
         for own, section in given.each() if given.value is not None else ():
             keys: Any = section.typed(bushing_keys())
-            numbers = {
-                each.name: units.in_si(each, getattr(keys, each.name))
-                for each in own_fields(Bushing)
-            }
+            numbers = _in_si(Bushing, keys, units)
             places = joint.points_on()
             if numbers["point"] is None and not places:
                 raise section.at("point").fault("missing, expected a point [x, y, z]; add it")
@@ -152,15 +152,18 @@ def _built(
             "missing, expected a number; add the key 'stiffness', or a curve"
         )
     keys: Any = section.typed(keys_of(cls))
-    given: dict[str, Any] = {
-        each.name: units.in_si(each, getattr(keys, each.name), driver) for each in own_fields(cls)
-    }
+    given = _in_si(cls, keys, units, driver)
     if hasattr(keys, "joints"):
         given["joints"] = keys.joints
     given |= zip("ij", getattr(keys, "bodies", ()), strict=False)
     make: Any = cls  # type checkers would take the classes of the conditions
     with explained(section.file, section.key, units.length, section.value):
         return make(*name, **given)
+
+
+def _in_si(cls: Any, keys: Any, units: FileUnits, driver: Unit | None = None) -> dict[str, Any]:
+    own = own_fields(cls)
+    return {each.name: units.in_si(each, getattr(keys, each.name), driver) for each in own}
 
 
 def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]]:
@@ -178,7 +181,7 @@ def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]
         parts.append(_built(section, section.class_of("coupler", Coupler.registry), units, name))
         sections[name] = section
     freedoms = {part.name: part.freedoms for part in parts if isinstance(part, Joint)}
-    couplers: list[Coupler] = []
+    couplers = list[Coupler]()
     for part in parts:
         if isinstance(part, Follower | LinearCoupler):
             if "freedoms" not in sections[part.name].table:
@@ -201,7 +204,7 @@ def _drivers(section: Section, units: FileUnits, *, free: bool) -> list[Driver]:
     found: list[Driver] = [
         _built(each, each.class_of("driver", DRIVERS), units, name) for name, each in section.each()
     ]
-    driven: dict[tuple[str, str], str] = {}
+    driven = dict[tuple[str, str], str]()
     for each in found:
         if not isinstance(each, JointDriver):
             continue
@@ -515,3 +518,61 @@ def with_bushings(case: Case, file: Path) -> Case:
     bushings = (*case.mechanism.bushings, *found)
     with explained(file, "joints", LENGTHS["m"], root.at("joints").value):
         return replace(case, mechanism=replace(case.mechanism, bushings=bushings))
+
+
+Names = Annotated[tuple[str, ...] | None, Meta(description="a list of names")]
+Loads = Annotated[tuple[Load, ...], Meta(description=f"a list of {', '.join(Load)}")]
+Stiffness = Annotated[
+    Annotated[float, Meta(gt=0.0)] | None, Meta(description="a number greater than zero")
+]
+
+
+class RigKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[compliance]."""
+
+    wheel: Text | None = None
+    contact: Text | None = None
+    held: Names = None
+    loads: Loads = tuple(Load)
+    tire_stiffness: Stiffness = None
+
+
+class RestingKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[equilibrium]."""
+
+    held: Annotated[tuple[str, ...], Meta(description="a list of names")] = ()
+
+
+def read_resting(section: Section, mechanism: Mechanism) -> Resting:
+    """Return the table [equilibrium].
+
+    Raises:
+        CaseError: unknown keys or names.
+    """
+    keys, known = section.typed(RestingKeys), mechanism.drivers
+    for name in keys.held:
+        if name not in (names := [driver.name for driver in known]):
+            raise section.at("held").unknown(name, names, "a driver")
+    return Resting(keys.held)
+
+
+def read_rig(section: Section, mechanism: Mechanism, units: FileUnits) -> Rig:
+    """Return the rig of a file, in SI.
+
+    Raises:
+        CaseError: unknown keys or names.
+    """
+    keys = section.typed(RigKeys)
+    known: dict[str, list[str]] = {
+        "wheel": [body.name for body in mechanism.moving],
+        "contact": [point.name for point in mechanism.points],
+        "held": [driver.name for driver in mechanism.drivers],
+    }
+    what = {"wheel": "a body that moves", "contact": "a point", "held": "a driver"}
+    for key, names in known.items():
+        given: Any = getattr(keys, key)
+        for name in [given] if isinstance(given, str) else given or ():
+            if name not in names:
+                raise section.at(key).unknown(name, names, what[key])
+    stiffness = keys.tire_stiffness and units.power(STIFFNESS, keys.tire_stiffness)
+    return Rig(keys.wheel, keys.contact, keys.held, keys.loads, stiffness)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import CaseError
 from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism
 from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
 from ..measures import (
     Component,
@@ -24,7 +24,7 @@ from ..measures import (
     Orientation,
     key_of,
 )
-from ..quantity import own_keys, with_markers
+from ..quantity import AXES, own_keys, with_markers
 from ..suspension import AxleOutput, PerTravel, Rate, Side, SuspensionOutput, Vehicle
 from ..suspension.base import WheelOutput
 from ..units import Convert, FileUnits
@@ -32,8 +32,6 @@ from .document import Section, explained, shown, toml_table
 from .reference_samples import DERIVATIVES
 from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
 from .suspension_section import SuspensionTable, check_point, direction, wheels_of
-
-AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.
@@ -157,10 +155,10 @@ def with_all_motions(case: Case, at_design: Mapping[str, float] | None = None) -
     return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))
 
 
-def read_outputs(
-    root: Section, table: SuspensionTable | None, case: Case, units: FileUnits
-) -> tuple[Quantity, ...]:
-    """Return the outputs that the file names.
+def read_output(
+    name: str, section: Section, table: SuspensionTable | None, case: Case, units: FileUnits
+) -> Quantity:
+    """Return an output that the file names.
 
     Args:
         table: the table [suspension], if there is one.
@@ -170,14 +168,6 @@ def read_outputs(
         CaseError: an unknown type, key or name, a missing input of the type, or an output that this
             joint or wheel does not have.
     """
-    return tuple(
-        _output(name, section, table, case, units) for name, section in root.at("outputs").each()
-    )
-
-
-def _output(
-    name: str, section: Section, table: SuspensionTable | None, case: Case, units: FileUnits
-) -> Quantity:
     if name.endswith((*DERIVATIVES, PER_TRAVEL)):
         raise section.fault(
             "a name with this ending is a derivative in reference tables; give the output another"
@@ -319,7 +309,7 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
         size: size of the mechanism [m]. If a pose error changes an output by d, it changes the
             slope by about d / size.
     """
-    both: list[Quantity] = []
+    both = list[Quantity]()
     for output in outputs:
         both.append(output)
         if isinstance(output, SuspensionOutput) and not isinstance(output, AxleOutput):

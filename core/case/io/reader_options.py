@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
 from ...options import declared, flags_of, option, positive, switch
 
-HARDPOINTS, MODELS = "hardpoints", "models"
+HARDPOINTS, MODELS, CURVES = "hardpoints", "models", "measured curves"
+_hardpoints, _models, _curves = (
+    partial(option, heading=heading) for heading in (HARDPOINTS, MODELS, CURVES)
+)
 
 
 @dataclass(frozen=True)
@@ -32,125 +36,111 @@ class Supplied:
         ),
     }
 
-    template: str | None = option(
+    template: str | None = _hardpoints(
         "type of suspension, if the file does not state it; kincheck templates prints them",
         metavar="NAME",
-        heading=HARDPOINTS,
     )
-    units: str | None = option(
+    units: str | None = _hardpoints(
         "unit of the coordinates, such as mm or m, if the file does not state it",
         metavar="UNIT",
-        heading=HARDPOINTS,
     )
-    axes: str | None = option(
+    axes: str | None = _hardpoints(
         "directions of x, y and z, if the file does not state them: forward,left,up or"
         " rearward,right,up, ...",
         metavar="X,Y,Z",
-        heading=HARDPOINTS,
     )
-    travel: str | None = option(
+    travel: str | None = _hardpoints(
         "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
         " up: --travel=-40:120mm:33; in metres without a unit",
         metavar="M[:SAMPLES]",
-        heading=HARDPOINTS,
     )
-    side: str | None = option(
+    side: str | None = _hardpoints(
         "side of the wheel, left or right; without it, the side follows from the points",
         metavar="SIDE",
-        heading=HARDPOINTS,
     )
-    names: Path | None = option(  # noqa: RUF009
+    names: Path | None = _hardpoints(  # noqa: RUF009
         'names of the points in the file: TOML, with a line ROLE = "NAME" for each; a new FILE'
         " is written",
         Path,
         metavar="FILE",
-        heading=HARDPOINTS,
     )
     ask_names: bool = switch(
         "refuse names that are only like those of the template, with a guess for each",
         heading=HARDPOINTS,
     )
-    wheel_radius: str | None = option(
+    wheel_radius: str | None = _hardpoints(
         "radius of the loaded wheel, such as 300mm, if no point is its contact: for roll"
         " centre, scrub radius and trail",
         metavar="M",
-        heading=HARDPOINTS,
     )
-    wheelbase: str | None = option(
+    wheelbase: str | None = _hardpoints(
         "wheelbase [m], for Ackermann, turning circle and anti-values",
         metavar="M",
-        heading=HARDPOINTS,
     )
-    rack_per_turn: str | None = option(
+    rack_per_turn: str | None = _hardpoints(
         "travel of the rack per turn of the steering wheel [m], for the steering ratio",
         metavar="M",
-        heading=HARDPOINTS,
     )
-    axle: str | None = option(
+    axle: str | None = _hardpoints(
         "motion of both wheels, the right one a mirror image of the left, and a rack: heave,"
         " roll or steer, over --travel of the left wheel or of the rack",
         metavar="MOTION",
-        heading=HARDPOINTS,
     )
-    rack: str | None = option(
+    rack: str | None = _hardpoints(
         "travel of the rack while the wheel goes up, such as 20mm, positive to the left: -M to"
         " M, or START:STOP; in metres without a unit",
         metavar="M",
-        heading=HARDPOINTS,
     )
-    position: str | None = option(
+    position: str | None = _hardpoints(
         "axle, front or rear, for anti-values; with --wheelbase, --cg-height and a share",
         metavar="AXLE",
-        heading=HARDPOINTS,
     )
-    cg_height: str | None = option(
+    cg_height: str | None = _hardpoints(
         "height of the vehicle's centre of gravity above the road [m]",
         metavar="M",
-        heading=HARDPOINTS,
     )
-    brake_share: str | None = option(
-        "share of the braking force at this axle, 0 to 1", metavar="X", heading=HARDPOINTS
+    brake_share: str | None = _hardpoints(
+        "share of the braking force at this axle, 0 to 1",
+        metavar="X",
     )
-    drive_share: str | None = option(
-        "share of the driving force at this axle, 0 to 1", metavar="X", heading=HARDPOINTS
+    drive_share: str | None = _hardpoints(
+        "share of the driving force at this axle, 0 to 1",
+        metavar="X",
     )
-    corner: str | None = option(
+    corner: str | None = _hardpoints(
         "wheel of a table of the whole car: FL, FR, RL, RR, or in words",
         metavar="NAME",
-        heading=HARDPOINTS,
     )
-    sheet: str | None = option(
+    sheet: str | None = _hardpoints(
         "sheet of a workbook with several tables, or section of a tree, such as front",
         metavar="NAME",
-        heading=HARDPOINTS,
     )
-    drive: tuple[str, ...] = option(
+    drive: tuple[str, ...] = _models(
         "a joint that moves, as qpos, in rad or m without a unit: knee:-30:30deg:61; several"
         " move together",
         metavar="JOINT:START:STOP[:SAMPLES]",
         several="repeated",
-        heading=MODELS,
     )
-    hold: tuple[str, ...] = option(
-        "joints or free bodies that do not move", metavar="NAME", several="together", heading=MODELS
+    hold: tuple[str, ...] = _models(
+        "joints or free bodies that do not move",
+        metavar="NAME",
+        several="together",
     )
     hold_rest: bool = switch(
         "hold as many joints as needed: free bodies, joints with an actuator, others",
         heading=MODELS,
     )
-    without: tuple[str, ...] = option(
+    without: tuple[str, ...] = _models(
         "elements of a model to leave out, by tag, name or TAG/NAME, or statements of a dataset"
         " of Adams, as BUSHING or BUSHING/3; a note beside every verdict says so",
         metavar="NAME",
         several="together",
-        heading=MODELS,
     )
-    start: tuple[str, ...] = option(
+    start: tuple[str, ...] = _models(
         "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
         " the start is assembled to close, and a note says by how far joints moved",
         metavar="WHERE",
         several="together",
-        heading=MODELS,
     )
     closure: float | None = option(
         "accept gaps up to X [m] that stem from rounded digits of the file: rows that are"
@@ -184,9 +174,6 @@ LEFT_OUT = "; left out: "
 """Separator in the source of a case, before the list of omitted content of its file."""
 
 
-CURVES = "measured curves"
-
-
 @dataclass(frozen=True)
 class CurveOptions:
     """What the user states of a curve."""
@@ -195,36 +182,31 @@ class CurveOptions:
         CURVES: "Facts that the file of --reference does not state; for one case."
     }
 
-    columns: Sequence[str] = option(
+    columns: Sequence[str] = _curves(
         'output of a column, if its name does not state it: "Toe Angle=toe [deg]"; with the'
         " opposite sign: COLUMN=-OUTPUT",
         metavar="COLUMN=OUTPUT",
         flag="--map",
         several="repeated",
-        heading=CURVES,
     )
-    signs: str | None = option(
+    signs: str | None = _curves(
         "iso8855 or sae_j670, if the file has no comment '# signs: CONVENTION'",
         metavar="CONVENTION",
-        heading=CURVES,
     )
-    accuracy: Sequence[str] = option(
+    accuracy: Sequence[str] = _curves(
         'uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"; without'
         " a unit in that of the column",
         metavar="OUTPUT=NUMBER UNIT",
         several="repeated",
-        heading=CURVES,
     )
-    citation: str | None = option(
+    citation: str | None = _curves(
         "source of the curve; without it, agreement is not called validated",
         metavar="TEXT",
-        heading=CURVES,
     )
-    sheet: str | None = option(
+    sheet: str | None = _curves(
         "sheet of a workbook with several tables",
         metavar="NAME",
         flag="--reference-sheet",
-        heading=CURVES,
     )
     own_samples: bool = switch(
         "solve at the samples of the curve, instead of interpolating it",

@@ -145,8 +145,8 @@ def compared(samples: Samples, columns: Columns, case: Case, *, own: bool) -> Ca
         CaseError: no sample is within the range of the rows, or they cannot be interpolated.
     """
     grid = Grid(samples, columns.driver, case.sweep.values, own=own)
-    known: dict[str, Series] = {}
-    limits: dict[str, str] = {}
+    known = dict[str, Series]()
+    limits = dict[str, str]()
     for output in case.outputs:
         if output.name not in columns.of:
             continue
@@ -418,7 +418,7 @@ def reason_against(case: Case) -> str:
 
 def _columns(case: Case) -> dict[str, Array]:
     """Return the columns of the known quantities, by name, shape (n,) each."""
-    found: dict[str, Array] = {}
+    found = dict[str, Array]()
     for name, known in case.reference.items():
         quantities: Sequence[Array | None] = [getattr(known, each) for each in QUANTITIES]
         for ending, values in zip(("", *DERIVATIVES), quantities, strict=True):

@@ -7,6 +7,7 @@ A column without a unit is in metres or radians.
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,23 +40,8 @@ from .schema import MOST_SAMPLES
 from .table import required_unit, split_head, unit_of_head
 
 MAP = "--map"
-# Names for an output or a driver, in normal form. Names of sums and changes (track, total toe) are
-# no names of outputs.
-_ALSO: Mapping[str, Sequence[str]] = {
-    "toe": ("toe_angle", "toe_in"),
-    "camber": ("camber_angle",),
-    "caster": ("caster_angle", "castor", "castor_angle"),
-    "kingpin_inclination": ("kpi", "kpi_angle", "kingpin_angle", "kingpin_inclination_angle"),
-    "roll_center_height": ("rc_height", "roll_center", "roll_center_z", "rch"),
-    "scrub_radius": ("scrub",),
-    "mechanical_trail": ("trail", "caster_trail", "castor_trail"),
-    "stroke": (
-        *("travel", "wheel_travel", "bump", "bump_travel", "jounce", "wheel_stroke", "wheel_lift"),
-        *("vertical_travel", "wheel_displacement", "vertical_displacement", "wheel_center_travel"),
-    ),
-    "rack_travel": ("rack", "rack_displacement", "rack_stroke", "rack_disp", "steering_rack"),
-}
-_OUTPUTS = {other: name for name, others in _ALSO.items() for other in others}
+_WRITTEN = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+_OUTPUTS = {other: name for name, others in tomllib.loads(_WRITTEN).items() for other in others}
 _SIDES = {
     side: re.compile(rf"^(?:{words})_(?=..)|_(?:{words})$")
     for side, words in (("left", "left|l|fl|rl|lf"), ("right", "right|r|fr|rr|rf"))
@@ -137,9 +123,9 @@ def _once(samples: Samples) -> tuple[Samples, list[str]]:
     Raises:
         CaseError: a driver value is missing.
     """
-    before: dict[bytes, str] = {}
-    kept: list[int] = []
-    equal: list[str] = []
+    before = dict[bytes, str]()
+    kept = list[int]()
+    equal = list[str]()
     for k, (place, row) in enumerate(zip(samples.places, samples.numbers, strict=True)):
         if np.isnan(row[0]):
             where = f"{place}, column {samples.columns[0]}"
@@ -164,7 +150,7 @@ def _columns(
     _, unit = driver_unit(samples, SECOND if driver == TIME else RADIAN if turns else METRE)
     if targets[0].opposite:
         unit = Unit(unit.name, unit.size, _opposite(unit.convert))
-    of: dict[str, Column] = {}
+    of = dict[str, Column]()
     for k, (text, target) in enumerate(zip(samples.columns, targets, strict=True)):
         if k == 0:
             continue
@@ -195,7 +181,7 @@ def _with_accuracy(
     Raises:
         CaseError: no such output, no such unit, or a number alone for columns of several units.
     """
-    stated: dict[str, float] = {}
+    stated = dict[str, float]()
     units = {output.name: output.unit for output in outputs if output.name in compared}
     for text in texts:
         name, equals, right = (part.strip() for part in text.partition("="))
@@ -333,7 +319,7 @@ def read_stated(
     Raises:
         CaseError: a text has another form, or names no output.
     """
-    stated: dict[str, Target] = {}
+    stated = dict[str, Target]()
     for text in texts:
         head, equals, right = (part.strip() for part in text.rpartition("="))
         opposite = right.startswith("-")
@@ -377,7 +363,7 @@ def match(
         CaseError: two columns hold the same, a stated column is missing, or none holds an output.
     """
     names = [_bare(head, known) for head in heads]
-    found: dict[int, Target] = {}
+    found = dict[int, Target]()
     for head, target in stated.items():
         places = [k for k, each in enumerate(heads) if head in (each, names[k])]
         if len(places) != 1:
@@ -398,7 +384,7 @@ def match(
         found[places[0]] = target
     taken = {target.name for target in found.values()}
     by_name = {_normal(name): name for name in (*known, driver)}
-    matches: dict[str, list[int]] = {}
+    matches = dict[str, list[int]]()
     for k, name in enumerate(names):
         wanted = _named(name, by_name, side)
         if k not in found and wanted and wanted not in taken:

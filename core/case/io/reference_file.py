@@ -167,17 +167,14 @@ def series(
             f"found {', '.join(proved) or 'none'}, expected outputs of the case; make the reference"
             " anew",
         )
-    return {name: _series(file, name, proved[name], len(values)) for name in names}
-
-
-def _series(file: Path, name: str, found: ProvedSeries, count: int) -> Series:
-    columns = {quantity: getattr(found, quantity) for quantity in QUANTITIES}
-    position, *derivatives = (
-        _numbers(file, f"outputs.{name}.{each}", columns[each], count) for each in columns
-    )
-    return Series(
-        position, *(column if np.isfinite(column).any() else None for column in derivatives)
-    )
+    known = dict[str, Series]()
+    for name in names:
+        position, *rates = (
+            _numbers(file, f"outputs.{name}.{each}", getattr(proved[name], each), len(values))
+            for each in QUANTITIES
+        )
+        known[name] = Series(position, *(x if np.isfinite(x).any() else None for x in rates))
+    return known
 
 
 def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> Array:

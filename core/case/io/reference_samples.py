@@ -160,7 +160,7 @@ def layout_of(table: Table) -> Layout:
     Raises:
         CaseError: the table is empty.
     """
-    first: list[tuple[str, Sequence[Cell]]] = []
+    first = list[tuple[str, Sequence[Cell]]]()
     all_numbers: int | None = None
     for where, cells in islice(table.rows(), MOST_ABOVE):
         first.append((where, trimmed(cells)))

@@ -10,18 +10,14 @@ import numpy as np
 from ...algebra import Vec3
 from ...errors import CaseError, MechanismError
 from ...jet import Jet
-from ...joints.base import unit
 from ...kinematics import Equilibria, StaticModel, with_free_coordinates
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import JointDriver, Motion, PointCoordinate, Ramp, Table
+from ...mechanism.motions import Motion, Ramp, Table
 from ...trajectory import Array
-from ..case import TIME, Case, Sweep, pace, size
-from ..compliance import Resting
-from ..measures import DriverEffort, JointAngle, JointDisplacement
+from ..case import TIME, Case, Resting, Sweep, pace, size
+from ..measures import DriverEffort, coordinate_of
 from ..quantity import with_markers
 from .outputs import default, largest_load
-
-_COORDINATES: Any = {"rotation": JointAngle, "translation": JointDisplacement}
 
 
 def at_rest(case: Case, resting: Resting) -> Case:
@@ -54,7 +50,7 @@ def at_rest(case: Case, resting: Resting) -> Case:
     unstable = [
         f"the resting pose is unstable: {way}" for way in dict.fromkeys(found.unstable) if way
     ]
-    motions: dict[str, Motion] = {}
+    motions = dict[str, Motion]()
     if not travel:
         motions = {name: Ramp(float(x[0])) for name, x in values.items()}
         at = Sweep(TIME, np.ones(1), 0.0, motions=motions)
@@ -96,17 +92,13 @@ def _through(times: Array, values: Array) -> Motion:
 
 def _values(mechanism: Mechanism, driver: Any, found: Equilibria) -> Array:
     """Return a driver's values from design at equilibria [m or rad], shape (n,)."""
-    if isinstance(driver, PointCoordinate):
-        point = mechanism.point(driver.point)
-        moved = found.place(point.body, point.position) - np.array(point.position)
-        return moved @ np.array([*unit(driver.direction)])
-    assert isinstance(driver, JointDriver)
-    measure = _COORDINATES[driver.freedom](driver.name, 0.0, 0.0, "", joint=driver.joint)
+    measure = coordinate_of(driver)
+    marked = with_markers(mechanism, [measure])
     at, design = dict[str, Vec3](), dict[str, Vec3]()
-    for point in measure.markers(mechanism):
+    for name in measure.points:
+        point = marked.point(name)
         place = found.place(point.body, point.position)
-        still = np.zeros(len(place))
-        at[point.name] = Vec3(*(Jet(place[:, k], still, still) for k in range(3)))
-        zero = np.zeros(())
-        design[point.name] = Vec3(*(Jet(np.array(x), zero, zero) for x in point.position))
+        still, zero = np.zeros(len(place)), np.zeros(())
+        at[name] = Vec3(*(Jet(place[:, k], still, still) for k in range(3)))
+        design[name] = Vec3(*(Jet(np.array(x), zero, zero) for x in point.position))
     return np.asarray(measure.of(at, design).x)

@@ -58,8 +58,7 @@ _DAMAGED = (
 
 _Powers: TypeAlias = tuple[int, int, int, int]
 """Powers of length, angle, time and force."""
-_NONE: _Powers = (0, 0, 0, 0)
-_LENGTH, _ANGLE, _TIME, _FORCE = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
+_LENGTH, _ANGLE = (1, 0, 0, 0), (0, 1, 0, 0)
 _OTHER_NAMES: Mapping[str, Sequence[str]] = {
     "m": ("meter", "metre", "meters", "metres"),
     "mm": ("millimeter", "millimetre", "millimeters", "millimetres"),
@@ -73,32 +72,24 @@ UNIT_NAMES: Mapping[str, str] = {
     other: name for name, others in _OTHER_NAMES.items() for other in (name, *others)
 }
 """Names of units of length and angle by their other names, in small letters."""
-_FACTORS: Mapping[str, tuple[float, _Powers]] = {
+_KINDS: Sequence[tuple[str, _Powers, Mapping[str, float]]] = (
+    ("no unit, [-] or [%]", (0, 0, 0, 0), {"1": 1.0, "-": 1.0, "%": 0.01}),
+    ("a length: m, mm, cm, inch or foot", _LENGTH, {"um": 1e-6, "µm": 1e-6}),
+    (
+        "an angle: deg, rad, mrad or arcmin",
+        _ANGLE,
+        {"mrad": 1e-3, "arcmin": ANGLES["deg"].size / 60.0},
+    ),
+    ("a time: s or ms", (0, 0, 1, 0), {"s": 1.0, "sec": 1.0, "ms": 1e-3}),
+    ("a force: N or kN", (0, 0, 0, 1), {"n": 1.0, "newton": 1.0, "kn": 1e3}),
+    ("a unit such as N m", (1, 0, 0, 1), {"nm": 1.0, "nmm": 1e-3}),
+)
+_FACTORS = {
     **{name: (unit.size, _LENGTH) for name, unit in LENGTHS.items()},
     **{name: (unit.size, _ANGLE) for name, unit in ANGLES.items()},
-    "1": (1.0, _NONE),
-    "-": (1.0, _NONE),
-    "%": (0.01, _NONE),
-    "um": (1e-6, _LENGTH),
-    "µm": (1e-6, _LENGTH),
-    "mrad": (1e-3, _ANGLE),
-    "arcmin": (ANGLES["deg"].size / 60.0, _ANGLE),
-    "s": (1.0, _TIME),
-    "sec": (1.0, _TIME),
-    "ms": (1e-3, _TIME),
-    "n": (1.0, _FORCE),
-    "newton": (1.0, _FORCE),
-    "kn": (1e3, _FORCE),
-    "nm": (1.0, (1, 0, 0, 1)),
-    "nmm": (1e-3, (1, 0, 0, 1)),
+    **{name: (size, powers) for _, powers, units in _KINDS for name, size in units.items()},
 }
-_WORDS: Mapping[_Powers, str] = {
-    _NONE: "no unit, [-] or [%]",
-    _LENGTH: "a length: m, mm, cm, inch or foot",
-    _ANGLE: "an angle: deg, rad, mrad or arcmin",
-    _TIME: "a time: s or ms",
-    _FORCE: "a force: N or kN",
-}
+_WORDS = {powers: words for words, powers, _ in _KINDS}
 _IN_BRACKETS = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*", re.DOTALL)
 _BETWEEN = re.compile(r"[\s_,/]+")
 _LONGEST = 30
@@ -220,7 +211,7 @@ def find_decimal_sign(file: Path, cells: Sequence[tuple[str, str]], possible: st
     Raises:
         CaseError: the numbers have both signs, group thousands, or leave the sign open.
     """
-    first: dict[str, tuple[str, str]] = {}
+    first = dict[str, tuple[str, str]]()
     open_cell: tuple[str, str] | None = None
     decided, plain = False, False
     for where, text in cells:
@@ -294,7 +285,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Table]:
                     f"found no sheet {shown(wanted)}, expected one of the file;"
                     f" {remedy(wanted, names)}",
                 )
-            sheets: list[Table] = []
+            sheets = list[Table]()
             for name in names if wanted is None else [wanted]:
                 rows, formulas = _rows(file, written[name], most_rows)
                 if formulas:
@@ -375,7 +366,7 @@ def _too_much(data: bytes) -> str:
 
 def _rows(file: Path, sheet: Any, most: int) -> tuple[list[Row], bool]:
     """Return the rows with filled cells, and whether any cell is a formula."""
-    rows: list[Row] = []
+    rows = list[Row]()
     formulas = False
     read = 0
     sheet.reset_dimensions()  # the dimensions in a workbook are often wrong
@@ -439,7 +430,7 @@ def read_unit(text: str) -> tuple[Unit, _Powers] | None:
     for known, powers in ((LENGTHS, _LENGTH), (ANGLES, _ANGLE)):
         if name in known:
             return known[name], powers
-    size, total = Fraction(1), list(_NONE)
+    size, total = Fraction(1), [0, 0, 0, 0]
     for k, part in enumerate(plain.split("/")):
         for factor in filter(None, re.split(r"[ *·.]+", part)):
             found = _FACTOR.fullmatch(factor)

@@ -19,19 +19,6 @@ if TYPE_CHECKING:
     from .trees.element import Element
     from .trees.tree import Tree
 
-CASE_FILES = (".toml", ".json")
-TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
-TREES = (".yaml", ".yml", ".py")
-ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
-STAGES = (".usd", ".usda", ".usdc", ".usdz")
-MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world", ".osim", *STAGES)
-DATASETS = (".adm",)
-SUFFIXES = (
-    *(*CASE_FILES, ".ini", ".pm", *TABLES, *TREES, *WORKBOOKS),
-    *(*ADAMS_FILES, *MODELS, *DATASETS),
-)
-"""Suffixes of names that are files, whether they exist or not."""
-
 CASE, CHRONO, ADAMS, ASSETTO, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "case file",
     "Project Chrono suspension",
@@ -43,6 +30,18 @@ CASE, CHRONO, ADAMS, ASSETTO, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "model",
     "dataset of Adams Solver",
 )
+STAGES, DATASETS = (".usd", ".usda", ".usdc", ".usdz"), (".adm",)
+_SUFFIXES = {
+    TABLE: (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts"),
+    TREE: (".yaml", ".yml", ".py"),
+    WORKBOOK: WORKBOOKS,
+    ADAMS: (".sub", ".tpl", ".asy", ".hpt"),
+    MODEL: (".xml", ".mjcf", ".urdf", ".sdf", ".world", ".osim", *STAGES),
+    DATASET: DATASETS,
+}
+_KINDS = {suffix: kind for kind, suffixes in _SUFFIXES.items() for suffix in suffixes}
+SUFFIXES = (".toml", ".json", ".ini", ".pm", *_KINDS)
+"""Suffixes of names that are files, whether they exist or not."""
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".pm": "is a suspension of rFactor, whose bars have no names of points; write their ends into a"
@@ -234,16 +233,8 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         return _kind_of_toml(file)
     if suffix == ".json":
         return _kind_of_json(file, supplied)
-    for kind, suffixes in (
-        (TABLE, TABLES),
-        (TREE, TREES),
-        (WORKBOOK, WORKBOOKS),
-        (ADAMS, ADAMS_FILES),
-        (MODEL, MODELS),
-        (DATASET, DATASETS),
-    ):
-        if suffix in suffixes:
-            return kind
+    if suffix in _KINDS:
+        return _KINDS[suffix]
     from .hardpoints.programs import is_assetto
 
     text = _text(file, of_spreadsheet=True)

@@ -41,7 +41,7 @@ def save_table(
             " dashes and blanks; give another"
         )
     path = table.file.parent / name
-    content = _edited(table, supplied, points) or _written(table, supplied, points)
+    content = _edited(table, points) or _written(table, supplied, points)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
     try:
         with open(os.open(path, flags, 0o644), "w", encoding="utf-8", newline="") as file:
@@ -76,9 +76,7 @@ def _same(
     return angles and positions == wanted
 
 
-def _edited(
-    table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]
-) -> str | None:
+def _edited(table: HardpointTable, points: Sequence[Sequence[float]]) -> str | None:
     """Return the text of a table with the changed numbers replaced; None unless each point is a
     line of text with plain numbers.
     """

@@ -54,7 +54,7 @@ class SuspensionOutput(TypedQuantity):
 
     def read_of(self, vehicle: Vehicle) -> tuple[str, ...]:
         """Return the names of the points it reads of a wheel."""
-        read: list[str] = []
+        read = list[str]()
         for each in self.reads:
             found: str | tuple[str, ...] | None = getattr(vehicle, each)
             read += [found] if isinstance(found, str) else found or ()
@@ -67,7 +67,7 @@ class SuspensionOutput(TypedQuantity):
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
         """Return the points on the wheel carrier that it reads beyond those of the case."""
-        found: list[Point] = []
+        found = list[Point]()
         for wheel in self.vehicles:
             body = mechanism.point(wheel.wheel_center).body
             found += [
@@ -95,6 +95,8 @@ class WheelOutput(SuspensionOutput):
 
 @dataclass(frozen=True)
 class _OfCorner(WheelOutput):
+    reads = ("wheel_center", "spin_marker")
+
     @abstractmethod
     def value(self, corner: Corner) -> Jet:
         """Return the value of the formula over the samples."""
@@ -103,6 +105,8 @@ class _OfCorner(WheelOutput):
 @dataclass(frozen=True)
 class Change(_OfCorner):
     """A coordinate relative to the design position."""
+
+    measure = "m"
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the coordinate minus its value at design."""
@@ -116,6 +120,8 @@ class Attitude(_OfCorner):
     Attributes:
         relative: whether it is measured from the design position.
     """
+
+    measure = "rad"
 
     relative: bool = False
 

@@ -183,7 +183,7 @@ class Vehicle:
 
     def markers(self, mechanism: Mechanism) -> dict[str, Vector]:
         """Return the positions of the points that the mechanism lacks at design, by name [m]."""
-        sides: dict[str, Vec3] = {}
+        sides = dict[str, Vec3]()
         if self.wheel_axis is None:
             sides[self.spin_marker] = self.spin(mechanism)
         if self.wheel_contact is None:

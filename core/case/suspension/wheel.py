@@ -50,8 +50,6 @@ class Toe(Attitude):
     """
 
     type = "toe"
-    measure = "rad"
-    reads = ("wheel_center", "spin_marker")
     positive = "toe-in"
 
     def value(self, corner: Corner) -> Jet:
@@ -67,9 +65,7 @@ class SteerAngle(Attitude):
     """
 
     type = "steer_angle"
-    measure = "rad"
     positive = "to the left (ISO 8855), to the right (SAE J670)"
-    reads = ("wheel_center", "spin_marker")
 
     @property
     def sense(self) -> str:
@@ -91,8 +87,6 @@ class Camber(Attitude):
     """Angle between the vehicle's z axis and the wheel plane, independent of toe: sin = -s_z."""
 
     type = "camber"
-    measure = "rad"
-    reads = ("wheel_center", "spin_marker")
     positive = "top outboard"
 
     def value(self, corner: Corner) -> Jet:
@@ -146,7 +140,6 @@ class HalfTrackChange(_Shift):
     """
 
     type = "half_track_change"
-    measure = "m"
     positive = "outboard, a wider track"
 
     def value(self, corner: Corner) -> Jet:
@@ -161,7 +154,6 @@ class WheelbaseChange(_Shift):
     """
 
     type = "wheelbase_change"
-    measure = "m"
     positive = "a longer wheel base: forward at the front, rearward at the rear"
     needs = ("axle",)
 
@@ -184,7 +176,6 @@ class WheelDisplacement(Change):
     """Displacement of the wheel centre relative to the body, along an axis of the convention."""
 
     type = "wheel_displacement"
-    measure = "m"
     positive = "x forward, y left, z up (ISO 8855); x forward, y right, z down (SAE J670)"
     reads = ("wheel_center",)
 
@@ -217,7 +208,6 @@ class WheelDisplacement(Change):
 class _Inclination(Attitude):
     """Angle between the steering axis and the vertical, in a view along an axis of the vehicle."""
 
-    measure = "rad"
     needs = ("kingpin",)
     reads = ("wheel_center", "kingpin_points")
 

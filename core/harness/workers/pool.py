@@ -168,9 +168,9 @@ class WorkerSlot:
                 return Attempt(None, Failure(Outcome.ERROR, "stopped"))
             used = not worker.fresh
             found = worker.solve(packed)
-            failure = (
-                found.result if isinstance(found.result, Failure) and found.result.harmful else None
-            )
+            # a failure that may leave the process in a corrupt state
+            result = found.result
+            failure = result if isinstance(result, Failure) and result.outcome.bad else None
             if failure is None and worker.late is None:
                 return found
             printed = self.close()
@@ -254,7 +254,7 @@ def in_workers(jobs: int, limits: Limits) -> Solver:
         finally:
             waiting.clear()
             for thread in threads:
-                thread.stop()
+                thread.slot.stop()
             for thread in threads:
                 thread.join()
 
@@ -318,10 +318,6 @@ class _SlotThread(Thread):
             self.through.put(error)
         finally:
             self.slot.close()
-
-    def stop(self) -> None:
-        """Stop soon, even during a solve."""
-        self.slot.stop()
 
 
 def solve_packed(pair: Pair, slot: WorkerSlot) -> Attempt:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...dataset import Dataset, Variable
 from ...errors import SolveError, number_of
-from ...input_checks import no_such, real, require_kind, require_positive
+from ...input_checks import real, require_kind, require_known, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
 from ...tabular import Tabular
@@ -134,14 +134,8 @@ def require_named(
 ) -> None:
     """Raise SolveError unless there are moving bodies and drivers of these names."""
     require_kind(who, "mechanism", mechanism, Mechanism)
-    for what, names, known in (
-        ("moving body", bodies, mechanism.moving),
-        ("driver", drivers, mechanism.drivers),
-    ):
-        there = [each.name for each in known]
-        for name in names:
-            if name not in there:
-                raise no_such(who, what, name, there)
+    require_known(who, "moving body", bodies, mechanism.moving)
+    require_known(who, "driver", drivers, mechanism.drivers)
 
 
 def require_shapes(

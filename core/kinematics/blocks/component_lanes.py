@@ -6,7 +6,7 @@ world) and adds its own. `ComponentLanes` binds them to lanes, one sample a lane
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import SolveError
 from ...failures import FailureKind, PoseFailure
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import Parts, Plan
 from ...program.plan import aligned
@@ -35,14 +35,13 @@ from ..compiled.request import (
     slots_of,
 )
 from ..compiled.solution import Columns
-from ..continuation.singular_poses import SOUND, Numbers
+from ..continuation.singular_poses import SOUND, Anchor, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
-from ..formulation.constraints import frames
-from ..formulation.parameters import places
-from ..structure.components import Component, Section, components, section
+from ..formulation.constraints import frames, structure
+from ..structure.components import Alike, components, described
 from ..structure.degrees_of_freedom import counted
 from .sparse_lanes import SparseLanes
-from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +94,10 @@ class ComponentLanes(Lanes):
     Args:
         request: as for `compile_model`; accelerations are computed whatever its order, to predict
             from.
-        parts: its components, if known already.
+        parts: the bodies of its components, if known already.
 
     Attributes:
         parts, kinds: the components in order, and their types.
-        points: names of the points of each component that are wanted or driven.
         world: all solved quantities, shape (rows, room).
 
     Raises:
@@ -108,32 +106,25 @@ class ComponentLanes(Lanes):
     """
 
     def __init__(
-        self, mechanism: Mechanism, request: Request, parts: Sequence[Component] | None = None
+        self,
+        mechanism: Mechanism,
+        request: Request,
+        parts: Sequence[tuple[str, ...]] | None = None,
     ) -> None:
         self.mechanism, self.request = mechanism, request
-        frame = frames(mechanism)
-        self.parts = components(mechanism, frame) if parts is None else parts
-        self.unit = max(part.extent for part in self.parts) or frame.unit
-        metres = {name: frame.unit * origin for name, origin in frame.origins.items()}
-        origins: dict[str, Vector] = {
-            name: (origin.x, origin.y, origin.z) for name, origin in metres.items()
-        }
-        driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
-        self.points: list[list[str]] = [[] for _ in self.parts]
+        if parts is None:
+            parts = components(mechanism, frames(mechanism))
+        self.parts = described(mechanism, parts, request.points, request.bodies)
+        self.unit = self.parts[0].section.unit
         self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
-        for point in mechanism.points:
-            if (
-                point.name in request.points or point.name in driven
-            ) and point.body in self.part_of:
-                self.points[self.part_of[point.body]].append(point.name)
-        sections = [self._section(k, part, origins) for k, part in enumerate(self.parts)]
-        alike: dict[object, list[int]] = {}
-        for k, each in enumerate(sections):
-            alike.setdefault(each.signature, []).append(k)
+        numbers: list[list[float]] = [[] for _ in self.parts]
+        alike: dict[Hashable, list[int]] = {}
+        for k, part in enumerate(self.parts):
+            alike.setdefault(structure(part.section, numbers[k]), []).append(k)
         self.kinds: list[ComponentType] = []
         rows = 0
         for members in alike.values():
-            kind = self._kind([sections[k] for k in members], members, rows)
+            kind = self._kind(members, np.array([numbers[k] for k in members]), rows)
             self.kinds.append(kind)
             rows += len(members) * kind.model.kept
         self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
@@ -182,7 +173,7 @@ class ComponentLanes(Lanes):
             rows += account.rows * len(kind.members)
             for part in (self.parts[k] for k in kind.members):
                 # as they are called in a section
-                joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}
+                joints = {f"j{k}": name for k, name in enumerate(part.joints)}
                 named = (name.partition(":") for name in account.redundant_rows)
                 redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
             which = f"components like that of {like} ({len(kind.members)})"
@@ -196,35 +187,19 @@ class ComponentLanes(Lanes):
             "program": sizes,
         }
 
-    def _section(self, k: int, part: Component, origins: dict[str, Vector]) -> Section:
-        points = [self.mechanism.point(name) for name in self.points[k]]
-        wanted = [self.mechanism.body(name) for name in part.bodies if name in self.request.bodies]
-        return section(part, self.unit, origins, points, wanted)
-
-    def _kind(
-        self, sections: Sequence[Section], members: Sequence[int], base: int
-    ) -> ComponentType:
-        first, values = sections[0], [places(each.mechanism) for each in sections]
-        varied = tuple(
-            place
-            for place, value in values[0].items()
-            if any(each[place] != value for each in values)
-        )
-        m, part = first.mechanism, self.parts[members[0]]
+    def _kind(self, members: Sequence[int], numbers: Array, base: int) -> ComponentType:
+        first = self.parts[members[0]].section
+        varied = np.flatnonzero((numbers != numbers[0]).any(axis=0))
         request = Request(
-            tuple(driver.name for driver in m.drivers),
-            tuple(f"p{k}" for k in range(len(self.points[members[0]]))),
-            tuple(f"b{k}" for k, name in enumerate(part.bodies) if name in self.request.bodies),
+            tuple(first.drivers),
+            tuple(first.points),
+            tuple(first.outputs),
             compiled=self.request.compiled,
             last_iteration=self.request.last_iteration,
             state=True,
-            varied=varied,
         )
-        model = compile_model(m, request, first)
-        numbers = np.array(
-            [[x for place in varied for x in each[place]] for each in values]
-        ).reshape(len(members), -1)
-        lanes = model.standing(numbers.T)
+        model = compile_model(self.mechanism, request, Alike(first, varied.tolist()))
+        lanes = model.standing(numbers[:, varied].T)
         if np.isnan(lanes).any():
             worst = self.parts[members[int(np.isnan(lanes).any(axis=0).argmax())]]
             raise SolveError(
@@ -273,7 +248,7 @@ class ComponentLanes(Lanes):
         for name in request.points:
             point = self.mechanism.point(name)
             part = self.part_of.get(point.body)
-            own = "" if part is None else f"p{self.points[part].index(name)}"
+            own = "" if part is None else f"p{self.parts[part].points.index(name)}"
             add(name, part, own, QUANTITIES[: request.order + 1], {"position": point.position})
         for name in request.bodies:
             body, part = self.mechanism.body(name), self.part_of.get(name)
@@ -357,7 +332,7 @@ class ComponentLanes(Lanes):
                 what, own = name.split(" ", 1)
                 if what == "x":
                     joint, _, coordinate = own.rpartition(".")
-                    whole = f"x {part.joints[int(joint[1:])].name}.{coordinate}"
+                    whole = f"x {part.joints[int(joint[1:])]}.{coordinate}"
                 else:
                     whole = f"{what} {part.bodies[int(own[1:])]}"
                 length = what == "u" or name.endswith(".translation")

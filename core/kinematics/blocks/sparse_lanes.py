@@ -27,7 +27,7 @@ from ..compiled.request import ACCEPT, MAX_ITERATIONS, Request
 from ..compiled.solution import Columns
 from ..compiled.step_programs import ABOUT
 from ..continuation.segments import BETTER, SEEN
-from ..continuation.singular_poses import SOUND, Numbers
+from ..continuation.singular_poses import SOUND, Anchor, Numbers
 from ..continuation.walk import failure_kind
 from ..formulation.acceptance_criteria import (
     AMPLIFIED,
@@ -43,11 +43,11 @@ from ..formulation.acceptance_criteria import (
     slope_between,
 )
 from ..formulation.constraints import measured
-from ..formulation.formulation import row_names
+from ..formulation.relative import row_names
 from ..formulation.state_vectors import turns
 from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
 from ..structure.sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
-from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
 POSES = 8
 """Poses evaluated together: samples that are so far from the last one are still predicted well."""
@@ -61,33 +61,27 @@ FEW = 5
 STEPS = 3
 
 
-@dataclass(frozen=True, eq=False)
 class Rows:
     """A choice of the rows to solve.
 
+    Args:
+        kept: the solved ones.
+        entries: of all rows at one pose; several lanes are factored in the order of that pose.
+
     Attributes:
-        kept, dropped: solved rows, and redundant rows.
+        dropped: redundant rows.
         pattern, blocks: of the solved ones.
     """
 
-    kept: Indices
-    dropped: Indices
-    pattern: Pattern
-    blocks: Blocks
-
-    @staticmethod
-    def of(kept: Indices, system: System, entries: Array, *, compiled: bool) -> Rows:
-        """Return the choice of these rows; several lanes are factored in the order of a pose with
-        these entries of all rows.
-        """
+    def __init__(self, kept: Indices, system: System, entries: Array, *, compiled: bool) -> None:
         count = len(system.tracer.formulation.owners)
         place = np.full(count, -1, np.intp)
         place[kept] = np.arange(len(kept))
         solved = np.flatnonzero(place[system.rows] >= 0)
         square = place[system.rows[solved]], system.columns[solved], len(kept), solved
         values = entries if compiled else None
-        dropped = np.setdiff1d(np.arange(count), kept)
-        return Rows(kept, dropped, Pattern(*square, values), Blocks(*square, values))
+        self.kept, self.dropped = kept, np.setdiff1d(np.arange(count), kept)
+        self.pattern, self.blocks = Pattern(*square, values), Blocks(*square, values)
 
     def begin(self) -> None:
         """Forget the orders of before."""
@@ -263,19 +257,8 @@ class SparseLanes(Lanes):
                 FailureKind.NOT_CLOSED,
             )
         none = np.zeros((self.rows.blocks.count, 1))
-        return Poses(
-            sample,
-            sample[0],
-            found.state,
-            found.state,
-            zero,
-            zero,
-            none,
-            none,
-            none,
-            none,
-            sample[0],
-        ).lane(0)
+        poses = (found.state, found.state, zero, zero), (none, none, none, none)
+        return Poses(sample, sample[0], *poses[0], *poses[1], sample[0]).lane(0)
 
     def _independent(self, entries: Array, count: int) -> Indices | None:
         system = self.system
@@ -283,7 +266,7 @@ class SparseLanes(Lanes):
         return null.independent_rows(len(self.mechanism.drivers))
 
     def _rows_of(self, kept: Indices, entries: Array) -> Rows:
-        return Rows.of(kept, self.system, entries, compiled=self.request.compiled)
+        return Rows(kept, self.system, entries, compiled=self.request.compiled)
 
     @property
     def _redundant(self) -> list[str]:
@@ -328,18 +311,18 @@ class SparseLanes(Lanes):
             raise SingularError("a block is exactly singular")
         known = len(here.sigmas) == len(sigmas)
         largest = np.maximum(here.largest, sigmas) if known else sigmas
-        self.here = Poses(
-            sample[:, 0],
-            sample[0, 0],
-            here.state,
-            here.state,
-            found.rates[:, 0],
-            found.accelerations[:, 0],
-            sigmas,
-            here.slopes if known else np.zeros_like(sigmas),
-            largest,
-            largest,
-            sign,
+        self.here = replace(
+            here,
+            sample=sample[:, 0],
+            earlier=sample[0, 0],
+            taylor=here.state,
+            rates=found.rates[:, 0],
+            accelerations=found.accelerations[:, 0],
+            sigmas=sigmas,
+            slopes=here.slopes if known else np.zeros_like(sigmas),
+            largest=largest,
+            high=largest,
+            sign=sign,
         )
         if not len(found.regular):
             raise SingularError("exactly singular")

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -26,7 +26,7 @@ from ..compiled.solution import Columns, solution
 from ..continuation.singular_poses import (
     CONTINUED,
     NEARLY,
-    Numbers,
+    Anchor,
     Passage,
     interpolated,
     listed,
@@ -40,29 +40,6 @@ WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
 CLOSURES, SIGMAS, MARGINS = (WORST.index(name) for name in ("closure", SIGMA, MARGIN))
 """Rows of those."""
 Indices = NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class Anchor:
-    """The pose before the lanes, to be restored later.
-
-    Attributes:
-        time: of the pose [s].
-        pose: of all blocks, as the lanes keep it.
-        motions: the wanted motions there, shape (columns,); none if they were not taken along.
-        error: a bound of its error by its tests [units].
-    """
-
-    time: float
-    pose: Any
-    _numbers: Callable[[Any], Numbers]
-    motions: Array = field(default_factory=lambda: np.empty(0))
-    error: float = 0.0
-
-    @property
-    def numbers(self) -> Numbers:
-        """The numbers of all blocks."""
-        return self._numbers(self.pose)
 
 
 class Lanes(ABC):
@@ -94,8 +71,11 @@ class Lanes(ABC):
         """
         return self.attempt_at(self.sampled(times, path))
 
-    def accept(self, tol: float, *, crossing: bool = False) -> None:
-        """Set the tolerance, and whether a singular pose may be crossed."""
+    def stand_at(self, anchor: Anchor, tol: float, *, crossing: bool = False) -> None:
+        """Set the pose before the lanes, the tolerance, and whether a singular pose may be
+        crossed.
+        """
+        self.restore(anchor)
         self.accept_by(accept_by(tol, crossing=crossing))
 
     def begin(self) -> None:
@@ -312,8 +292,7 @@ class _Run:
         """
         lanes, path, times = self.lanes, side.path, side.times
         left, refused = np.arange(len(times)), list[int]()
-        lanes.restore(start)
-        lanes.accept(self.tol)
+        lanes.stand_at(start, self.tol)
         came: tuple[Anchor, Anchor | None] | None = None
         while len(left):
             ahead = BlockWalk(lanes, side, left, keep, start, self.tol, watch=watch)
@@ -335,15 +314,13 @@ class _Run:
             start = passed.poses[-1]
             beside = left[np.abs(times[left] - ahead.time) <= abs(start.time - ahead.time)]
             left = left[len(beside) :]
-            lanes.restore(start)
-            lanes.accept(self.tol)
+            lanes.stand_at(start, self.tol)
             back = BlockWalk(lanes, side, beside[::-1], keep, start, self.tol, watch=watch)
             reached, _ = back.run()
             for each in beside[: len(beside) - reached].tolist()[:BRIDGED]:
                 if not self.interpolate(side, each, ahead.sound, None):
                     refused.append(each)
-            lanes.restore(start)
-            lanes.accept(self.tol)
+            lanes.stand_at(start, self.tol)
             came = start, None
         if refused:
             places = listed([path.where(float(times[k])) for k in refused])
@@ -363,13 +340,12 @@ class _Run:
         way: float,
         *,
         rates: bool = True,
-    ) -> Passage[Anchor] | None:
+    ) -> Passage | None:
         """Pass a time on a path, see `continuation.singular_poses.pass_over`."""
         lanes, tol = self.lanes, self.tol
 
         def reach(at: Anchor, time: float, crossing: bool) -> Anchor | None:
-            lanes.restore(at)
-            lanes.accept(tol, crossing=crossing)
+            lanes.stand_at(at, tol, crossing=crossing)
             here = at.time
             # parts of a step over a singular pose at which the motion turns back end at the pose
             for _ in range(FEW if crossing else MOST):
@@ -504,8 +480,7 @@ class BlockSweep:
         way.
         """
         lanes, path, begin, run = self._lanes, self.path, self.start, _Run(self._lanes, CLOSED)
-        lanes.restore(lanes.design)
-        lanes.accept(CLOSED)
+        lanes.stand_at(lanes.design, CLOSED)
         if way := begin.lead:
             times = np.array([0.0, 1.0])
             lanes.depart(0.0, way)

@@ -11,7 +11,7 @@ import hashlib
 import os
 import pathlib
 import pickle
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
@@ -34,10 +34,9 @@ from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import samples
-from ..structure.components import Section
+from ..structure.components import Alike
 from ..structure.degrees_of_freedom import Selection
-from . import step_programs as acceptance
-from . import step_programs as predictor
+from . import step_programs
 from .request import (
     EARLIER,
     FROM,
@@ -92,7 +91,7 @@ class Tracing:
     frame: Frames
 
 
-def traced(mechanism: Mechanism, request: Request, section: Section | None = None) -> Tracing:
+def traced(mechanism: Mechanism, request: Request, alike: Alike | None = None) -> Tracing:
     """Select the rows and trace the programs of a request, or load them from the disk cache.
 
     Raises:
@@ -100,18 +99,17 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     """
     compiled = request.compiled and compiler.available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
-    if section or request.varied or not (is_builtin(mechanism) and compiled):
-        return _trace(mechanism, request, section, lanes)
+    if alike or request.varied or not (is_builtin(mechanism) and compiled):
+        return _trace(mechanism, request, alike, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
-    return kept(content, lambda: _packed(_trace(mechanism, request, None, lanes)), _unpacked)
 
+    def made() -> bytes:
+        return msgspec.msgpack.encode(_trace(mechanism, request, None, lanes), enc_hook=_plain)
 
-def _packed(tracing: Tracing) -> bytes:
-    return msgspec.msgpack.encode(tracing, enc_hook=_plain)
+    def read(whole: bytes) -> Tracing:
+        return msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
 
-
-def _unpacked(whole: bytes) -> Tracing:
-    return msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
+    return kept(content, made, read)
 
 
 def _plain(value: slice | np.generic) -> Any:
@@ -139,41 +137,31 @@ def source_files() -> list[str]:
     """Return the files of every folder imported by tracing; a test compares them."""
     # a new process reads them all: pathlib would take twice as long
     folders = ("primitives", "joints", "mechanism", "program", "kinematics")
-    nested = [name for folder in folders for name in _modules(os.path.join(CORE, folder))]
-    return sorted([*(each.path for each in os.scandir(CORE) if _is_module(each)), *nested])
+    walks = (os.walk(os.path.join(CORE, folder)) for folder in folders)
+    nested = (os.path.join(at, name) for walk in walks for at, _, names in walk for name in names)
+    own = (os.path.join(CORE, name) for name in os.listdir(CORE))
+    return sorted(name for name in (*own, *nested) if name.endswith(".py"))
 
 
-def _modules(folder: str) -> Iterator[str]:
-    for each in os.scandir(folder):
-        if _is_module(each):
-            yield each.path
-        elif each.is_dir():
-            yield from _modules(each.path)
-
-
-def _is_module(entry: os.DirEntry[str]) -> bool:
-    return entry.name.endswith(".py")
-
-
-def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:
+def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: int) -> Tracing:
     from .programs import Tracer  # with all that tracing takes: who finds it done does without
 
-    tracer = Tracer(mechanism, request, section)
-    programs = [tracer.newton(), predictor.predict(tracer)]
+    tracer = Tracer(mechanism, request, alike)
+    programs = [tracer.newton(), step_programs.predict(tracer)]
     # a lane needs v and a where the march goes on from it, whatever is asked for
     if request.order < 2:
         programs.append(tracer.tangent())
     if not request.state:
-        programs.append(predictor.extrapolate(tracer, lanes))
+        programs.append(step_programs.extrapolate(tracer, lanes))
     programs.append(tracer.outputs())
-    programs += acceptance.tests(tracer, neighbours=False)
+    programs += step_programs.tests(tracer, neighbours=False)
     if not request.state:  # parts of a mechanism are attempted lane by lane
-        programs += acceptance.tests(tracer, neighbours=True)
-    if request.varied:
+        programs += step_programs.tests(tracer, neighbours=True)
+    if tracer.geometry:
         programs.append(tracer.prepared.program())
         if not request.state:
-            programs.append(predictor.extend(tracer))
-    carried, continued = predictor.carried(tracer), predictor.continued(tracer)
+            programs.append(step_programs.extend(tracer))
+    carried, continued = step_programs.carried(tracer), step_programs.continued(tracer)
     tracer.layout.scalar(ITERATIONS)
     slots, vectors, state = tracer.layout.slots, tracer.layout.vectors, tracer.formulation.design
     sampled = [slots[TIME], *slots_of(vectors, (f"drive {name}" for name in request.drivers))]
@@ -184,13 +172,13 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None, lane
         {program.name: program for program in programs},
         slots,
         after=("outputs",),
-        alone=acceptance.ALONE,
-        joined=() if request.state else acceptance.JOINED,
+        alone=step_programs.ALONE,
+        joined=() if request.state else step_programs.JOINED,
         onward=("outputs" if request.order == 2 else "tangent",),
-        sampled=[*sampled, *vectors.get(predictor.WEIGHT, ())],
+        sampled=[*sampled, *vectors.get(step_programs.WEIGHT, ())],
         behind=groups_behind(lanes),
-        remembered=slots_of(vectors, state) if predictor.PAST in vectors else (),
-        past=vectors.get(predictor.PAST, (0,))[0],
+        remembered=slots_of(vectors, state) if step_programs.PAST in vectors else (),
+        past=vectors.get(step_programs.PAST, (0,))[0],
         carried=carried,
         continued=continued,
         kept=[*slots_of(vectors, motions), *(slots[name] for name in tests)],
@@ -228,7 +216,7 @@ NONE_VARIED = np.empty((0, 1))
 STILL = Path({}, np.zeros(1))
 
 
-def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
+def compile_model(mechanism: Mechanism, request: Request, alike: Alike | None = None) -> Model:
     """Select the rows and trace the programs of a request.
 
     Raises:
@@ -237,7 +225,7 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
     """
     if request.compiled and available():
         make_loops_ready()
-    return Model(mechanism, request, traced(mechanism, request, section))
+    return Model(mechanism, request, traced(mechanism, request, alike))
 
 
 @keep_last(RECENT)

@@ -28,7 +28,7 @@ from ..formulation.constraints import Style
 from ..formulation.formulation import Configuration
 from ..formulation.state_vectors import samples
 from .compiled_model import Model, is_builtin
-from .elements import AFTER, GEOMETRY, linked
+from .elements import AFTER, GEOMETRY, Elements
 from .programs import Tracer
 from .request import FROM, RATE, RATE_T, TIME, kept_forces, kept_motions
 
@@ -87,7 +87,7 @@ class System:
             to compile so many operations than they ever run.
 
     Attributes:
-        conditions: see `Formulation`.
+        conditions: see `Cartesian`.
         unknowns: n.
         names: by vector of the state, its numbers in a state.
         rows, columns: of the entries of the Jacobian.
@@ -110,7 +110,7 @@ class System:
         tables, self._geometry, after = None, np.empty((0, 1)), ""
         native = tracer.request.style is Style.NATIVE and is_builtin(tracer.mechanism)
         if compiled and native and isinstance(formulation, Cartesian):
-            found = linked(formulation, tracer.layout, vector_width())
+            found = Elements(formulation, tracer.layout, vector_width())
             self.rows, self.columns, self.sizes = found.rows, found.columns, {**found.sizes}
             self._geometry, after = found.geometry[:, None], AFTER
             last = bytecode(outputs, len(tracer.layout.slots), vector_width())

@@ -18,8 +18,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, reduce
 from typing import Any
 
-from ...algebra import Scalar, Vec3, quat, vec
-from ...mechanism.mechanism import Mechanism, Vector
+from ...algebra import Scalar, quat, vec
+from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
 from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, minimum, program
 from ...trajectory import QUANTITIES
@@ -30,15 +30,14 @@ from ..formulation.constraints import Frames, Style, constraints, frames
 from ..formulation.formulation import (
     GROUND_ACCELERATION,
     Acceleration,
-    Formulation,
     State,
     motion_of_frame,
     motion_of_point,
 )
 from ..formulation.parameters import every_place, placed
-from ..formulation.relative import Relative
+from ..formulation.relative import Formulation, Relative
 from ..formulation.state_vectors import turns
-from ..structure.components import Section, select_section
+from ..structure.components import Alike, select_section
 from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import (
     BLOCKS,
@@ -59,7 +58,8 @@ class Tracer:
     """One tape for all programs: shared operations are recorded once.
 
     Args:
-        frame: of the lengths, if it is not that of the section or of the mechanism's size.
+        alike: sections of the mechanism, to be solved instead of the whole of it.
+        frame: of the lengths, if it is not that of the mechanism's size.
         selection: of the rows, if it is known.
 
     Attributes:
@@ -70,37 +70,48 @@ class Tracer:
         self,
         mechanism: Mechanism,
         request: Request,
-        section: Section | None = None,
+        alike: Alike | None = None,
         *,
         frame: Frames | None = None,
         selection: Selection | None = None,
     ) -> None:
         self.request, self.tape, self.layout = request, Tape(), Layout()
-        self.mechanism, self._section = mechanism, section
-        self.frame = frame or (section.frame(mechanism) if section else frames(mechanism))
-        self.prescribed: Mapping[str, PrescribedBody] = (
-            {name: PrescribedBody() for name in section.given} if section else {}
-        )
+        self.mechanism, self._alike = mechanism, alike
         # the angle of a torsional spring is a coordinate, followed through any number of turns
         self.named = angles(mechanism) if request.forces else []
-        self._described = mechanism, self.frame, self.prescribed  # without traced numbers
         if selection is not None:
             self.selection = selection
-        known = every_place(mechanism)
-        self.geometry = {place: known[place] for place in request.varied}
+        if alike:
+            self.frame = Frames(alike.first.unit, {}, alike.first.bodies)
+            known = alike.numbers
+            self.geometry = {"geometry": [known[k] for k in alike.varied]} if alike.varied else {}
+        else:
+            self.frame, known = frame or frames(mechanism), every_place(mechanism)
+            self.geometry = {place: known[place] for place in request.varied}
+        self._described = mechanism, self.frame  # without traced numbers
         given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
         slots = {slot for place in given for slot in self.layout.vectors[place]}
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)
-        if given:
-            self.mechanism = placed(mechanism, given)
-            self.frame = (
-                section.frame(self.mechanism)
-                if section
-                else frames(self.mechanism, self.frame.unit)
-            )
-        self.prescribed = {name: self._moved(name) for name in self.prescribed}
+        self.prescribed = {name: self._moved(name) for name in (alike.first.given if alike else ())}
         self.drives = {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
-        self.formulation = self._formulate(self.mechanism, self.frame, self.prescribed, self.drives)
+        if alike:
+            section = alike.with_numbers(given.get("geometry", ()))
+            self.formulation = section.formulation(self.prescribed, self.drives)
+            self._points, self._bodies = section.points, section.outputs
+        else:
+            if given:
+                self.mechanism = placed(mechanism, given)
+                self.frame = frames(self.mechanism, self.frame.unit)
+            self.formulation = self._formulate(self.mechanism, self.frame, self.drives)
+            points = map(self.mechanism.point, request.points)
+            bodies = map(self.mechanism.body, request.bodies)
+            self._points = {
+                each.name: (each.body, *self.frame.end(each.body, each.position)) for each in points
+            }
+            self._bodies = {
+                each.name: (*self.frame.end(each.name, each.origin), quat(each.euler_parameters))
+                for each in bodies
+            }
         design = self.formulation.design
         for label in BLOCKS:
             for name, value in design.items():
@@ -111,16 +122,12 @@ class Tracer:
         self.unknowns = self.formulation.unknowns
 
     def _formulate(
-        self,
-        mechanism: Mechanism,
-        frame: Frames,
-        prescribed: Mapping[str, PrescribedBody],
-        drives: Mapping[str, Drive],
+        self, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive]
     ) -> Formulation:
         found = constraints(mechanism, frame, drives, self.request.style, self.named)
         if self.request.style is Style.RELATIVE:
             return Relative.of(mechanism, frame, found)
-        return Cartesian(found, frame.moving, prescribed=prescribed)
+        return Cartesian(found, frame.moving)
 
     def _moved(self, name: str) -> PrescribedBody:
         """A prescribed body, its motion read from slots."""
@@ -152,11 +159,10 @@ class Tracer:
     @cached_property
     def selection(self) -> Selection:
         """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
-        mechanism, frame, _ = self._described
+        if self._alike:
+            return select_section(self._alike.first)
         formulation = self._formulate(*self._described, {})
-        if self._section:
-            return select_section(mechanism, formulation)
-        return select_rows(mechanism, frame, formulation, self.request.rows)
+        return select_rows(*self._described, formulation, self.request.rows)
 
     def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]
@@ -248,10 +254,10 @@ class Tracer:
         )
 
     def _outputs(
-        self, v: Sequence[Scalar], a: Sequence[Scalar], found: Mapping[int, Scalar]
+        self, v: Sequence[Scalar], a: Sequence[Scalar], tests: Mapping[int, Scalar]
     ) -> Program:
         out = {
-            **found,
+            **tests,
             self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
         }
         twists = self.formulation.twists(self.at, v)
@@ -261,22 +267,15 @@ class Tracer:
             pose, twist = self.at.poses.get(body, GROUND_POSE), twists.get(body, GROUND_TWIST)
             return pose, twist, accelerations.get(body, GROUND_ACCELERATION)
 
-        def of_point(body: str, position: Vector) -> tuple[Vec3, Vec3, Vec3]:
-            return motion_of_point(
-                position, self.frame.arm(body, position), self.frame.unit, *moving(body)
-            )
-
-        for name in self.request.points:
-            point = self.mechanism.point(name)
-            self._store_motion(out, QUANTITIES, name, of_point(point.body, point.position))
-        for name in self.request.bodies:
-            body = self.mechanism.body(name)
-            self._store_motion(out, ("r", "rdot", "rddot"), name, of_point(name, body.origin))
+        unit = self.frame.unit
+        for name, (body, position, arm) in self._points.items():
+            found = motion_of_point(position, arm, unit, *moving(body))
+            self._store_motion(out, QUANTITIES, name, found)
+        for name, (position, arm, p) in self._bodies.items():
+            found = motion_of_point(position, arm, unit, *moving(name))
+            self._store_motion(out, ("r", "rdot", "rddot"), name, found)
             self._store_motion(
-                out,
-                ("p", "omega", "omega_t"),
-                name,
-                motion_of_frame(quat(body.euler_parameters), *moving(name)),
+                out, ("p", "omega", "omega_t"), name, motion_of_frame(p, *moving(name))
             )
         if self.request.forces:
             states = BodyStates(self.frame, self.at.poses, twists, accelerations)

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ...program import ITERATIONS, MARGIN
+from ...algebra import Scalar
+from ...program import ITERATIONS, MARGIN, Program, Tape, program
 from ...trajectory import QUANTITIES
 from ..forces.wanted import WantedForces
 from ..formulation.constraints import Style
@@ -139,6 +140,12 @@ class Layout:
     def vector(self, name: str, count: int = 3) -> list[int]:
         """The slots of a vector's components."""
         return self.vectors.setdefault(name, [self.scalar(f"{name}.{k}") for k in range(count)])
+
+    def program(self, name: str, tape: Tape, vectors: Mapping[str, Sequence[Scalar]]) -> Program:
+        """Return a program of vectors by name."""
+        slots = [k for vector, each in vectors.items() for k in self.vector(vector, len(each))]
+        values = [x for each in vectors.values() for x in each]
+        return program(name, tape, dict(zip(slots, values, strict=True)))
 
 
 TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)

@@ -17,10 +17,10 @@ from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Drive
 from ...program import Elimination, absolute, maximum
-from ..forces.equations import BodyStates, ForceEquations, at_work, powers
+from ..forces.equations import BodyStates, ForceEquations, powers
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import Cartesian
-from ..formulation.constraints import Frames, constraints
+from ..formulation.constraints import Frames
 from ..formulation.formulation import Configuration
 from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
@@ -64,8 +64,7 @@ def native_rows(
     mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], at: Configuration
 ) -> Rows:
     """Return the native rows of a mechanism whose motion is solved in another style."""
-    found = constraints(mechanism, frame, drives, named=angles(mechanism))
-    formulation = Cartesian(found, frame.moving)
+    formulation = Cartesian.of(mechanism, frame, drives, named=angles(mechanism))
     selection = select_rows(mechanism, frame, formulation)
     rows = formulation.rows(at)
     factor = Elimination([rows[k] for k in selection.chosen])
@@ -90,10 +89,7 @@ class TracedForces:
         drives: Mapping[str, Drive],
     ) -> None:
         self._mechanism, self._rows, self._states, self._drives = mechanism, rows, states, drives
-        applied = at_work(mechanism, states, lambda joint: at.state[f"x {joint}.rotation"][0])
-        self._equations = ForceEquations(
-            mechanism, rows.formulation, at, states, applied, Cartesian((), ())
-        )
+        self._equations = ForceEquations.traced(mechanism, rows.formulation, at, states)
 
     @cached_property
     def _multipliers(self) -> list[Scalar]:

@@ -45,6 +45,8 @@ STATIONARY = 1e-9
 # Beside a bifurcation, poses are taken at multiples of this: there sigma, about as large, costs two
 # digits, and a polynomial through eight of them is exact to about 1e-16.
 NODE = 0.01
+PLACES = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
+"""Eight places around a singular pose, in parts of a way beside it."""
 # Cubics through the four nodes on either side are off by about NODE ** 4 where the nodes begin:
 # their zeros meet at a bifurcation.
 MEETS = 1e-6
@@ -238,8 +240,7 @@ class ArclengthWalk:
         """Return spots on both sides of a length from the first, and their lengths; None if any is
         not reached.
         """
-        steps = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
-        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * steps
+        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * PLACES
         found = [self.advance(before, centre + offset) for offset in offsets.tolist()]
         spots = [spot for spot in found if spot is not None]
         return (offsets, spots) if len(spots) == len(found) else None

@@ -21,7 +21,7 @@ from ...mechanism.motions import Path
 from ...trajectory import Array
 from ..compiled.compiled_model import Model, recent_model
 from ..compiled.dense_equations import system_of
-from ..compiled.request import CONSISTENT, FROM, LARGEST_SIGMA, SIGMA, TIME
+from ..compiled.request import CONSISTENT, FROM, LARGEST_SIGMA, SIGMA
 from ..compiled.routes import Route
 from ..formulation.acceptance_criteria import LOW, doubtful, in_question
 from ..formulation.cartesian import Cartesian
@@ -30,7 +30,7 @@ from ..formulation.formulation import Condition
 from ..formulation.state_vectors import jacobian, standing_drives
 from ..structure.redundancy import independent_rows
 from .singular_poses import bridge, onward
-from .walk import End, March, arrived, led, march
+from .walk import End, March, arrived, led, march, time_of
 
 # A motion that ends with a smallest singular value above this part of the largest that it has had
 # does not end at a singular pose.
@@ -46,53 +46,42 @@ BETTER = 3.0
 AS_GOOD = 0.3
 
 
-class Choice:
-    """The rows of a motion so far.
+def with_better_rows(route: Route, lane: Array, path: Path, models: list[Model]) -> Route | None:
+    """Return the route from the pose of a lane on another one along a path, with rows chosen there;
+    None if none are better.
 
-    Attributes:
-        models: one for each choice of rows; the first is the motion's own.
+    Args:
+        models: one for each choice of rows of the motion so far; a new one is added.
     """
-
-    def __init__(self, model: Model) -> None:
-        self.models = [model]
-
-    def anew(self, route: Route, lane: Array, path: Path) -> Route | None:
-        """Return the route from the pose of a lane on another one along a path, with rows chosen
-        there; None if none are better.
-        """
-        model, slots, time = route.model, route.model.slots, _time(route, lane)
-        if not model.selection.dropped:
-            return None
-        system, sample = system_of(model), route.sampled(np.array([time]))
-        (matrix,) = system.jacobian(system.evaluate(system.state(lane[:, None]), sample)[2])
-        if not np.isfinite(matrix).all():
-            return None
-        largest = float(lane[slots[FROM + LARGEST_SIGMA]])
-        least = max(BETTER * _sigma(matrix, model.selection.chosen), SEEN * largest)
-        if not _sigma(matrix, range(len(matrix))) > least:
-            return None
-        known = {each.selection.chosen: each for each in self.models}
-        rows = chosen(matrix, [*known], len(model.mechanism.drivers), system.conditions)
-        sigma = _sigma(matrix, rows)
-        if not sigma > least:
-            return None
-        best = known.get(rows)
-        if best is None:
-            best = recent_model(model.mechanism, replace(model.request, rows=rows))
-            self.models.append(best)
-        stands = _standing(
-            best,
-            {name: lane[model.vectors[FROM + name]] for name in model.state},
-            sample,
-            NEAR * sigma,
-        )
-        if stands is None:
-            return None
-        # beside a corner all rows are nearly singular: the scale is that of the motion, not of what
-        # it is there
-        for name in (LARGEST_SIGMA, FROM + LARGEST_SIGMA):
-            stands[best.slots[name]] = max(stands[best.slots[name]], largest)
-        return Route(best, path, stands, time)
+    model, time = route.model, time_of(route.model, lane)
+    if not model.selection.dropped:
+        return None
+    system, sample = system_of(model), route.sampled(np.array([time]))
+    (matrix,) = system.jacobian(system.evaluate(system.state(lane[:, None]), sample)[2])
+    if not np.isfinite(matrix).all():
+        return None
+    largest = float(lane[model.slots[FROM + LARGEST_SIGMA]])
+    least = max(BETTER * _sigma(matrix, model.selection.chosen), SEEN * largest)
+    if not _sigma(matrix, range(len(matrix))) > least:
+        return None
+    known = {each.selection.chosen: each for each in models}
+    rows = chosen(matrix, [*known], len(model.mechanism.drivers), system.conditions)
+    sigma = _sigma(matrix, rows)
+    if not sigma > least:
+        return None
+    best = known.get(rows)
+    if best is None:
+        best = recent_model(model.mechanism, replace(model.request, rows=rows))
+        models.append(best)
+    state = {name: lane[model.vectors[FROM + name]] for name in model.state}
+    stands = _standing(best, state, sample, NEAR * sigma)
+    if stands is None:
+        return None
+    # beside a corner all rows are nearly singular: the scale is that of the motion, not of what it
+    # is there
+    for name in (LARGEST_SIGMA, FROM + LARGEST_SIGMA):
+        stands[best.slots[name]] = max(stands[best.slots[name]], largest)
+    return Route(best, path, stands, time)
 
 
 def chosen(
@@ -103,7 +92,7 @@ def chosen(
 
     Args:
         matrix: Jacobian of all rows, the drivers' last.
-        conditions: see `Formulation`.
+        conditions: see `Cartesian`.
     """
     best = max(known, key=lambda rows: _sigma(matrix, rows))
     if _sigma(matrix, best) >= AS_GOOD * _sigma(matrix, range(len(matrix))):
@@ -193,14 +182,14 @@ class Followed:
         found: the samples, with those reached beyond ends.
         parts: the first is the wanted route, from its start on the path.
         part_of: the part of each sample, shape (n,).
-        choice: of rows.
+        models: one for each choice of rows.
         ends: the remaining ends.
         passages, stuck: ends at which singular poses are passed, and samples near them.
     """
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
-        self.choice = Choice(route.model)
+        self.models = [route.model]
         stands = led(route, tol)
         self.parts = [
             Part(stands if isinstance(stands, Route) else route, np.arange(len(self.times)))
@@ -253,7 +242,7 @@ class Followed:
         without = 0
         while left and without < WITHOUT:
             here, samples = left[0], np.array(left)
-            route = self.choice.anew(routes[here], lanes[here], self._path(samples))
+            route = with_better_rows(routes[here], lanes[here], self._path(samples), self.models)
             if route is None:
                 without += 1
                 left = left[1:]
@@ -278,7 +267,7 @@ class Followed:
         path = end.route.path if number is None else self._path(missing)
         other = None
         if self.renewed < MOST:
-            other = self.choice.anew(end.route, end.lane, path)
+            other = with_better_rows(end.route, end.lane, path, self.models)
         if other is not None:
             self.renewed += 1
             if number is None:
@@ -300,7 +289,7 @@ class Followed:
         if passed is None:
             return None
         self.passages.append(end)
-        over = onward(end.route.model, passed.poses[-1].lane, path)
+        over = onward(end.route.model, passed.poses[-1].pose, path)
         if number is None:
             return self._arrive(over)
         ends, beyond = self._follow(over, missing), over.start
@@ -400,8 +389,3 @@ class Followed:
     def _number(self, route: Route) -> int | None:
         """Return the number of the part on a route; None on the way to the start."""
         return next((k for k, part in enumerate(self.parts) if part.route is route), None)
-
-
-def _time(route: Route, lane: Array) -> float:
-    """At which a lane stands on a route."""
-    return float(lane[route.model.slots[FROM + TIME]])

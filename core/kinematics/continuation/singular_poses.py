@@ -19,9 +19,9 @@ singular one does not lie on the polynomial.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,8 @@ from ..compiled.dense_equations import System, system_of
 from ..compiled.request import FROM, RATE, SIGMA, TESTS, TIME, slots_of
 from ..compiled.routes import Route
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
-from .walk import arrived, march
+from .pseudo_arclength import PLACES
+from .walk import arrived, march, time_of
 
 # Of what is largest, in a combination of rows or a motion: smaller shares are not named.
 SHARE = 0.1
@@ -281,7 +282,6 @@ def _finite(jacobian: Array) -> Array:
 # accuracy by the motion's curvature, short ones by the poses' own nearness to the singular one; the
 # first that is accurate enough is taken.
 NODES = (0.02, 0.01, 0.005, 0.002)
-PLACES = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
 # Lagrange's weights at the middle of the eight, and of the inner six: the values differ by the
 # error of the latter. Rounding adds up to 2.7 times its size in a value, to 0.46 times in the
 # difference, which may be less by chance: thirty differences cover both.
@@ -308,35 +308,31 @@ class Numbers(NamedTuple):
     rates: Array
 
 
-class Followed(Protocol):
-    """A pose of a motion that goes on from it."""
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """A pose of a motion that goes on from it.
 
-    @property
-    def time(self) -> float:
-        """The time of the pose on its path [s]."""
-        ...
+    Attributes:
+        time: of the pose on its path [s].
+        pose: as its solver keeps it.
+        motions: the wanted motions there, shape (rows,); none if they were not taken along.
+        error: a bound of its error by its tests [units].
+    """
+
+    time: float
+    pose: Any
+    _numbers: Callable[[Any], Numbers]
+    motions: Array = field(default_factory=lambda: np.empty(0))
+    error: float = 0.0
 
     @property
     def numbers(self) -> Numbers:
         """The numbers of the pose."""
-        ...
-
-    @property
-    def motions(self) -> Array:
-        """The motions wanted there, shape (rows,); not read of the first pose."""
-        ...
-
-    @property
-    def error(self) -> float:
-        """A bound of the error of the pose by its tests [units]; not read of the first pose."""
-        ...
-
-
-AnyPose = TypeVar("AnyPose", bound=Followed)
+        return self._numbers(self.pose)
 
 
 @dataclass(frozen=True, eq=False)
-class Passage(Generic[AnyPose]):
+class Passage:
     """A singular pose on a motion.
 
     Attributes:
@@ -345,24 +341,24 @@ class Passage(Generic[AnyPose]):
         error: bound of their errors: of the pose by the mechanism's size, of rates by their own.
     """
 
-    poses: Sequence[AnyPose]
+    poses: Sequence[Anchor]
     motions: Array
     error: float
 
 
-Reach = Callable[[AnyPose, float, bool], AnyPose | None]
+Reach = Callable[[Anchor, float, bool], Anchor | None]
 """Goes from a pose to a time, over a singular pose if that is true; None if it is out of reach."""
 
 
 def pass_over(
-    sound: AnyPose,
+    sound: Anchor,
     near: tuple[Array, float] | None,
     time: float,
     way: float,
-    reach: Reach[AnyPose],
+    reach: Reach,
     measure: Callable[[Array, float], float],
     limit: float,
-) -> Passage[AnyPose] | None:
+) -> Passage | None:
     """Return the passage over a singular pose, or None if the motion is not known to go on, or not
     well enough.
 
@@ -391,13 +387,17 @@ def pass_over(
             for x in (state, rates)
         )
         error = max(*(pose.error for pose in poses), measure(whole, speed))
-        if smooth and error <= limit and (near is None or _on_curve(state, *near)):
+        middle, on_curve = state @ EIGHT, True
+        if near is not None:
+            known = COVERED * np.abs(state @ (EIGHT - SIX)) + near[1]
+            on_curve = (np.abs(middle - near[0]) <= known).all()
+        if smooth and error <= limit and on_curve:
             return Passage(poses, whole @ EIGHT, error)
     return None
 
 
-def _eight(sound: AnyPose, times: Array, reach: Reach[AnyPose]) -> Sequence[AnyPose] | None:
-    here, found = sound, list[AnyPose]()
+def _eight(sound: Anchor, times: Array, reach: Reach) -> Sequence[Anchor] | None:
+    here, found = sound, list[Anchor]()
     for k, time in enumerate(times.tolist()):
         after = reach(here, time, k == BEYOND)
         if after is None:
@@ -406,50 +406,16 @@ def _eight(sound: AnyPose, times: Array, reach: Reach[AnyPose]) -> Sequence[AnyP
     return found
 
 
-def _on_curve(eight: Array, near: Array, error: float) -> bool:
-    """Return whether a state, known to an error, is on the polynomial through eight others at the
-    middle time.
-    """
-    known = COVERED * np.abs(eight @ (EIGHT - SIX)) + error
-    return bool((np.abs(eight @ EIGHT - near) <= known).all())
-
-
 def onward(model: Model, lane: Array, path: Path) -> Route:
     """Return the route from a lane on a path along it."""
-    return Route(model, path, arrived(model, lane), float(lane[model.slots[FROM + TIME]]))
-
-
-@dataclass(frozen=True, eq=False)
-class RoutePose:
-    """A lane on a route as a pose; its motions are the kept rows (`Model.rows`)."""
-
-    model: Model
-    lane: Array
-    motions: Array
-
-    @property
-    def time(self) -> float:
-        """See `Followed`."""
-        return float(self.lane[self.model.slots[FROM + TIME]])
-
-    @property
-    def numbers(self) -> Numbers:
-        """See `Followed`: the rates of the unknowns alone."""
-        vectors = self.model.vectors
-        state = slots_of(vectors, (FROM + name for name in self.model.state))
-        return Numbers(self.lane[state], self.lane[vectors[FROM + RATE]])
-
-    @property
-    def error(self) -> float:
-        """See `Followed`."""
-        closure, sigma = (self.motions[self.model.rows[name].start] for name in ("closure", SIGMA))
-        return WORSE * float(max(closure, EPSILON) / sigma)
+    return Route(model, path, arrived(model, lane), time_of(model, lane))
 
 
 def bridge(
     route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True
-) -> Passage[RoutePose] | None:
-    """Pass a time on a route, from a lane; see `pass_over`.
+) -> Passage | None:
+    """Pass a time on a route, from a lane; see `pass_over`. Its motions are the kept rows
+    (`Model.rows`).
 
     Args:
         near: last followed lane.
@@ -457,19 +423,31 @@ def bridge(
             wants rates elsewhere.
     """
     model, known = route.model, None
+    state = slots_of(model.vectors, (FROM + name for name in model.state))
 
-    def reach(at: RoutePose, time: float, crossing: bool) -> RoutePose | None:
+    def numbers(lane: Array) -> Numbers:
+        return Numbers(lane[state], lane[model.vectors[FROM + RATE]])
+
+    def reach(at: Anchor, time: float, crossing: bool) -> Anchor | None:
         there = replace(route.path, times=np.array([time]))
-        found = march(onward(model, at.lane, there), tol, {0}, crossing=crossing)
-        return RoutePose(model, found.visited[0], found.kept[:, 0]) if found.visited else None
+        found = march(onward(model, at.pose, there), tol, {0}, crossing=crossing)
+        if not found.visited:
+            return None
+        closure, sigma = (found.kept[model.rows[name].start, 0] for name in ("closure", SIGMA))
+        error = WORSE * float(max(closure, EPSILON) / sigma)
+        after = found.visited[0]
+        return Anchor(time_of(model, after), after, numbers, found.kept[:, 0], error)
 
     if near is not None:
         system, at = system_of(model), near[[model.slots[FROM + TIME]]]
         solved = solve_closely(system, system.state(near[:, None]), route.sampled(at))
         known = solved.state[:, 0], WORSE * float(solved.error[0, 0])
-    sound = RoutePose(model, lane, np.empty(0))
+    sound = Anchor(time_of(model, lane), lane, numbers)
     measure = partial(interpolated, model.rows, model.frame.unit, rates=rates)
     return pass_over(sound, known, time, time - sound.time, reach, measure, AMPLIFIED * tol)
+
+
+ORDERS = {"velocity": 1, "rdot": 1, "omega": 1, "acceleration": 2, "rddot": 2, "omega_t": 2}
 
 
 def interpolated(
@@ -488,13 +466,7 @@ def interpolated(
     differences, off = np.abs(whole @ (EIGHT - SIX)), 0.0
     for name, at in rows.items():
         label = name.split(" ")[0]
-        order = (
-            1
-            if label in ("velocity", "rdot", "omega")
-            else 2
-            if label in ("acceleration", "rddot", "omega_t")
-            else 0
-        )
+        order = ORDERS.get(label, 0)
         if label in TESTS or (order and not rates):
             continue
         length = unit if label in (*QUANTITIES, "r", "rdot", "rddot") else 1.0

@@ -5,15 +5,15 @@ A curve is closed if it passes its beginning again, in the same direction.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ...dataset import Dataset, Variable
 from ...errors import SolveError, number_of
-from ...input_checks import names_of, no_such, require_kind, require_positive
+from ...input_checks import names_of, require_kind, require_known, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...tabular import Tabular
@@ -116,82 +116,9 @@ SAME_POSE = 0.02
 SMALL, ROUNDS = 1e-6, 8
 
 
-class Beginning:
-    """The first spot of a walk, and the plane across the curve there."""
-
-    def __init__(self, walk: ArclengthWalk, first: Spot, longest: float) -> None:
-        self.walk, self.first, self.longest = walk, first, longest
-        self._poses = walk.system.poses(first.state)
-        after = walk.system.poses(walk.system.stepped(first.state, SMALL * first.dq[:, None]))
-        self._way = (after - self._poses) / SMALL
-
-    def passed(self, before: Spot, after: Spot) -> Spot | None:
-        """Return the beginning as a spot at its length on the curve if the step between two spots
-        passes it, else None.
-        """
-        if float(self.first.dq @ after.dq) < SAME_WAY:
-            return None
-        change, change_after = self._change(before), self._change(after)
-        ahead, beyond = self._along(change), -self._along(change_after)
-        if not (ahead > 0.0 <= beyond and np.abs(change_after).max() <= 2.0 * self.longest):
-            return None
-        share = ahead / (ahead + beyond)
-        spot: Spot | None = None
-        h, apart = (
-            share * (after.arc - before.arc),
-            np.abs((1.0 - share) * change + share * change_after).max(),
-        )
-        for _ in range(ROUNDS):
-            spot = self.walk.advance(before, h)
-            # beside a branch point: where it is between the two spots is known well enough
-            if spot is None:
-                break
-            change = self._change(spot)
-            gap, apart = self._along(change), np.abs(change).max()
-            h += gap
-            if abs(gap) <= SMALL * SMALL:
-                break
-        if apart > SAME_POSE * self.longest:
-            return None
-        turned = before.time + share * (after.time - before.time) if spot is None else spot.time
-        return replace(self.first, arc=before.arc + h, time=turned)
-
-    def _change(self, spot: Spot) -> Array:
-        """Return the change from the pose of a spot to the beginning; Euler parameters p and -p are
-        the same.
-        """
-        there = self.walk.system.poses(spot.state)
-        there[:, 3:] *= np.where(
-            (there[:, 3:] * self._poses[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0
-        )
-        return self._poses - there
-
-    def _along(self, change: Array) -> float:
-        """Return the length of a change along the curve, to first order."""
-        return float((change * self._way).sum() / (self._way * self._way).sum())
-
-
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be
 # cheap, near enough to be drawn.
 LONGEST = 0.05
-
-
-@dataclass
-class _Trail:
-    """Spots of a walk, and events between them.
-
-    Attributes:
-        length: of a closed curve; infinite until it is known to be one.
-    """
-
-    spots: list[Spot]
-    events: list[Event] = field(default_factory=list[Event])
-    length: float = np.inf
-
-    @property
-    def closed(self) -> bool:
-        """Whether the walk came back to its first spot."""
-        return self.length < np.inf
 
 
 def trace(
@@ -223,9 +150,8 @@ def trace(
             design position, or an argument is invalid.
     """
     require_kind("trace", "mechanism", mechanism, Mechanism)
-    if driver not in (drivers := [each.name for each in mechanism.drivers]):
-        require_driven(mechanism)
-        raise no_such("trace", "driver", driver, drivers)
+    driven = partial(require_driven, mechanism)
+    require_known("trace", "driver", [driver], mechanism.drivers, driven)
     if direction not in (1, -1):
         raise SolveError(
             f"trace: direction is {direction}, expected 1 (the driver's value grows) or -1 (it"
@@ -233,21 +159,16 @@ def trace(
         )
     for name, given in (("length", length), ("longest", longest), ("tol", tol)):
         require_positive("trace", name, given)
-    there = [point.name for point in mechanism.points]
-    wanted = names_of("trace", "points", there if points is None else points)
-    for name in wanted:
-        if name not in there:
-            raise no_such("trace", "point", name, there)
+    every = [point.name for point in mechanism.points]
+    wanted = names_of("trace", "points", every if points is None else points)
+    require_known("trace", "point", wanted, mechanism.points)
     request = Request((driver,), wanted, order=0, style=Style(style), compiled=False)
     model = recent_model(mechanism, request)
     system = system_of(model)
     walk = ArclengthWalk(system, Path({driver: Ramp(1.0)}, np.zeros(1)), tol)
-    trail = _walked(
-        walk,
-        walk.begin(system.state(model.design[:, None], ahead=""), 0.0, direction),
-        length,
-        longest,
-    )
+    first = walk.begin(system.state(model.design[:, None], ahead=""), 0.0, direction)
+    trail = _Trail(walk, first, longest)
+    trail.follow(length)
     spots, reached = trail.spots, trail.spots[-1].arc
     message = (
         ""
@@ -262,7 +183,7 @@ def trace(
         driver=driver,
         arc=direction * np.array([spot.arc for spot in spots]),
         values=np.array([spot.time for spot in spots]),
-        sigma=_sigma(walk, spots),
+        sigma=np.linalg.svd(system.equations(*_stacked(walk, spots)).jacobian)[1][:, -1],
         points=_points(walk, spots),
         events=tuple(trail.events),
         closed=trail.closed,
@@ -280,9 +201,10 @@ def limit_ahead(
         spot = walk.begin(state, time, direction)
     except np.linalg.LinAlgError:
         return None
-    for before, after in pairwise(_from(spot, walk.along(spot, NEARBY, LONGEST, ATTEMPTS))):
-        if _turns_back(before, after):
-            return _event(walk, walk.limit(before, after))
+    for after in walk.along(spot, NEARBY, LONGEST, ATTEMPTS):
+        if _turns_back(spot, after):
+            return _event(walk, walk.limit(spot, after))
+        spot = after
     return None
 
 
@@ -294,23 +216,115 @@ NEARBY = 0.5
 ATTEMPTS = 100
 
 
-def _from(first: Spot, others: Iterator[Spot]) -> Iterator[Spot]:
-    yield first
-    yield from others
+class _Trail:
+    """The spots of a walk, and the events between them.
 
+    Attributes:
+        length: of a closed curve; infinite until it is known to be one.
+    """
 
-def _walked(walk: ArclengthWalk, first: Spot, length: float, longest: float) -> _Trail:
-    trail, beginning = _Trail([first]), Beginning(walk, first, longest)
-    for spot in walk.along(first, length, longest):
-        closing = beginning.passed(trail.spots[-1], spot)
-        trail.spots.append(closing or spot)
-        _note_limit(walk, trail)
-        if closing is not None:
-            trail.length = closing.arc
-            break
-    _note_branches(walk, trail)
-    trail.events.sort(key=lambda event: event.arc)
-    return trail
+    def __init__(self, walk: ArclengthWalk, first: Spot, longest: float) -> None:
+        self.walk, self.first, self.longest = walk, first, longest
+        self.spots, self.events, self.length = [first], list[Event](), np.inf
+        # the plane across the curve at its beginning
+        self._poses = walk.system.poses(first.state)
+        after = walk.system.poses(walk.system.stepped(first.state, SMALL * first.dq[:, None]))
+        self._way = (after - self._poses) / SMALL
+
+    @property
+    def closed(self) -> bool:
+        """Whether the walk came back to its first spot."""
+        return self.length < np.inf
+
+    def follow(self, length: float) -> None:
+        """Walk up to a length, or until the curve closes."""
+        for spot in self.walk.along(self.first, length, self.longest):
+            before = self.spots[-1]
+            closing = self._passed(before, spot)
+            after = closing or spot
+            self.spots.append(after)
+            if _turns_back(before, after):
+                self.events.append(_event(self.walk, self.walk.limit(before, after)))
+            if closing is not None:
+                self.length = closing.arc
+                break
+        self._note_branches()
+        self.events.sort(key=lambda event: event.arc)
+
+    def _passed(self, before: Spot, after: Spot) -> Spot | None:
+        """Return the beginning as a spot at its length on the curve if the step between two spots
+        passes it, else None.
+        """
+        if float(self.first.dq @ after.dq) < SAME_WAY:
+            return None
+        change, change_after = self._change(before), self._change(after)
+        ahead, beyond = self._along(change), -self._along(change_after)
+        if not (ahead > 0.0 <= beyond and np.abs(change_after).max() <= 2.0 * self.longest):
+            return None
+        share = ahead / (ahead + beyond)
+        apart = np.abs((1.0 - share) * change + share * change_after).max()
+        spot: Spot | None = None
+        h = share * (after.arc - before.arc)
+        for _ in range(ROUNDS):
+            spot = self.walk.advance(before, h)
+            # beside a branch point: where it is between the two spots is known well enough
+            if spot is None:
+                break
+            change = self._change(spot)
+            gap, apart = self._along(change), np.abs(change).max()
+            h += gap
+            if abs(gap) <= SMALL * SMALL:
+                break
+        if apart > SAME_POSE * self.longest:
+            return None
+        turned = before.time + share * (after.time - before.time) if spot is None else spot.time
+        return replace(self.first, arc=before.arc + h, time=turned)
+
+    def _change(self, spot: Spot) -> Array:
+        """Return the change from the pose of a spot to the beginning; Euler parameters p and -p are
+        the same.
+        """
+        there = self.walk.system.poses(spot.state)
+        there[:, 3:] *= np.where(
+            (there[:, 3:] * self._poses[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0
+        )
+        return self._poses - there
+
+    def _along(self, change: Array) -> float:
+        """Return the length of a change along the curve, to first order."""
+        return float((change * self._way).sum() / (self._way * self._way).sum())
+
+    def _note_branches(self) -> None:
+        """Add branch points: sigma is least at a spot, or the determinant changes its sign."""
+        spots, first, last = self._with_neighbours(), self.spots[0], self.spots[-1]
+        for one, two, three in zip(spots, spots[1:], spots[2:], strict=False):
+            least = two.sigma < min(one.sigma, three.sigma)
+            if not least and not (two.sign != three.sign and two.sigma > three.sigma):
+                continue
+            found = self.walk.branching(one, three)
+            if found is None or not first.arc <= (arc := found.arc % self.length) <= last.arc:
+                continue
+            # each is seen from both sides
+            ways = [abs(arc - other.arc) for other in self.events]
+            if any(min(way, self.length - way) <= NODE for way in ways):
+                continue
+            turned = last.time - first.time if found.arc > last.arc else 0.0
+            event = _event(self.walk, replace(found, arc=arc, time=found.time - turned))
+            if not event.singularity.regular:
+                self.events.append(event)
+
+    def _with_neighbours(self) -> list[Spot]:
+        """Return the spots, and one before the first and after the last: a branch point is seen by
+        the spots on both sides of it.
+        """
+        first, second, last = self.spots[0], self.spots[1:2], self.spots[-1]
+        if self.closed:
+            (after,) = second
+            time = after.time + last.time - first.time
+            return [*self.spots, replace(after, arc=after.arc + self.length, time=time)]
+        h = second[0].arc - first.arc if second else NODE
+        before, after = self.walk.advance(first, -h), self.walk.advance(last, h)
+        return [*filter(None, (before, *self.spots, after))]
 
 
 def _turns_back(before: Spot, after: Spot) -> bool:
@@ -318,80 +332,11 @@ def _turns_back(before: Spot, after: Spot) -> bool:
     return (before.dt < 0.0) != (after.dt < 0.0)
 
 
-def _note_limit(walk: ArclengthWalk, trail: _Trail) -> None:
-    """Add the limit point between the last spots, if there is one."""
-    before, after = trail.spots[-2:]
-    if _turns_back(before, after):
-        trail.events.append(_event(walk, walk.limit(before, after)))
-
-
-def _note_branches(walk: ArclengthWalk, trail: _Trail) -> None:
-    """Add branch points: sigma is least at a spot, or the determinant changes sign beside it."""
-    spots = _with_neighbours(walk, trail)
-    for one, two, three in zip(spots, spots[1:], spots[2:], strict=False):
-        if two.sigma < min(one.sigma, three.sigma) or (
-            two.sign != three.sign and two.sigma > three.sigma
-        ):
-            found = walk.branching(one, three)
-            if (
-                found is None
-                or not trail.spots[0].arc
-                <= (arc := found.arc % trail.length)
-                <= trail.spots[-1].arc
-            ):
-                continue
-            if any(_apart(arc, other.arc, trail.length) <= NODE for other in trail.events):
-                continue  # it is seen from both sides
-            turned = (
-                trail.spots[-1].time - trail.spots[0].time
-                if found.arc > trail.spots[-1].arc
-                else 0.0
-            )
-            event = _event(walk, replace(found, arc=arc, time=found.time - turned))
-            if not event.singularity.regular:
-                trail.events.append(event)
-
-
-def _with_neighbours(walk: ArclengthWalk, trail: _Trail) -> list[Spot]:
-    """Return the spots, and one before the first and after the last: a branch point is seen by the
-    spots on both sides of it.
-    """
-    first, last = trail.spots[0], trail.spots[-1]
-    if trail.closed:
-        after = trail.spots[1]
-        again = replace(
-            after, arc=after.arc + trail.length, time=after.time + last.time - first.time
-        )
-        return [*trail.spots, again]
-    h = trail.spots[1].arc - first.arc if len(trail.spots) > 1 else NODE
-    beside = walk.advance(first, -h), walk.advance(last, h)
-    return [*([beside[0]] if beside[0] else []), *trail.spots, *([beside[1]] if beside[1] else [])]
-
-
-def _apart(a: float, b: float, length: float) -> float:
-    """Return how far two places are apart on a curve, of that length if it is closed."""
-    way = abs(a - b)
-    return min(way, length - way)
-
-
 def _event(walk: ArclengthWalk, found: Beside) -> Event:
     spot = found.spot
-    return Event(
-        found.arc,
-        found.time,
-        examine(walk.system, spot.state, walk.sample(spot.time)),
-        _at(walk, spot),
-    )
-
-
-def _at(walk: ArclengthWalk, spot: Spot) -> dict[str, Array]:
-    return {name: found[0] for name, found in _points(walk, [spot]).items()}
-
-
-def _sigma(walk: ArclengthWalk, spots: Sequence[Spot]) -> Array:
-    """Return the smallest singular value of the kept rows at spots, shape (spots,)."""
-    sigma = np.linalg.svd(walk.system.equations(*_stacked(walk, spots)).jacobian)[1]
-    return np.asarray(sigma[:, -1], dtype=np.float64)
+    singularity = examine(walk.system, spot.state, walk.sample(spot.time))
+    points = {name: places[0] for name, places in _points(walk, [spot]).items()}
+    return Event(found.arc, found.time, singularity, points)
 
 
 def _stacked(walk: ArclengthWalk, spots: Sequence[Spot]) -> tuple[Array, Array]:

@@ -247,7 +247,12 @@ class End:
     @property
     def time(self) -> float:
         """The time of the last pose [s]."""
-        return float(self.lane[self.route.model.slots[FROM + TIME]])
+        return time_of(self.route.model, self.lane)
+
+
+def time_of(model: Model, lane: Array) -> float:
+    """Return the time at which a lane stands [s]."""
+    return float(lane[model.slots[FROM + TIME]])
 
 
 def _columns(side: Side, at: int, stop: int) -> NDArray[np.intp]:
@@ -327,9 +332,12 @@ class Marcher:
         """Follow one side, after `at` samples, to its last sample; return its end if it ends
         before.
         """
-        side, anew = self.grid.sides[number], True
-        stops = self._stops(side) if self.visit else {side.count: -1}
-        for stop, sample in stops.items():
+        side, anew, stops = self.grid.sides[number], True, {}
+        if self.visit:
+            place = np.argsort(self.route.by_time)
+            passed = {int((place[k] - side.first) * side.step) + 1: k for k in self.visit}
+            stops = {count: passed[count] for count in passed if 1 <= count <= side.count}
+        for stop, sample in sorted(stops.items()) if self.visit else [(side.count, -1)]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
             walk = SideWalk(self, number)
@@ -360,21 +368,11 @@ class Marcher:
         found[self.model.ahead] = self.track.anchors[number]
         return found
 
-    def time_of(self, lane: Array) -> float:
-        """The time at which a lane stands."""
-        return float(lane[self.slots[FROM + TIME]])
-
-    def _stops(self, side: Side) -> dict[int, int]:
-        """Return the samples to visit on a side, by the number of samples up to each, in order."""
-        place = np.argsort(self.route.by_time)
-        passed = {int((place[k] - side.first) * side.step) + 1: k for k in self.visit}
-        return {count: passed[count] for count in sorted(passed) if 1 <= count <= side.count}
-
     def _end(self, side: Side, at: int, anchor: Array, failure: PoseFailure) -> End:
         if failure.kind is not FailureKind.TOO_MANY_PARTS:
             failure = replace(failure, sigma=float(anchor[self.slots[FROM + SIGMA]]))
         last, wanted = float(side.samples[0, at - 1]) if at else None, float(side.samples[0, at])
-        message = self.route.path.ended(self.time_of(anchor), wanted, last, str(failure))
+        message = self.route.path.ended(time_of(self.model, anchor), wanted, last, str(failure))
         return End(message, self.route, anchor, wanted, failure.kind)
 
 
@@ -411,12 +409,12 @@ class SideWalk(Walk):
         """Follow a part of a step, up to `LONGER` times as long as the one before."""
         if self.leaves_off:
             return PoseFailure(FailureKind.LEFT_OFF)
-        anchor, time_of = self.marcher.anchor(self.number), self.marcher.time_of
+        anchor = self.marcher.anchor(self.number)
         found = self._divided(anchor, float(self.side.samples[0, at]))
         if isinstance(found, PoseFailure):
             return found
         self.track.anchors[self.number] = found[self.model.ahead]
-        self.length = LONGER * abs(time_of(found) - time_of(anchor))
+        self.length = LONGER * abs(time_of(self.model, found) - time_of(self.model, anchor))
         return None
 
     def _leaves_off(self) -> bool:
@@ -456,7 +454,7 @@ class SideWalk(Walk):
             parts.attempt()
             return parts.get([margin])[0]
 
-        part = part_of_step(self.marcher.time_of(anchor), aim, attempt, AT_ONCE, self.length)
+        part = part_of_step(time_of(self.model, anchor), aim, attempt, AT_ONCE, self.length)
         lanes = parts.get(every)
         if part is None:
             refused = np.flatnonzero(~(lanes[margin] > 0.0))[-1]

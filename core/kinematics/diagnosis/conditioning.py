@@ -31,7 +31,7 @@ from ..compiled.compiled_model import compile_model
 from ..compiled.request import Request
 from ..continuation.segments import chosen
 from ..continuation.sweep import sweep
-from ..formulation.cartesian import Cartesian
+from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames
 from ..formulation.formulation import Configuration, position_of
 from ..formulation.parameters import placed, places
@@ -77,52 +77,39 @@ class Geometry:
         return np.broadcast_to(derivatives(x), (self.parameters,))
 
 
-@dataclass(frozen=True, eq=False)
-class Dependence:
-    """Dependence of the unknowns at a sample on residuals and geometry.
+def _gradient(
+    point: Point,
+    geometry: Geometry,
+    formulation: Cartesian,
+    at: Configuration,
+    frame: Frames,
+    shifts: tuple[Array, Array],
+) -> Gradient:
+    """Return how the position of a point depends on residuals and geometry.
 
-    Attributes:
-        by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad],
-            shape (unknowns, rows).
-        by_geometry: derivatives of the unknowns by the parameters of the geometry, shape
-            (unknowns, parameters).
+    Args:
+        shifts: derivatives of the unknowns by the residuals of the solved rows [m or rad], shape
+            (unknowns, rows), and by the parameters, shape (unknowns, parameters).
     """
-
-    formulation: Cartesian
-    at: Configuration
-    frame: Frames
-    by_residuals: Array
-    by_geometry: Array
-
-    def gradient(self, point: Point, geometry: Geometry) -> Gradient:
-        """How the position of a point depends on both."""
-        pose, arm = (
-            self.at.poses.get(point.body, GROUND_POSE),
-            self.frame.arm(point.body, point.position),
-        )
-        turned = pose.turn(arm)
-        by_unknowns = np.zeros((3, self.formulation.unknowns))
-        if point.body in self.formulation.columns:
-            first = self.formulation.columns[point.body]
-            for k in range(6):
-                rates = [float(k == column) for column in range(6)]
-                by_unknowns[:, first + k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
-        by_unknowns *= self.frame.unit
-        moved: Vec3 = vec(geometry.slopes.get(f"points.{point.name}.position", point.position))
-        # the body carries its point along: A times the change of where it is at design
-        design = np.array([geometry.derivatives_of(x) for x in moved])
-        along = np.array([geometry.derivatives_of(x) for x in pose.turn(moved)])
-        here, there = (
-            np.array([*position_of(point.position, arm, self.frame.unit, pose)]),
-            np.array(point.position),
-        )
-        return Gradient(
-            here,
-            there,
-            by_unknowns @ self.by_residuals,
-            by_unknowns @ self.by_geometry + along,
-            design,
-        )
+    pose, arm = at.poses.get(point.body, GROUND_POSE), frame.arm(point.body, point.position)
+    turned, by_unknowns = pose.turn(arm), np.zeros((3, formulation.unknowns))
+    if point.body in formulation.columns:
+        first = formulation.columns[point.body]
+        for k, rates in enumerate(np.eye(COLUMNS).tolist(), first):
+            by_unknowns[:, k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
+    by_unknowns *= frame.unit
+    moved: Vec3 = vec(geometry.slopes.get(f"points.{point.name}.position", point.position))
+    # the body carries its point along: A times the change of where it is at design
+    design = np.array([geometry.derivatives_of(x) for x in moved])
+    along = np.array([geometry.derivatives_of(x) for x in pose.turn(moved)])
+    by_residuals, by_geometry = shifts
+    return Gradient(
+        np.array([*position_of(point.position, arm, frame.unit, pose)]),
+        np.array(point.position),
+        by_unknowns @ by_residuals,
+        by_unknowns @ by_geometry + along,
+        design,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,8 +200,9 @@ def conditioning(
             frame,
             {name: (found.bodies[name].r[k], found.bodies[name].p[k]) for name in bodies},
         )
+        state = state_of(formulation, mechanism, frame, pose, change)
         configuration = formulation.configuration(
-            _floats(state_of(formulation, mechanism, frame, pose, change))
+            {name: tuple(map(float, vector)) for name, vector in state.items()}
         )
         matrix = jacobian(formulation, configuration)
         matrices.append(matrix)
@@ -231,7 +219,7 @@ def conditioning(
         )
         by_geometry = np.array([geometry.derivatives_of(x) for x in phi])
         shift = -inverse @ by_geometry[kept]
-        dependence = Dependence(formulation, configuration, frame, metres, shift)
+        pose_of = formulation, configuration, frame
         looked.append(
             PoseConditioning(
                 float(values[k]),
@@ -240,7 +228,10 @@ def conditioning(
                 float(sizes[0]),
                 1.0,
                 screws(formulation, configuration, frame, V[-1]),
-                {name: dependence.gradient(mechanism.point(name), geometry) for name in points},
+                {
+                    name: _gradient(mechanism.point(name), geometry, *pose_of, (metres, shift))
+                    for name in points
+                },
                 by_geometry[dropped] + rest @ shift,
             )
         )
@@ -288,7 +279,3 @@ def _is_length(formulation: Cartesian, rows: Array) -> NDArray[np.bool_]:
     slides = [k for name, k in formulation.coordinates.items() if name.endswith(".translation")]
     shifts = [k + axis for k in first for axis in range(3)] + slides
     return np.abs(rows[:, shifts]).max(axis=1) > 0.0
-
-
-def _floats(state: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
-    return {name: tuple(map(float, vector)) for name, vector in state.items()}

@@ -23,12 +23,19 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import Twist
 from ...trajectory import Array
 from ..compiled.request import CONSISTENT
-from ..formulation.cartesian import COLUMNS, Cartesian
+from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Constraint, Frames, constraints_left_out, frames
-from ..formulation.formulation import Configuration, Formulation, State
+from ..formulation.formulation import Configuration, State
+from ..formulation.relative import Formulation
 from ..formulation.state_vectors import jacobian
 from ..structure.degrees_of_freedom import FreedomAccount, account
-from ..structure.redundancy import DIGITS, RANK_TOLERANCE, independent_joint_rows, independent_rows
+from ..structure.redundancy import (
+    DIGITS,
+    RANK_TOLERANCE,
+    independent_joint_rows,
+    independent_rows,
+    parts_of_columns,
+)
 
 # Parts of a motion below this share of its largest are left out: round-off of a null vector is far
 # below, what moves is above.
@@ -318,22 +325,10 @@ class Ranks:
     @cached_property
     def components(self) -> list[ComponentCount]:
         """Return the unconnected parts of the mechanism."""
-        groups: list[set[int]] = []  # of columns
-        for row in self.matrix:
-            columns = set(np.flatnonzero(row).tolist())
-            columns |= {
-                COLUMNS * (c // COLUMNS) + k
-                for c in columns
-                if c < COLUMNS * len(self.formulation.bodies)
-                for k in range(6)
-            }
-            touching = [group for group in groups if group & columns]
-            groups = [group for group in groups if not group & columns] + [columns.union(*touching)]
-        loose = set(range(self.formulation.unknowns)) - set[int]().union(*groups)
-        groups += [set(range(c, c + COLUMNS)) for c in sorted(loose) if c % COLUMNS == 0]
-        return [
-            self._component(sorted(group)) for group in sorted((g for g in groups if g), key=min)
-        ]
+        groups: dict[int, list[int]] = {}
+        for column, part in enumerate(parts_of_columns(self.formulation, self.matrix)):
+            groups.setdefault(part, []).append(column)
+        return [*map(self._component, groups.values())]
 
     def _component(self, columns: Sequence[int]) -> ComponentCount:
         own = np.flatnonzero(np.abs(self.matrix[:, columns]).max(axis=1) > 0.0)

@@ -373,6 +373,14 @@ class ForceEquations:
     applied: Mapping[str, Applied]
     left_out: Cartesian
 
+    @classmethod
+    def traced(
+        cls, mechanism: Mechanism, formulation: Cartesian, at: Configuration, states: BodyStates
+    ) -> ForceEquations:
+        """Return the equations at a configuration that has the angles of torsional springs."""
+        applied = at_work(mechanism, states, lambda joint: at.state[f"x {joint}.rotation"][0])
+        return cls(mechanism, formulation, at, states, applied, Cartesian((), ()))
+
     @cached_property
     def rows(self) -> Rows:
         """Return the Jacobian of all rows, lengths in the unit of the frames."""
@@ -403,12 +411,7 @@ class ForceEquations:
     @cached_property
     def _numbered(self) -> list[tuple[int, Constraint | Relation]]:
         """Return the constraint and number of every row: joints, couplers, drivers, left out."""
-        every = (
-            c
-            for c in (*self.formulation.constraints, *self.left_out.constraints)
-            for _ in range(c.primitive.n if isinstance(c, Constraint) else 1)
-        )
-        return list(enumerate(every))
+        return [*enumerate((*self.formulation.of_rows, *self.left_out.of_rows))]
 
     @cached_property
     def _of_joints(self) -> Mapping[str, list[tuple[int, Constraint | Relation]]]:
@@ -424,13 +427,6 @@ class ForceEquations:
                 found[mechanism.given_name(c.owner)].append((k, c))
         return found
 
-    @cached_property
-    def _measuring(self) -> Mapping[str, int]:
-        """Return the number of the measuring row by coordinate."""
-        return {
-            c.coordinate: k for k, c in self._numbered if isinstance(c, Constraint) and c.coordinate
-        }
-
     def _parts(self, joint: Joint, multipliers: Sequence[Scalar]) -> Iterator[tuple[int, Scalar]]:
         """Yield the rows acting on the bodies of a joint, with the joint's part of each multiplier.
 
@@ -441,7 +437,7 @@ class ForceEquations:
         for k, c in self._of_joints[joint.name]:
             if isinstance(c, Relation):
                 for name, weight in c.weights.items():
-                    measuring = self._measuring[name]
+                    measuring = self.formulation.measuring[name]
                     share = self.rows[measuring][self.formulation.coordinates[name]]
                     yield measuring, -(weight / share) * multipliers[k]
             elif not c.coordinate:

@@ -7,26 +7,27 @@ forces left undetermined by redundant rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from itertools import islice
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import ZERO, Scalar, Vec3, angle_about, cross, quat, vec
+from ...algebra import IDENTITY, ZERO, Vec3, angle_about, cross, quat, vec
 from ...errors import SolveError
 from ...forces import AMPLIFIED, Forces, Multipliers, Reaction, in_wrenches
 from ...joints.base import Joint, unit
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Driver, JointDriver, Path
-from ...primitives.base import GROUND_POSE, Drive, Pose, Twist
+from ...primitives.base import Drive, Pose, Twist
 from ...trajectory import QUANTITIES, Array, BodyMotion, Trajectory
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import constraints_left_out, frames
-from ..formulation.formulation import Acceleration, Configuration
-from ..formulation.state_vectors import displaced, drive_numbers, state_of
+from ..formulation.formulation import Acceleration, Configuration, Rows
+from ..formulation.state_vectors import columns_of, dense, displaced, drive_numbers, state_of
 from .equations import Applied, BodyStates, ForceEquations, at_work, powers
 from .wanted import wanted_forces
 
@@ -36,16 +37,49 @@ rate at the solved samples [rad, rad/s].
 """
 
 
-class MotionLanes:
-    """The motion at the solved samples: states of the bodies and of force elements, as lanes.
+TURN = 2.0 * np.pi
+
+
+def joint_angle(mechanism: Mechanism, name: str, motion: Trajectory) -> tuple[Array, Array]:
+    """Return the angle of a joint but for whole turns [rad], and its rate, shape (n,)."""
+    joint: Any = mechanism.joint(name)
+    axis = vec([*unit(joint.axis)])
+    turns, spins = [IDENTITY] * 2, [ZERO] * 2
+    for k, body in enumerate(joint.bodies):
+        if (moved := motion.bodies.get(body)) is None:
+            continue
+        assert moved.v is not None
+        pose = quat(moved.p.T)
+        turns[k] = pose * quat(mechanism.body(body).euler_parameters).conjugate()
+        spins[k] = Pose.of(ZERO, pose).turn(vec([*moved.v.T[3:]]))
+    i, j = turns
+    rate = Pose.of(ZERO, i).turn(axis) @ (spins[1] - spins[0])
+    still = np.zeros(len(motion.solved))
+    return angle_about(axis, i.conjugate() * j) + still, rate + still
+
+
+def expected_change(rate: Array, times: Array) -> Array:
+    """Return the changes between samples that the rates tell [rad]."""
+    return 0.5 * (rate[1:] + rate[:-1]) * np.diff(times, axis=0)
+
+
+# Size limit of the matrices solved at once, in numbers over all samples: some 64 MB.
+AT_ONCE = 8_000_000
+
+
+class ForceRows:
+    """The motion at the solved samples, and the equations of forces there, as lanes; singular
+    values solve them.
+
+    Rows left out within digits come last: they carry nothing, and count in the self-stress.
+
+    Args:
+        freedoms: number of degrees of freedom that no driver holds, in a free motion.
 
     Attributes:
         frame, times, n: frames of the mechanism, times of the solved samples [s], and their number.
-        poses: poses of the moving bodies.
-        at: poses, twists and accelerations.
-        drive: value from design, velocity and acceleration of every driver [SI], shape
-            (3, drivers, n).
-        values, rates: value from design and velocity, by driver.
+        at: poses, twists and accelerations of the moving bodies.
+        values, rates: value from design and velocity, by driver [SI].
         applied: force elements at work, by name.
 
     Raises:
@@ -53,48 +87,57 @@ class MotionLanes:
     """
 
     def __init__(
-        self, mechanism: Mechanism, path: Path, motion: Trajectory, follow: Follow | None = None
+        self,
+        mechanism: Mechanism,
+        path: Path,
+        motion: Trajectory,
+        follow: Follow | None = None,
+        freedoms: int = 0,
     ) -> None:
-        self._follow = follow
         self.mechanism, self.frame = mechanism, frames(mechanism)
-        solved = motion.solved
-        self.times: Array = path.times[solved]
+        self._motion, self._follow, self._freedoms = motion, follow, freedoms
+        self.times: Array = path.times[motion.solved]
         self.n = len(self.times)
-        self.poses = self._poses(motion)
-        self.at = self._states(motion)
+        self.at = self._states()
         names = [driver.name for driver in mechanism.drivers]
-        self.drive = path.drive(names, self.times) if names else np.empty((3, 0, self.n))
-        self.rates = dict(zip(names, self.drive[1], strict=True))
-        self.values = dict(zip(names, self.drive[0], strict=True))
+        drive = path.drive(names, self.times) if names else np.empty((3, 0, self.n))
+        self.values, self.rates = (dict(zip(names, x, strict=True)) for x in drive[:2])
         self.applied: Mapping[str, Applied] = at_work(mechanism, self.at, self.angle)
+        numbers = drive_numbers(mechanism.drivers, drive, self.frame.unit)
+        drives = {name: Drive(*numbers[5 * k : 5 * k + 5]) for k, name in enumerate(names)}
+        self.formulation = Cartesian.of(mechanism, self.frame, drives)
+        state = state_of(self.formulation, mechanism, self.frame, self.at.poses, self.values)
+        left_out = Cartesian(constraints_left_out(mechanism, self.frame), self.frame.moving)
+        self.equations = ForceEquations(
+            mechanism,
+            self.formulation,
+            self.formulation.configuration(state),
+            self.at,
+            self.applied,
+            left_out,
+        )
 
-    def _poses(self, motion: Trajectory) -> dict[str, Pose]:
-        missing = [body.name for body in self.mechanism.moving if body.name not in motion.bodies]
-        if missing:
-            raise SolveError(f"forces: the motion of body {missing[0]!r} is missing")
-        placed = {
-            name: (each.r[motion.solved], each.p[motion.solved])
-            for name, each in motion.bodies.items()
-        }
-        return displaced(self.mechanism, self.frame, placed)
-
-    def _states(self, motion: Trajectory) -> BodyStates:
-        solved = motion.solved
+    def _states(self) -> BodyStates:
+        solved, frame, placed = self._motion.solved, self.frame, dict[str, tuple[Array, Array]]()
+        for body in self.mechanism.moving:
+            if (moved := self._motion.bodies.get(body.name)) is None:
+                raise SolveError(f"forces: the motion of body {body.name!r} is missing")
+            placed[body.name] = moved.r[solved], moved.p[solved]
+        poses, per_unit = displaced(self.mechanism, frame, placed), 1.0 / frame.unit
         twists, accelerations = dict[str, Twist](), dict[str, Acceleration]()
         for body in self.mechanism.moving:
-            moved = motion.bodies[body.name]
+            moved = self._motion.bodies[body.name]
             if moved.v is None or moved.a is None:
                 raise SolveError(f"forces: body {body.name!r} has no accelerations; give order 2")
-            frame = Pose.of(ZERO, quat(moved.p[solved].T))
+            own = Pose.of(ZERO, quat(moved.p[solved].T))
             v, a = moved.v[solved].T, moved.a[solved].T
-            w, w_t = frame.turn(vec([*v[3:]])), frame.turn(vec([*a[3:]]))
-            arm = self.poses[body.name].turn(self.frame.arm(body.name, body.origin))
-            per_unit = 1.0 / self.frame.unit
+            w, w_t = own.turn(vec([*v[3:]])), own.turn(vec([*a[3:]]))
+            arm = poses[body.name].turn(frame.arm(body.name, body.origin))
             twists[body.name] = Twist(per_unit * vec([*v[:3]]) - cross(w, arm), w)
             # the origin's acceleration, less the part of the arm from the internal origin
             added = Acceleration(ZERO, w_t).of(arm, twists[body.name])
             accelerations[body.name] = Acceleration(per_unit * vec([*a[:3]]) - added, w_t)
-        return BodyStates(self.frame, self.poses, twists, accelerations)
+        return BodyStates(frame, poses, twists, accelerations)
 
     def angle(self, name: str) -> Array:
         """Return the angle of a joint over the samples [rad], continuous, zero at design.
@@ -105,23 +148,16 @@ class MotionLanes:
         known = self._driven.get((name, "rotation"))
         if known is not None or not self.n:
             return np.zeros(0) if known is None else known
-        joint: Any = self.mechanism.joint(name)
-        i, j = (self.poses.get(body, GROUND_POSE) for body in joint.bodies)
-        axis = vec([*unit(joint.axis)])
+        angle, rate = (
+            each[self._motion.solved] for each in joint_angle(self.mechanism, name, self._motion)
+        )
         order = np.argsort(self.times, kind="stable")
-        angle: Array = (angle_about(axis, i.q.conjugate() * j.q) + np.zeros(self.n))[order]
-        spin = self.at.spin(joint.j) - self.at.spin(joint.i)
-        along = self.at.turned(joint.i, [*unit(joint.axis)])
-        rate: Array = (along @ spin + np.zeros(self.n))[order]
-        expected = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self.times[order])
-        jumps: Array = np.round((expected - np.diff(angle)) / (2.0 * np.pi))
-        turned = angle.copy()
-        turned[1:] += 2.0 * np.pi * np.cumsum(jumps)
-        nearest = float(turned[int(np.argmin(np.abs(self.times[order])))])
-        continuous, rates = np.empty(self.n), np.empty(self.n)
-        continuous[order] = turned - 2.0 * np.pi * round(nearest / (2.0 * np.pi))
-        rates[order] = rate
-        return self._follow(name, continuous, rates) if self._follow else continuous
+        turned, times = angle[order], self.times[order]
+        expected = expected_change(rate[order], times)
+        turned[1:] += TURN * np.cumsum(np.round((expected - np.diff(turned)) / TURN))
+        nearest = float(turned[int(np.argmin(np.abs(times)))])
+        angle[order] = turned - TURN * round(nearest / TURN)
+        return self._follow(name, angle, rate) if self._follow else angle
 
     @cached_property
     def _driven(self) -> Mapping[tuple[str, str], Array]:
@@ -145,53 +181,18 @@ class MotionLanes:
                     )
         return found
 
-
-# Size limit of the matrices solved at once, in numbers over all samples: some 64 MB.
-AT_ONCE = 8_000_000
-
-
-class ForceRows:
-    """The equations of forces at all samples as lanes, solved by singular values.
-
-    Rows left out within digits come last: they carry nothing, and count in the self-stress.
-    """
-
-    def __init__(self, lanes: MotionLanes, freedoms: int = 0) -> None:
-        self.lanes, mechanism, frame = lanes, lanes.mechanism, lanes.frame
-        self._freedoms = freedoms
-        numbers = drive_numbers(mechanism.drivers, lanes.drive, frame.unit)
-        drives = {
-            driver.name: Drive(*numbers[5 * k : 5 * k + 5])
-            for k, driver in enumerate(mechanism.drivers)
-        }
-        self.formulation = Cartesian.of(mechanism, frame, drives)
-        left_out = Cartesian(constraints_left_out(mechanism, frame), frame.moving)
-        self.equations = ForceEquations(
-            mechanism, self.formulation, self._configuration(), lanes.at, lanes.applied, left_out
-        )
-
-    def _configuration(self) -> Configuration:
-        lanes = self.lanes
-        state = state_of(self.formulation, lanes.mechanism, lanes.frame, lanes.poses, lanes.values)
-        return self.formulation.configuration(state)
-
     @cached_property
     def matrix(self) -> Array:
         """Return the Jacobian of all rows, lengths in the unit of the frames.
 
         Shape (n, rows, unknowns).
         """
-        rows = self.equations.rows
-        found = np.zeros((self.lanes.n, len(rows), self.formulation.unknowns))
-        for k, row in enumerate(rows):
-            for column, value in row.items():
-                found[:, k, column] = value
-        return found
+        return dense(self.equations.rows, self.formulation.unknowns, self.n)
 
     @cached_property
     def demand(self) -> Array:
         """Return M a + h - Q by the unknowns [J], shape (n, unknowns)."""
-        return self.stacked(self.equations.demand)
+        return columns_of(self.equations.demand, self.n)
 
     def solve(self) -> Multipliers:
         """Return the multipliers at all samples [J]."""
@@ -209,7 +210,7 @@ class ForceRows:
             one = np.ones(n)
             return Multipliers(values, np.empty((*values.shape, 0)), np.zeros(n), one, one, one)
         last = len(self.formulation.owners)
-        drivers = range(last - len(self.lanes.mechanism.drivers), last)
+        drivers = range(last - len(self.mechanism.drivers), last)
         return Multipliers.of(rows, demand, drivers, rows.shape[1] - last, self._freedoms)
 
     def wrench(self, joint: Joint, multipliers: Array) -> tuple[Array, Array]:
@@ -218,22 +219,57 @@ class ForceRows:
         They act on the joint's second body, about the joint's point carried by this body.
         """
         pair: tuple[Vec3, Vec3] = self.equations.reaction(joint, [*multipliers.T])
-        return self.stacked(pair[0]), self.stacked(pair[1])
+        return columns_of(pair[0], self.n), columns_of(pair[1], self.n)
 
     def free(self, joint: Joint, found: Multipliers) -> Array:
         """Return the undetermined directions of a joint's wrench, shape (n, 6, redundant rows)."""
         columns = np.moveaxis(found.free, 2, 0)
         each = [np.hstack(self.wrench(joint, multipliers)) for multipliers in columns]
-        return np.stack(each, axis=2) if each else np.empty((self.lanes.n, 6, 0))
+        return np.stack(each, axis=2) if each else np.empty((self.n, 6, 0))
 
     def effort(self, driver: Driver, found: Multipliers) -> Array:
         """Return the effort of a driver [N or N m], shape (n,)."""
         effort: Array = self.equations.effort(driver, [*found.values.T])
-        return effort + np.zeros(self.lanes.n)
+        return effort + np.zeros(self.n)
 
-    def stacked(self, values: Iterable[Scalar]) -> Array:
-        """Return scalars over the samples as columns, shape (n, len(values))."""
-        return np.stack([x + np.zeros(self.lanes.n) for x in values], axis=1)
+    def left(self, at: Configuration | None = None) -> Iterator[tuple[Array, Array]]:
+        """Yield what is left of the rows by order of the motion, phi, J v - nu and J a - gamma, and
+        their right-hand sides, shape (n, rows) each.
+
+        The rates of the joints' own coordinates are those that their measuring rows tell.
+
+        Args:
+            at: configuration with other numbers of turns of the coordinates.
+        """
+        formulation, at = self.formulation, at or self.equations.at
+        yield columns_of(formulation.phi(at), self.n), np.zeros((self.n, 1))
+        rows, names = formulation.rows(at), formulation.bodies
+        v = [x for k in names for x in (*self.at.twists[k].v, *self.at.twists[k].w)]
+        nu = formulation.nu(at)
+        own, off = self._less(nu, rows, v)
+        yield columns_of(off, self.n), columns_of(nu, self.n)
+        every = (self.at.accelerations[k] for k in names)
+        a = [x for each in every for x in (*each.v_t, *each.w_t)]
+        gamma = formulation.gamma(at, [*v, *own])
+        yield columns_of(self._less(gamma, rows, a)[1], self.n), columns_of(gamma, self.n)
+
+    def _less(
+        self, right: Sequence[Any], rows: Rows, rates: Sequence[Any]
+    ) -> tuple[list[Any], list[Any]]:
+        """Return the rates of the joints' coordinates, and J times all rates less the right-hand
+        sides.
+        """
+        bodies, formulation = len(rates), self.formulation
+        left = [
+            sum((x * rates[c] for c, x in row.items() if c < bodies), -b)
+            for row, b in zip(rows, right, strict=True)
+        ]
+        own: list[Any] = [0.0] * (formulation.unknowns - bodies)
+        for name, k in formulation.measuring.items():
+            column = formulation.coordinates[name]
+            own[column - bodies] = -left[k] / rows[k][column]
+        moved = (sum(x * own[c - bodies] for c, x in row.items() if c >= bodies) for row in rows)
+        return own, [x + y for x, y in zip(left, moved, strict=True)]
 
 
 def _inverse(rows: Array) -> Array | None:
@@ -266,17 +302,9 @@ def with_forces(
 ) -> Trajectory:
     """Return a solved motion with its forces and only the named bodies; see `forces_of`."""
     found = forces_of(mechanism, path, motion, names, follow)
-    return Trajectory(
-        motion.points,
-        motion.solved,
-        motion.iterations,
-        motion.residual,
-        "; ".join(filter(None, (motion.message, found.message))),
-        motion.details,
-        {name: motion.bodies[name] for name in bodies},
-        found,
-        failures=motion.failures,
-    )
+    message = "; ".join(filter(None, (motion.message, found.message)))
+    kept = {name: motion.bodies[name] for name in bodies}
+    return replace(motion, message=message, bodies=kept, forces=found)
 
 
 def forces_of(
@@ -301,17 +329,14 @@ def forces_of(
         SolveError: a name is unknown, or the motion lacks a body.
     """
     wanted = wanted_forces(mechanism, names)
-    solved = motion.solved
-    lanes = MotionLanes(mechanism, path, motion, follow)
-    lines = ForceRows(lanes, freedoms)
-    solution = lines.solve()
+    lines = ForceRows(mechanism, path, motion, follow, freedoms)
+    solution, still = lines.solve(), np.zeros(lines.n)
     efforts = {each.name: lines.effort(each, solution) for each in mechanism.drivers}
-    elements = {name: each.amount + np.zeros(lanes.n) for name, each in lanes.applied.items()}
-    every = powers(mechanism, lanes.at, lanes.applied, efforts, lanes.rates)
+    elements = {name: each.amount + still for name, each in lines.applied.items()}
+    every = powers(mechanism, lines.at, lines.applied, efforts, lines.rates)
     # its shape is given: without a mass, or without a solved sample, the list alone has none
-    table: Array = np.array([each + np.zeros(lanes.n) for each in every])
-    table = table.reshape(len(every), lanes.n)
-    spread = _Spread(solved, solution.singular)
+    table: Array = np.array([each + still for each in every]).reshape(len(every), lines.n)
+    spread = _Spread(motion.solved, solution.singular)
     joints = [j for j in mechanism.given_joints if mechanism.reduced or j.name in wanted.joints]
     free = {joint.name: lines.free(joint, solution) for joint in joints}
     if mechanism.reduced:
@@ -320,7 +345,7 @@ def forces_of(
 
     def reaction(name: str) -> Reaction:
         force, moment = map(spread, lines.wrench(mechanism.joint(name), solution.values))
-        return Reaction(force / lanes.frame.unit, moment, spread(free[name]), known)
+        return Reaction(force / lines.frame.unit, moment, spread(free[name]), known)
 
     return Forces(
         {name: reaction(name) for name in wanted.joints},
@@ -328,7 +353,7 @@ def forces_of(
         {name: spread(elements[name], ill=False) for name in wanted.elements},
         spread(table.sum(axis=0)),
         spread(np.abs(table).max(axis=0, initial=0.0)),
-        solution.message(lanes.times),
+        solution.message(lines.times),
     )
 
 
@@ -360,62 +385,34 @@ def motion_defects(mechanism: Mechanism, path: Path, motion: Trajectory) -> Mapp
     Raises:
         SolveError: the motion lacks a body.
     """
-    bodies = {name: motion.bodies[name] for name in motion.bodies}
-    orders = min(1 + (each.v is not None) * (1 + (each.a is not None)) for each in bodies.values())
-    whole = Trajectory(
-        motion.points,
-        motion.solved,
-        motion.iterations,
-        motion.residual,
-        bodies={name: _with_rates(each) for name, each in bodies.items()},
-    )
-    lines = ForceRows(MotionLanes(mechanism, path, whole))
-    found: dict[str, Array] = {}
-    for quantity, defects in zip(QUANTITIES[:orders], _defects(lines), strict=False):
+    orders, bodies = with_rates(motion.bodies)
+    lines = ForceRows(mechanism, path, replace(motion, bodies=bodies))
+    found, speed = dict[str, Array](), 1.0
+    for order, (defects, right) in enumerate(islice(lines.left(), orders)):
+        largest = float(np.abs(right).max(initial=0.0))
+        speed = largest or 1.0 if order == 1 else speed
+        scale = (1.0, speed, max(largest, speed**2))[order]
         for (owner, _), row in zip(lines.formulation.owners, np.abs(defects).T, strict=True):
-            label = f"{quantity} at {owner!r}"
-            found[label] = np.maximum(row, found.get(label, 0.0))
+            label = f"{QUANTITIES[order]} at {owner!r}"
+            found[label] = np.maximum(row / scale, found.get(label, 0.0))
     for point in mechanism.points:
         if point.name in motion.points:
             there = motion.points[point.name].position[motion.solved] - np.array(point.position)
-            off = there - lines.stacked(lines.lanes.at.place(point.body, point.position))
-            distance = np.linalg.norm(off, axis=1) / lines.lanes.frame.unit
+            off = there - columns_of(lines.at.place(point.body, point.position), lines.n)
+            distance = np.linalg.norm(off, axis=1) / lines.frame.unit
             label = f"position of points on {point.body!r}"
             found[label] = np.maximum(distance, found.get(label, 0.0))
     return found
 
 
-def _defects(lines: ForceRows) -> Iterator[Array]:
-    """Yield what is left of the constraints by order of the motion, shape (n, rows)."""
-    lanes, formulation, at = lines.lanes, lines.formulation, lines.equations.at
-    names, carried = formulation.bodies, lanes.at.accelerations
-    yield lines.stacked(formulation.phi(at))
-    v = lines.stacked([x for k in names for x in (*lanes.at.twists[k].v, *lanes.at.twists[k].w)])
-    nu = lines.stacked(formulation.nu(at))
-    speed = float(np.abs(nu).max(initial=0.0)) or 1.0
-    own, off = _left(lines.matrix, v, nu)
-    yield off / speed
-    a = lines.stacked([x for k in names for x in (*carried[k].v_t, *carried[k].w_t)])
-    gamma = lines.stacked(formulation.gamma(at, [*np.hstack([v, own]).T]))
-    _, off = _left(lines.matrix, a, gamma)
-    yield off / max(float(np.abs(gamma).max(initial=0.0)), speed**2)
-
-
-def _with_rates(motion: BodyMotion) -> BodyMotion:
-    """Return the motion with zero for rates that are not given."""
-    none = np.zeros((len(motion.r), 6))
-    v, a = (none if each is None else each for each in (motion.v, motion.a))
-    return replace(motion, v=v, a=a)
-
-
-def _left(matrix: Array, of_bodies: Array, right: Array) -> tuple[Array, Array]:
-    """Return the rates of the joints' own coordinates that fit best, and what is left of the rows.
-
-    Args:
-        matrix: shape (n, rows, unknowns): bodies, then coordinates.
-        of_bodies: rates of the bodies, shape (n, 6 bodies).
+def with_rates(motions: Mapping[str, BodyMotion]) -> tuple[int, dict[str, BodyMotion]]:
+    """Return the number of orders that all motions have, and the motions with zero for rates that
+    are not given.
     """
-    bodies, own = np.split(matrix, [of_bodies.shape[1]], axis=2)
-    wanted = right - np.einsum("nrk,nk->nr", bodies, of_bodies)
-    rates: Array = np.einsum("nkr,nr->nk", np.linalg.pinv(own), wanted)
-    return rates, wanted - np.einsum("nrk,nk->nr", own, rates)
+    orders = min(1 + (m.v is not None) * (1 + (m.a is not None)) for m in motions.values())
+    found: dict[str, BodyMotion] = {}
+    for name, motion in motions.items():
+        none = np.zeros((len(motion.r), 6))
+        v, a = (none if each is None else each for each in (motion.v, motion.a))
+        found[name] = replace(motion, v=v, a=a)
+    return orders, found

@@ -7,7 +7,7 @@ style. dpi is in global axes, or in body axes if the row style is; the poses are
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -35,7 +35,7 @@ class PrescribedBody:
 
 @dataclass(frozen=True, eq=False)
 class Cartesian:
-    """The constraints over the named moving bodies; implements `Formulation`.
+    """The equations of a mechanism over its named moving bodies: rows of joints, then of drivers.
 
     Attributes:
         named: coordinates with a column even if no primitive is driven by them.
@@ -54,12 +54,13 @@ class Cartesian:
         frame: Frames,
         drives: Mapping[str, Drive] | None = None,
         style: Style = Style.NATIVE,
+        named: Collection[str] = (),
     ) -> Cartesian:
-        """Return all constraints of a mechanism over its moving bodies.
+        """Return all constraints of a mechanism over its moving bodies; see `constraints`.
 
         Drivers without a drive hold their design value.
         """
-        return cls(constraints(mechanism, frame, drives or {}, style), frame.moving)
+        return cls(constraints(mechanism, frame, drives or {}, style, named), frame.moving)
 
     @cached_property
     def columns(self) -> Mapping[str, int]:
@@ -79,24 +80,39 @@ class Cartesian:
 
     @property
     def unknowns(self) -> int:
+        """Number of unknowns (columns)."""
         return COLUMNS * len(self.bodies) + len(self.coordinates)
 
     @property
     def design(self) -> Mapping[str, Sequence[float]]:
+        """The state at the design position."""
         still: dict[str, Sequence[float]] = {f"u {name}": (0.0, 0.0, 0.0) for name in self.bodies}
         still |= {f"q {name}": (1.0, 0.0, 0.0, 0.0) for name in self.bodies}
         return still | {f"x {name}": (0.0,) for name in self.coordinates}
 
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
-        return [name for c in self.constraints for name in [_named(c)] * _count(c)]
+        """For every row, its joint or driver and its primitive."""
+        return [*map(_named, self.of_rows)]
+
+    @cached_property
+    def of_rows(self) -> Sequence[Constraint | Relation]:
+        """The constraint of every row."""
+        return [c for c in self.constraints for _ in range(c.n)]
+
+    @cached_property
+    def measuring(self) -> Mapping[str, int]:
+        """Number of the row that measures a named coordinate."""
+        rows = enumerate(self.of_rows)
+        return {c.coordinate: k for k, c in rows if isinstance(c, Constraint) and c.coordinate}
 
     @property
     def conditions(self) -> Sequence[Condition]:
+        """The geometric conditions of the rows, in order."""
         far, found, first = self._from_ground, list[Condition](), 0
         for _, group in groupby(self.constraints, key=_condition):
             members = [*group]
-            rows = range(first, first := first + sum(map(_count, members)))
+            rows = range(first, first := first + sum(c.n for c in members))
             pairs = [c for c in members if isinstance(c, Constraint)]
             remote = max((far.get(c.i, 0) + far.get(c.j, 0) for c in pairs), default=0)
             steady = all(
@@ -132,12 +148,14 @@ class Cartesian:
         return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
 
     def configuration(self, state: State) -> Configuration:
+        """Return the poses of a state."""
         poses = {name: each.pose for name, each in self.prescribed.items()}
         for name in self.bodies:
             poses[name] = Pose.of(vec(state[f"u {name}"]), quat(state[f"q {name}"]))
         return Configuration(state, poses)
 
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
+        """Return the state after a step of the unknowns, exact to second order."""
         state: dict[str, Sequence[Scalar]] = {}
         for name, k in self.columns.items():
             dr, dpi = (
@@ -151,6 +169,7 @@ class Cartesian:
         return state
 
     def phi(self, at: Configuration) -> list[Scalar]:
+        """Return all residuals."""
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
@@ -160,10 +179,12 @@ class Cartesian:
         return found
 
     def branch(self, at: Configuration) -> list[Scalar]:
+        """Return all branch tests: positive on the intended branch."""
         bodily = (c for c in self.constraints if isinstance(c, Constraint))
         return [value for c in bodily for value in self._bound(c, at).branch(*_pair(c, at))]
 
     def rows(self, at: Configuration) -> Rows:
+        """Return the Jacobian by the unknowns."""
         found: Rows = []
         for c in self.constraints:
             if isinstance(c, Relation):
@@ -182,6 +203,7 @@ class Cartesian:
         return found
 
     def nu(self, at: Configuration) -> list[Scalar]:
+        """Return the right-hand sides of the velocity equations."""
         carried = {name: each.twist for name, each in self.prescribed.items()}
         found: list[Scalar] = []
         for c in self.constraints:
@@ -192,6 +214,7 @@ class Cartesian:
         return found
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
+        """Return the right-hand sides of the acceleration equations at unknown rates v."""
         twists = self._own(v) | {name: each.twist for name, each in self.prescribed.items()}
         carried = {
             name: Twist(each.acceleration.v_t, each.acceleration.w_t)
@@ -240,6 +263,7 @@ class Cartesian:
         return replace(driven, drive=drive)
 
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
+        """Return the twists of the bodies at unknown rates v."""
         return {
             name: Twist(twist.v, self._global(at.poses[name], twist.w))
             for name, twist in self._own(v).items()
@@ -248,6 +272,7 @@ class Cartesian:
     def accelerations(
         self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
     ) -> Mapping[str, Acceleration]:
+        """Return the accelerations of the bodies at unknown rates v and accelerations a."""
         # A w' differentiated is A w'dot + w x w, and the last is zero
         return {
             name: Acceleration(twist.v, self._global(at.poses[name], twist.w))
@@ -287,10 +312,6 @@ def _condition(c: Constraint | Relation) -> tuple[object, ...]:
 def _values(c: Relation, at: Configuration) -> list[Scalar]:
     """Return the coordinates of a relation."""
     return [at.state[f"x {name}"][0] for name in c.weights]
-
-
-def _count(c: Constraint | Relation) -> int:
-    return 1 if isinstance(c, Relation) else c.primitive.n
 
 
 def _pair(c: Constraint, at: Configuration) -> tuple[Pose, Pose]:

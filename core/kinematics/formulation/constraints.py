@@ -9,20 +9,22 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import StrEnum
-from typing import Any, Never
+from functools import cache
+from typing import Any, Never, TypeVar, cast
 
 from ... import primitives as p
-from ...algebra import ZERO, Vec3, vec
+from ...algebra import ZERO, Scalar, Vec3, vec
 from ...errors import SolveError
 from ...joints import Attachment, AxialJoint, Joint, PiecewisePolynomial
 from ...joints.base import unit
-from ...mechanism.mechanism import GROUND, Mechanism, extent
+from ...mechanism.mechanism import GROUND, Mechanism, Vector, extent
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...mechanism.tree import spanning_tree
 from ...primitives.base import Drive
+from ...program import Traced
 from .formulation import Relation as Relation
 
 
@@ -41,6 +43,11 @@ class Constraint:
     j: str
     coordinate: str = ""
 
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return self.primitive.n
+
 
 @dataclass(frozen=True)
 class Frames:
@@ -53,6 +60,15 @@ class Frames:
     def arm(self, body: str, position: Sequence[float]) -> Vec3:
         """Return the vector from a body's internal origin to a point, at design [units]."""
         return (1.0 / self.unit) * vec(position) - self.origins[body]
+
+    def end(self, body: str, position: Vector) -> tuple[Vector, Vec3]:
+        """Return a point of a body: its position and arm."""
+        return position, self.arm(body, position)
+
+    def in_units(self, unit: float) -> Frames:
+        """Return the same frames with another length unit, a power of two of metres."""
+        scaled = {name: (self.unit / unit) * origin for name, origin in self.origins.items()}
+        return Frames(unit, scaled, self.moving)
 
 
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
@@ -90,11 +106,7 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
             points[body] += joint.points_on(body)
     sizes = sorted(size for body in whole.moving if (size := extent(points[body])) > 0.0)
     unit = unit_near(sizes[len(sizes) // 2]) if sizes else whole.unit
-    return whole.unit, Frames(
-        unit,
-        {name: (whole.unit / unit) * origin for name, origin in whole.origins.items()},
-        whole.moving,
-    )
+    return whole.unit, whole.in_units(unit)
 
 
 def unit_near(length: float) -> float:
@@ -268,3 +280,80 @@ def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Cons
             forms = c.primitive.paper_form() if paper else c.primitive.conventional_form()
             styled += [replace(c, primitive=form) for form in forms]
     return styled
+
+
+def coordinates_of(c: Constraint | Relation) -> tuple[str, ...]:
+    """Return the names of the coordinates of a constraint."""
+    if isinstance(c, Relation):
+        return tuple(c.weights)
+    return (c.coordinate,) if c.coordinate else ()
+
+
+def renamed(
+    c: Constraint | Relation, owner: str, bodies: Mapping[str, str], coordinates: Sequence[str]
+) -> Constraint | Relation:
+    """Return a constraint with other names of its owner, bodies and coordinates; bodies without one
+    are the ground.
+    """
+    if isinstance(c, Relation):
+        weights = dict(zip(coordinates, c.weights.values(), strict=True))
+        return Relation(owner, weights, c.drive, c.curve)
+    i, j = (bodies.get(body, GROUND) for body in (c.i, c.j))
+    return Constraint(owner, c.primitive, i, j, "".join(coordinates))
+
+
+def structure(value: Any, numbers: list[Scalar]) -> Hashable:
+    """Return all of a value but its numbers, which are appended in order; values of one structure
+    can share a program. Whether a vector is zero is part of it.
+
+    The parts of tuples, mappings and data classes are looked into.
+    """
+    if _is_number(value):
+        numbers.append(value)
+        return Traced if isinstance(value, Traced) else float
+    names, parts = _parts(value)
+    if parts is None:
+        return value
+    found = tuple(structure(part, numbers) for part in parts)
+    if isinstance(value, Vec3):
+        return Vec3, any(isinstance(x, Traced) or x != 0.0 for x in value)
+    return value.__class__, names, found
+
+
+_Value = TypeVar("_Value")
+
+
+def with_numbers(value: _Value, numbers: Iterator[Scalar]) -> _Value:
+    """Return a value with other numbers, in the order of `structure`."""
+    if _is_number(value):
+        return next(numbers)
+    names, parts = _parts(value)
+    if parts is None:
+        return value
+    new = [with_numbers(part, numbers) for part in parts]
+    other: Any = value
+    if isinstance(value, tuple):
+        return cast("_Value", tuple(new))
+    named = dict(zip(names, new, strict=True))
+    return cast("_Value", named) if isinstance(value, dict) else replace(other, **named)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Traced | float | int) and not isinstance(value, bool)
+
+
+def _parts(value: Any) -> tuple[Sequence[str], Sequence[Any] | None]:
+    """Return the names and the parts of a value; no parts of one that is not looked into."""
+    if isinstance(value, tuple):
+        return (), cast("tuple[Any, ...]", value)
+    if isinstance(value, dict):
+        named = cast("dict[str, Any]", value)
+        return tuple(named), tuple(named.values())
+    names = _names(value.__class__)
+    return names or (), None if names is None else [getattr(value, name) for name in names]
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...] | None:
+    """Return the names of the fields of a data class; None of another type."""
+    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else None

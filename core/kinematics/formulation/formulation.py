@@ -1,15 +1,12 @@
-"""The interface of a formulation: unknowns, the poses they stand for, and the equations; motions of
-points and frames carried by a body; rows of joint coordinates.
-
-Newton's iteration, velocities, accelerations, prediction and row selection are written once over
-this interface, for all formulations.
+"""What formulations have in common: states and the poses they stand for, conditions of rows,
+motions of points and frames carried by a body, and rows of joint coordinates.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from typing import ClassVar, TypeAlias
 
 from ...algebra import ZERO, Quat, Scalar, Vec3, cross, rotation_less_identity, vec
 from ...joints import PiecewisePolynomial
@@ -65,69 +62,6 @@ class Acceleration:
 GROUND_ACCELERATION = Acceleration(ZERO, ZERO)
 
 
-class Formulation(Protocol):
-    """The equations of a mechanism over the unknowns of one formulation: joints, then drivers.
-
-    Attributes:
-        unknowns: number of unknowns (columns).
-        design: the state at the design position.
-        owners: for every row, its joint or driver and its primitive.
-        conditions: the geometric conditions of the rows, in order.
-    """
-
-    @property
-    def unknowns(self) -> int: ...
-    @property
-    def design(self) -> Mapping[str, Sequence[float]]: ...
-    @property
-    def owners(self) -> Sequence[tuple[str, str]]: ...
-    @property
-    def conditions(self) -> Sequence[Condition]: ...
-
-    def configuration(self, state: State) -> Configuration:
-        """Return the poses of a state."""
-        ...
-
-    def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
-        """Return the state after a step of the unknowns, exact to second order."""
-        ...
-
-    def phi(self, at: Configuration) -> list[Scalar]:
-        """Return all residuals."""
-        ...
-
-    def branch(self, at: Configuration) -> list[Scalar]:
-        """Return all branch tests: positive on the intended branch."""
-        ...
-
-    def rows(self, at: Configuration) -> Rows:
-        """Return the Jacobian by the unknowns."""
-        ...
-
-    def nu(self, at: Configuration) -> list[Scalar]:
-        """Return the right-hand sides of the velocity equations."""
-        ...
-
-    def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        """Return the right-hand sides of the acceleration equations at unknown rates v."""
-        ...
-
-    def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
-        """Return the twists of the bodies at unknown rates v."""
-        ...
-
-    def accelerations(
-        self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
-    ) -> Mapping[str, Acceleration]:
-        """Return the accelerations of the bodies at unknown rates v and accelerations a."""
-        ...
-
-
-def row_names(formulation: Formulation) -> list[str]:
-    """Return a readable name of every row: its joint or driver, and its primitive."""
-    return [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
-
-
 def position_of(position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose) -> Vec3:
     """Return the position of a point [m]; its displacement is formed first and added once.
 
@@ -177,6 +111,7 @@ class Relation:
         curve: a function of the last coordinate that is added to the sum; None for a linear row.
     """
 
+    n: ClassVar[int] = 1
     owner: str
     weights: Mapping[str, Scalar]
     drive: Drive = field(default_factory=Drive)

@@ -45,19 +45,15 @@ class LoadPlace:
 
 def load_places(mechanism: Mechanism) -> dict[str, LoadPlace]:
     """Return the places of bodies with mass, then of force elements, by name."""
-    every = [*_of_bodies(mechanism), *_of_forces(mechanism)]
-    return {place.name: place for place in every}
+    return {place.name: place for place in _load_places(mechanism)}
 
 
-def _of_bodies(mechanism: Mechanism) -> Iterator[LoadPlace]:
+def _load_places(mechanism: Mechanism) -> Iterator[LoadPlace]:
     for body in mechanism.moving:
         if body.mass != 0.0:
             part = f"bodies.{body.name}"
             yield LoadPlace(part, "mass", (body.mass,), MASS)
             yield LoadPlace(part, "center_of_mass", body.center_of_mass or body.origin, None)
-
-
-def _of_forces(mechanism: Mechanism) -> Iterator[LoadPlace]:
     for force in mechanism.forces:
         part = f"forces.{force.name}"
         for each in fields(force):
@@ -104,26 +100,28 @@ def _changed(part: _Part, changes: Mapping[str, Any] | None) -> _Part:
 
 def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
     """Return the value of every place [m or -]: three numbers of a point or direction, or one."""
-    found: dict[str, tuple[float, ...]] = {}
+    return {
+        name: (value,) if kind is Kind.LENGTH else tuple(value)
+        for name, kind, value in _geometry(mechanism)
+    }
+
+
+def kinds(mechanism: Mechanism) -> dict[str, Kind]:
+    """Return the kind of every place: a point, a direction or a length."""
+    return {name: kind for name, kind, _ in _geometry(mechanism)}
+
+
+def _geometry(mechanism: Mechanism) -> Iterator[tuple[str, Kind, Any]]:
     for joint in mechanism.joints:
         for name, kind, value in joint.parts():
-            found[f"joints.{joint.name}.{name}"] = (value,) if kind is Kind.LENGTH else tuple(value)
-    return found | {f"points.{point.name}.position": point.position for point in mechanism.points}
+            yield f"joints.{joint.name}.{name}", kind, value
+    for point in mechanism.points:
+        yield f"points.{point.name}.position", Kind.POSITION, point.position
 
 
 def every_place(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
     """Return the value of every place [SI], of geometry, masses and loads."""
     return places(mechanism) | {name: place.value for name, place in load_places(mechanism).items()}
-
-
-def kinds(mechanism: Mechanism) -> dict[str, Kind]:
-    """Return the kind of every place: a point, a direction or a length."""
-    found = {
-        f"joints.{joint.name}.{name}": kind
-        for joint in mechanism.joints
-        for name, kind, _ in joint.parts()
-    }
-    return found | {f"points.{point.name}.position": Kind.POSITION for point in mechanism.points}
 
 
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:

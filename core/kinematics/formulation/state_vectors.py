@@ -4,12 +4,12 @@ and the numbers of a `Drive` from values in SI units.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 
-from ...algebra import ZERO, angle_about, quat, vec
+from ...algebra import ZERO, Scalar, angle_about, quat, vec
 from ...joints import AxialJoint
 from ...joints.base import unit
 from ...mechanism.mechanism import Mechanism
@@ -17,7 +17,8 @@ from ...mechanism.motions import Driver, JointAngle, Path
 from ...primitives.base import GROUND_POSE, Drive, Pose
 from ...trajectory import Array
 from .constraints import Frames
-from .formulation import Configuration, Formulation
+from .formulation import Configuration, Rows, position_of
+from .relative import Formulation
 
 
 def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
@@ -81,6 +82,27 @@ def displaced(
     return found
 
 
+def placed_bodies(
+    mechanism: Mechanism, frame: Frames, poses: Mapping[str, Pose], n: int
+) -> dict[str, tuple[Array, Array]]:
+    """Return origins [m], shape (n, 3), and Euler parameters, shape (n, 4), of the moving bodies at
+    poses relative to design, scalars or lanes.
+    """
+    found: dict[str, tuple[Array, Array]] = {}
+    for body in mechanism.moving:
+        pose, arm = poses[body.name], frame.arm(body.name, body.origin)
+        r = position_of(body.origin, arm, frame.unit, pose)
+        p = pose.q * quat(body.euler_parameters)
+        found[body.name] = columns_of(r, n), columns_of(p, n)
+    return found
+
+
+def columns_of(scalars: Iterable[Scalar], n: int) -> Array:
+    """Return scalars or lanes as columns, shape (n, scalars)."""
+    found = [x + np.zeros(n) for x in scalars]
+    return np.stack(found, axis=1) if found else np.empty((n, 0))
+
+
 def state_of(
     formulation: Formulation,
     mechanism: Mechanism,
@@ -125,7 +147,13 @@ def jacobian(formulation: Formulation, at: Configuration | None = None) -> Array
     The shape is (rows, unknowns).
     """
     rows = formulation.rows(at or formulation.configuration(formulation.design))
-    matrix = np.zeros((len(rows), formulation.unknowns))
+    return dense(rows, formulation.unknowns, 1)[0]
+
+
+def dense(rows: Rows, unknowns: int, n: int) -> Array:
+    """Return rows of scalars or lanes as matrices, shape (n, rows, unknowns)."""
+    found = np.zeros((n, len(rows), unknowns))
     for k, row in enumerate(rows):
-        matrix[k, list(row)] = list(row.values())
-    return matrix
+        for column, value in row.items():
+            found[:, k, column] = value
+    return found

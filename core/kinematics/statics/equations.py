@@ -15,7 +15,7 @@ equations. `rest` is the unbalance at design, taken away little by little.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
@@ -37,17 +37,16 @@ from ...program import (
     Tape,
     absolute,
     maximum,
-    program,
 )
 from ...program.llvm.executor import Executor
 from ...program.tape import folded, jacobian
 from ...trajectory import Array
 from ..compiled.request import Layout
 from ..compiled.traced_forces import angles
-from ..forces.equations import BodyStates, ForceEquations, Wrench, at_work
+from ..forces.equations import BodyStates, ForceEquations
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Frames, constraints, frames
-from ..formulation.formulation import GROUND_ACCELERATION
+from ..formulation.constraints import frames
+from ..formulation.formulation import GROUND_ACCELERATION, Configuration
 from ..formulation.state_vectors import jacobian as rows_at
 from ..structure.redundancy import independent_rows
 
@@ -79,9 +78,8 @@ class LoadPoint:
     position: Vector
 
 
-@dataclass(frozen=True, eq=False)
 class StaticEquations:
-    """The traced equations of a mechanism.
+    """The traced equations of a mechanism; its drivers are held, all other motions are free.
 
     Attributes:
         plan: the programs and the slots of a lane.
@@ -90,40 +88,235 @@ class StaticEquations:
         columns: first unknown of each moving body.
         tangent: row and column of each slot of the tangent; rows of constraints come last.
         unknowns: number of the step's components.
-        scale: of forces [J].
+        order: number of all unknowns.
         chosen, dropped: independent rows, and redundant ones.
         rest: the unbalance at design [J], shape (unknowns,).
         multipliers: of the chosen rows at design, which carry the other forces [J].
-    """
-
-    mechanism: Mechanism
-    loads: tuple[LoadPoint, ...]
-    plan: Plan
-    vectors: Mapping[str, Sequence[int]]
-    design: Mapping[str, Sequence[float]]
-    columns: Mapping[str, int]
-    tangent: Sequence[tuple[int, int]]
-    unknowns: int
-    scale: float
-    chosen: tuple[int, ...]
-    dropped: tuple[int, ...]
-    rest: Array
-    multipliers: Array
-    frame: Frames
-
-    @property
-    def order(self) -> int:
-        """Number of all unknowns."""
-        return self.unknowns + len(self.chosen)
-
-
-def static_equations(mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> StaticEquations:
-    """Trace the equations of a mechanism; its drivers are held, all other motions are free.
 
     Raises:
         SolveError: nothing holds a body in some direction.
     """
-    return _Tracer(mechanism, loads).equations()
+
+    def __init__(self, mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> None:
+        for each in mechanism.forces:
+            if isinstance(each, TorsionSpringDamper) and not isinstance(
+                mechanism.joint(each.joint), AxialJoint
+            ):
+                raise SolveError(
+                    f"{each}: statics follow the angle of hinges and of other joints about one"
+                    f" axis; {mechanism.joint(each.joint)} is none, give the spring another joint"
+                )
+        self.mechanism, self.loads, self.frame = mechanism, tuple(loads), frames(mechanism)
+        self._tape, self._layout = Tape(), Layout()
+        self.vectors = self._layout.vectors
+        self.chosen, self.dropped, self._matrix = self._independent()
+        self._drives = dict[str, Drive]()
+        for driver in mechanism.drivers:
+            value, *half = self._vector(f"{DRIVE}{driver.name}", 3)
+            self._drives[driver.name] = Drive(value, 0.0, 0.0, *half)
+        self._formulation = formulation = self._formulate(self._drives)
+        self.design, self.columns = formulation.design, formulation.columns
+        self._now = formulation.configuration(
+            {name: self._vector(name, len(value)) for name, value in self.design.items()}
+        )
+        self.unknowns = formulation.unknowns
+        self.order = self.unknowns + len(self.chosen)
+        self.plan = self._programs()
+
+    def _formulate(self, drives: Mapping[str, Drive]) -> Cartesian:
+        return Cartesian.of(self.mechanism, self.frame, drives, named=angles(self.mechanism))
+
+    def _vector(self, name: str, count: int) -> list[Any]:
+        return [self._tape.input(slot) for slot in self._layout.vector(name, count)]
+
+    def _program(self, name: str, vectors: Mapping[str, Sequence[Scalar]]) -> Program:
+        return self._layout.program(name, self._tape, vectors)
+
+    def _independent(self) -> tuple[list[int], list[int], Array]:
+        """Return the independent rows at design, the others, and the matrix of the former.
+
+        Raises:
+            SolveError: joints or other drivers hold the coordinate of a driver already.
+        """
+        drivers, at_rest = self.mechanism.drivers, self._formulate({})
+        matrix = rows_at(at_rest)
+        first = len(matrix) - len(drivers)
+        rank = len(independent_rows(matrix[:first], 0))
+        for k, driver in enumerate(drivers, 1):
+            if len(independent_rows(matrix[: first + k], 0)) < rank + k:
+                raise SolveError(
+                    f"driver {driver.name!r} holds nothing at the design position: joints or other"
+                    " held drivers hold its coordinate already; leave it out"
+                )
+        chosen = independent_rows(matrix, len(drivers), at_rest.conditions)
+        return chosen, [k for k in range(len(matrix)) if k not in chosen], matrix[chosen]
+
+    def _programs(self) -> Plan:
+        step = self._vector(STEP + " of", self.unknowns)
+        multipliers = self._vector(MULTIPLIERS, len(self.chosen))
+        pulls = [x for each in self.loads for x in self._vector(f"{LOAD}{each.name}", 6)]
+        drives = [
+            x for each in self._drives.values() for x in (each.c, each.half_cos, each.half_sin)
+        ]
+        at = self._formulation.configuration(self._formulation.retract(self._now, step))
+        balance = self._balance(at, multipliers, pulls)
+        slopes = jacobian(self._tape, balance, [*step, *multipliers, *drives, *pulls], smooth=True)
+        # at a step of zero; in one call, as values and slopes share most operations
+        every = [*balance, *(x for row in slopes for x in row.values())]
+        found = iter(folded(self._tape, every, dict.fromkeys(self.vectors[f"{STEP} of"], 0.0)))
+        balance = [next(found) for _ in balance]
+        rows = [{k: next(found) for k in row} for row in slopes]
+        slopes = [{k: x for k, x in row.items() if not is_literal_zero(x)} for row in rows]
+        tangent = [{k: x for k, x in row.items() if k < self.order} for row in slopes[: self.order]]
+        self.tangent = [(i, k) for i, row in enumerate(tangent) for k in row]
+        entries = self._program(
+            "tangent", {"tangent": [x for row in tangent for x in row.values()]}
+        )
+        scale, exponent = self._at_design(entries, balance[: self.unknowns])
+        rest = self._vector(REST, self.unknowns)
+        left = [(1.0 / scale) * (x - y) for x, y in zip(balance, rest, strict=False)]
+        factor = Elimination(
+            [
+                {k: (1.0 / scale) * x if max(i, k) < self.unknowns else x for k, x in row.items()}
+                for i, row in enumerate(tangent)
+            ]
+        )
+        corrections = factor.solve([*left, *balance[self.unknowns : self.order]])
+        by_step = [-x for x in corrections[: self.unknowns]]
+        changes = zip(multipliers, corrections[self.unknowns :], strict=True)
+        per_pivot = 2.0 ** -round(exponent / max(1, len(factor.pivots)))
+        newton = {
+            **self._formulation.retract(self._now, by_step),
+            MULTIPLIERS: [x - scale * change for x, change in changes],
+            STEP: [reduce(maximum, map(absolute, by_step))],
+            SIGNS: [factor.orientation],
+            DETERMINANT: [factor.determinant(per_pivot)],
+        }
+        compliance = {EFFORTS: balance[self.order :], **self._compliance(factor, slopes, scale)}
+        programs = (
+            entries,
+            self._program("newton", newton),
+            self._program("compliance", compliance),
+        )
+        return Plan({each.name: each for each in programs}, dict(self._layout.slots))
+
+    def _balance(
+        self, at: Configuration, multipliers: Sequence[Scalar], pulls: Sequence[Scalar]
+    ) -> list[Scalar]:
+        """Return F - J^T lambda by the unknowns [J], the gaps of the chosen rows, and the efforts
+        of the drivers [N or N m].
+        """
+        bodies = self._formulation.bodies
+        still = dict.fromkeys(bodies, Twist(ZERO, ZERO))
+        rests = dict.fromkeys(bodies, GROUND_ACCELERATION)
+        states = BodyStates(self.frame, at.poses, still, rests)
+        equations = ForceEquations.traced(self.mechanism, self._formulation, at, states)
+        demand = [*equations.demand]
+        for each, first in zip(self.loads, range(0, len(pulls), 6), strict=True):
+            force, torque = vec(pulls[first : first + 3]), vec(pulls[first + 3 : first + 6])
+            if each.body in self.columns:
+                arm = states.arm(each.body, each.position)
+                pull = [*(self.frame.unit * force), *(cross(arm, force) + torque)]
+                for k, x in enumerate(pull, self.columns[each.body]):
+                    demand[k] = demand[k] - x
+        every: list[Scalar] = [0.0] * len(equations.rows)
+        for row, multiplier in zip(self.chosen, multipliers, strict=True):
+            every[row] = multiplier
+            for k, x in equations.rows[row].items():
+                demand[k] = demand[k] - x * multiplier
+        gaps = self._formulation.phi(at)
+        efforts = [equations.effort(each, every) for each in self.mechanism.drivers]
+        return [*demand, *(gaps[k] for k in self.chosen), *efforts]
+
+    def _at_design(self, entries: Program, forces: Sequence[Scalar]) -> tuple[float, float]:
+        """Find what is out of balance at the design position without loads, and the multipliers
+        that carry the rest; return the scale of the stiffness and the binary exponent of the
+        determinant.
+
+        Raises:
+            SolveError: nothing holds a body in some direction.
+        """
+        unbalanced = self._program("unbalanced", {"unbalanced": forces})
+        both = {each.name: each for each in (entries, unbalanced)}
+        executor = NumpyExecutor(Plan(both, dict(self._layout.slots)), 1)
+        executor.clear()
+        self.multipliers = np.zeros(len(self.chosen))
+        self.stand(executor)
+        executor.run("unbalanced")
+        out = self.vectors["unbalanced"]
+        # joints carry what they can, which changes the stiffness; the rest is out of balance
+        found = np.linalg.lstsq(self._matrix.T, executor.get(out)[:, 0], rcond=None)[0]
+        self.multipliers = np.asarray(found, dtype=np.float64)
+        self.stand(executor)
+        for name in both:
+            executor.run(name)
+        self.rest = executor.get(out)[:, 0]
+        matrix = np.zeros((self.order, self.order))
+        matrix[tuple(np.array(self.tangent).T)] = executor.get(self.vectors["tangent"])[:, 0]
+        stiffness = matrix[: self.unknowns, : self.unknowns]
+        largest = float(np.abs(stiffness).max(initial=0.0))
+        self._require_held(stiffness, largest)
+        scale = 2.0 ** round(np.log2(largest)) if largest else 1.0
+        stiffness /= scale
+        return scale, float(np.linalg.slogdet(matrix)[1]) / np.log(2.0)
+
+    def stand(self, executor: Executor) -> None:
+        """Set all lanes to the design position without loads."""
+        for name, values in self.design.items():
+            executor.put(self.vectors[name], np.array(values)[:, None])
+        for name in self._drives:
+            executor.put(self.vectors[f"{DRIVE}{name}"], np.array([[0.0], [1.0], [0.0]]))
+        executor.put(self.vectors[MULTIPLIERS], self.multipliers[:, None])
+
+    def _require_held(self, stiffness: Array, largest: float) -> None:
+        free = null_space(self._matrix, self.unknowns)
+        reduced = free.T @ stiffness @ free
+        u, sizes, _ = np.linalg.svd(reduced)
+        loose = u[:, sizes <= FREE * largest] if largest else u
+        if not loose.size:
+            return
+        motion = free @ loose[:, 0]
+        name, _ = moved_most(self.columns, motion)
+        own = [each for each in self.mechanism.forces if name in each.bodies]
+        verb = "does" if len(own) == 1 else "do"
+        known = f" ({', '.join(map(str, own))} {verb} not)" if own else ""
+        raise SolveError(
+            f"{motion_of(self.columns, motion)} freely: no joint, spring or bushing"
+            f" holds it at the design position{known}; give stiffness or turning_stiffness there,"
+            " hold a driver, or give another design position"
+        )
+
+    def _compliance(
+        self, factor: Elimination, slopes: Sequence[Mapping[int, Scalar]], scale: float
+    ) -> dict[str, list[Scalar]]:
+        """Return the derivatives of step and efforts by each driver and component of a load."""
+        n, found = self.unknowns, dict[str, list[Scalar]]()
+
+        def add(name: str, first: int, weights: Sequence[Scalar], *, pulls: bool) -> None:
+            def by_input(row: Mapping[int, Scalar]) -> Scalar:
+                return sum((row.get(first + k, 0.0) * x for k, x in enumerate(weights)), 0.0)
+
+            # drivers move the rows, and loads pull
+            pull = [(-1.0 / scale) * by_input(row) if pulls else 0.0 for row in slopes[:n]]
+            gaps = [0.0 if pulls else -by_input(row) for row in slopes[n : self.order]]
+            rates = factor.solve([*pull, *gaps])
+            step, rates = rates[:n], [*rates[:n], *(scale * x for x in rates[n:])]
+            efforts = [
+                sum((x * rates[k] for k, x in row.items() if k < self.order), by_input(row))
+                for row in slopes[self.order :]
+            ]
+            found[f"{BY}{name}"] = [*step, *efforts]
+
+        loads = self.order + 3 * len(self._drives)
+        components = [f"{each.name}.{k}" for each in self.loads for k in range(6)]
+        for k, name in enumerate(components, loads):
+            add(name, k, (1.0,), pulls=True)
+        for (name, drive), first in zip(
+            self._drives.items(), range(self.order, loads, 3), strict=True
+        ):
+            weights = (1.0, -0.5 * drive.half_sin, 0.5 * drive.half_cos)
+            add(name, first, weights, pulls=False)
+        return found
 
 
 def with_free_coordinates(mechanism: Mechanism) -> Mechanism:
@@ -131,17 +324,19 @@ def with_free_coordinates(mechanism: Mechanism) -> Mechanism:
     far as joints have any.
     """
     driven = {(x.joint, x.freedom) for x in mechanism.drivers if isinstance(x, JointDriver)}
-    names = {each.name for each in mechanism.drivers}
-    candidates = [
-        cls(joint.name if joint.name not in names else f"{joint.name}.{cls.freedom}", joint.name)
-        for joint in mechanism.joints
-        for cls in (JointAngle, JointDisplacement)
-        if cls.freedom in joint.freedoms and (joint.name, cls.freedom) not in driven
-    ]
+    names, candidates = {each.name for each in mechanism.drivers}, list[Driver]()
+    for joint in mechanism.joints:
+        kinds = [
+            each
+            for each in (JointAngle, JointDisplacement)
+            if each.freedom in joint.freedoms and (joint.name, each.freedom) not in driven
+        ]
+        whole = joint.name not in names and len(kinds) == 1
+        for each in kinds:
+            name = joint.name if whole else f"{joint.name}.{each.freedom}"
+            candidates.append(each(name, joint.name))
     every = replace(mechanism, drivers=[*mechanism.drivers, *candidates])
-    frame, drives = frames(every), {each.name: Drive() for each in every.drivers}
-    found = constraints(every, frame, drives, named=angles(every))
-    rows = rows_at(Cartesian(found, frame.moving))
+    rows = rows_at(Cartesian.of(every, frames(every), named=angles(every)))
     first, chosen = len(rows) - len(candidates), list[Driver]()
     kept = rows[:first]
     rank = len(independent_rows(kept, 0))
@@ -151,300 +346,6 @@ def with_free_coordinates(mechanism: Mechanism) -> Mechanism:
             kept, rank = wider, of_wider
             chosen.append(driver)
     return replace(mechanism, drivers=[*mechanism.drivers, *chosen])
-
-
-class _Tracer:
-    def __init__(self, mechanism: Mechanism, loads: Sequence[LoadPoint]) -> None:
-        for each in mechanism.forces:
-            if isinstance(each, TorsionSpringDamper) and not isinstance(
-                mechanism.joint(each.joint), AxialJoint
-            ):
-                raise SolveError(
-                    f"{each}: statics follow the angle of hinges and of other joints about one"
-                    f" axis; {mechanism.joint(each.joint)} is none, give the spring another joint"
-                )
-        self.mechanism, self.loads = mechanism, tuple(loads)
-        self.tape, self.layout, self.frame = Tape(), Layout(), frames(mechanism)
-        drives = {each.name: Drive() for each in mechanism.drivers}
-        at_rest = self._formulate(drives)
-        matrix = rows_at(at_rest)
-        held = len(mechanism.drivers)
-        self.chosen = tuple(independent_rows(matrix, held, at_rest.conditions))
-        self._require_free(matrix, held)
-        self.dropped = tuple(k for k in range(len(matrix)) if k not in self.chosen)
-        self.matrix = matrix[list(self.chosen)]
-        inputs = {name: self._vector(f"{DRIVE}{name}", 3) for name in drives}
-        self.drives = {name: Drive(c, 0.0, 0.0, cos, sin) for name, (c, cos, sin) in inputs.items()}
-        self.formulation = self._formulate(self.drives)
-        self.state = {
-            name: self._vector(name, len(value)) for name, value in self.formulation.design.items()
-        }
-        self.n = self.formulation.unknowns
-        self.step = self._vector(STEP + " of", self.n)
-        self.multipliers = self._vector(MULTIPLIERS, len(self.chosen))
-        self.at = self.formulation.configuration(
-            self.formulation.retract(self.formulation.configuration(self.state), self.step)
-        )
-        still = {name: Twist(ZERO, ZERO) for name in self.formulation.bodies}
-        rests = dict.fromkeys(self.formulation.bodies, GROUND_ACCELERATION)
-        self.states = BodyStates(self.frame, self.at.poses, still, rests)
-
-    def _require_free(self, matrix: Array, held: int) -> None:
-        """Raise SolveError if joints or other drivers hold the coordinate of a driver already."""
-        first, rank = len(matrix) - held, len(independent_rows(matrix[: len(matrix) - held], 0))
-        for k, driver in enumerate(self.mechanism.drivers, 1):
-            if len(independent_rows(matrix[: first + k], 0)) < rank + k:
-                raise SolveError(
-                    f"driver {driver.name!r} holds nothing at the design position: joints or other"
-                    " held drivers hold its coordinate already; leave it out"
-                )
-
-    def _formulate(self, drives: Mapping[str, Drive]) -> Cartesian:
-        found = constraints(self.mechanism, self.frame, drives, named=angles(self.mechanism))
-        return Cartesian(found, self.frame.moving)
-
-    def _vector(self, name: str, count: int) -> list[Any]:
-        return [self.tape.input(slot) for slot in self.layout.vector(name, count)]
-
-    def equations(self) -> StaticEquations:
-        """Return the equations with all programs."""
-        rows = self.formulation.rows(self.at)
-        gaps = [self.formulation.phi(self.at)[k] for k in self.chosen]
-        forces, efforts = self._forces([rows[k] for k in self.chosen]), self._efforts()
-        drives = [x for drive in self.drives.values() for x in _numbers(drive)]
-        inputs = [*self.step, *self.multipliers, *drives]
-        slopes = jacobian(self.tape, [*forces, *gaps, *efforts], inputs, smooth=True)
-        values, slopes = self._now([*forces, *gaps, *efforts], slopes)
-        balance, efforts = values[: self.order], values[self.order :]
-        tangent = [{k: x for k, x in row.items() if k < self.order} for row in slopes[: self.order]]
-        at_design = self._at_design(tangent, balance[: self.n])
-        scale = at_design.scale
-        rest = self._vector(REST, self.n)
-        left = [(1.0 / scale) * (x - y) for x, y in zip(balance, rest, strict=False)]
-        factor = Elimination(
-            [
-                {k: (1.0 / scale) * x if max(i, k) < self.n else x for k, x in row.items()}
-                for i, row in enumerate(tangent)
-            ]
-        )
-        programs = [
-            at_design.program,
-            self._newton(factor, [*left, *balance[self.n :]], at_design),
-            self._compliance(factor, slopes, efforts, scale),
-        ]
-        return StaticEquations(
-            self.mechanism,
-            self.loads,
-            Plan({each.name: each for each in programs}, dict(self.layout.slots)),
-            self.layout.vectors,
-            self.formulation.design,
-            self.formulation.columns,
-            [(i, k) for i, row in enumerate(tangent) for k in row],
-            self.n,
-            scale,
-            self.chosen,
-            self.dropped,
-            at_design.unbalanced,
-            at_design.multipliers,
-            self.frame,
-        )
-
-    @property
-    def order(self) -> int:
-        """Number of all unknowns."""
-        return self.n + len(self.chosen)
-
-    def _forces(self, rows: Sequence[Mapping[int, Scalar]]) -> list[Scalar]:
-        """Return F - J^T lambda by the unknowns [J]."""
-        wrenches = dict[str, Wrench]()
-        for each in self.loads:
-            slots = self._vector(f"{LOAD}{each.name}", 6)
-            force, torque = vec(slots[:3]), vec(slots[3:])
-            at_point = Wrench.at(self.states.arm(each.body, each.position), force)
-            wrenches[each.name] = at_point + Wrench(ZERO, torque)
-        applied = at_work(
-            self.mechanism, self.states, lambda joint: self.at.state[f"x {joint}.rotation"][0]
-        )
-        self.balance = ForceEquations(
-            *(self.mechanism, self.formulation, self.at, self.states, applied), Cartesian((), ())
-        )
-        found = list(self.balance.demand)
-        for each in self.loads:
-            if each.body in self.formulation.columns:
-                first, wrench = self.formulation.columns[each.body], wrenches[each.name]
-                pull = [*(self.frame.unit * wrench.force), *wrench.torque]
-                for k, x in enumerate(pull, first):
-                    found[k] = found[k] - x
-        for row, multiplier in zip(rows, self.multipliers, strict=True):
-            for k, x in row.items():
-                found[k] = found[k] - x * multiplier
-        return found
-
-    def _efforts(self) -> list[Scalar]:
-        """Return the efforts of the drivers [N or N m]."""
-        every: list[Scalar] = [0.0] * len(self.balance.rows)
-        for k, x in zip(self.chosen, self.multipliers, strict=True):
-            every[k] = x
-        return [self.balance.effort(each, every) for each in self.mechanism.drivers]
-
-    def _now(
-        self, values: Sequence[Scalar], slopes: Sequence[Mapping[int, Scalar]]
-    ) -> tuple[list[Scalar], list[dict[int, Scalar]]]:
-        """Return values and their derivatives at a step of zero."""
-        zero = dict.fromkeys(self.layout.vectors[f"{STEP} of"], 0.0)
-        # in one call, as they share most operations
-        every = [*values, *(x for row in slopes for x in row.values())]
-        found = folded(self.tape, every, zero)
-        rest = iter(found[len(values) :])
-        rows = [{k: next(rest) for k in row} for row in slopes]
-        return found[: len(values)], [
-            {k: x for k, x in row.items() if not is_literal_zero(x)} for row in rows
-        ]
-
-    def _at_design(
-        self, tangent: Sequence[Mapping[int, Scalar]], forces: Sequence[Scalar]
-    ) -> _AtDesign:
-        """Evaluate tangent and forces at the design position without loads.
-
-        Raises:
-            SolveError: nothing holds a body in some direction.
-        """
-        places = [(i, k) for i, row in enumerate(tangent) for k in row]
-        entries = [x for row in tangent for x in row.values()]
-        slots = self.layout.vector("tangent", len(places))
-        found = program("tangent", self.tape, dict(zip(slots, entries, strict=True)))
-        out = self.layout.vector("unbalanced", self.n)
-        of_forces = program("unbalanced", self.tape, dict(zip(out, forces, strict=True)))
-        both = {each.name: each for each in (found, of_forces)}
-        executor = NumpyExecutor(Plan(both, dict(self.layout.slots)), 1)
-        executor.clear()
-        put_design(executor, self.layout.vectors, self.formulation.design, self.drives)
-        executor.run("unbalanced")
-        # joints carry what they can, which changes the stiffness; the rest is out of balance
-        carried: Any = np.linalg.lstsq(self.matrix.T, executor.get(out)[:, 0], rcond=None)[0]
-        executor.put(self.layout.vectors[MULTIPLIERS], carried[:, None])
-        for name in both:
-            executor.run(name)
-        matrix = np.zeros((self.order, self.order))
-        matrix[tuple(np.array(places).T)] = executor.get(slots)[:, 0]
-        stiffness = matrix[: self.n, : self.n]
-        largest = float(np.abs(stiffness).max(initial=0.0))
-        self._require_held(stiffness, largest)
-        scale = 2.0 ** round(np.log2(largest)) if largest else 1.0
-        stiffness /= scale
-        exponent = float(np.linalg.slogdet(matrix)[1]) / np.log(2.0)
-        return _AtDesign(found, scale, exponent, carried, executor.get(out)[:, 0])
-
-    def _require_held(self, stiffness: Array, largest: float) -> None:
-        free = null_space(self.matrix, self.n)
-        reduced = free.T @ stiffness @ free
-        u, sizes, _ = np.linalg.svd(reduced)
-        loose = u[:, sizes <= FREE * largest] if largest else u
-        if not loose.size:
-            return
-        motion = free @ loose[:, 0]
-        name, _ = moved_most(self.formulation.columns, motion)
-        own = [each for each in self.mechanism.forces if name in each.bodies]
-        verb = "does" if len(own) == 1 else "do"
-        known = f" ({', '.join(map(str, own))} {verb} not)" if own else ""
-        raise SolveError(
-            f"{motion_of(self.formulation.columns, motion)} freely: no joint, spring or bushing"
-            f" holds it at the design position{known}; give stiffness or turning_stiffness there,"
-            " hold a driver, or give another design position"
-        )
-
-    def _newton(self, factor: Elimination, left: Sequence[Scalar], at_design: _AtDesign) -> Program:
-        found, out = factor.solve(left), dict[int, Scalar]()
-        by_step = [-x for x in found[: self.n]]
-        new = self.formulation.retract(self.formulation.configuration(self.state), by_step)
-        for name, values in new.items():
-            out |= zip(self.layout.vectors[name], values, strict=True)
-        multipliers = zip(self.multipliers, found[self.n :], strict=True)
-        slots = self.layout.vectors[MULTIPLIERS]
-        out |= zip(slots, (x - at_design.scale * change for x, change in multipliers), strict=True)
-        out[self.layout.scalar(STEP)] = reduce(maximum, map(absolute, by_step))
-        out[self.layout.scalar(SIGNS)] = factor.orientation
-        per_pivot = 2.0 ** -round(at_design.exponent / max(1, len(factor.pivots)))
-        out[self.layout.scalar(DETERMINANT)] = factor.determinant(per_pivot)
-        return program("newton", self.tape, out)
-
-    def _compliance(
-        self,
-        factor: Elimination,
-        slopes: Sequence[Mapping[int, Scalar]],
-        efforts: Sequence[Scalar],
-        scale: float,
-    ) -> Program:
-        out = dict[int, Scalar]()
-        out |= zip(self.layout.vector(EFFORTS, len(efforts)), efforts, strict=True)
-        of_efforts = slopes[self.order :]
-
-        def add(name: str, right: list[Scalar], own: Sequence[Scalar]) -> None:
-            found = factor.solve(right)
-            step, rates = found[: self.n], [*found[: self.n], *(scale * x for x in found[self.n :])]
-            totals = [
-                sum((x * rates[k] for k, x in row.items() if k < self.order), start)
-                for row, start in zip(of_efforts, own, strict=True)
-            ]
-            values = [*step, *totals]
-            out.update(zip(self.layout.vector(f"{BY}{name}", len(values)), values, strict=True))
-
-        none = [0.0] * len(efforts)
-        now = self.formulation.configuration(self.state)
-        for each in self.loads:
-            for k in range(6):
-                right: list[Scalar] = [0.0] * self.order
-                first = self.formulation.columns.get(each.body)
-                if first is not None:
-                    unit = vec([float(k == x) for x in range(3)])
-                    turn = vec([float(k == x) for x in range(3, 6)])
-                    pose = now.poses[each.body]
-                    arm = self.frame.unit * pose.turn(self.frame.arm(each.body, each.position))
-                    pull = [*(self.frame.unit * unit), *(cross(arm, unit) + turn)]
-                    for x, value in enumerate(pull, first):
-                        right[x] = (1.0 / scale) * value
-                add(f"{each.name}.{k}", right, none)
-        for number, (name, drive) in enumerate(self.drives.items()):
-            first = self.order + 3 * number
-            weights = (1.0, -0.5 * drive.half_sin, 0.5 * drive.half_cos)
-
-            def by_drive(row: Mapping[int, Scalar], first: int, weights: Any) -> Scalar:
-                return sum((row.get(first + k, 0.0) * x for k, x in enumerate(weights)), 0.0)
-
-            right = [0.0] * self.n
-            right += [-by_drive(row, first, weights) for row in slopes[self.n : self.order]]
-            add(name, right, [by_drive(row, first, weights) for row in of_efforts])
-        return program("compliance", self.tape, out)
-
-
-@dataclass(frozen=True, eq=False)
-class _AtDesign:
-    """The program of the tangent, the scale of its stiffness, the binary exponent of its
-    determinant, the multipliers that carry most of the forces, and the rest of them.
-    """
-
-    program: Program
-    scale: float
-    exponent: float
-    multipliers: Array
-    unbalanced: Array
-
-
-def _numbers(drive: Drive) -> tuple[Scalar, Scalar, Scalar]:
-    return drive.c, drive.half_cos, drive.half_sin
-
-
-def put_design(
-    executor: Executor,
-    vectors: Mapping[str, Sequence[int]],
-    design: Mapping[str, Sequence[float]],
-    drivers: Iterable[str],
-) -> None:
-    """Set all lanes to the design position without loads."""
-    for name, values in design.items():
-        executor.put(vectors[name], np.array(values)[:, None])
-    for name in drivers:
-        executor.put(vectors[f"{DRIVE}{name}"], np.array([[0.0], [1.0], [0.0]]))
 
 
 def null_space(rows: Array, unknowns: int) -> Array:

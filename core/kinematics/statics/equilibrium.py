@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,9 @@ from ...program.llvm.compiler import available
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array, BodyMotion
+from ..forces.equations import BodyStates
 from ..formulation.cartesian import COLUMNS
+from ..formulation.state_vectors import columns_of, placed_bodies
 from .equations import (
     BY,
     DETERMINANT,
@@ -44,10 +45,9 @@ from .equations import (
     SIGNS,
     STEP,
     LoadPoint,
+    StaticEquations,
     motion_of,
     null_space,
-    put_design,
-    static_equations,
 )
 
 Lanes = NDArray[np.bool_]
@@ -105,53 +105,45 @@ class Equilibria:
     iterations: NDArray[np.int64]
 
     @cached_property
+    def _at(self) -> BodyStates:
+        poses = {
+            name: Pose.of(vec([*self.states[f"u {name}"]]), quat([*self.states[f"q {name}"]]))
+            for name in self.model.equations.columns
+        }
+        return BodyStates(self.model.equations.frame, poses, {}, {})
+
+    @cached_property
     def bodies(self) -> Mapping[str, BodyMotion]:
         """Poses of the moving bodies at the last equilibrium."""
-        n, frame, found = len(self.share), self.model.equations.frame, dict[str, BodyMotion]()
-        for body in self.model.mechanism.moving:
-            pose = self._pose(body.name)
-            moved = frame.unit * (pose.u + pose.swing(frame.arm(body.name, body.origin)))
-            r = np.array(body.origin) + np.stack([x + np.zeros(n) for x in moved], axis=1)
-            p = np.stack([x + np.zeros(n) for x in pose.q * quat(body.euler_parameters)], axis=1)
-            found[body.name] = BodyMotion(r, p, np.zeros((n, 6)), np.zeros((n, 6)))
-        return found
+        still = np.zeros((len(self.share), 6))
+        mechanism, at = self.model.mechanism, self._at
+        return {
+            name: BodyMotion(r, p, still, still)
+            for name, (r, p) in placed_bodies(mechanism, at.frame, at.poses, len(still)).items()
+        }
 
     def place(self, body: str, position: Sequence[float]) -> Array:
         """Return a point of a body, given at design [m], shape (n, 3)."""
-        frame = self.model.equations.frame
-        arm = frame.arm(body, position)
-        if body not in self.model.equations.columns:
-            return np.tile(np.array(position), (len(self.share), 1))
-        pose = self._pose(body)
-        moved = frame.unit * (pose.u + pose.swing(arm))
-        return np.array(position) + np.stack([x + np.zeros(len(self.share)) for x in moved], axis=1)
+        return np.array(position) + columns_of(self._at.place(body, position), len(self.share))
 
     def turned(self, body: str, direction: Sequence[float]) -> Array:
         """Return a direction fixed in a body, given at design [-], shape (n, 3)."""
-        found = self._pose(body).turn(vec(direction))
-        return np.stack([x + np.zeros(len(self.share)) for x in found], axis=1)
+        return columns_of(self._at.turned(body, direction), len(self.share))
 
     def motion(self, step: Array, body: str, position: Sequence[float]) -> Array:
         """Return the motion of a point and the turn of its body [m, rad], shape (n, 6, ...), for
         motions of the unknowns, shape (n, unknowns, ...).
         """
-        equations = self.model.equations
         found = np.zeros((len(step), 6, *step.shape[2:]))
-        if body in equations.columns:
-            first = equations.columns[body]
-            pose = self._pose(body)
-            arm = pose.turn(equations.frame.arm(body, position))
-            reach = equations.frame.unit * np.stack([x + np.zeros(len(step)) for x in arm], axis=1)
+        first = self.model.equations.columns.get(body)
+        if first is not None:
+            reach = columns_of(self._at.arm(body, position), len(step))
             own = step[:, first : first + COLUMNS]
             found[:, 3:] = own[:, 3:]
             turns = np.moveaxis(own[:, 3:], 1, -1)
             swept = np.cross(turns, reach.reshape(len(step), *(1,) * (step.ndim - 2), 3))
-            found[:, :3] = equations.frame.unit * own[:, :3] + np.moveaxis(swept, -1, 1)
+            found[:, :3] = self._at.frame.unit * own[:, :3] + np.moveaxis(swept, -1, 1)
         return found
-
-    def _pose(self, body: str) -> Pose:
-        u, q = self.states[f"u {body}"], self.states[f"q {body}"]
-        return Pose.of(vec([*u]), quat([*q]))
 
     def require_reached(self, what: Callable[[int, float], str]) -> None:
         """Raise SolveError with the last equilibrium of the first sample out of reach.
@@ -178,17 +170,21 @@ class StaticModel:
     """
 
     def __init__(self, mechanism: Mechanism, loads: Sequence[LoadPoint] = ()) -> None:
-        self.mechanism, self.equations = mechanism, static_equations(mechanism, loads)
+        self.mechanism, self.equations = mechanism, StaticEquations(mechanism, loads)
         self.drivers = [each.name for each in mechanism.drivers]
         vectors = self.equations.vectors
         names = [*self.equations.design, MULTIPLIERS]
         self._state = [slot for name in names for slot in vectors[name]]
-        self._tests = [self.equations.plan.slots[name] for name in (STEP, SIGNS, DETERMINANT)]
+        self._tests = [slot for name in (STEP, SIGNS, DETERMINANT) for slot in vectors[name]]
         if compiled := available():
             make_loops_ready()
         self._code = LlvmCode(self.equations.plan) if compiled else None
         self._bound: dict[int, Executor] = {}
-        self._signs, self._determinant = self._at_design()
+        # no walk changes the signs
+        executor = self.executor(1)
+        self._put_rest(executor, np.zeros(1))
+        executor.run("newton")
+        _, self._signs, self._determinant = executor.get(self._tests)[:, 0].tolist()
 
     def executor(self, lanes: int) -> Executor:
         """Return the programs bound to lanes at design."""
@@ -198,8 +194,7 @@ class StaticModel:
         for name in (REST, *(f"{LOAD}{each.name}" for each in self.equations.loads)):
             slots = self.equations.vectors[name]
             made.put(slots, np.zeros((len(slots), 1)))
-        put_design(made, self.equations.vectors, self.equations.design, self.drivers)
-        made.put(self.equations.vectors[MULTIPLIERS], self.equations.multipliers[:, None])
+        self.equations.stand(made)
         return made
 
     @cached_property
@@ -212,16 +207,6 @@ class StaticModel:
         put = partial(self._put_rest, executor)
         share, determinant, _ = self._walk(executor, put, self._determinant)
         return executor.get(self._state), float(share[0]), float(determinant[0])
-
-    def _at_design(self) -> tuple[float, float]:
-        """Return signs and size of the determinant at design, where what is out of balance is held.
-        No walk changes the signs.
-        """
-        executor = self.executor(1)
-        self._put_rest(executor, np.zeros(1))
-        executor.run("newton")
-        _, signs, determinant = executor.get(self._tests)[:, 0].tolist()
-        return signs, determinant
 
     def _put_rest(self, executor: Executor, share: Array) -> None:
         left = self.equations.rest[:, None]
@@ -239,20 +224,33 @@ class StaticModel:
             slopes: whether to compute compliance and stability, without which they are empty.
         """
         n = next((len(each) for each in (*loads.values(), *travel.values())), 1)
+        kept = [*self.equations.design, EFFORTS]
+        if slopes:
+            kept += [name for name in self.equations.vectors if name.startswith(BY)] + ["tangent"]
+        ends = [0, *np.cumsum([len(self.equations.vectors[name]) for name in kept]).tolist()]
         parts = [
             self._solve(
                 {name: np.asarray(x)[k : k + LANES] for name, x in loads.items()},
                 {name: np.asarray(x)[k : k + LANES] for name, x in travel.items()},
                 min(LANES, n - k),
-                slopes,
+                kept,
             )
             for k in range(0, n, LANES)
         ]
-        return parts[0] if len(parts) == 1 else _joined(parts)
+        share, iterations, table = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
+        found = {
+            name: table[first:last] for name, first, last in zip(kept, ends, ends[1:], strict=False)
+        }
+        return self._read(share, iterations, found)
 
     def _solve(
-        self, loads: Mapping[str, Array], travel: Mapping[str, Array], n: int, slopes: bool
-    ) -> Equilibria:
+        self,
+        loads: Mapping[str, Array],
+        travel: Mapping[str, Array],
+        n: int,
+        kept: Sequence[str],
+    ) -> tuple[Array, NDArray[np.int64], Array]:
+        """Return shares and iterations of samples, and their values of vectors."""
         state, settled, determinant = self.rest  # it takes an executor of one lane to itself
         executor, vectors = self.executor(n), self.equations.vectors
         if settled == 1.0:
@@ -272,17 +270,18 @@ class StaticModel:
             for name, values in loads.items():
                 executor.put(vectors[f"{LOAD}{name}"], share * np.asarray(values).T)
             for name, values in travel.items():
-                values = self._drive(name, share * values)
-                executor.put(vectors[f"{DRIVE}{name}"][: len(values)], values)
+                slots, values = vectors[f"{DRIVE}{name}"], share * values
+                if self.mechanism.driver(name).turns:
+                    halves = np.cos(0.5 * values), np.sin(0.5 * values)
+                    executor.put(slots, np.array([values, *halves]))
+                else:  # cosine and sine are of no angle
+                    executor.put(slots[:1], values[None] / self.equations.frame.unit)
 
         share, _, iterations = self._walk(executor, put, determinant)
         executor.run("compliance")
-        return self._read(executor, share, iterations, slopes)
-
-    def _drive(self, name: str, values: Array) -> Array:
-        if self.mechanism.driver(name).turns:
-            return np.array([values, np.cos(0.5 * values), np.sin(0.5 * values)])
-        return values[None] / self.equations.frame.unit  # cosine and sine are of no angle
+        if "tangent" in kept:
+            executor.run("tangent")
+        return share, iterations, executor.get([k for name in kept for k in vectors[name]])
 
     def _walk(
         self, executor: Executor, put: Callable[[Array], None], start: float
@@ -346,42 +345,26 @@ class StaticModel:
         return good & settled, used, first, determinant
 
     def _read(
-        self, executor: Executor, share: Array, iterations: NDArray[np.int64], slopes: bool
+        self, share: Array, iterations: NDArray[np.int64], found: Mapping[str, Array]
     ) -> Equilibria:
         equations, n = self.equations, len(share)
-
-        def get(name: str) -> Array:
-            return executor.get(equations.vectors[name])
-
-        states = {name: get(name) for name in equations.design}
-        m = len(self.drivers)
-        efforts = get(EFFORTS) if m else np.empty((0, n))
-
-        def by(names: Sequence[str]) -> tuple[Array, Array]:
-            slots = [slot for name in names for slot in equations.vectors[f"{BY}{name}"]]
-            found = executor.get(slots).reshape(len(names), -1, n).transpose(2, 1, 0)
-            return found[:, : equations.unknowns], found[:, equations.unknowns :]
-
-        by_load = {
-            each.name: by([f"{each.name}.{k}" for k in range(6)])
-            for each in equations.loads
-            if slopes
-        }
-        by_driver = dict[str, tuple[Array, Array]]()
-        for name in self.drivers if slopes else ():
-            per = 1.0 if self.mechanism.driver(name).turns else 1.0 / equations.frame.unit
-            step, of_efforts = by([name])
-            by_driver[name] = per * step[..., 0], per * of_efforts[..., 0]
+        by_load, by_driver = dict[str, tuple[Array, Array]](), dict[str, tuple[Array, Array]]()
         least, unstable = np.full(n, np.nan), [""] * n
-        if slopes:
-            executor.run("tangent")
-            least, unstable = self._stability(get("tangent"))
+        if "tangent" in found:
+            for each in equations.loads:
+                by = np.stack([found[f"{BY}{each.name}.{k}"].T for k in range(6)], axis=-1)
+                by_load[each.name] = by[:, : equations.unknowns], by[:, equations.unknowns :]
+            for name in self.drivers:
+                per = 1.0 if self.mechanism.driver(name).turns else 1.0 / equations.frame.unit
+                by = per * found[f"{BY}{name}"].T
+                by_driver[name] = by[:, : equations.unknowns], by[:, equations.unknowns :]
+            least, unstable = self._stability(found["tangent"])
         return Equilibria(
             self,
             share >= 1.0,
             share,
-            states,
-            dict(zip(self.drivers, efforts, strict=True)),
+            {name: found[name] for name in equations.design},
+            dict(zip(self.drivers, found[EFFORTS], strict=True)),
             by_load,
             by_driver,
             least,
@@ -408,35 +391,10 @@ class StaticModel:
             values, modes = np.linalg.eigh(free.T @ (0.5 * (stiffness + stiffness.T)) @ free)
             largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
             least[k] = values[0] / largest
-            said.append(self._motion(free @ modes[:, 0]) if least[k] < -NEGATIVE else "")
+            motion = free @ modes[:, 0]
+            said.append(motion_of(self.equations.columns, motion) if least[k] < -NEGATIVE else "")
         return least, said
-
-    def _motion(self, motion: Any) -> str:
-        return motion_of(self.equations.columns, motion)
 
 
 def _steady(one: Array, other: Array) -> Lanes:
     return (one <= STEADY * other) & (other <= STEADY * one)
-
-
-def _joined(parts: Sequence[Equilibria]) -> Equilibria:
-    def rows(values: Sequence[Any]) -> Any:
-        return np.concatenate(values, axis=0)
-
-    def slopes(of: Callable[[Equilibria], Mapping[str, tuple[Array, Array]]]) -> Any:
-        names = of(parts[0])
-        return {x: tuple(rows([of(p)[x][k] for p in parts]) for k in (0, 1)) for x in names}
-
-    first = parts[0]
-    return Equilibria(
-        first.model,
-        rows([each.reached for each in parts]),
-        rows([each.share for each in parts]),
-        {x: np.concatenate([p.states[x] for p in parts], axis=1) for x in first.states},
-        {x: rows([p.efforts[x] for p in parts]) for x in first.efforts},
-        slopes(lambda each: each.by_load),
-        slopes(lambda each: each.by_driver),
-        rows([each.least for each in parts]),
-        [way for each in parts for way in each.unstable],
-        rows([each.iterations for each in parts]),
-    )

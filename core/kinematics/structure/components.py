@@ -2,35 +2,106 @@
 
 Earlier components prescribe the motion of their bodies to later ones. A matching of rows with
 bodies' columns and the strongly connected sets of bodies give the components (block-triangular
-form). A component becomes a mechanism of its own, a section, with numbered names: components of the
-same structure then differ in their geometry only and share programs.
+form). The constraints of a component get numbered names, as a section: sections of one structure
+then differ in their numbers only and share programs.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
+from typing import Any, cast
 
 import numpy as np
 
-from ...algebra import ZERO, vec
+from ...algebra import Quat, Scalar, Vec3, quat
 from ...errors import SolveError
 from ...failures import FailureKind
-from ...joints import Joint, Kind
-from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector, extent
-from ...mechanism.motions import Driver, JointDriver, PointCoordinate
-from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Frames, unit_near
-from ..formulation.formulation import Formulation
-from ..formulation.parameters import places
+from ...joints import Joint
+from ...mechanism.mechanism import Mechanism, Point, Vector, extent
+from ...primitives.base import Drive
+from ..formulation.cartesian import COLUMNS, Cartesian, PrescribedBody
+from ..formulation.constraints import (
+    Constraint,
+    Frames,
+    Relation,
+    constraints,
+    coordinates_of,
+    frames,
+    renamed,
+    structure,
+    unit_near,
+    with_numbers,
+)
 from ..formulation.state_vectors import jacobian
-from .degrees_of_freedom import Selection, counted, selected
+from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection, selected
 from .redundancy import independent_rows
 
-ORIGIN = "origin "
-"""Prefix of the name of a section's point that is only the internal origin of a body."""
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """A component with numbered names: those of one structure differ in their numbers only.
+
+    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ...
+
+    Attributes:
+        unit: length unit [m].
+        given: moving bodies that are solved elsewhere.
+        joints: types of the joints.
+        constraints: of the joints.
+        drivers: the constraint of each driver.
+        points: body, position [m] and arm [units] of those whose motion is wanted.
+        outputs: position, arm and Euler parameters of the bodies whose motion is wanted.
+    """
+
+    unit: float
+    bodies: tuple[str, ...]
+    given: tuple[str, ...]
+    joints: tuple[str, ...]
+    constraints: tuple[Constraint | Relation, ...]
+    drivers: Mapping[str, Constraint]
+    points: Mapping[str, tuple[str, Vector, Vec3]]
+    outputs: Mapping[str, tuple[Vector, Vec3, Quat]]
+
+    def formulation(
+        self, prescribed: Mapping[str, PrescribedBody], drives: Mapping[str, Drive]
+    ) -> Cartesian:
+        """Return its equations, for motions of the prescribed bodies and of the drivers."""
+        primitives: dict[str, Any] = {name: c.primitive for name, c in self.drivers.items()}
+        driven = [
+            replace(c, primitive=replace(primitives[name], drive=drives[name]))
+            for name, c in self.drivers.items()
+        ]
+        return Cartesian([*self.constraints, *driven], self.bodies, prescribed=prescribed)
+
+
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """Sections of one structure.
+
+    Attributes:
+        first: one of them.
+        varied: positions, among the numbers of each, of those that are not the same in all.
+    """
+
+    first: Section
+    varied: Sequence[int]
+
+    @property
+    def numbers(self) -> list[Scalar]:
+        """All numbers of the first section."""
+        found = list[Scalar]()
+        structure(self.first, found)
+        return found
+
+    def with_numbers(self, given: Sequence[Scalar]) -> Section:
+        """Return the section with other varied numbers."""
+        numbers = self.numbers
+        for k, number in zip(self.varied, given, strict=True):
+            numbers[k] = number
+        return with_numbers(self.first, iter(numbers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,77 +110,19 @@ class Component:
 
     Attributes:
         given: moving bodies of earlier components, touched by its joints and drivers.
-        joints, drivers: those of the component.
+        joints, points: names of the joints, and of the points whose motion is wanted.
+        section: the same with numbered names.
     """
 
     bodies: tuple[str, ...]
     given: tuple[str, ...]
-    joints: tuple[Joint, ...]
-    drivers: tuple[Driver, ...]
-
-    @property
-    def extent(self) -> float:
-        """A power of two of metres near its size; zero if all its joints are at one point."""
-        points = [point for joint in self.joints for point in joint.points_on()]
-        size = extent(points)
-        return unit_near(size) if size > 0.0 else 0.0
+    joints: tuple[str, ...]
+    points: tuple[str, ...]
+    section: Section
 
 
-@dataclass(frozen=True, eq=False)
-class Section:
-    """A component as a mechanism of its own.
-
-    Attributes:
-        unit: length unit of the whole mechanism [m].
-        given: moving bodies that are solved elsewhere.
-        origins: place (see `places`) of the internal origin of every moving body.
-    """
-
-    mechanism: Mechanism
-    unit: float
-    given: tuple[str, ...]
-    origins: Mapping[str, str]
-
-    @property
-    def signature(self) -> object:
-        """A key, equal for sections that differ in their geometry only."""
-        m = self.mechanism
-        return (
-            m.bodies,
-            tuple((joint.type, joint.bodies, *_besides_geometry(joint)) for joint in m.joints),
-            tuple((point.name, point.body) for point in m.points),
-            m.drivers,
-            tuple(self.origins.items()),
-        )
-
-    def frame(self, mechanism: Mechanism) -> Frames:
-        """Return the frames of the section for a mechanism of its structure and traced geometry."""
-        value = places(mechanism)
-        fixed = dict.fromkeys(
-            (GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO
-        )
-        moving = {
-            name: (1.0 / self.unit) * vec(value[place]) for name, place in self.origins.items()
-        }
-        return Frames(
-            self.unit,
-            fixed | moving,
-            tuple(body.name for body in mechanism.moving if body.name not in self.given),
-        )
-
-
-def _besides_geometry(joint: Joint) -> list[object]:
-    """Return the other fields of a joint, and for each optional length whether it is absent."""
-    values = [(each, getattr(joint, each.name)) for each in fields(joint)]
-    return [
-        value is None if "kind" in each.metadata else value
-        for each, value in values
-        if each.name != "name"
-    ]
-
-
-def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
-    """Return the components in the order of their solution.
+def components(mechanism: Mechanism, frame: Frames) -> list[tuple[str, ...]]:
+    """Return the bodies of each component, in the order of their solution.
 
     Raises:
         SolveError: couplers connect joints, or the rows cannot be matched with the unknowns.
@@ -119,37 +132,6 @@ def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
             f"mechanism {mechanism.name!r}: couplers tie its components together; solve it as one"
         )
     formulation = Cartesian.of(mechanism, frame)
-    order = _order(mechanism, formulation)
-    level = {name: k for k, bodies in enumerate(order) for name in bodies}
-    joints: list[list[Joint]] = [[] for _ in order]
-    drivers: list[list[Driver]] = [[] for _ in order]
-    given: list[dict[str, None]] = [{} for _ in order]
-
-    def place(bodies: Sequence[str]) -> int:
-        """Return the component of the body solved last; there the others are prescribed."""
-        moving = [name for name in bodies if name in level]
-        last = max(level[name] for name in moving)
-        given[last] |= dict.fromkeys(name for name in moving if level[name] != last)
-        return last
-
-    for joint in mechanism.joints:
-        joints[place(joint.bodies)].append(joint)
-    for driver in mechanism.drivers:
-        drivers[place(_bodies(mechanism, driver))].append(driver)
-    parts = zip(order, given, joints, drivers, strict=True)
-    return [
-        Component(bodies, tuple(others), tuple(js), tuple(ds)) for bodies, others, js, ds in parts
-    ]
-
-
-def _bodies(mechanism: Mechanism, driver: Driver) -> tuple[str, ...]:
-    if isinstance(driver, JointDriver):
-        return mechanism.joint(driver.joint).bodies
-    return (mechanism.point(driver.point).body,) if isinstance(driver, PointCoordinate) else ()
-
-
-def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]]:
-    """Return the sets of bodies in the order of their solution."""
     sparse, graphs = (
         importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
     )
@@ -193,93 +175,98 @@ def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]
     return [tuple(members[k]) for k in TopologicalSorter(before).static_order()]
 
 
-def section(
-    component: Component,
-    unit: float,
-    origins: Mapping[str, Vector],
-    points: Sequence[Point],
-    bodies: Sequence[Body],
-) -> Section:
-    """Return the component with numbered names.
-
-    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ... They have no
-    masses: motion does not need them, and components that differ in masses share a program.
+def described(
+    mechanism: Mechanism,
+    parts: Sequence[tuple[str, ...]],
+    points: Collection[str],
+    bodies: Collection[str],
+) -> list[Component]:
+    """Return components, in a length unit near the size of the largest.
 
     Args:
-        origins: internal origin of every moving body, global [m].
-        points: output points and driven points.
-        bodies: its own bodies whose motion is an output.
+        parts: the bodies of each, see `components`.
+        points, bodies: names of those whose motion is wanted.
     """
-    own = {name: f"b{k}" for k, name in enumerate(component.bodies)}
-    names = own | {name: f"g{k}" for k, name in enumerate(component.given)}
-    joint_names = {joint.name: f"j{k}" for k, joint in enumerate(component.joints)}
-    point_names = {point.name: f"p{k}" for k, point in enumerate(points)}
-    joints = [
-        joint.changed(
-            name=joint_names[joint.name], i=names.get(joint.i, GROUND), j=names.get(joint.j, GROUND)
+    level = {name: k for k, names in enumerate(parts) for name in names}
+    given: list[dict[str, None]] = [{} for _ in parts]
+
+    def place(bodies: Sequence[str]) -> int:
+        """Return the component of the body solved last; there the others are prescribed."""
+        moving = [name for name in bodies if name in level]
+        last = max(level[name] for name in moving)
+        given[last] |= dict.fromkeys(name for name in moving if level[name] != last)
+        return last
+
+    joints: list[list[Joint]] = [[] for _ in parts]
+    for joint in mechanism.joints:
+        joints[place(joint.bodies)].append(joint)
+    size = max(extent([point for each in own for point in each.points_on()]) for own in joints)
+    whole = frames(mechanism)
+    frame = whole.in_units(unit_near(size) if size > 0.0 else whole.unit)
+    every = constraints(mechanism, frame, {})
+    last = len(every) - len(mechanism.drivers)
+    of_joint: dict[str, list[Constraint | Relation]] = {}
+    for c in every[:last]:
+        of_joint.setdefault(c.owner, []).append(c)
+    drivers: list[dict[str, Constraint]] = [{} for _ in parts]
+    for c in cast("list[Constraint]", every[last:]):  # native ones
+        drivers[place((c.i, c.j))][c.owner] = c
+    wanted: list[list[Point]] = [[] for _ in parts]
+    for point in mechanism.points:
+        if point.name in points and point.body in level:
+            wanted[level[point.body]].append(point)
+    found = list[Component]()
+    for k, names in enumerate(parts):
+        others, held, ends = given[k], joints[k], wanted[k]
+        own = {name: f"b{n}" for n, name in enumerate(names)}
+        numbered = own | {name: f"g{n}" for n, name in enumerate(others)}
+        moving = [mechanism.body(name) for name in names if name in bodies]
+        section = Section(
+            frame.unit,
+            tuple(own.values()),
+            tuple(numbered.values())[len(own) :],
+            tuple(joint.type for joint in held),
+            tuple(
+                renamed(
+                    c, f"j{n}", numbered, [f"j{n}{x[len(c.owner) :]}" for x in coordinates_of(c)]
+                )
+                for n, joint in enumerate(held)
+                for c in of_joint.get(joint.name, ())
+            ),
+            {
+                name: cast("Constraint", renamed(c, name, numbered, ()))
+                for name, c in drivers[k].items()
+            },
+            {f"p{n}": (own[p.body], *frame.end(p.body, p.position)) for n, p in enumerate(ends)},
+            {
+                own[body.name]: (*frame.end(body.name, body.origin), quat(body.euler_parameters))
+                for body in moving
+            },
         )
-        for joint in component.joints
-    ]
-    named = [
-        replace(point, name=point_names[point.name], body=names.get(point.body, GROUND))
-        for point in points
-    ]
-    drivers: list[Driver] = []
-    for driver in component.drivers:
-        if isinstance(driver, JointDriver):
-            drivers.append(replace(driver, joint=joint_names[driver.joint]))
-        elif isinstance(driver, PointCoordinate):
-            drivers.append(replace(driver, point=point_names[driver.point]))
-    at: dict[str, str] = {}
-    for name, body in names.items():
-        found = next(
-            (place for place, point in _joint_places(joints, body) if point == origins[name]), None
-        )
-        if found is None:  # an origin at no joint of the component is a point of its own
-            named.append(Point(f"{ORIGIN}{body}", body, origins[name]))
-            found = f"points.{ORIGIN}{body}.position"
-        at[body] = found
-    wanted = {body.name: body for body in bodies}
-    described = [
-        Body(new, wanted[name].origin, wanted[name].euler_parameters)
-        if name in wanted
-        else Body(new)
-        for name, new in names.items()
-    ]
-    return Section(
-        Mechanism("section", described, joints, named, drivers),
-        unit,
-        tuple(names.values())[len(own) :],
-        at,
-    )
+        joint_names = tuple(joint.name for joint in held)
+        point_names = tuple(point.name for point in ends)
+        found.append(Component(names, tuple(others), joint_names, point_names, section))
+    return found
 
 
-def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[float, ...]]]:
-    """Return the places of the points of joints on a body, with their values."""
-    parts = [
-        (joint.name, part) for joint in joints if body in joint.bodies for part in joint.parts(body)
-    ]
-    return [
-        (f"joints.{owner}.{name}", value)
-        for owner, (name, kind, value) in parts
-        if kind is Kind.POSITION
-    ]
-
-
-def select_section(mechanism: Mechanism, formulation: Formulation) -> Selection:
+def select_section(section: Section) -> Selection:
     """Select the rows of a section to solve, drivers first.
 
     Raises:
         SolveError: there are too few independent rows.
     """
-    matrix, drivers = jacobian(formulation), len(mechanism.drivers)
-    kept = independent_rows(matrix, drivers, formulation.conditions)
-    if len(kept) < formulation.unknowns:
+    at_rest = {name: PrescribedBody() for name in section.given}
+    formulation = section.formulation(at_rest, dict.fromkeys(section.drivers, Drive()))
+    matrix, bodies, unknowns = jacobian(formulation), len(section.bodies), formulation.unknowns
+    kept = independent_rows(matrix, len(section.drivers), formulation.conditions)
+    if len(kept) < unknowns:
         raise SolveError(
-            f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can"
-            f" still move at the design position (rank {len(kept)} of {formulation.unknowns}):"
+            f"a component with the joints {', '.join(section.joints)} can"
+            f" still move at the design position (rank {len(kept)} of {unknowns}):"
             " lock-up, dead centre or too few drivers; shift the design",
             FailureKind.LOCKED,
         )
-    found = counted(mechanism, formulation.unknowns, len(matrix) - drivers, ())
+    rows = len(matrix) - len(section.drivers)
+    coordinates = COORDINATES * bodies
+    found = FreedomAccount(bodies, coordinates, rows + bodies, unknowns, rows, rows, ())
     return selected(found, formulation, kept)

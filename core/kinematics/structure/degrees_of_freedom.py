@@ -32,7 +32,7 @@ from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, frames, measured
-from ..formulation.formulation import Formulation, row_names
+from ..formulation.relative import Formulation, row_names
 from ..formulation.state_vectors import jacobian
 from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independent_rows
 
@@ -146,7 +146,8 @@ def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
         )
     found = account(mechanism, frame)
     if found.dof != len(mechanism.drivers):
-        raise SolveError(_mismatch(mechanism, frame, found), imbalance(mechanism, found.dof))
+        why = "" if found.dof < len(mechanism.drivers) else _still_free(mechanism, frame)
+        raise _mismatch(mechanism, found.dof, found.moving_coordinates, why)
     return found
 
 
@@ -210,29 +211,27 @@ def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
     return formulation, jacobian(formulation)
 
 
-def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
-    """Return the message with the numbers of degrees of freedom and of drivers."""
+def _mismatch(mechanism: Mechanism, dof: int, unknowns: int, why: str) -> SolveError:
+    """Return the error of a mechanism with more or fewer drivers than degrees of freedom."""
     drivers = len(mechanism.drivers)
-    return (
+    advice = (
+        f"remove {drivers - dof} or free the mechanism"
+        if dof < drivers
+        else "add a driver, or join what spins freely (a rod between two balls: use distance)"
+    )
+    return SolveError(
         f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom ({unknowns}"
-        f" coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)}"
+        f" coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)};"
+        f" {why}{advice}",
+        FailureKind.FREE if dof > drivers else FailureKind.OVERDRIVEN,
     )
 
 
-def imbalance(mechanism: Mechanism, dof: int) -> FailureKind:
-    """Return the kind of a mismatch between degrees of freedom and drivers."""
-    return FailureKind.FREE if dof > len(mechanism.drivers) else FailureKind.OVERDRIVEN
-
-
-def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
-    """Return the message on a mismatch, with the bodies still free while the drivers hold.
-
-    These bodies move in the null space of all rows.
+def _still_free(mechanism: Mechanism, frame: Frames) -> str:
+    """Return the bodies still free while the drivers hold: they move in the null space of all
+    rows.
     """
-    matrix, drivers = _matrix(mechanism, frame)[1], len(mechanism.drivers)
-    head = mismatch(mechanism, found.dof, found.moving_coordinates)
-    if found.dof < drivers:
-        return f"{head}; remove {drivers - found.dof} or free the mechanism"
+    matrix = _matrix(mechanism, frame)[1]
     motions = np.linalg.svd(matrix, full_matrices=True)[2][len(independent_rows(matrix, 0)) :]
     free: list[str] = []
     for k, body in enumerate(mechanism.moving):
@@ -240,10 +239,7 @@ def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str
         if block.max() > STILL:
             how = "move" if block[:3].max() > STILL else "turn"
             free.append(f"{body.name!r} can {how}")
-    return (
-        f"{head}; {', '.join(free)}; add a driver, or join what spins freely (a rod between two"
-        " balls: use distance)"
-    )
+    return f"{', '.join(free)}; "
 
 
 # Up to this number of bodies the dense count takes some 20 ms.
@@ -270,12 +266,14 @@ def require_driven(mechanism: Mechanism) -> None:
     if len(mechanism.moving) <= DENSE:
         driven_account(mechanism, frames(mechanism))
         return
-    found = _balance(mechanism)
+    found = _Balance(mechanism)
     if found.dof != len(mechanism.drivers):
-        raise SolveError(
-            f"{mismatch(mechanism, found.dof, found.formulation.unknowns)}; {found.remedy}",
-            imbalance(mechanism, found.dof),
+        why = (
+            f"not independent are {found.dependent}; "
+            if found.dof < len(mechanism.drivers)
+            else f"what can still move is most of all {found.movable}; "
         )
+        raise _mismatch(mechanism, found.dof, found.unknowns, why)
 
 
 def degrees_of_freedom(mechanism: Mechanism) -> int:
@@ -283,73 +281,48 @@ def degrees_of_freedom(mechanism: Mechanism) -> int:
     return (
         account(mechanism, frames(mechanism)).dof
         if len(mechanism.moving) <= DENSE
-        else _balance(mechanism).dof
+        else _Balance(mechanism).dof
     )
 
 
 def locked_drivers(mechanism: Mechanism) -> str:
     """Return the drivers, at any size, that duplicate other rows at design; empty without any."""
-    return _balance(mechanism).dependent
+    return _Balance(mechanism).dependent
 
 
-@dataclass(frozen=True, eq=False)
 class _Balance:
     """Freedoms left by the drivers of a mechanism, and contradictions among them.
 
     Attributes:
-        formulation: its rows, those of the drivers last.
-        free: remaining motions with all drivers held, orthonormal, shape (unknowns, motions).
-        excess: share of each driver in each contradiction, shape (drivers, contradictions); the
-            contradictions are orthonormal over all rows.
+        unknowns: number of unknowns.
+        dof: degrees of freedom.
+        dependent: the drivers that contradict other rows.
+        movable: the bodies that move most with all drivers held.
     """
 
-    mechanism: Mechanism
-    formulation: Cartesian
-    free: Array
-    excess: Array
-
-    @property
-    def dof(self) -> int:
-        return len(self.mechanism.drivers) + self.free.shape[1] - self.excess.shape[1]
-
-    @property
-    def dependent(self) -> str:
-        """The drivers that contradict other rows."""
-        return _largest(
-            np.linalg.norm(self.excess, axis=1), [driver.name for driver in self.mechanism.drivers]
-        )
-
-    @property
-    def remedy(self) -> str:
-        """Advice for the message: bodies that need a driver, or drivers to remove."""
-        if self.dof < len(self.mechanism.drivers):
-            many = len(self.mechanism.drivers) - self.dof
-            return f"not independent are {self.dependent}; remove {many} or free the mechanism"
-        bodies = self.formulation.bodies
-        blocks = self.free[: COLUMNS * len(bodies)].reshape(len(bodies), -1)
-        free = _largest(np.linalg.norm(blocks, axis=1), bodies) or "a joint coordinate"
-        advice = "add a driver, or join what spins freely (a rod between two balls: use distance)"
-        return f"what can still move is most of all {free}; {advice}"
+    def __init__(self, mechanism: Mechanism) -> None:
+        formulation = Cartesian.of(mechanism, measured(mechanism)[1])
+        rows = formulation.rows(formulation.configuration(formulation.design))
+        at = np.array([(k, column) for k, row in enumerate(rows) for column in row], np.intp)
+        values = np.array([value for row in rows for value in row.values()], dtype=np.float64)
+        at, self.unknowns = at.reshape(-1, 2), formulation.unknowns
+        null = NullSpaces(at[:, 0], at[:, 1], values, (len(rows), self.unknowns))
+        names = [driver.name for driver in mechanism.drivers]
+        # the contradictions are orthonormal over all rows
+        excess = null.contradictions(len(names))[len(rows) - len(names) :]
+        free, bodies = null.motions(), formulation.bodies
+        self.dof = len(names) + free.shape[1] - excess.shape[1]
+        self.dependent = _largest(excess, names)
+        blocks = free[: COLUMNS * len(bodies)].reshape(len(bodies), -1)
+        self.movable = _largest(blocks, bodies) or "a joint coordinate"
 
 
-def _largest(sizes: Array, names: Sequence[str]) -> str:
-    """Return the names with the largest sizes."""
+def _largest(rows: Array, names: Sequence[str]) -> str:
+    """Return the names with the largest rows."""
+    sizes = np.linalg.norm(rows, axis=1)
     order: list[int] = np.argsort(-sizes, kind="stable").tolist()
     found = [repr(names[k]) for k in order if sizes[k] > LEFT]
     return ", ".join([*found[:FEW], "..."] if len(found) > FEW else found)
-
-
-def _balance(mechanism: Mechanism) -> _Balance:
-    frame = measured(mechanism)[1]
-    formulation = Cartesian.of(mechanism, frame)
-    rows = formulation.rows(formulation.configuration(formulation.design))
-    at = np.array([(k, column) for k, row in enumerate(rows) for column in row], np.intp)
-    values = np.array([value for row in rows for value in row.values()], dtype=np.float64)
-    at = at.reshape(-1, 2)
-    null = NullSpaces(at[:, 0], at[:, 1], values, (len(rows), formulation.unknowns))
-    drivers = len(mechanism.drivers)
-    excess = null.contradictions(drivers)[len(rows) - drivers :]
-    return _Balance(mechanism, formulation, null.motions(), excess)
 
 
 class NullSpaces:

@@ -38,7 +38,8 @@ from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, frames, unit_near
-from ..formulation.formulation import Condition, Formulation
+from ..formulation.formulation import Condition
+from ..formulation.relative import Formulation
 from ..formulation.state_vectors import displaced, jacobian
 
 # Rows are of size one. At a feasible pose a redundant row leaves round-off (1e-15); the smallest
@@ -287,7 +288,7 @@ def reduce_rows(
     matrix, named = jacobian(formulation), dict[str, list[int]]()
     for k, (owner, _) in enumerate(formulation.owners):
         named.setdefault(owner, []).append(k)
-    part_of = _parts(formulation, matrix)
+    part_of = parts_of_columns(formulation, matrix)
     columns: dict[int, list[int]] = {}
     for k, part in enumerate(part_of):
         columns.setdefault(part, []).append(k)
@@ -430,7 +431,7 @@ def _normal(pair: Array) -> Vector:
     return x, y, z
 
 
-def _parts(formulation: Cartesian, matrix: Array) -> list[int]:
+def parts_of_columns(formulation: Cartesian, matrix: Array) -> list[int]:
     """Return the part of each column: rows tie bodies of one part alone."""
     parts = [*range(matrix.shape[1])]
     for first in formulation.columns.values():

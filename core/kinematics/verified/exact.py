@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
 from ...algebra import Scalar, Vec3, power, quat
 from ...errors import SolveError
@@ -30,14 +30,7 @@ from ...program.tape import jacobian
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames, constraints, frames
-from .exact_forces import (
-    ForceInputs,
-    ForcePrograms,
-    TracedRows,
-    converted,
-    force_programs,
-    numbered,
-)
+from .exact_forces import ExactForces, ForceInputs, ForcePrograms, numbered
 
 Reading = Callable[[float], Fraction]
 """Interpretation of a float of a description as a fraction."""
@@ -174,29 +167,43 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
                 f"{coupler} has pieces, and proofs know none; give a polynomial in its place"
             )
 
-    def read(value: Any) -> Any:
+    def number(value: Any) -> Any:
         if isinstance(value, float):
             return Exact.of(reading(value))
-        if isinstance(value, tuple):
-            return tuple(map(read, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-        return (
-            Exact.of(Fraction(value))
-            if isinstance(value, int) and not isinstance(value, bool)
-            else value
-        )
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        return Exact.of(Fraction(value)) if whole else value
 
-    def each(item: Any) -> Any:
-        return replace(item, **{f.name: read(getattr(item, f.name)) for f in fields(item)})
+    return _converted(mechanism, number)
 
-    return mechanism.with_joints(
-        each,
-        points=[*map(each, mechanism.points)],
-        drivers=[*map(each, mechanism.drivers)],
-        couplers=[*map(each, mechanism.couplers)],
-        bodies=[converted(body, read) for body in mechanism.bodies],
-        gravity=read(mechanism.gravity),
-        forces=[converted(force, read) for force in mechanism.forces],
-    )
+
+def _converted(mechanism: Mechanism, number: Callable[[Any], Any]) -> Mechanism:
+    """Return a mechanism with its numbers passed to a function.
+
+    They are checked already: the checks of its members take doubles.
+    """
+
+    def member(item: Any) -> Any:
+        new: Any = object.__new__(cast("type[Any]", type(item)))
+        for each in fields(item):
+            object.__setattr__(new, each.name, _mapped(getattr(item, each.name), number))
+        return new
+
+    kinds = ("points", "drivers", "couplers", "bodies", "forces")
+    changes = {kind: [*map(member, getattr(mechanism, kind))] for kind in kinds}
+    gravity = _mapped(mechanism.gravity, number)
+    return mechanism.with_joints(member, grounded=(), gravity=gravity, **changes)
+
+
+def _mapped(value: Any, number: Callable[[Any], Any]) -> Any:
+    """Return a value with the numbers in it passed to a function."""
+    if isinstance(value, Mapping):
+        return {key: _mapped(each, number) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
+    if isinstance(value, tuple):
+        return tuple(_mapped(each, number) for each in value)  # pyright: ignore[reportUnknownVariableType]
+    if is_dataclass(value) and not isinstance(value, type):
+        changes = {f.name: _mapped(getattr(value, f.name), number) for f in fields(value)}
+        return replace(value, **changes)
+    return number(value)
 
 
 class _Inputs:
@@ -213,25 +220,14 @@ class _Inputs:
 
     def lift(self, value: Any) -> Any:
         """Return a value with its exact numbers as program inputs, or literals if trivial."""
-        if isinstance(value, Exact):
-            return self._number(value)
-        if isinstance(value, Mapping):
-            return {key: self.lift(each) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
-        if isinstance(value, tuple):
-            return tuple(map(self.lift, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-        if is_dataclass(value) and not isinstance(value, type):
-            return replace(
-                value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)}
-            )
+        return _mapped(value, self.number)
+
+    def number(self, value: Any) -> Any:
+        """Return an exact number as an input, or a literal if it is trivial."""
         if isinstance(value, float) and value not in (0.0, 1.0, -1.0):
-            return self._number(Exact.of(Fraction(value)))
-        return value
-
-    def members(self, items: Sequence[Any]) -> list[Any]:
-        """Return bodies, joints or force elements with exact numbers as program inputs."""
-        return [converted(item, self.lift) for item in items]
-
-    def _number(self, value: Exact) -> Scalar:
+            value = Exact.of(Fraction(value))
+        if not isinstance(value, Exact):
+            return value
         if value.trivial is not None:
             return value.trivial
         self.geometry.append(value.ball)
@@ -330,10 +326,16 @@ def equations(
     }
     forces: ForcePrograms | None = None
     if wanted is not None and given is not None:
-        traced = TracedRows(formulation, at, parts, gradients[: len(phi)], drives, left_out)
-        forces = force_programs(
-            inputs.tape, _lifted(mechanism, inputs), inputs.lift(frame), traced, given, wanted
+        exact = ExactForces.of(
+            _converted(mechanism, inputs.number),
+            inputs.lift(frame),
+            formulation,
+            at,
+            given,
+            gradients[: len(phi)],
+            drives,
         )
+        forces = exact.programs(inputs.tape, wanted, left_out)
     return ExactEquations(
         frame,
         {name: len(value) for name, value in design.items()},
@@ -346,17 +348,4 @@ def equations(
         kept,
         left_out,
         forces,
-    )
-
-
-def _lifted(mechanism: Mechanism, inputs: _Inputs) -> Mechanism:
-    """Return the mechanism with inputs in place of the numbers that forces depend on."""
-    return mechanism.with_joints(
-        lambda joint: converted(joint, inputs.lift),
-        grounded=(),
-        points=inputs.members(mechanism.points),
-        drivers=inputs.members(mechanism.drivers),
-        bodies=inputs.members(mechanism.bodies),
-        gravity=inputs.lift(mechanism.gravity),
-        forces=inputs.members(mechanism.forces),
     )

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 from ...algebra import ZERO, Quat, Scalar, quat, vec
 from ...errors import KincheckError
@@ -40,17 +40,6 @@ from ..forces.wanted import WantedForces
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Constraint, Frames
 from ..formulation.formulation import Acceleration, Configuration, Rows
-
-
-def converted(item: Any, change: Callable[[Any], Any]) -> Any:
-    """Return a body, joint or force element with its numbers passed to a function.
-
-    They are checked already; their own checks take doubles.
-    """
-    new: Any = object.__new__(cast("type[Any]", type(item)))
-    for each in fields(item):
-        object.__setattr__(new, each.name, change(getattr(item, each.name)))
-    return new
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,104 +106,124 @@ class ForcePrograms:
     forces: Program
 
 
-@dataclass(frozen=True, eq=False)
-class TracedRows:
-    """The traced residuals of all rows.
-
-    Attributes:
-        parts: the state's vectors by name.
-        gradients: derivatives of the rows by the state, then by the drives, three inputs each.
-        drives: of the drivers.
-        left_out: numbers of the rows that are not solved.
-    """
-
-    formulation: Cartesian
-    at: Configuration
-    parts: Mapping[str, Sequence[Traced]]
-    gradients: Sequence[Gradient]
-    drives: Mapping[str, Drive]
-    left_out: Sequence[int]
-
-    @property
-    def size(self) -> int:
-        """Number of scalars of the state."""
-        return sum(len(each) for each in self.parts.values())
-
-
-def force_programs(
-    tape: Tape,
-    mechanism: Mechanism,
-    frame: Frames,
-    traced: TracedRows,
-    given: ForceInputs,
-    wanted: WantedForces,
-) -> ForcePrograms:
-    """Return the programs of forces.
-
-    Args:
-        mechanism: with inputs of the tape as numbers of bodies, joints, points and loads.
-        frame: with inputs of the tape as numbers.
-    """
-    states = _states(frame, traced, given)
-    applied = at_work(mechanism, states, given.angles.__getitem__)
-    none = Cartesian((), ())
-    equations = _Equations(mechanism, traced.formulation, traced.at, states, applied, none, traced)
-    efforts = {
-        driver.name: _effort(traced, driver.name, given.multipliers)
-        * (1.0 if driver.turns else 1.0 / frame.unit)
-        for driver in mechanism.drivers
-    }
-    speeds = {
-        driver.name: given.speeds[driver.name] * (1.0 if driver.turns else frame.unit)
-        for driver in mechanism.drivers
-    }
-    found: list[Scalar] = []
-    for name in wanted.joints:
-        force, moment = equations.reaction(mechanism.joint(name), given.multipliers)
-        found += [*((1.0 / frame.unit) * force), *moment]
-    found += [efforts[name] for name in wanted.drivers]
-    found += [applied[name].amount for name in wanted.elements]
-    found.append(sum(powers(mechanism, states, applied, efforts, speeds), 0.0))
-    left_out = [
-        traced.gradients[row].get(k, 0.0) for row in traced.left_out for k in range(traced.size)
-    ]
-    return ForcePrograms(
-        wanted,
-        len(traced.gradients),
-        len(traced.gradients) - len(mechanism.couplers) - len(mechanism.drivers),
-        [*given.angles],
-        numbered("half angles", tape, _half_angles(mechanism, traced.at, given.angles)),
-        numbered("demand", tape, _by_state(traced, equations.demand)),
-        numbered("acting", tape, _by_state(traced, equations.acting(efforts, given.multipliers))),
-        numbered("rows left out", tape, left_out),
-        numbered("forces", tape, found),
-    )
-
-
 def numbered(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
     """Return the program of values, in slots by their number."""
     return program(name, tape, dict(enumerate(values)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Equations(ForceEquations):
-    """The equations of forces with rows that are derivatives of the residuals."""
+class ExactForces(ForceEquations):
+    """The equations of forces with rows that are derivatives of the residuals.
 
-    traced: TracedRows
+    Attributes:
+        mechanism: with inputs of a tape as numbers of bodies, joints, points and loads.
+        inputs: those of forces.
+        gradients: derivatives of the rows by the state, then by the drives, three inputs each.
+        drives: of the drivers.
+        first: place of each vector of the state.
+        size: number of scalars of the state.
+    """
+
+    inputs: ForceInputs
+    gradients: Sequence[Gradient]
+    drives: Mapping[str, Drive]
+    first: Mapping[str, int]
+    size: int
+
+    @staticmethod
+    def of(
+        mechanism: Mechanism,
+        frame: Frames,
+        formulation: Cartesian,
+        at: Configuration,
+        inputs: ForceInputs,
+        gradients: Sequence[Gradient],
+        drives: Mapping[str, Drive],
+    ) -> ExactForces:
+        """Return the equations at a traced configuration; frames have inputs as numbers."""
+        *ends, size = accumulate(map(len, at.state.values()), initial=0)
+        first = dict(zip(at.state, ends, strict=True))
+        twists: dict[str, Twist] = {}
+        accelerations: dict[str, Acceleration] = {}
+        for name, pose in at.poses.items():
+            u, q = first[f"u {name}"], first[f"q {name}"]
+            rates = inputs.rates, inputs.accelerations
+            v, a = (vec(each[u : u + 3]) for each in rates)
+            # the second derivative of q has no further part: q' q'* is a real number
+            w, w_t = (2.0 * (quat(each[q : q + 4]) * pose.q.conjugate()).e for each in rates)
+            twists[name], accelerations[name] = Twist(v, w), Acceleration(a, w_t)
+        states = BodyStates(frame, at.poses, twists, accelerations)
+        applied = at_work(mechanism, states, inputs.angles.__getitem__)
+        return ExactForces(
+            mechanism,
+            formulation,
+            at,
+            states,
+            applied,
+            Cartesian((), ()),
+            inputs,
+            gradients,
+            drives,
+            first,
+            size,
+        )
+
+    def programs(self, tape: Tape, wanted: WantedForces, left_out: Sequence[int]) -> ForcePrograms:
+        """Return the programs of forces.
+
+        Args:
+            left_out: numbers of the rows that are not solved.
+        """
+        mechanism, multipliers, unit_of_length = (
+            self.mechanism,
+            self.inputs.multipliers,
+            self.states.frame.unit,
+        )
+        efforts = {
+            driver.name: self._effort_of(driver.name)
+            * (1.0 if driver.turns else 1.0 / unit_of_length)
+            for driver in mechanism.drivers
+        }
+        speeds = {
+            driver.name: self.inputs.speeds[driver.name] * (1.0 if driver.turns else unit_of_length)
+            for driver in mechanism.drivers
+        }
+        found: list[Scalar] = []
+        for name in wanted.joints:
+            force, moment = self.reaction(mechanism.joint(name), multipliers)
+            found += [*((1.0 / unit_of_length) * force), *moment]
+        found += [efforts[name] for name in wanted.drivers]
+        found += [self.applied[name].amount for name in wanted.elements]
+        found.append(sum(powers(mechanism, self.states, self.applied, efforts, speeds), 0.0))
+        rows = [self.gradients[row].get(k, 0.0) for row in left_out for k in range(self.size)]
+        acting = dict.fromkeys(self.formulation.columns, NO_WRENCH)
+        for body, wrench in self._wrenches(efforts):
+            if body in acting:
+                acting[body] += wrench
+        return ForcePrograms(
+            wanted,
+            len(self.gradients),
+            len(self.gradients) - len(mechanism.couplers) - len(mechanism.drivers),
+            [*self.inputs.angles],
+            numbered("half angles", tape, [*self._half_angles()]),
+            numbered("demand", tape, self._by_state(self.demand)),
+            numbered("acting", tape, self._by_state(self.by_unknowns(acting))),
+            numbered("rows left out", tape, rows),
+            numbered("forces", tape, found),
+        )
 
     @cached_property
     def rows(self) -> Rows:
         """The Jacobian of all rows by the unknowns, from the derivatives by the state."""
-        traced, found = self.traced, Rows()
-        first = _first(traced.parts)
-        for gradient in traced.gradients:
+        first, found = self.first, Rows()
+        for gradient in self.gradients:
             row: dict[int, Scalar] = {}
-            for name, column in traced.formulation.columns.items():
+            for name, column in self.formulation.columns.items():
                 by_u = [gradient.get(first[f"u {name}"] + k, 0.0) for k in range(3)]
                 by_q = [gradient.get(first[f"q {name}"] + k, 0.0) for k in range(4)]
-                torque = 0.5 * (quat(by_q) * traced.at.poses[name].q.conjugate()).e
+                torque = 0.5 * (quat(by_q) * self.at.poses[name].q.conjugate()).e
                 row |= dict(enumerate([*by_u, *torque], column))
-            for name, column in traced.formulation.coordinates.items():
+            for name, column in self.formulation.coordinates.items():
                 row[column] = gradient.get(first[f"x {name}"], 0.0)
             found.append(row)
         return found
@@ -225,18 +234,9 @@ class _Equations(ForceEquations):
             if isinstance(c, Constraint):
                 yield k, multipliers[k]
 
-    def acting(self, efforts: Mapping[str, Scalar], multipliers: Sequence[Scalar]) -> list[Scalar]:
-        """Return the generalised forces of drivers and couplers by the unknowns [J]."""
-        total = dict.fromkeys(self.formulation.columns, NO_WRENCH)
-        for body, wrench in self._wrenches(efforts, multipliers):
-            if body in total:
-                total[body] += wrench
-        return self.by_unknowns(total)
-
-    def _wrenches(
-        self, efforts: Mapping[str, Scalar], multipliers: Sequence[Scalar]
-    ) -> Iterator[tuple[str, Wrench]]:
-        mechanism, traced, states = self.mechanism, self.traced, self.states
+    def _wrenches(self, efforts: Mapping[str, Scalar]) -> Iterator[tuple[str, Wrench]]:
+        """Yield the wrenches of drivers and couplers on bodies."""
+        mechanism, states, multipliers = self.mechanism, self.states, self.inputs.multipliers
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)
@@ -245,10 +245,9 @@ class _Equations(ForceEquations):
             elif isinstance(driver, JointDriver):
                 yield from self._along(driver.joint, driver.freedom, efforts[driver.name])
         first = len(multipliers) - len(mechanism.drivers) - len(mechanism.couplers)
-        slots = _first(traced.parts)
         for k, coupler in enumerate(mechanism.couplers, first):
             for joint, freedom, _ in coupler.terms:
-                slope = traced.gradients[k].get(slots[f"x {joint}.{freedom}"], 0.0)
+                slope = self.gradients[k].get(self.first[f"x {joint}.{freedom}"], 0.0)
                 unit_of = states.frame.unit if freedom == "translation" else 1.0
                 yield from self._along(joint, freedom, (1.0 / unit_of) * slope * multipliers[k])
 
@@ -264,69 +263,41 @@ class _Equations(ForceEquations):
             else:
                 yield body, Wrench.at(self.states.arm(body, joint.point), push)
 
+    def _by_state(self, demand: Sequence[Scalar]) -> list[Scalar]:
+        """Return generalised forces by the state from those by the unknowns."""
+        found: list[Scalar] = []
+        for name, values in self.at.state.items():
+            kind, body = name[0], name[2:]
+            if kind == "x":
+                found += [0.0] * len(values)
+                continue
+            first = self.formulation.columns[body]
+            force, torque = demand[first : first + 3], vec(demand[first + 3 : first + COLUMNS])
+            if kind == "u":
+                found += force
+            else:
+                product = Quat(0.0, torque) * self.at.poses[body].q
+                found += [2.0 * x for x in product]
+        return found
 
-def _first(parts: Mapping[str, Sequence[Any]]) -> dict[str, int]:
-    """Return the place of each vector of the state."""
-    ends = accumulate(map(len, parts.values()), initial=0)
-    return dict(zip(parts, ends, strict=False))
+    def _effort_of(self, driver: str) -> Scalar:
+        """Return the effort of a driver [J / unit of its value]: minus mu dF/dc."""
+        drive = self.drives[driver]
+        first = self.size + 3 * [*self.drives].index(driver)
+        weights = (1.0, -0.5 * drive.half_sin, 0.5 * drive.half_cos)  # of c, and cos and sin of c/2
+        found: Scalar = 0.0
+        for gradient, multiplier in zip(self.gradients, self.inputs.multipliers, strict=True):
+            for k, weight in enumerate(weights):
+                found = found - weight * gradient.get(first + k, 0.0) * multiplier
+        return found
 
-
-def _states(frame: Frames, traced: TracedRows, given: ForceInputs) -> BodyStates:
-    first = _first(traced.parts)
-    twists: dict[str, Twist] = {}
-    accelerations: dict[str, Acceleration] = {}
-    for name, pose in traced.at.poses.items():
-        u, q = first[f"u {name}"], first[f"q {name}"]
-        v, a = (vec(each[u : u + 3]) for each in (given.rates, given.accelerations))
-        # the second derivative of q has no further part: q' q'* is a real number
-        w, w_t = (
-            2.0 * (quat(each[q : q + 4]) * pose.q.conjugate()).e
-            for each in (given.rates, given.accelerations)
-        )
-        twists[name], accelerations[name] = Twist(v, w), Acceleration(a, w_t)
-    return BodyStates(frame, traced.at.poses, twists, accelerations)
-
-
-def _by_state(traced: TracedRows, demand: Sequence[Scalar]) -> list[Scalar]:
-    """Return generalised forces by the state from those by the unknowns."""
-    found: list[Scalar] = []
-    for name, values in traced.parts.items():
-        kind, body = name[0], name[2:]
-        if kind == "x":
-            found += [0.0] * len(values)
-            continue
-        first = traced.formulation.columns[body]
-        force, torque = demand[first : first + 3], vec(demand[first + 3 : first + COLUMNS])
-        if kind == "u":
-            found += force
-        else:
-            product = Quat(0.0, torque) * traced.at.poses[body].q
-            found += [2.0 * x for x in product]
-    return found
-
-
-def _effort(traced: TracedRows, name: str, multipliers: Sequence[Scalar]) -> Scalar:
-    """Return the effort of a driver [J / unit of its value]: minus mu dF/dc."""
-    drive = traced.drives[name]
-    first = traced.size + 3 * [*traced.drives].index(name)
-    weights = (1.0, -0.5 * drive.half_sin, 0.5 * drive.half_cos)  # of c, and cos and sin of c/2
-    found: Scalar = 0.0
-    for gradient, multiplier in zip(traced.gradients, multipliers, strict=True):
-        for k, weight in enumerate(weights):
-            found = found - weight * gradient.get(first + k, 0.0) * multiplier
-    return found
-
-
-def _half_angles(
-    mechanism: Mechanism, at: Configuration, joints: Mapping[str, Traced]
-) -> list[Scalar]:
-    found: list[Scalar] = []
-    for name in joints:
-        joint: Any = mechanism.joint(name)
-        i, j = (at.poses.get(body, GROUND_POSE) for body in joint.bodies)
-        turn = i.q.conjugate() * j.q
-        found += [vec([*unit(joint.axis)]) @ turn.e, turn.e0]
-    return found
+    def _half_angles(self) -> Iterator[Scalar]:
+        for name in self.inputs.angles:
+            joint: Any = self.mechanism.joint(name)
+            i, j = (self.at.poses.get(body, GROUND_POSE) for body in joint.bodies)
+            turn = i.q.conjugate() * j.q
+            yield vec([*unit(joint.axis)]) @ turn.e
+            yield turn.e0
 
 
 WRENCH = 6

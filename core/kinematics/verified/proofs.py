@@ -23,11 +23,11 @@ from ..compiled.request import Request
 from ..compiled.routes import start_of
 from ..continuation.segments import chosen_at
 from ..continuation.sweep import sweep
-from ..forces.reactions import Follow, MotionLanes, with_forces
+from ..forces.reactions import Follow, ForceRows, with_forces
 from ..forces.wanted import WantedForces, wanted_forces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
-from ..formulation.formulation import row_names
+from ..formulation.relative import row_names
 from ..formulation.state_vectors import displaced, state_of
 from ..structure.degrees_of_freedom import select_rows
 from .exact import Reading, as_double, equations, exact_mechanism
@@ -208,8 +208,8 @@ def _angles(mechanism: Mechanism, path: Path, native: Trajectory, follow: Follow
     )
     found = np.full((len(native.solved), len(joints)), np.nan)
     if joints:
-        lanes = MotionLanes(mechanism, path, native, follow)
-        found[native.solved] = np.stack([lanes.angle(name) for name in joints], axis=1)
+        lines = ForceRows(mechanism, path, native, follow)
+        found[native.solved] = np.stack([lines.angle(name) for name in joints], axis=1)
     return found
 
 

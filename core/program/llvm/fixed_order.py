@@ -121,109 +121,117 @@ def _code() -> Code:
     return load("fixed order", text, {"factor": 10, "gather": 9, "scatter": 9})
 
 
-class _Loop(Lines):
-    """Lines with tables of integers and of vectors."""
+VECTOR, WORDS = f"<{LANES} x double>", f"<{LANES} x i64>"
 
-    def place(self, table: str, at: str) -> str:
-        """Return an integer of a table."""
-        return self.assign(f"load i64, ptr {self.number(table, at)}, align 8")
 
-    def at(self, table: str, row: str) -> str:
-        """Return the address of a vector of a table."""
-        return self.let(f"getelementptr {self.vector}, ptr {table}, i64 {row}")
+def _load(name: str, table: str, at: str, kind: str = "i64") -> str:
+    """Return lines to read a number of a table, or a vector."""
+    return f"""%{name}_at = getelementptr {kind}, ptr {table}, i64 {at}
+  %{name} = load {kind}, ptr %{name}_at, align 8"""
 
-    def load(self, table: str, row: str) -> str:
-        """Return a vector of a table."""
-        return self.assign(f"load {self.vector}, ptr {self.at(table, row)}, align 8")
 
-    def store(self, value: str, table: str, row: str) -> None:
-        """Set a vector of a table."""
-        self.lines.append(f"store {self.vector} {value}, ptr {self.at(table, row)}, align 8")
+def _store(value: str, table: str, at: str, kind: str = VECTOR) -> str:
+    """Return lines to write a vector of a table."""
+    place = f"{value}_{table[1:]}"
+    return f"""{place} = getelementptr {kind}, ptr {table}, i64 {at}
+  store {kind} {value}, ptr {place}, align 8"""
 
-    def less(self, a: str, b: str, c: str) -> str:
-        """Return c - a b."""
-        return self.fused("fnma", a, b, c)
+
+def _largest(value: str, so_far: str) -> str:
+    """Return lines for `%value_largest`: the larger of the size of a vector and another one."""
+    return f"""%{value}_size = call {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR} %{value})
+  %{value}_largest = call nsz {VECTOR} @llvm.maximum.v{LANES}f64({VECTOR} {so_far}, {VECTOR}
+    %{value}_size)"""
+
+
+def _less(name: str, a: str, b: str, c: str) -> str:
+    """Return lines for c - a b."""
+    numbers = f"{VECTOR} %{name}_minus, {VECTOR} {b}, {VECTOR} {c}"
+    return f"""%{name}_minus = fneg {VECTOR} {a}
+  %{name} = call {VECTOR} @llvm.fmuladd.v{LANES}f64({numbers})"""
 
 
 def _factor() -> str:
     """Return row by row (Doolittle): a row of the matrix less the rows above it."""
-    row, copy, by, less, back, end = (
-        _Loop(LANES, name) for name in ("row", "copy", "by", "less", "back", "end")
-    )
-    first, pivot = row.place("%starts", "%i"), row.place("%pivots", "%i")
-    stop = row.place("%starts", row.sum("%i", 1))
-    copy.store(
-        copy.load("%given", copy.place("%sources", "%p")), "%work", copy.place("%columns", "%p")
-    )
-    k = by.place("%columns", "%l")
-    multiplier = by.arithmetic("*", by.load("%work", k), by.load("%inverse", k))
-    by.store(multiplier, "%work", k)
-    largest = by.call("maximum", "%growth_now", by.call("fabs", multiplier))
-    above, above_end = by.sum(by.place("%pivots", k), 1), by.place("%starts", by.sum(k, 1))
-    j = less.place("%columns", "%u")
-    less.store(less.less(multiplier, less.load("%table", "%u"), less.load("%work", j)), "%work", j)
-    back.store(back.load("%work", back.place("%columns", "%q")), "%table", "%q")
-    inverse = end.arithmetic("/", end.constant(1.0), end.load("%work", "%i"))
-    end.store(inverse, "%inverse", "%i")
-    longest = end.call("maximum", "%inverse_row", end.call("fabs", inverse))
-    # the sign bits of all pivots: those of the other bits have no meaning
-    words = f"<{LANES} x i64>"
-    bits = end.let(f"bitcast {end.vector} {inverse} to {words}")
-    signs = end.let(f"xor {words} {bits}, %signs_row")
-    done = _Loop(LANES, "done")
-    for k, value in enumerate(("%growth_now", longest)):
-        done.store(value, "%growth", str(k))
-    done.lines.append(f"store {words} {signs}, ptr {done.at('%growth', '2')}, align 8")
     places = "ptr %starts, ptr %pivots, ptr %columns, ptr %sources"
     numbers = "ptr %given, ptr %table, ptr %inverse, ptr %work, ptr %growth"
+    one = Lines(LANES).constant(1.0)
     return f"""define void @factor(i64 %n, {places}, {numbers}) {{
 entry:
   br label %row
 row:
   %i = phi i64 [0, %entry], [%i_next, %end]
-  %growth_row = phi {row.vector} [zeroinitializer, %entry], [%growth_now, %end]
-  %inverse_row = phi {row.vector} [zeroinitializer, %entry], [{longest}, %end]
-  %signs_row = phi {words} [zeroinitializer, %entry], [{signs}, %end]
-  {row.text}
+  %growth_row = phi {VECTOR} [zeroinitializer, %entry], [%growth_now, %end]
+  %inverse_row = phi {VECTOR} [zeroinitializer, %entry], [%reciprocal_largest, %end]
+  %signs_row = phi {WORDS} [zeroinitializer, %entry], [%signs, %end]
+  %i_next = add i64 %i, 1
+  {_load("start", "%starts", "%i")}
+  {_load("pivot", "%pivots", "%i")}
+  {_load("stop", "%starts", "%i_next")}
   br label %copy
 copy:
-  %p = phi i64 [{first}, %row], [%p_next, %copy]
-  {copy.text}
+  %p = phi i64 [%start, %row], [%p_next, %copy]
+  {_load("source", "%sources", "%p")}
+  {_load("column", "%columns", "%p")}
+  {_load("entry_given", "%given", "%source", VECTOR)}
+  {_store("%entry_given", "%work", "%column")}
   %p_next = add i64 %p, 1
-  %p_more = icmp slt i64 %p_next, {stop}
+  %p_more = icmp slt i64 %p_next, %stop
   br i1 %p_more, label %copy, label %below
 below:
-  %l = phi i64 [{first}, %copy], [%l_next, %by_end]
-  %growth_now = phi {row.vector} [%growth_row, %copy], [{largest}, %by_end]
-  %l_more = icmp slt i64 %l, {pivot}
+  %l = phi i64 [%start, %copy], [%l_next, %by_end]
+  %growth_now = phi {VECTOR} [%growth_row, %copy], [%multiplier_largest, %by_end]
+  %l_more = icmp slt i64 %l, %pivot
   br i1 %l_more, label %by, label %back
 by:
-  {by.text}
+  {_load("k", "%columns", "%l")}
+  {_load("left", "%work", "%k", VECTOR)}
+  {_load("scale", "%inverse", "%k", VECTOR)}
+  %multiplier = fmul {VECTOR} %left, %scale
+  {_store("%multiplier", "%work", "%k")}
+  {_largest("multiplier", "%growth_now")}
+  %k_next = add i64 %k, 1
+  {_load("above", "%pivots", "%k")}
+  %above_first = add i64 %above, 1
+  {_load("above_end", "%starts", "%k_next")}
   br label %update
 update:
-  %u = phi i64 [{above}, %by], [%u_next, %less]
-  %u_more = icmp slt i64 %u, {above_end}
+  %u = phi i64 [%above_first, %by], [%u_next, %less]
+  %u_more = icmp slt i64 %u, %above_end
   br i1 %u_more, label %less, label %by_end
 less:
-  {less.text}
+  {_load("j", "%columns", "%u")}
+  {_load("entry_above", "%table", "%u", VECTOR)}
+  {_load("entry_here", "%work", "%j", VECTOR)}
+  {_less("rest", "%multiplier", "%entry_above", "%entry_here")}
+  {_store("%rest", "%work", "%j")}
   %u_next = add i64 %u, 1
   br label %update
 by_end:
   %l_next = add i64 %l, 1
   br label %below
 back:
-  %q = phi i64 [{first}, %below], [%q_next, %back]
-  {back.text}
+  %q = phi i64 [%start, %below], [%q_next, %back]
+  {_load("column_back", "%columns", "%q")}
+  {_load("entry_back", "%work", "%column_back", VECTOR)}
+  {_store("%entry_back", "%table", "%q")}
   %q_next = add i64 %q, 1
-  %q_more = icmp slt i64 %q_next, {stop}
+  %q_more = icmp slt i64 %q_next, %stop
   br i1 %q_more, label %back, label %end
 end:
-  {end.text}
-  %i_next = add i64 %i, 1
+  {_load("diagonal", "%work", "%i", VECTOR)}
+  %reciprocal = fdiv {VECTOR} {one}, %diagonal
+  {_store("%reciprocal", "%inverse", "%i")}
+  {_largest("reciprocal", "%inverse_row")}
+  ; the sign bits of all pivots: those of the other bits have no meaning
+  %bits = bitcast {VECTOR} %reciprocal to {WORDS}
+  %signs = xor {WORDS} %bits, %signs_row
   %i_more = icmp slt i64 %i_next, %n
   br i1 %i_more, label %row, label %done
 done:
-  {done.text}
+  {_store("%growth_now", "%growth", "0")}
+  {_store("%reciprocal_largest", "%growth", "1")}
+  {_store("%signs", "%growth", "2", WORDS)}
   ret void
 }}
 """
@@ -233,20 +241,15 @@ def _sweep(name: str) -> str:
     """Return a substitution over the rows, up or down: each gathers what the rows before it give,
     or scatters what it gives to those after it.
     """
-    row, run, end, gathers = _Loop(LANES, "row"), _Loop(LANES, "run"), _Loop(LANES, "end"), False
-    gathers = name == "gather"
-    first, stop = row.place("%begins", "%i"), row.place("%ends", "%i")
-    own, scale = row.load("%b", "%i"), row.load("%scale", "%i")
-    x = own if gathers else row.arithmetic("*", own, scale)
-    if not gathers:
-        row.store(x, "%b", "%i")
-    column, entry = run.place("%columns", "%p"), run.load("%table", "%p")
-    other = run.load("%b", column)
-    found = run.less(entry, other if gathers else x, "%x" if gathers else other)
-    if gathers:
-        end.store(end.arithmetic("*", "%x", scale), "%b", "%i")
+    scaled = f"""%scaled = fmul {VECTOR} {"%x" if name == "gather" else "%own"}, %scale_here
+  {_store("%scaled", "%b", "%i")}"""
+    if name == "gather":
+        before, first, found, after = "", "%own", "%left", scaled
+        run = _less("left", "%entry_here", "%other", "%x")
     else:
-        run.store(found, "%b", column)
+        before, first, found, after = scaled, "%scaled", "%x", ""
+        run = f"""{_less("left", "%entry_here", "%x", "%other")}
+  {_store("%left", "%b", "%column")}"""
     head = "ptr %begins, ptr %ends, ptr %columns, ptr %table, ptr %scale, ptr %b"
     return f"""define void @{name}(i64 %n, i64 %start, i64 %step, {head}) {{
 entry:
@@ -254,19 +257,26 @@ entry:
 row:
   %k = phi i64 [0, %entry], [%k_next, %end]
   %i = phi i64 [%start, %entry], [%i_next, %end]
-  {row.text}
+  {_load("first", "%begins", "%i")}
+  {_load("stop", "%ends", "%i")}
+  {_load("own", "%b", "%i", VECTOR)}
+  {_load("scale_here", "%scale", "%i", VECTOR)}
+  {before}
   br label %next
 next:
-  %p = phi i64 [{first}, %row], [%p_next, %run]
-  %x = phi {row.vector} [{x}, %row], [{found}, %run]
-  %p_more = icmp slt i64 %p, {stop}
+  %p = phi i64 [%first, %row], [%p_next, %run]
+  %x = phi {VECTOR} [{first}, %row], [{found}, %run]
+  %p_more = icmp slt i64 %p, %stop
   br i1 %p_more, label %run, label %end
 run:
-  {run.text}
+  {_load("column", "%columns", "%p")}
+  {_load("entry_here", "%table", "%p", VECTOR)}
+  {_load("other", "%b", "%column", VECTOR)}
+  {run}
   %p_next = add i64 %p, 1
   br label %next
 end:
-  {end.text}
+  {after}
   %i_next = add i64 %i, %step
   %k_next = add i64 %k, 1
   %k_more = icmp slt i64 %k_next, %n

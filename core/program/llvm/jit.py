@@ -222,11 +222,6 @@ def make_loops_ready() -> None:
         Thread(target=lambda: [_loop(name, width) for name in missing]).start()
 
 
-def interpreter(width: int) -> Callable[..., int]:
-    """Return the interpreter function of the addresses of lanes and table."""
-    return _loop("interpret", width).calls["interpret"]
-
-
 def _loop(name: str, width: int) -> Code:
     with _LOCK:
         return _made(name, width)

@@ -11,7 +11,17 @@ from collections.abc import Sequence
 
 from ..plan import LINE
 from ..tape import NODES
-from .plan import TOGETHER, Rows, call, function, over
+from .plan import (
+    SIGN,
+    all_lanes,
+    call,
+    each_number,
+    each_pair,
+    each_slot,
+    fields_of,
+    function,
+    over,
+)
 from .programs import Lines
 
 
@@ -19,22 +29,23 @@ def settle(width: int) -> str:
     """Return the attempt at W predicted lanes without its test: iterate until each converged or is
     not finite.
     """
-    vector, mask, lines = f"<{width} x double>", f"<{width} x i1>", Lines(width)
-    at = {name: lines.slot(f"%plan_{name}") for name in ("residual", "iterations", "done")}
-    tolerance = lines.spread("%plan_tolerance")
-    body = f"""{lines.text}
+    vector, mask, constant = f"<{width} x double>", f"<{width} x i1>", Lines(width).constant
+    body = f"""%residual_at = getelementptr {vector}, ptr %lane, i64 %plan_residual
+  %iterations_at = getelementptr {vector}, ptr %lane, i64 %plan_iterations
+  %done_at = getelementptr {vector}, ptr %lane, i64 %plan_done
+  {all_lanes(width, "plan_tolerance")}
   br label %iterate
 iterate:
   %pass = phi i64 [1, %entry], [%next_pass, %iterate]
   %done = phi {mask} [zeroinitializer, %entry], [%now_done, %iterate]
   %count = phi {vector} [zeroinitializer, %entry], [%now_count, %iterate]
   {call("newton", "%plan_newton")}
-  %residual = load {vector}, ptr {at["residual"]}, align 8
-  %more_count = fadd {vector} %count, {lines.constant(1.0)}
+  %residual = load {vector}, ptr %residual_at, align 8
+  %more_count = fadd {vector} %count, {constant(1.0)}
   %now_count = select {mask} %done, {vector} %count, {vector} %more_count
-  %met = fcmp olt {vector} %residual, {tolerance}
+  %met = fcmp olt {vector} %residual, %plan_tolerance_all
   %now_done = or {mask} %done, %met
-  %finite = fcmp olt {vector} %residual, {lines.constant(math.inf)}
+  %finite = fcmp olt {vector} %residual, {constant(math.inf)}
   %lost = xor {mask} %finite, <{", ".join(["i1 true"] * width)}>
   %settled = or {mask} %now_done, %lost
   %all = call i1 @llvm.vector.reduce.and.v{width}i1({mask} %settled)
@@ -44,9 +55,9 @@ iterate:
   br i1 %stop, label %finish, label %iterate
 finish:
   {over("calls", "after")}
-  store {vector} %now_count, ptr {at["iterations"]}, align 8
-  %done_number = select {mask} %now_done, {vector} {lines.constant(1.0)}, {vector} zeroinitializer
-  store {vector} %done_number, ptr {at["done"]}, align 8
+  store {vector} %now_count, ptr %iterations_at, align 8
+  %done_number = select {mask} %now_done, {vector} {constant(1.0)}, {vector} zeroinitializer
+  store {vector} %done_number, ptr %done_at, align 8
   ret void"""
     reduction = f"declare i1 @llvm.vector.reduce.and.v{width}i1({mask})\n"
     return reduction + function("internal void @settle(ptr %plan, ptr %lane)", body)
@@ -87,17 +98,19 @@ end:
 
 def parts(width: int) -> str:
     """Return the LLVM functions of `parts` of an executor."""
-    source = Rows(width)
-    row = source.let(f"load i64, ptr {source.number('%rows', '%row')}, align 8")
-    place = source.number("%world", source.product("%room", row))
-    source.write(source.entry(), source.let(f"load <{width} x double>, ptr {place}, align 8"))
-    leave = Rows(width)
-    last = leave.let(
-        f"load double, ptr {leave.number(leave.slot(leave.entry(0, 2)), width - 1)}, align 8"
-    )
-    leave.lines.append(
-        f"store double {last}, ptr {leave.number('%ahead', leave.entry(1, 2))}, align 8"
-    )
+    vector = f"<{width} x double>"
+    source = f"""%row_at = getelementptr i64, ptr %rows, i64 %row
+  %world_row = load i64, ptr %row_at, align 8
+  %world_at = mul i64 %room, %world_row
+  %value_at = getelementptr double, ptr %world, i64 %world_at
+  %value = load {vector}, ptr %value_at, align 8
+  store {vector} %value, ptr %slot, align 8"""
+    leave = f"""%target_at = getelementptr i64, ptr %place, i64 1
+  %target = load i64, ptr %target_at, align 8
+  %last_at = getelementptr double, ptr %slot, i64 {width - 1}
+  %last = load double, ptr %last_at, align 8
+  %to = getelementptr double, ptr %ahead, i64 %target
+  store double %last, ptr %to, align 8"""
     tables = (
         "ptr %members, ptr %own_all, ptr %ahead_all, ptr %samples, i64 %room, ptr %sources_all, ptr"
         " %world"
@@ -147,8 +160,8 @@ end:
         " %groups)"
     )
     rows = [
-        source.function("source", "ptr %rows", "ptr %world", "i64 %room"),
-        leave.function("leave", "ptr %ahead"),
+        each_slot("source", ", ptr %rows, ptr %world, i64 %room", source),
+        each_slot("leave", ", ptr %ahead", leave, 2),
     ]
     return "".join([*rows, function(head, body)])
 
@@ -176,10 +189,9 @@ def follow(width: int) -> str:
     Extrapolated groups begin at a multiple of W: the group after a fully accepted one ends there.
     With few lanes, several such groups must precede.
     """
-    vector, test = f"<{width} x double>", Lines(width, "test")
-    accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
-    body = f"""{_read_fields("motion", MOTION)}
-  {_read_fields("side", SIDE)}
+    vector = f"<{width} x double>"
+    body = f"""{fields_of("motion", MOTION)}
+  {fields_of("side", SIDE)}
   %descending = icmp slt i64 %step, 0
   %extrapolates = icmp ne i64 %plan_behind, 0
   %quick = icmp ne i64 %plan_quick, 0
@@ -203,8 +215,8 @@ attempt:
   {call("first", "%first_call")}
   call void @settle(ptr %plan, ptr %lane)
   {over("calls", "joined")}
-  {test.text}
-  %bits = bitcast <{width} x i1> {accepted} to i{width}
+  {_test(width)}
+  %bits = bitcast <{width} x i1> %passed to i{width}
   %wide = zext i{width} %bits to i64
   %rejected = xor i64 %wide, {2 ** (width + 1) - 1}
   %leading = call i64 @llvm.cttz.i64(i64 %rejected, i1 true)
@@ -276,18 +288,17 @@ end:
   {over("put", "targets", "ptr %anchor", "i64 1")}
   {over("end_worst", "worst", "ptr %worst_here", "ptr %worst")}
   ret i64 %at"""
-    turned = Rows(width)
-    place = turned.number("%numbers", turned.product("%stride", "%row"))
-    turned.lines.append(
-        f"store {vector} {turned.turned(turned.read(turned.entry()))}, ptr {place}, align 8"
-    )
+    order = ", ".join(f"i32 {k}" for k in reversed(range(width)))
+    turned = f"""%value = load {vector}, ptr %slot, align 8
+  %turned = shufflevector {vector} %value, {vector} poison, <{width} x i32> <{order}>
+  store {vector} %turned, ptr %number, align 8"""
     places = "ptr %plan, ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop"
     stay = f"""  %at = call i64 @go({places}, i1 true)
   ret i64 %at"""
     return f"""declare i64 @llvm.cttz.i64(i64, i1)
 declare i64 @llvm.smin.i64(i64, i64)
 declare i64 @llvm.smax.i64(i64, i64)
-{turned.function("keep_turned", "ptr %numbers", "i64 %stride")}{_worst(width)}{_run()}""" + "".join(
+{each_number("keep_turned", turned)}{_worst(width)}{_run()}""" + "".join(
         [
             function(f"internal i64 @go({places}, i1 %stays)", body),
             function(f"i64 @follow({places})", stay),
@@ -295,11 +306,19 @@ declare i64 @llvm.smax.i64(i64, i64)
     )
 
 
+def _test(width: int) -> str:
+    """Return lines to find the accepted lanes, `%passed`."""
+    vector = f"<{width} x double>"
+    return f"""%margin_at = getelementptr {vector}, ptr %lane, i64 %plan_margin
+  %margin = load {vector}, ptr %margin_at, align 8
+  %passed = fcmp ogt {vector} %margin, zeroinitializer"""
+
+
 def _run() -> str:
     """Return the function that follows every side and counts the sides that end early."""
     return f"""define i64 @run(ptr %plan, ptr %motion, ptr %table) {{
 entry:
-  {_read_fields("motion", MOTION)}
+  {fields_of("motion", MOTION)}
   br label %head
 head:
   %k = phi i64 [0, %entry], [%next, %one]
@@ -309,7 +328,7 @@ head:
 one:
   %offset = mul i64 %k, {len(SIDE)}
   %side = getelementptr i64, ptr %table, i64 %offset
-  {_read_fields("side", SIDE)}
+  {fields_of("side", SIDE)}
   %at = call i64 @go(ptr %plan, ptr %motion, ptr %side, ptr %start, i64 0, i64 %count, i1 false)
   %reached_at = getelementptr i64, ptr %side, i64 {_index(SIDE, "reached")}
   store i64 %at, ptr %reached_at, align 8
@@ -324,14 +343,6 @@ end:
 """
 
 
-def _read_fields(name: str, fields: Sequence[str]) -> str:
-    """Return lines that read the fields of a struct, each under its own name."""
-    lines = Lines(0, f"{name}_")
-    for k, (kind, field) in enumerate(each.split() for each in fields):
-        lines.lines.append(f"%{field} = load {kind}, ptr {lines.number(f'%{name}', k)}, align 8")
-    return lines.text
-
-
 def _index(fields: Sequence[str], name: str) -> int:
     return [each.split()[1] for each in fields].index(name)
 
@@ -342,41 +353,42 @@ def _worst(width: int) -> str:
 
     They begin, update by a group, and write the largest to its place.
     """
-    begin, update, end = (Rows(width) for _ in range(3))
-    vector, words = begin.vector, f"<{width} x i64>"
-    here, *_ = [
-        rows.let(f"getelementptr {vector}, ptr %here, i64 %row") for rows in (begin, update, end)
-    ]
-    new, sign = begin.let("icmp ne i64 %forget, 0"), begin.entry(1, 3, "double")
-    so_far = begin.let(f"load double, ptr {begin.number('%found', '%row')}, align 8")
-    so_far = begin.let(f"fmul double {so_far}, {sign}")
-    start = begin.spread(
-        begin.let(f"select i1 {new}, double {begin.entry(2, 3, 'double')}, double {so_far}")
-    )
-    begin.lines.append(f"store {vector} {start}, ptr {here}, align 64")
+    vector, words = f"<{width} x double>", f"<{width} x i64>"
+    here = f"""%here_at = getelementptr {vector}, ptr %here, i64 %row
+  {SIGN}"""
+    begin = f"""{here}
+  %start_at = getelementptr double, ptr %place, i64 2
+  %start = load double, ptr %start_at, align 8
+  %found_at = getelementptr double, ptr %found, i64 %row
+  %so_far = load double, ptr %found_at, align 8
+  %signed = fmul double %so_far, %sign
+  %new = icmp ne i64 %forget, 0
+  %first = select i1 %new, double %start, double %signed
+  {all_lanes(width, "first")}
+  store {vector} %first_all, ptr %here_at, align 64"""
     numbers = ", ".join(f"i64 {k}" for k in range(width))
-    one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
-    wanted = update.let(
-        f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer"
-    )
-    kept = update.let(f"icmp ult {words} <{numbers}>, {wanted}")
-    before = update.let(f"load {vector}, ptr {here}, align 64")
-    signed = update.arithmetic(
-        "*", update.read(update.entry(0, 3)), update.spread(update.entry(1, 3, "double"))
-    )
-    value = update.choose(kept, signed, before)
-    worse = update.let(f"fcmp ogt {vector} {value}, {before}")
-    update.lines.append(
-        f"store {vector} {update.choose(worse, value, before)}, ptr {here}, align 64"
-    )
-    largest = end.let(f"load {vector}, ptr {here}, align 64")
-    largest = end.let(f"call nnan double @llvm.vector.reduce.fmax.v{width}f64({vector} {largest})")
-    largest = end.let(f"fmul double {largest}, {end.entry(1, 3, 'double')}")
-    end.lines.append(f"store double {largest}, ptr {end.number('%found', '%row')}, align 8")
+    update = f"""{here}
+  {all_lanes(width, "sign")}
+  %one = insertelement {words} poison, i64 %accepted, i64 0
+  %wanted = shufflevector {words} %one, {words} poison, <{width} x i32> zeroinitializer
+  %kept = icmp ult {words} <{numbers}>, %wanted
+  %before = load {vector}, ptr %here_at, align 64
+  %value = load {vector}, ptr %slot, align 8
+  %signed = fmul {vector} %value, %sign_all
+  %counted = select <{width} x i1> %kept, {vector} %signed, {vector} %before
+  %worse = fcmp ogt {vector} %counted, %before
+  %worst = select <{width} x i1> %worse, {vector} %counted, {vector} %before
+  store {vector} %worst, ptr %here_at, align 64"""
+    end = f"""{here}
+  %values = load {vector}, ptr %here_at, align 64
+  %largest = call nnan double @llvm.vector.reduce.fmax.v{width}f64({vector} %values)
+  %signed = fmul double %largest, %sign
+  %found_at = getelementptr double, ptr %found, i64 %row
+  store double %signed, ptr %found_at, align 8"""
     return f"""declare double @llvm.vector.reduce.fmax.v{width}f64({vector})
-{begin.function("begin_worst", "ptr %here", "ptr %found", "i64 %forget")}{
-        update.function("update_worst", "ptr %here", "i64 %accepted")
-    }{end.function("end_worst", "ptr %here", "ptr %found")}"""
+{each_slot("begin_worst", ", ptr %here, ptr %found, i64 %forget", begin, 3)}{
+        each_slot("update_worst", ", ptr %here, i64 %accepted", update, 3)
+    }{each_slot("end_worst", ", ptr %here, ptr %found", end, 3)}"""
 
 
 def fan(width: int) -> str:
@@ -386,8 +398,7 @@ def fan(width: int) -> str:
     After `NODES` samples a group is predicted by `extend`. If this fails for a live motion, the
     group goes back and is predicted by its rates.
     """
-    vector, mask, test = f"<{width} x double>", f"<{width} x i1>", Lines(width, "test")
-    accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
+    mask = f"<{width} x i1>"
     given = over("give", "sampled", "ptr %samples_here", "i64 %stride")
     body = f"""%bytes = mul i64 %plan_stride, {8 * width}
   %plane = mul i64 %columns, %lanes
@@ -425,8 +436,8 @@ attempt:
   %extended = phi i1 [true, %extend], [false, %predict]
   call void @settle(ptr %plan, ptr %lane)
   {over("calls", "alone")}
-  {test.text}
-  %still = and {mask} %alive, {accepted}
+  {_test(width)}
+  %still = and {mask} %alive, %passed
   %lost = xor {mask} %alive, %still
   %any = call i1 @llvm.vector.reduce.or.v{width}i1({mask} %lost)
   %missed = and i1 %any, %extended
@@ -481,35 +492,33 @@ def _kept(width: int) -> str:
     """Return functions that store a sample (NaN for an ended motion), remember it, and mark ended
     motions in the worst.
     """
-    keep, lose, remember = Rows(width), Rows(width), Rows(width, TOGETHER)
+    vector, still = f"<{width} x double>", f"<{width} x i1> %still"
+    lost = Lines(width).constant(math.nan)
     # whole cache lines bypass the caches: a fetch before each overwrite takes a third of all time
     whole = width == LINE
     past_caches = ", !nontemporal !{i32 1}" if whole else ""
-    place = keep.number("%numbers", keep.product("%stride", "%row"))
-    value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
-    keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
     # partial lines are prefetched a sample ahead; collecting them into whole lines takes as long
     # as waiting
-    if not whole:
-        keep.lines.append(
-            f"call void @llvm.prefetch.p0(ptr {keep.number(place, '%ahead')}, i32 1, i32 3, i32 1)"
-        )
-    worst = lose.number("%numbers", lose.product("%stride", "%row"))
-    known = lose.choose(
-        "%still", lose.let(f"load {lose.vector}, ptr {worst}, align 8"), lose.constant(math.nan)
+    prefetch = (
+        ""
+        if whole
+        else """
+  %next_number = getelementptr double, ptr %number, i64 %ahead
+  call void @llvm.prefetch.p0(ptr %next_number, i32 1, i32 3, i32 1)"""
     )
-    lose.lines.append(f"store {lose.vector} {known}, ptr {worst}, align 8")
-    for k in range(TOGETHER):
-        remember.at = remember.sum("%row", k)
-        to = remember.sum("%past", remember.entry(1, 2))
-        remember.write(
-            to,
-            remember.assign(
-                f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"
-            ),
-        )
-    kept = keep.function(
-        "keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still", "i64 %ahead"
+    keep = f"""%value = load {vector}, ptr %slot, align 8
+  %kept = select {still}, {vector} %value, {vector} {lost}
+  store {vector} %kept, ptr %number, align {8 * width}{past_caches}{prefetch}"""
+    lose = f"""%known = load {vector}, ptr %number, align 8
+  %kept = select {still}, {vector} %known, {vector} {lost}
+  store {vector} %kept, ptr %number, align 8"""
+    remember = f"""%past# = getelementptr i8, ptr %to#, i64 %past
+  %value# = load {vector}, ptr %from#, align 8
+  store {vector} %value#, ptr %past#, align 8"""
+    return "".join(
+        [
+            each_number("keep_alive", keep, arguments=f", {still}, i64 %ahead"),
+            each_number("lose", lose, 3, f", {still}"),
+            each_pair("remember", ", i64 %past", remember),
+        ]
     )
-    lost = lose.function("lose", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
-    return kept + lost + remember.function("remember", "i64 %past")

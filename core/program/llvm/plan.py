@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plan import DONE, ITERATIONS, MARGIN, Plan, shifted
-from .programs import Lines
 
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 """Slots that loops read and write, by their names in the plan."""
@@ -43,66 +42,55 @@ FIELDS = [*NUMBERS, *PROGRAMS, *(field for name in TABLES for field in (name, f"
 
 
 def function(head: str, body: str) -> str:
-    """Return a function of a plan: the fields that its body names as "%plan_..." are read at its
-    entry.
-    """
-    named, lines = set(re.findall(r"%plan_(\w+)", body)), Lines(0, "plan")
-    for k, name in enumerate(FIELDS):
-        if name in named:
-            kind = (
-                "double"
-                if name == "tolerance"
-                else "ptr"
-                if name in TABLES or name in PROGRAMS
-                else "i64"
-            )
-            lines.lines.append(
-                f"%plan_{name} = load {kind}, ptr {lines.number('%plan', k)}, align 8"
-            )
+    """Return a function of a plan; fields named "%plan_..." in its body are read at its entry."""
+    named = set(re.findall(r"%plan_(\w+)", body))
+    kinds = {"tolerance": "double", **dict.fromkeys((*TABLES, *PROGRAMS), "ptr")}
+    fields = [f"{kinds.get(name, 'i64')} plan_{name}" if name in named else "" for name in FIELDS]
     return f"""define {head} {{
 entry:
-  {lines.text}
+  {fields_of("plan", fields)}
   {body}
 }}
 """
 
 
+def fields_of(name: str, fields: Sequence[str]) -> str:
+    """Return lines to read fields of a struct, each a kind and a name; empty ones are left out.
+
+    Each field takes eight bytes.
+    """
+    return "\n  ".join(
+        f"%{name}_at_{k} = getelementptr i64, ptr %{name}, i64 {k}\n"
+        f"  %{field.split()[1]} = load {field.split()[0]}, ptr %{name}_at_{k}, align 8"
+        for k, field in enumerate(fields)
+        if field
+    )
+
+
 def call(prefix: str, program: str) -> str:
-    """Return lines that call a program, given the address of its call."""
-    lines = Lines(0, f"{prefix}_call")
-    function = lines.let(f"load ptr, ptr {program}, align 8")
-    table = lines.let(f"load ptr, ptr {lines.number(program, 1)}, align 8")
-    lines.lines.append(f"call void {function}(ptr %lane, ptr {table})")
-    return lines.text
+    """Return lines to call a program, given the address of its call."""
+    return f"""%{prefix}_code = load ptr, ptr {program}, align 8
+  %{prefix}_table_at = getelementptr ptr, ptr {program}, i64 1
+  %{prefix}_table = load ptr, ptr %{prefix}_table_at, align 8
+  call void %{prefix}_code(ptr %lane, ptr %{prefix}_table)"""
 
 
-class Rows(Lines):
-    """A loop over the rows of a table; its lines are those of one row, or of `step` rows."""
+def over(name: str, table: str, *arguments: str) -> str:
+    """Return a call of a loop over the rows of a table of the plan."""
+    rows = f"ptr %lane, ptr %plan_{table}, i64 %plan_{table}_count"
+    return f"call void @{name}({', '.join((rows, *arguments))})"
 
-    def __init__(self, width: int, step: int = 1) -> None:
-        super().__init__(width, "r")
-        self._step, self.at = step, "%row"
 
-    def entry(self, column: int = 0, columns: int = 1, kind: str = "i64") -> str:
-        """Return a number of the row."""
-        at = self.sum(self.product(self.at, columns), column)
-        return self.let(f"load {kind}, ptr {self.number('%table', at)}, align 8")
-
-    def slot(self, number: str | int) -> str:
-        """Return the address of a slot, given its byte offset from the lanes."""
-        return self.let(f"getelementptr i8, ptr %lane, i64 {number}")
-
-    def function(self, name: str, *arguments: str) -> str:
-        """Return the loop as a function of lanes and a table."""
-        head = ", ".join(("ptr %lane, ptr %table, i64 %count", *arguments))
-        return f"""define internal void @{name}({head}) {{
+def _each_row(name: str, arguments: str, body: str, step: int = 1) -> str:
+    """Return a loop over the rows of a table, one or several at a time, as a function."""
+    return f"""define internal void @{name}(ptr %lane, ptr %table, i64 %count{arguments}) {{
 entry:
   %any = icmp ne i64 %count, 0
   br i1 %any, label %loop, label %end
 loop:
   %row = phi i64 [0, %entry], [%next, %loop]
-  {self.text}
-  %next = add i64 %row, {self._step}
+  {body}
+  %next = add i64 %row, {step}
   %more = icmp ult i64 %next, %count
   br i1 %more, label %loop, label %end
 end:
@@ -111,57 +99,94 @@ end:
 """
 
 
-def over(name: str, table: str, *arguments: str) -> str:
-    """Return a call of such a function for a table of the plan."""
-    rows_of = f"ptr %lane, ptr %plan_{table}, i64 %plan_{table}_count"
-    return f"call void @{name}({', '.join((rows_of, *arguments))})"
+def each_slot(name: str, arguments: str, body: str, columns: int = 1) -> str:
+    """Return a loop over `%slot`, named in the first column of a table."""
+    place = f"""%place_at = mul i64 %row, {columns}
+  %place = getelementptr i64, ptr %table, i64 %place_at
+  %bytes = load i64, ptr %place, align 8
+  %slot = getelementptr i8, ptr %lane, i64 %bytes"""
+    return _each_row(name, arguments, f"{place}\n  {body}")
+
+
+def each_number(name: str, body: str, columns: int = 1, arguments: str = "") -> str:
+    """Return a loop over `%slot` and `%number`, its place in a table of numbers by rows."""
+    number = """%number_at = mul i64 %stride, %row
+  %number = getelementptr double, ptr %numbers, i64 %number_at"""
+    return each_slot(
+        name, f", ptr %numbers, i64 %stride{arguments}", f"{number}\n  {body}", columns
+    )
+
+
+def each_pair(name: str, arguments: str, body: str) -> str:
+    """Return a loop over pairs of slots, `TOGETHER` at a time; its body is of one pair,
+    `%from#` and `%to#`.
+    """
+    lines = """%source_at# = getelementptr [2 x i64], ptr %pairs, i64 #, i64 0
+  %target_at# = getelementptr [2 x i64], ptr %pairs, i64 #, i64 1
+  %source# = load i64, ptr %source_at#, align 8
+  %target# = load i64, ptr %target_at#, align 8
+  %from# = getelementptr i8, ptr %lane, i64 %source#
+  %to# = getelementptr i8, ptr %lane, i64 %target#
+  """
+    pairs = "%pairs = getelementptr [2 x i64], ptr %table, i64 %row"
+    unrolled = [(lines + body).replace("#", str(k)) for k in range(TOGETHER)]
+    return _each_row(name, arguments, "\n  ".join([pairs, *unrolled]), TOGETHER)
+
+
+def all_lanes(width: int, name: str) -> str:
+    """Return lines for a vector `%name_all` of equal numbers."""
+    vector, zeros = f"<{width} x double>", f"<{width} x i32> zeroinitializer"
+    return f"""%{name}_one = insertelement {vector} poison, double %{name}, i64 0
+  %{name}_all = shufflevector {vector} %{name}_one, {vector} poison, {zeros}"""
+
+
+SIGN = """%sign_at = getelementptr double, ptr %place, i64 1
+  %sign = load double, ptr %sign_at, align 8"""
+"""Lines to read the sign of a row of the table "worst"."""
 
 
 def rows(width: int) -> str:
     """Return functions on slots of a table, and the function that calls the programs of a table."""
     vector = f"<{width} x double>"
-    calls, give, take, keep, put, worsen = (Rows(width) for _ in range(6))
-    copy, spread = Rows(width, TOGETHER), Rows(width, TOGETHER)
-    calls.lines.append(call("row", calls.entry(kind="ptr")))
-    for k in range(TOGETHER):
-        copy.at, spread.at = copy.sum("%row", k), spread.sum("%row", k)
-        copy.write(
-            copy.entry(1, 2),
-            copy.assign(f"load {vector}, ptr {copy.slot(copy.entry(0, 2))}, align 8"),
-        )
-        number = spread.number(spread.slot(spread.entry(0, 2)), "%k")
-        spread.write(
-            spread.entry(1, 2), spread.spread(spread.assign(f"load double, ptr {number}, align 8"))
-        )
-    here = [
-        each.number("%numbers", each.product("%stride", "%row")) for each in (give, take, keep, put)
-    ]
-    give.write(give.entry(), give.spread(give.let(f"load double, ptr {here[0]}, align 8")))
-    take.write(take.entry(), take.let(f"load {vector}, ptr {here[1]}, align 8"))
-    keep.lines.append(f"store {vector} {keep.read(keep.entry())}, ptr {here[2]}, align 8")
-    first = put.let(f"load double, ptr {put.slot(put.entry())}, align 8")
-    put.lines.append(f"store double {first}, ptr {here[3]}, align 8")
-    sign, worst = (
-        worsen.spread(worsen.entry(1, 3, "double")),
-        worsen.number("%numbers", worsen.product("%stride", "%row")),
-    )
-    values = worsen.read(worsen.entry(0, 3)), worsen.let(f"load {vector}, ptr {worst}, align 8")
+    load, store = f"load {vector}, ptr", f"store {vector}"
+    calls = f"""%program_at = getelementptr ptr, ptr %table, i64 %row
+  %program = load ptr, ptr %program_at, align 8
+  {call("row", "%program")}"""
+    copy = f"""%value# = {load} %from#, align 8
+  {store} %value#, ptr %to#, align 8"""
+    spread = f"""%lane_at# = getelementptr double, ptr %from#, i64 %k
+  %value# = load double, ptr %lane_at#, align 8
+  {all_lanes(width, "value#")}
+  {store} %value#_all, ptr %to#, align 8"""
+    give = f"""%value = load double, ptr %number, align 8
+  {all_lanes(width, "value")}
+  {store} %value_all, ptr %slot, align 8"""
+    take = f"""%value = {load} %number, align 8
+  {store} %value, ptr %slot, align 8"""
+    keep = f"""%value = {load} %slot, align 8
+  {store} %value, ptr %number, align 8"""
+    put = """%value = load double, ptr %slot, align 8
+  store double %value, ptr %number, align 8"""
     # NaN if either is
-    worse = worsen.call("maximum", *(worsen.arithmetic("*", sign, each) for each in values))
-    worsen.lines.append(
-        f"store {vector} {worsen.arithmetic('*', sign, worse)}, ptr {worst}, align 8"
-    )
-    numbers = "ptr %numbers", "i64 %stride"
+    worsen = f"""{SIGN}
+  {all_lanes(width, "sign")}
+  %value = {load} %slot, align 8
+  %before = {load} %number, align 8
+  %signed = fmul {vector} %value, %sign_all
+  %signed_before = fmul {vector} %before, %sign_all
+  %larger = call nsz {vector} @llvm.maximum.v{width}f64({vector} %signed, {vector} %signed_before)
+  %worst = fmul {vector} %larger, %sign_all
+  {store} %worst, ptr %number, align 8"""
     return "".join(
         [
-            calls.function("calls"),
-            copy.function("copy"),
-            spread.function("spread", "i64 %k"),
-            give.function("give", *numbers),
-            take.function("take", *numbers),
-            keep.function("keep", *numbers),
-            put.function("put", *numbers),
-            worsen.function("worsen", *numbers),
+            _each_row("calls", "", calls),
+            each_pair("copy", "", copy),
+            each_pair("spread", ", i64 %k", spread),
+            each_number("give", give),
+            each_number("take", take),
+            each_number("keep", keep),
+            each_number("put", put),
+            each_number("worsen", worsen, 3),
         ]
     )
 

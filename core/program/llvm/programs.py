@@ -58,14 +58,6 @@ class Lines:
         """The lines, indented."""
         return "\n  ".join(self.lines)
 
-    def sum(self, a: str | int, b: str | int) -> str:
-        """Return the sum of two integers."""
-        return self.let(f"add i64 {a}, {b}")
-
-    def product(self, a: str | int, b: str | int) -> str:
-        """Return the product of two integers."""
-        return self.let(f"mul i64 {a}, {b}")
-
     def number(self, pointer: str, index: str | int) -> str:
         """Return the address of a number in an array."""
         return self.let(f"getelementptr double, ptr {pointer}, i64 {index}")
@@ -76,13 +68,6 @@ class Lines:
         return self.let(
             f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32>"
             " zeroinitializer"
-        )
-
-    def turned(self, x: str) -> str:
-        """Return the lanes in reverse order."""
-        order = ", ".join(f"i32 {k}" for k in reversed(range(self.width)))
-        return self.let(
-            f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>"
         )
 
     def slot(self, number: str | int) -> str:

@@ -8,7 +8,7 @@ import os
 import statistics
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter
 
 import msgspec
@@ -19,7 +19,7 @@ from ...harness.compare import output_series
 from ...joints import Kind
 from ...kinematics import NativeSolver, PreparedDesigns, Variants, kinds, places
 from ...program.llvm.compiler import available
-from ...trajectory import Array, PointMotion, Trajectory
+from ...trajectory import PointMotion, Trajectory
 from ..tolerance.sweep import sweep_designs
 from ..variation.variation import Coordinate, Law, Mode, Variation
 from .rounds import Peak, Spread, Work, spread, take_turns
@@ -56,19 +56,6 @@ class Batch(msgspec.Struct, frozen=True, kw_only=True):
     of_peak: float | None
 
 
-@dataclass
-class _Batch:
-    """A batch to be timed, with its last solution."""
-
-    designs: PreparedDesigns
-    geometry: Array
-    tol: float
-    found: list[Variants] = field(default_factory=list[Variants])
-
-    def __call__(self) -> None:
-        self.found = [self.designs.solve(self.geometry, self.tol)]
-
-
 def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[Batch]:
     """Solve batches of all sizes in turns with the peak kernel.
 
@@ -86,36 +73,33 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
     )
     scatter[:, 0] = 0.0
     batches = {
-        str(count): _Batch(designs, nominal[:, None] + scatter[:, :count], tol) for count in SIZES
+        count: partial(designs.solve, nominal[:, None] + scatter[:, :count], tol) for count in SIZES
     }
-    work: dict[str, Work] = {**batches}
-    if peak is not None:
-        work["peak"] = peak
+    work: dict[int, Work] = {**batches} if peak is None else {**batches, 0: peak}
     seconds = take_turns(work, rounds)
-    most = None if peak is None else peak.rate(seconds["peak"])
-    return [_batch(case, each, seconds[name], most) for name, each in batches.items()]
-
-
-def _batch(case: Case, batch: _Batch, seconds: Spread, peak: float | None) -> Batch:
-    (found,) = batch.found
-    n, count = found.solved.shape
-    reached = int(found.solved.sum())
-    taken: list[float] = batch.designs.iterations(found)[found.solved].tolist()
-    iterations = statistics.fmean(taken) if taken else 0.0
-    flops = batch.designs.size.of_sample(iterations, motions=True)
-    rate = flops * reached / seconds.median
-    return Batch(
-        case=case.name,
-        variants=count,
-        loop="compiled" if available() else "python",
-        solved=reached / (n * count),
-        retried=found.retried,
-        error=_error(case, batch.designs, found),
-        us_per_sample=seconds.times(1e6 / (n * count)),
-        flops_per_sample=flops,
-        gflops=1e-9 * rate,
-        of_peak=None if peak is None else rate / peak,
-    )
+    rows: list[Batch] = []
+    for count, solve in batches.items():
+        found, n = solve(), len(case.sweep.values)
+        reached = int(found.solved.sum())
+        taken: list[float] = designs.iterations(found)[found.solved].tolist()
+        iterations = statistics.fmean(taken) if taken else 0.0
+        flops = designs.size.of_sample(iterations, motions=True)
+        rate = flops * reached / seconds[count].median
+        rows.append(
+            Batch(
+                case=case.name,
+                variants=count,
+                loop="compiled" if available() else "python",
+                solved=reached / (n * count),
+                retried=found.retried,
+                error=_error(case, designs, found),
+                us_per_sample=seconds[count].times(1e6 / (n * count)),
+                flops_per_sample=flops,
+                gflops=1e-9 * rate,
+                of_peak=None if peak is None else rate / peak.rate(seconds[0]),
+            )
+        )
+    return rows
 
 
 def _error(case: Case, designs: PreparedDesigns, found: Variants) -> float | None:

@@ -14,26 +14,29 @@ import msgspec
 from ...case.case import Case, without_forces
 from ...errors import KincheckError, number_of
 from ...extras import THREADS
-from ...harness.engine import Engine
+from ...harness.engine import Engine, Measurable
 from ...harness.native_engine import NativeEngine
 from ...harness.provenance import circumstances
 from ...program.llvm import compiler
 from ...program.llvm.jit import compiled_at_once
 from ...report.figures import Effort
 from ..paper.formulation import Formulation
-from . import native_breakdown
 from .designs import Batch, StudyRate, measure_batches, measure_studies
 from .precision import (
+    ALONE,
+    EVERYTHING,
     Contestant,
     Entry,
     FloorOf,
     LoopTime,
     Needed,
     contestants,
-    efforts_of,
     floors,
+    levels,
+    loops_alone,
     measure_loops,
     needed,
+    program_size,
     with_truth,
 )
 from .processes import Process, measure_processes
@@ -117,12 +120,8 @@ def measure(
         KincheckError: a case has no reference, and none can be proved.
     """
     started, before = datetime.now(UTC), _load()
-    found: dict[str, list[Any]] = {}
-
-    def add(what: str, rows: Sequence[Any]) -> None:
-        found.setdefault(what, []).extend(rows)
-
     peak = prepare() if compiler.available() else None
+    found: dict[str, Any] = {}
     true = {name: with_truth(without_forces(case), tol) for name, case in cases.items()}
     native = any(isinstance(engine, NativeEngine) for engine in engines)
     several = {"work": 2 * len(true), "loop": len(true), "size": 2 if native else 1}
@@ -135,43 +134,38 @@ def measure(
 
     if "work" in parts:
         for case in true.values():
-            _measure_work(case, engines, tol, rounds, peak, add, begin)
+            for what, rows in _measure_work(case, engines, tol, rounds, peak, begin).items():
+                found.setdefault(what, []).extend(rows)
     name, first = next(iter(true.items()))
     projections = [each for each in engines if each.mode == "projection"]
     if "loop" in parts:
-        add("loops", measure_loops(true.values(), projections, tol, rounds, begin))
+        found["loops"] = measure_loops(true.values(), projections, tol, rounds, begin)
     if "batch" in parts:
         begin(f"{first.name}: batches of variants")
-        add("batches", measure_batches(first, tol, rounds, peak))
+        found["batches"] = measure_batches(first, tol, rounds, peak)
     if "study" in parts:
         begin(f"{first.name}: a study by threads")
-        add("studies", measure_studies(first, tol, rounds, peak))
+        found["studies"] = measure_studies(first, tol, rounds, peak)
     if "size" in parts:
         begin("chains and rings of loops")
-        add("sizes", measure_sizes(projections, tol, rounds))
+        found["sizes"] = measure_sizes(projections, tol, rounds)
         if native:
             begin("large mechanisms")
-            add("scalings", measure_scalings(LARGE, tol, min(rounds, LARGE_ROUNDS)))
+            found["scalings"] = measure_scalings(LARGE, tol, min(rounds, LARGE_ROUNDS))
     if "processes" in parts:
         begin(f"{first.name}: separate processes")
         # variants of a simulator need the same memory
         names = {engine.name for engine in projections}
         own = [engine for engine in engines if engine.name in names]
-        add("processes", measure_processes(first, name, own, tol, rounds))
+        found["processes"] = measure_processes(first, name, own, tol, rounds)
     run = circumstances([*true.values()], started=started, tol=tol, command=command)
     run |= {
         "cores": os.cpu_count(),
         "load_before": before,
         "load_after": _load(),
-        "linear_algebra_threads": _threads(),
+        "linear_algebra_threads": os.environ.get(THREADS[0], "not limited"),
     }
-    facts: dict[str, Any] = {
-        "run": run,
-        "rounds": rounds,
-        "vector_width": peak and peak.width,
-        **found,
-    }
-    return Bench(**facts)
+    return Bench(run=run, rounds=rounds, vector_width=peak and peak.width, **found)
 
 
 def _measure_work(
@@ -180,25 +174,25 @@ def _measure_work(
     tol: float,
     rounds: int,
     peak: Peak | None,
-    add: Callable[[str, Sequence[Any]], object],
     begin: Callable[[str], Callable[[float], object]],
-) -> None:
+) -> dict[str, Sequence[Any]]:
     """Measure work and precision of a case, its floors, and the native engine in detail, all in the
-    same rounds.
+    same rounds; return the rows by the attributes of `Bench`.
     """
     entering: dict[tuple[str, str], Contestant] = {}
     for engine in engines:
-        for each in contestants(case, efforts_of(engine), tol):
+        efforts = engine.efforts() if isinstance(engine, Measurable) else {"default": engine}
+        for each in contestants(case, efforts, tol):
             entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
     detailed = any(isinstance(engine, NativeEngine) for engine in engines)
     if detailed:
-        for each in contestants(case, native_breakdown.levels(case), tol):
+        for each in contestants(case, levels(case), tol):
             entering["levels", each.entry.setting] = each
     work: dict[tuple[str, str], Work] = {
         key: each.work for key, each in entering.items() if each.work is not None
     }
     if detailed and compiler.available():
-        work["levels", native_breakdown.ALONE] = native_breakdown.loops_alone(case, tol)
+        work["levels", ALONE] = loops_alone(case, tol)
     if peak is not None:
         work["peak", ""] = peak
     told = begin(f"{case.name}: {number_of(len(work), 'contestant')}, {number_of(rounds, 'round')}")
@@ -206,60 +200,48 @@ def _measure_work(
     timed = {key: each.timed(seconds.get(key)) for key, each in entering.items()}
     entries = [entry for (kind, _), entry in timed.items() if kind != "levels"]
     native = {setting: entry for (kind, setting), entry in timed.items() if kind == "levels"}
-    if ("levels", native_breakdown.ALONE) in seconds:
-        whole = native[native_breakdown.EVERYTHING]
-        alone = seconds["levels", native_breakdown.ALONE].times(1e6 / whole.samples)
-        native[native_breakdown.ALONE] = msgspec.structs.replace(
-            whole, setting=native_breakdown.ALONE, us_per_sample=alone
-        )
-    add("entries", entries)
-    add("needed", needed(entries))
-    add("levels", [*native.values()])
+    if ("levels", ALONE) in seconds:
+        whole = native[EVERYTHING]
+        alone = seconds["levels", ALONE].times(1e6 / whole.samples)
+        native[ALONE] = msgspec.structs.replace(whole, setting=ALONE, us_per_sample=alone)
     begin(f"{case.name}: floors")
-    add("floors", floors(case, engines))
-    if peak is not None:
-        add("rates", _rates(case, native, peak, seconds["peak", ""]))
+    return {
+        "entries": entries,
+        "needed": needed(entries),
+        "levels": [*native.values()],
+        "floors": floors(case, engines),
+        "rates": [] if peak is None else _rates(case, native, peak, seconds["peak", ""]),
+    }
 
 
 def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread) -> list[Rate]:
     most = 1e-9 * peak.rate(seconds)
     vectors = f"vectors of {peak.width} doubles"
-    rates = [
+    found: list[tuple[str, float | None, float | None, float]] = [
+        (f"peak of one core: multiply and add, {vectors}", None, None, most)
+    ]
+    for setting in (EVERYTHING, ALONE):
+        entry = native.get(setting)
+        if entry is not None and entry.us_per_sample is not None:
+            flops = program_size(case).of_sample(entry.iterations or 0.0)
+            us = entry.us_per_sample.median
+            found.append((f"one sweep, {setting}", us, flops, 1e-3 * flops / us))
+    return [
         Rate(
             case=case.name,
-            what=f"peak of one core: multiply and add, {vectors}",
-            us_per_sample=None,
-            flops_per_sample=None,
-            gflops=most,
-            of_peak=1.0,
+            what=what,
+            us_per_sample=us,
+            flops_per_sample=flops,
+            gflops=gflops,
+            of_peak=gflops / most,
         )
+        for what, us, flops, gflops in found
     ]
-    for setting in (native_breakdown.EVERYTHING, native_breakdown.ALONE):
-        entry = native.get(setting)
-        if entry is None or entry.us_per_sample is None:
-            continue
-        flops = native_breakdown.program_size(case).of_sample(entry.iterations or 0.0)
-        us = entry.us_per_sample.median
-        rates.append(
-            Rate(
-                case=case.name,
-                what=f"one sweep, {setting}",
-                us_per_sample=us,
-                flops_per_sample=flops,
-                gflops=1e-3 * flops / us,
-                of_peak=1e-3 * flops / us / most,
-            )
-        )
-    return rates
 
 
 def _load() -> float | None:
     """Return the number of runnable processes over the last minute; None if it is unknown."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-
-
-def _threads() -> str:
-    return os.environ.get(THREADS[0], "not limited")
 
 
 def efforts_in(file: Path) -> dict[str, list[Effort]]:
@@ -291,8 +273,3 @@ def effort(entry: Entry) -> list[Effort]:
     return [
         Effort(name, entry.setting, entry.errors.position, entry.us_per_sample.median, entry.mode)
     ]
-
-
-def with_formulation(found: Bench, formulation: Formulation) -> Bench:
-    """Return the results with those of the formulation benchmark."""
-    return msgspec.structs.replace(found, formulation=formulation)

@@ -5,19 +5,21 @@ run; and the cost of its whole loop over the cases, as a multiple of another eng
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from ...case.case import Case, Truth
 from ...case.io.reference_file import series
 from ...harness.engine import Engine, Measurable
+from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome, Record
 from ...harness.run import run
-from ...trajectory import Trajectory
+from ...kinematics import Method, NativeSolver, ProgramSize
+from ...trajectory import Array, Trajectory
 from ..verified_reference import prove_case
 from .rounds import Spread, take_turns
 
@@ -127,11 +129,6 @@ def with_truth(case: Case, tol: float) -> Case:
     return replace(case, truth=Truth.IN_HOUSE_ORACLE, reference=truth)
 
 
-def efforts_of(engine: Engine) -> Mapping[str, Engine]:
-    """Return the engine at all its efforts, or alone if it has no efforts."""
-    return engine.efforts() if isinstance(engine, Measurable) else {"default": engine}
-
-
 def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[Contestant]:
     """Return each engine at several efforts, after one solve of the case; only one effort if it
     cannot solve the case.
@@ -142,10 +139,8 @@ def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[C
     found: list[Contestant] = []
     for setting, engine in engines.items():
         (record,) = run([case], [engine], tol=tol, residuals=False).records
-        entry = _entry(case, record, setting)
-        found.append(
-            Contestant(entry, _work(case, engine, tol) if record.us_per_step is not None else None)
-        )
+        work = None if record.us_per_step is None else _work(case, engine, tol)
+        found.append(Contestant(_entry(case, record, setting), work))
         if record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
             break
     return found
@@ -179,9 +174,11 @@ def _entry(case: Case, record: Record, setting: str) -> Entry:
         solved=record.solved,
         samples=len(case.sweep.values),
         residual=record.residual_max,
-        iterations=record.iterations / record.solved
-        if record.iterations is not None and record.solved
-        else None,
+        iterations=(
+            None
+            if record.iterations is None or not record.solved
+            else record.iterations / record.solved
+        ),
     )
 
 
@@ -190,61 +187,44 @@ def needed(entries: Sequence[Entry]) -> list[Needed]:
     found: list[Needed] = []
     for key in dict.fromkeys((e.case, e.engine, e.mode) for e in entries):
         mine = [e for e in entries if (e.case, e.engine, e.mode) == key]
+        timed = [(e.us_per_sample.median, e) for e in mine if e.us_per_sample is not None]
+        judged = [
+            (e.errors.position, us, e.setting) for us, e in timed if e.errors.position is not None
+        ]
+        if judged:
+            reason = f"no effort reaches it: the best error is {min(judged)[0]:.1e} m"
+        elif timed:
+            reason = "no position error is known"
+        else:
+            reason = f"{mine[0].outcome}: {mine[0].message}"
         for required in REQUIRED:
-            found.append(_fastest(mine, required))
+            meeting = [(us, setting) for error, us, setting in judged if error <= required]
+            us, setting = min(meeting, key=lambda each: each[0], default=(None, None))
+            case, engine, mode = key
+            found.append(
+                Needed(
+                    case=case,
+                    engine=engine,
+                    mode=mode,
+                    loop=mine[0].loop,
+                    required=required,
+                    setting=setting,
+                    us_per_sample=us,
+                    reason=None if meeting else reason,
+                )
+            )
     return found
-
-
-def _fastest(mine: Sequence[Entry], required: float) -> Needed:
-    timed = [(e.us_per_sample.median, e) for e in mine if e.us_per_sample is not None]
-    meeting = [
-        (us, e)
-        for us, e in timed
-        if e.errors.position is not None and e.errors.position <= required
-    ]
-    first = mine[0]
-    of: dict[str, Any] = {
-        "case": first.case,
-        "engine": first.engine,
-        "mode": first.mode,
-        "loop": first.loop,
-        "required": required,
-    }
-    if meeting:
-        us, best = min(meeting, key=lambda each: each[0])
-        return Needed(**of, setting=best.setting, us_per_sample=us)
-    errors = [e.errors.position for _, e in timed if e.errors.position is not None]
-    if errors:
-        reason = f"no effort reaches it: the best error is {min(errors):.1e} m"
-    elif timed:
-        reason = "no position error is known"
-    else:
-        reason = f"{first.outcome}: {first.message}"
-    return Needed(**of, setting=None, us_per_sample=None, reason=reason)
 
 
 def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
     """Return the floors of the engines on the case."""
     found: list[FloorOf] = []
     for engine in engines:
-        if (
-            not isinstance(engine, Measurable)
-            or engine.version() is None
-            or engine.unsupported(case)
-        ):
-            continue
-        if (floor := engine.floor(case)) is None:
-            continue
-        found.append(
-            FloorOf(
-                case=case.name,
-                engine=engine.name,
-                mode=engine.mode,
-                us_per_sample=floor.us_per_sample,
-                counted=floor.counted,
-                parts=dict(floor.parts),
+        able = engine.version() is not None and not engine.unsupported(case)
+        if able and isinstance(engine, Measurable) and (floor := engine.floor(case)) is not None:
+            found.append(
+                FloorOf(case=case.name, engine=engine.name, mode=engine.mode, **asdict(floor))
             )
-        )
     return found
 
 
@@ -286,36 +266,97 @@ def measure_loops(
     The least time of the rounds counts, so that other processes do not affect the ratios.
     """
     able = [engine for engine in engines if engine.version() is not None]
-    names = [engine.name for engine in able]
     if not able:
         return []
-    base = BASE if BASE in names else names[0]
-    found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
+    base = min(able, key=lambda engine: engine.name != BASE).name
+    found: dict[str, list[tuple[float, float]]] = {engine.name: [] for engine in able}
     for case in cases:
         progress(f"{case.name}: loops of {len(able)} engines")
         work = {e.name: _work(case, e, tol) for e in able if e.unsupported(case) is None}
-        if base not in work:
-            continue
-        us = {
-            name: 1e6 * each.least / len(case.sweep.values)
-            for name, each in take_turns(work, rounds).items()
-        }
-        for name, each in us.items():
-            found[name].append((each, each / us[base]))
-    return [_summary(engine, base, found) for engine in able if found[engine.name]]
+        if base in work:
+            least = {name: each.least for name, each in take_turns(work, rounds).items()}
+            for name, each in least.items():
+                us = 1e6 * each / len(case.sweep.values)
+                found[name].append((us, each / least[base]))
+    return [
+        LoopTime(
+            engine=engine.name,
+            loop=engine.loop,
+            base=base,
+            cases=len(times),
+            us_per_sample=median(us for us, _ in times),
+            ratio=median(ratio for _, ratio in times),
+            lower=min(ratio for _, ratio in times),
+            upper=max(ratio for _, ratio in times),
+        )
+        for engine in able
+        if (times := found[engine.name])
+    ]
 
 
-def _summary(
-    engine: Engine, base: str, found: Mapping[str, Sequence[tuple[float, float]]]
-) -> LoopTime:
-    us, ratios = np.array(found[engine.name]).T
-    return LoopTime(
-        engine=engine.name,
-        loop=engine.loop,
-        base=base,
-        cases=len(us),
-        us_per_sample=float(np.median(us)),
-        ratio=float(np.median(ratios)),
-        lower=float(ratios.min()),
-        upper=float(ratios.max()),
+# The native engine in detail: by requested quantities, by executor, and with or without the Python
+# around its loops
+
+EVERYTHING = "every body and point: position, velocity, acceleration"
+"""The base level of the comparison."""
+ALONE = f"{EVERYTHING}; loops alone"
+NUMPY = f"{EVERYTHING}; numpy executor"
+FORCES = f"{EVERYTHING}; all forces"
+
+
+def level(
+    *, order: int = 2, bodies: bool = True, compiled: bool = True, forces: bool = False
+) -> NativeEngine:
+    """Return the native engine with requested quantities, as one program, prepared again.
+
+    Args:
+        order: 0 for positions, 1 also velocities, 2 also accelerations.
+        bodies: also solve every body in the paper's variables, instead of only the compared points.
+        compiled: run machine code; else numpy.
+        forces: also solve the forces of all joints, drivers and force elements.
+    """
+    solver = NativeSolver(order=order, compiled=compiled, method=Method.ONE_PROGRAM)
+    return NativeEngine(solver, every_body=bodies, every_force=forces)
+
+
+LEVELS: Mapping[str, NativeEngine] = {
+    EVERYTHING: level(),
+    "every body and point: position, velocity": level(order=1),
+    "every body and point: position": level(order=0),
+    "compared points: position, velocity, acceleration": level(bodies=False),
+    "compared points: position": level(order=0, bodies=False),
+    NUMPY: level(compiled=False),
+    "every body and point: position; numpy executor": level(order=0, compiled=False),
+}
+"""Levels that are timed as a whole call, by requested quantities."""
+WITH_FORCES: Mapping[str, NativeEngine] = {
+    FORCES: level(forces=True),
+    f"{FORCES}; numpy executor": level(forces=True, compiled=False),
+}
+"""Further levels for cases with masses or force elements."""
+
+
+def levels(case: Case) -> Mapping[str, NativeEngine]:
+    """Return the timed levels of a case."""
+    return {**LEVELS, **(WITH_FORCES if case.mechanism.has_loads else {})}
+
+
+def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
+    """Return a function that runs the executor's loops over all samples with everything requested:
+    two calls from Python, without results.
+
+    It is the native engine's floor, including tests and copying.
+
+    Raises:
+        SolveError: a step must be halved, which needs Python.
+    """
+    whole = level()
+    return whole.solver.loops(case.mechanism, case.sweep.path, case.points, whole.bodies(case), tol)
+
+
+def program_size(case: Case) -> ProgramSize:
+    """Return the size of the programs with everything requested."""
+    whole = level()
+    return whole.solver.program_size(
+        case.mechanism, case.sweep.path, case.points, whole.bodies(case)
     )

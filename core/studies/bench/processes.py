@@ -11,17 +11,17 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import msgspec
 
 from ...case.case import Case
 from ...harness.engine import Engine, may_run_here
 from ...harness.native_engine import NativeEngine
-from .native_breakdown import level
+from .precision import level
 from .rounds import Spread, spread
 
 STAGES = (
@@ -116,9 +116,8 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
         return sum(self.stages[name].median for name in FIRST) if self.stages else None
 
 
-@dataclass
-class _Kind:
-    """The command of a kind of process, and its measurements so far."""
+class _Kind(NamedTuple):
+    """The command of a kind of process."""
 
     what: str
     code: str
@@ -126,10 +125,15 @@ class _Kind:
     given: bytes = b""
     folder: Path | None = None
     rounds: int = 1
-    seconds: list[float] = field(default_factory=list[float])
-    stages: list[Mapping[str, float]] = field(default_factory=list[Mapping[str, float]])
-    peaks: list[float | None] = field(default_factory=list[float | None])
-    status: int = 0
+
+
+class _End(NamedTuple):
+    """An ended process: its seconds, status and memory [MB], and the seconds of its stages."""
+
+    seconds: float
+    status: int
+    peak_mb: float | None
+    stages: Mapping[str, float]
 
 
 def measure_processes(
@@ -154,24 +158,29 @@ def measure_processes(
             mode = "" if engine.mode == "projection" else f" --mode {engine.mode}"
             options = f"--engine {engine.name}{mode}"
             arguments = ["run", name, *options.split(), "--jobs", "0"]
-            kinds.append(
-                _Kind(
-                    f"kincheck run {options}",
-                    _RUN,
-                    arguments,
-                    rounds=rounds if may_run_here(engine) else 1,
-                )
-            )
+            turns = rounds if may_run_here(engine) else 1
+            kinds.append(_Kind(f"kincheck run {options}", _RUN, arguments, rounds=turns))
         # fills the code cache, and the file cache of the system
         _once(_Kind(CACHED, _FIRST_USE, given=given, folder=kept), kept)
+        found: dict[str, list[_End]] = {kind.what: [] for kind in kinds}
         for turn in range(rounds):
             for kind in kinds:
                 if turn < kind.rounds:
-                    _once(kind, kind.folder or Path(folder) / f"new {turn}")
-    return [_process(kind) for kind in kinds]
+                    cache = kind.folder or Path(folder) / f"new {turn}"
+                    found[kind.what].append(_once(kind, cache))
+    return [
+        Process(
+            what=what,
+            seconds=spread([end.seconds for end in ends]),
+            status=ends[-1].status,
+            stages={name: spread([end.stages[name] for end in ends]) for name in ends[0].stages},
+            peak_mb=max((end.peak_mb for end in ends if end.peak_mb), default=None),
+        )
+        for what, ends in found.items()
+    ]
 
 
-def _once(kind: _Kind, cache: Path) -> None:
+def _once(kind: _Kind, cache: Path) -> _End:
     environment = {key: value for key, value in os.environ.items() if key != "KINCHECK_HISTORY"}
     if kind.given:  # `kincheck run` is timed as for a user, with the user's cache
         environment["XDG_CACHE_HOME"] = str(cache)
@@ -183,29 +192,12 @@ def _once(kind: _Kind, cache: Path) -> None:
         env=environment,
         check=False,
     )
-    kind.seconds.append(perf_counter() - begin)
-    kind.status = done.returncode
+    seconds = perf_counter() - begin
     lines = done.stdout.decode("utf-8", "replace").splitlines()
     if done.returncode not in (0, 1) or not lines:
         raise RuntimeError(
             f"{kind.what}: exit status"
             f" {done.returncode}\n{done.stderr.decode('utf-8', 'replace')[-2000:]}"
         )
-    kind.peaks.append(float(lines[-1]) / 1024.0 if lines[-1] else None)
-    if kind.given:
-        kind.stages.append(json.loads(lines[-2]))
-
-
-def _process(kind: _Kind) -> Process:
-    peaks = [each for each in kind.peaks if each is not None]
-    return Process(
-        what=kind.what,
-        seconds=spread(kind.seconds),
-        status=kind.status,
-        stages=(
-            {name: spread([each[name] for each in kind.stages]) for name in STAGES}
-            if kind.stages
-            else {}
-        ),
-        peak_mb=max(peaks, default=None),
-    )
+    peak = float(lines[-1]) / 1024.0 if lines[-1] else None
+    return _End(seconds, done.returncode, peak, json.loads(lines[-2]) if kind.given else {})

@@ -64,7 +64,7 @@ def take_turns(
     the caches after the previous contestant. Python's garbage is collected only between rounds.
     `progress` is called before each round with the finished share.
     """
-    calls = {key: _calls(work) for key, work in contestants.items()}
+    calls = {key: math.ceil(TURN / warmed(work)) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
     enabled = gc.isenabled()
     try:
@@ -78,11 +78,6 @@ def take_turns(
     finally:
         (gc.enable if enabled else gc.disable)()
     return {key: spread(each) for key, each in times.items()}
-
-
-def _calls(work: Work) -> int:
-    """Return the number of warm calls in a turn."""
-    return max(1, math.ceil(TURN / warmed(work)))
 
 
 def warmed(work: Work, clock: Callable[[], float] | None = None) -> float:

@@ -13,7 +13,6 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from time import process_time
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -24,14 +23,66 @@ from ...harness.engine import Engine
 from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
 from ...harness.standard import STANDARD
-from ...joints import Revolute, Spherical, Universal
+from ...joints import Inline, Joint, Revolute, Spherical, Universal
 from ...kinematics import Method, NativeSolver
-from ...mechanism.mechanism import Body, Mechanism, Point
+from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 from ...mechanism.motions import JointAngle
-from ...trajectory import Trajectory
-from .precision import Contestant, contestants
-from .ring import LEAN, pivot, ring
-from .rounds import Spread, take_turns, warmed
+from .precision import contestants
+from .rounds import Spread, Work, take_turns, warmed
+
+LEAN = 0.3
+"""Angle of the cranks at design [rad]; a quarter turn from upright the ring is singular."""
+BEFORE, AFTER = 1.0, 0.25
+"""Heights of a plate's pins above its ball [m]; with equal heights, errors would grow with the
+square of the ring's length.
+"""
+UP: Vector = (0.0, 0.0, 1.0)
+
+
+def pivot(k: int, cranks: int) -> float:
+    """Return the position of a crank's pivot along x [m]: outwards in steps of two and back in
+    between, so that the last is near the first.
+    """
+    return 2.0 * k if 2 * k < cranks else 2.0 * (cranks - k) - 1.0
+
+
+def tip(k: int, cranks: int, turn: float = 0.0) -> Vector:
+    """Return the tip of a crank at a turn of the driver [m]; all cranks turn alike."""
+    return pivot(k, cranks) + math.sin(LEAN - turn), math.cos(LEAN - turn), 0.0
+
+
+def ring(cranks: int) -> Mechanism:
+    """Return three or more parallel unit cranks in a ring; a plate ties each crank but the first,
+    which is driven, to both neighbours.
+
+    A plate holds a ball of its crank, and by two pins in grooves along the tips of the cranks
+    before and after it. Ball and pins leave one equation between three angles, BEFORE d_k+1 =
+    -AFTER d_k between their differences at design, so none of the 2 N - 2 loops can be solved
+    before the others. There are 12 N - 6 unknowns and as many rows. Like the chain of
+    parallelograms of IFToMM's benchmark A02, it has a known motion: every crank turns like the
+    first, and every plate moves without turning.
+    """
+    tips = [tip(k, cranks) for k in range(cranks)]
+    joints: list[Joint] = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (pivot(k, cranks), 0.0, 0.0), UP)
+        for k in range(cranks)
+    ]
+    for k in range(1, cranks):
+        joints.append(Spherical(f"ball{k}", f"crank{k}", f"plate{k}", tips[k]))
+        for which, to, height in (("before", k - 1, BEFORE), ("after", (k + 1) % cranks, AFTER)):
+            x, y, _ = tips[to]
+            joints.append(Inline(f"{which}{k}", f"crank{to}", f"plate{k}", (x, y, height), UP))
+    return Mechanism(
+        f"ring of {cranks} cranks",
+        [
+            *(Body(f"crank{k}") for k in range(cranks)),
+            *(Body(f"plate{k}") for k in range(1, cranks)),
+        ],
+        joints,
+        [Point(f"tip{k}", f"crank{k}", tips[k]) for k in range(cranks)],
+        [JointAngle("turn", "pivot0")],
+    )
+
 
 LOOPS = (1, 2, 4, 8, 16)
 CRANKS = (4, 8, 16, 24, 48, 100)
@@ -144,18 +195,9 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
     if any(isinstance(engine, NativeEngine) for engine in engines):
         requested.insert(1, (CHAIN, BY_COMPONENTS, MANY))
     requested += [(RING, engine, CRANKS) for engine in engines]
-    found = [
-        each
-        for family, engine, ladder in requested
-        for each in _solved(family, engine, ladder, tol)
-    ]
-    work = {
-        k: each.work
-        for k, (_, each) in enumerate(found)
-        if each is not None and each.work is not None
-    }
-    seconds = take_turns(work, rounds)
-    times = {k: seconds[k].times(1e6 / SAMPLES) for k in work}
+    found = [each for asked in requested for each in _solved(*asked, tol)]
+    work = {k: work for k, (_, work) in enumerate(found) if work is not None}
+    times = {k: us.times(1e6 / SAMPLES) for k, us in take_turns(work, rounds).items()}
     return [
         msgspec.structs.replace(size, us_per_sample=times.get(k))
         for k, (size, _) in enumerate(found)
@@ -164,8 +206,10 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
 
 def _solved(
     family: str, engine: Engine, ladder: Sequence[int], tol: float
-) -> Iterator[tuple[Size, Contestant | None]]:
-    """Return an engine's chains or rings, the shortest first, solved but not timed."""
+) -> Iterator[tuple[Size, Work | None]]:
+    """Yield an engine's chains or rings, the shortest first, solved but not timed, with the work
+    that can be.
+    """
     slow = ""
     for loops in ladder:
         case = chain(loops) if family == CHAIN else circle(loops)
@@ -183,20 +227,17 @@ def _solved(
             continue
         (each,) = contestants(case, {"": engine}, tol)
         entry = each.entry
-        facts: dict[str, Any] = {
-            "outcome": entry.outcome,
-            "message": entry.message,
-            "residual": entry.residual,
-        }
-        yield msgspec.structs.replace(size, **facts, error=entry.errors.position), each
-        if each.work is not None:
-            # processor time, so that the same engines drop out on a busy machine as on a quiet one
-            seconds = warmed(each.work, process_time)
-            slow = (
-                f"not tried: {loops} took {seconds:.2g} s for {SAMPLES} samples"
-                if seconds > LONGEST
-                else ""
-            )
+        solved = msgspec.structs.replace(
+            size,
+            outcome=entry.outcome,
+            message=entry.message,
+            residual=entry.residual,
+            error=entry.errors.position,
+        )
+        yield solved, each.work
+        # processor time, so that the same engines drop out on a busy machine as on a quiet one
+        if each.work is not None and (seconds := warmed(each.work, process_time)) > LONGEST:
+            slow = f"not tried: {loops} took {seconds:.2g} s for {SAMPLES} samples"
 
 
 class Scaling(msgspec.Struct, frozen=True, kw_only=True):
@@ -231,27 +272,27 @@ def measure_scalings(sizes: Sequence[int], tol: float, rounds: int) -> list[Scal
         key: partial(solver.prepare(case.mechanism, case.sweep.path, case.outputs[0].points), tol)
         for key, case in cases.items()
     }
-    seconds = take_turns(work, rounds)
-    return [_scaling(key, case, work[key](), seconds[key]) for key, case in cases.items()]
-
-
-def _scaling(key: tuple[str, int], case: Case, found: Trajectory, seconds: Spread) -> Scaling:
-    name, size = key
-    if not found.solved.all():
-        raise SolveError(f"bench: {name} of {size}: {found.message}")
-    x, y = (case.reference[output.name].position for output in case.outputs)
-    expected = np.stack([x, y, np.zeros_like(x)], axis=1)
-    off = found.points[case.outputs[0].points[0]].position - expected
-    return Scaling(
-        mechanism=name,
-        size=size,
-        bodies=len(case.mechanism.bodies),
-        unknowns=found.details["unknowns"],
-        path="sparse",
-        us_per_value=seconds.times(1e6 / SAMPLES),
-        residual=found.residual,
-        error=float(np.abs(off).max()),
-    )
+    rows: list[Scaling] = []
+    for (name, size), seconds in take_turns(work, rounds).items():
+        case, found = cases[name, size], work[name, size]()
+        if not found.solved.all():
+            raise SolveError(f"bench: {name} of {size}: {found.message}")
+        x, y = (case.reference[output.name].position for output in case.outputs)
+        expected = np.stack([x, y, np.zeros_like(x)], axis=1)
+        off = found.points[case.outputs[0].points[0]].position - expected
+        rows.append(
+            Scaling(
+                mechanism=name,
+                size=size,
+                bodies=len(case.mechanism.bodies),
+                unknowns=found.details["unknowns"],
+                path="sparse",
+                us_per_value=seconds.times(1e6 / SAMPLES),
+                residual=found.residual,
+                error=float(np.abs(off).max()),
+            )
+        )
+    return rows
 
 
 def exponent(small: Scaling, large: Scaling) -> float:

@@ -156,7 +156,6 @@ def check_engine(
     topologies: Mapping[str, Case],
     *,
     tol: float,
-    limits: Limits | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Examine an engine.
@@ -165,7 +164,6 @@ def check_engine(
         native: the native engine, the standard of cases without a reference.
         topologies: further cases, by a word on their structure.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        limits: limits of a pair; by default those of the command line.
         progress: called with each record.
     """
     found = [*_protocol(engine)]
@@ -176,7 +174,7 @@ def check_engine(
     cases |= {f"topology: {word}": case for word, case in topologies.items()}
     cases |= {"topology: uneven drives": uneven_drives()}
     cases |= {f"forces: {word}": case for word, case in force_cases()}
-    solver = in_workers(1, limits or Limits())
+    solver = in_workers(1, Limits())
     answers: dict[str, dict[str, Attempt]] = {engine.name: {}, STANDARD: {}}
 
     def kept(pairs: Sequence[Pair]) -> Attempts:
@@ -196,7 +194,7 @@ def check_engine(
     beyond = refused[BEYOND].name
     found += [_folded(records[beyond], mine[beyond]), _unknown(records[refused[UNKNOWN].name])]
     again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
-    found.append(_same("determinism", again, mine, in_workers(1, limits or Limits())))
+    found.append(_same("determinism", again, mine, in_workers(1, Limits())))
     if may_run_here(engine):
         found.append(_same("isolation: in this process", again, mine, here))
     return Report(engine.name, (), None, tuple(found))
@@ -293,7 +291,7 @@ def _difference(one: Attempt, other: Attempt) -> float:
     worst = 0.0
     for name, series in one.result.outputs.items():
         found = other.result.outputs[name]
-        for quantity in ("position", "velocity", "acceleration"):
+        for quantity in QUANTITIES:
             a, b = getattr(series, quantity), getattr(found, quantity)
             if (a is None) != (b is None):
                 return np.inf

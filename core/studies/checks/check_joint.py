@@ -24,23 +24,24 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import Field, is_dataclass, replace
 from functools import partial
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from ...algebra import triple
 from ...case.joint_probe import fitting, required
 from ...errors import KincheckError, MechanismError
 from ...harness.engine import Engine
 from ...joints import Joint, Kind
 from ...trajectory import Array
-from .findings import Finding, Report, Verdict, skipped, stated
+from .findings import Finding, Report, Verdict, skipped, stated, worst
 from .joint_equations import (
     axis_lengths,
     composition,
     convergence,
     cost,
     derivatives,
+    driver,
     exchange,
     freedoms,
     intended_branch,
@@ -50,7 +51,7 @@ from .joint_equations import (
     round_off,
     size_and_place,
 )
-from .joint_loops import driver, loops
+from .joint_loops import loops
 from .manifold import Specimen, branches, moved_specimen
 from .traced_joint import BODIES, Place
 
@@ -118,14 +119,13 @@ def check_joint(
         for k, joint in enumerate(offered)
         for finding in _examined(joint, k, samples, [seed, k])
     ]
-    order = {name: k for k, name in enumerate(dict.fromkeys(each.check for each in found))}
-    by_name = groupby(
-        sorted(found, key=lambda each: order[each.check]), key=lambda each: each.check
-    )
-    worst = [max(group, key=lambda each: each.badness) for _, group in by_name]
-    failing = [each.check for each in worst if each.verdict is Verdict.FAIL]
+    by_name: dict[str, list[Finding]] = {}
+    for each in found:
+        by_name.setdefault(each.check, []).append(each)
+    findings = [worst(*group) for group in by_name.values()]
+    failing = [each.check for each in findings if each.verdict is Verdict.FAIL]
     loop = loops(offered[0] if own else joint_class, engines, failing)
-    return Report(joint_class.__name__, tuple(map(repr, offered)), seed, (*worst, *loop))
+    return Report(joint_class.__name__, tuple(map(repr, offered)), seed, (*findings, *loop))
 
 
 def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Iterator[Finding]:
@@ -236,11 +236,8 @@ def _value(field: Field[Any], rng: np.random.Generator, angle: float) -> Any:
     makers: Mapping[Kind, Callable[[], Any]] = {
         Kind.POSITION: lambda: _snapped(centre),
         Kind.POSITIONS: lambda: tuple(map(_snapped, ends)),
-        Kind.DIRECTION: lambda: tuple((stretch[0] * a).tolist()),
-        Kind.DIRECTIONS: lambda: (
-            tuple((stretch[0] * a).tolist()),
-            tuple((stretch[1] * b).tolist()),
-        ),
+        Kind.DIRECTION: lambda: triple(stretch[0] * a),
+        Kind.DIRECTIONS: lambda: (triple(stretch[0] * a), triple(stretch[1] * b)),
         Kind.LENGTH: lambda: float(rng.uniform(0.5, 1.5) * SIZE),
     }
     return makers[field.metadata["kind"]]()
@@ -250,15 +247,8 @@ def place(joint: Joint, rng: np.random.Generator) -> Place:
     """Return body origins near the joint, but at none of its points, and a unit near its size."""
     points = np.array(joint.points_on()).reshape(-1, 3)
     lengths = [value for _, kind, value in joint.parts() if kind is Kind.LENGTH]
-    size = (
-        max(
-            [
-                float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0,
-                *(abs(x) for x in lengths if x),
-            ]
-        )
-        or SIZE
-    )
+    extent = float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0
+    size = max([extent, *(abs(x) for x in lengths if x)]) or SIZE
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     origins = (_snapped(centre + size * rng.uniform(-1.0, 1.0, 3)) for _ in BODIES)
     first, second = origins
@@ -277,4 +267,4 @@ def _unit(a: Array) -> Array:
 
 
 def _snapped(point: Any) -> tuple[float, ...]:
-    return tuple((np.round(np.asarray(point) / GRID) * GRID).tolist())
+    return triple(np.round(np.asarray(point) / GRID) * GRID)

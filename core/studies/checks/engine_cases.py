@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
+from pathlib import Path
 
 from ... import primitives as p
 from ...algebra import ZERO, vec
-from ...case.case import TIME, Case, Quantity, Sweep, Truth
+from ...case.case import Case
+from ...case.io.case_file import load_case
 from ...case.io.outputs import default
 from ...case.joint_probe import coordinates, probe, probes
 from ...case.measures import Axis, DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
-from ...joints import Attachment, Fixed, Joint, Revolute, Translational
+from ...joints import Attachment, Joint, Revolute
 from ...joints.base import directions, position, require_perpendicular, unit
-from ...mechanism.body import Body
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
-from ...mechanism.mechanism import GROUND, Mechanism, Point
-from ...mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
-from .loaded_probe import GRAVITY, INERTIA, loaded
+from .joint_loops import loaded
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,6 @@ UnknownJoint.type = "unknown_to_engines"  # set here, so that it is not register
 
 RATE = 0.75
 """Rate of the probes' hinge [rad/s]; at one, rates by time and by angle are the same."""
-SOURCE = "made for check-engine"
 
 
 def force_cases() -> Iterator[tuple[str, Case]]:
@@ -61,8 +56,8 @@ def force_cases() -> Iterator[tuple[str, Case]]:
         yield case.name, replace(at_rate(loaded(case)), name=f"{case.name}_with_loads")
     yield "elements", _elements()
     yield "drivers", _with_forces(uneven_drives())
-    yield "turns", _turns()
-    yield "undetermined", _undetermined()
+    for name in ("turns", "undetermined"):
+        yield name, _with_forces(_read(name))
 
 
 def at_rate(case: Case) -> Case:
@@ -112,83 +107,12 @@ def _elements() -> Case:
 
 def uneven_drives() -> Case:
     """Return a chain with a joint angle, a displacement and a point driven by sines at once."""
-    mechanism = Mechanism(
-        "uneven_drives",
-        [
-            *(_body(name, k) for k, name in enumerate(("sledge", "arm", "hand"))),
-            Body("wall", (0.3, 0.2, 0.1), fixed=True),
-        ],
-        [
-            # the fixed body is the second: a reaction is that of the first body on the second
-            Translational("guide", "sledge", "wall", (0.4, -0.2, 0.3), (0.3, 0.5, 1.0)),
-            Revolute("shoulder", "sledge", "arm", (0.2, 0.1, 0.4), (1.0, -2.0, 0.5)),
-            Revolute("elbow", "arm", "hand", (0.6, 0.3, 0.2), (0.4, 1.0, 0.3)),
-        ],
-        [Point("tip", "hand", (0.9, 0.3, 0.6)), Point("heel", "arm", (0.5, -0.2, 0.3))],
-        [
-            JointDisplacement("slide", "guide"),
-            JointAngle("swing", "shoulder"),
-            PointCoordinate("reach", "tip", (1.0, 0.0, -1.0)),
-        ],
-        gravity=GRAVITY,
-    )
-    motions = {
-        "swing": Sine(0.3, 0.5, 0.1),
-        "reach": Sine(0.05, 0.4),
-        "slide": Sine(-0.1, 0.3, 0.2),
-    }
-    sweep = Sweep(TIME, np.linspace(0.0, 0.75, 4), motions=motions)
-    return _case(mechanism, sweep, coordinates(mechanism))
+    case = _read("uneven_drives")
+    first, *others = case.sweep.motions.items()
+    # not in the order of the drivers: an engine is to take a motion by its name
+    sweep = replace(case.sweep, motions=dict([*others, first]))
+    return replace(case, sweep=sweep, outputs=coordinates(case.mechanism))
 
 
-def _case(mechanism: Mechanism, sweep: Sweep, outputs: tuple[Quantity, ...] = ()) -> Case:
-    return Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
-
-
-def _turns() -> Case:
-    """Return a wheel with a rider on a torsional spring over two turns, from the last value to the
-    first.
-    """
-    mechanism = Mechanism(
-        "turns",
-        [_body("wheel", 0), _body("rider", 1)],
-        [
-            Revolute("hub", GROUND, "wheel", (0.1, 0.2, 0.3), (0.2, -1.0, 0.4)),
-            Fixed("weld", "wheel", "rider", (0.3, 0.1, 0.4)),
-        ],
-        drivers=[JointAngle("turn", "hub")],
-        gravity=GRAVITY,
-        forces=[TorsionSpringDamper("clock", "hub", 4.0, damping=0.5, free_angle=0.25)],
-    )
-    return _with_forces(_case(mechanism, Sweep("turn", np.linspace(7.0, -6.0, 14), RATE)))
-
-
-def _undetermined() -> Case:
-    """Return a planar four-bar: its true hinges leave three directions of each reaction open."""
-    places = ((0.0, 0.0, 0.0), (0.1, 0.3, 0.0), (0.6, 0.5, 0.0), (0.5, 0.0, 0.0))
-    bodies = (GROUND, "crank", "rod", "rocker", GROUND)
-    axis = (0.0, 0.0, 1.0)
-    mechanism = Mechanism(
-        "undetermined",
-        [_body(name, k) for k, name in enumerate(bodies[1:-1])],
-        [
-            Revolute(f"hinge_{k}", i, j, place, axis)
-            for k, (i, j, place) in enumerate(zip(bodies, bodies[1:], places, strict=False))
-        ],
-        drivers=[JointAngle("turn", "hinge_0")],
-        gravity=GRAVITY,
-    )
-    return _with_forces(_case(mechanism, Sweep("turn", np.linspace(-0.2, 0.3, 3), RATE)))
-
-
-def _body(name: str, number: int) -> Body:
-    """Return a body with mass whose frame is away from the global one and turned."""
-    center = (0.3 + 0.1 * number, 0.1, 0.2 * math.cos(number))
-    return Body(
-        name,
-        (0.1, -0.2, 0.05),
-        (0.5, 0.5, -0.5, 0.5),
-        mass=2.0 + number,
-        center_of_mass=center,
-        inertia=INERTIA,
-    )
+def _read(name: str) -> Case:
+    return load_case(Path(__file__).with_name(f"{name}.toml"))

@@ -76,6 +76,11 @@ class Finding:
         return ", ".join(part for part in parts if part)
 
 
+def worst(*findings: Finding) -> Finding:
+    """Return the worst of several findings of one check."""
+    return max(findings, key=lambda each: each.badness)
+
+
 def skipped(check: str, why: str) -> Finding:
     """Return the finding of a check without a run."""
     return Finding(check, Verdict.SKIP, message=why)

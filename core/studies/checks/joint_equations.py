@@ -12,15 +12,23 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import quat
-from ...joints import AxialJoint, Kind
+from ...algebra import Quat, quat, vec
+from ...joints import Attachment, AxialJoint, Kind
 from ...kinematics import Style
-from ...primitives.base import NoFormError
+from ...primitives.base import Drive, NoFormError, Pose, Twist
 from ...trajectory import Array
-from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated
-from .joint_loops import coordinate
-from .manifold import NEAR, STEP, Specimen, min_norm, newton, rank, smallest, times
-from .traced_joint import COLUMNS, POSES, Place, TracedJoint, execute, precise, turned
+from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated, worst
+from .manifold import NEAR, STEP, Motion, Specimen, min_norm, newton, rank, smallest, times
+from .traced_joint import (
+    COLUMNS,
+    POSES,
+    CarriedPoint,
+    Place,
+    TracedJoint,
+    execute,
+    precise,
+    turned,
+)
 
 INDEPENDENT = Limit(0.0, "rows must be independent")
 NAMED = Limit(0.0, "6 - rank must be named")
@@ -99,7 +107,7 @@ def _outside(rows: Array, space: Array) -> Array:
 
 def right_sides(s: Specimen) -> Iterator[Finding]:
     """Check rows . v = nu and rows . a = gamma along motions admitted by phi."""
-    _, velocity, acceleration = _defects(s.traced, s.state, s.rate, s.acceleration)
+    _, velocity, acceleration = _defects(s.traced, s.motion)
     remedy = "rows . v must be nu where phi stays zero; a joint has nu = 0"
     yield judged("nu", velocity, AMPLIFIED, s.traced.names, remedy=remedy)
     remedy = (
@@ -109,15 +117,14 @@ def right_sides(s: Specimen) -> Iterator[Finding]:
     yield judged("gamma", acceleration, AMPLIFIED, s.traced.names, remedy=remedy)
 
 
-def _defects(
-    t: TracedJoint, state: Array, rate: Array, acceleration: Array, units: Any = 1.0
-) -> tuple[Array, Array, Array]:
+def _defects(t: TracedJoint, motion: Motion, units: Any = 1.0) -> tuple[Array, Array, Array]:
     """Return the defects of a motion in position, velocity and acceleration, by row and pose,
     relative to the size of the row.
 
     Args:
         units: units of the equations' columns in those of the rates, shape (columns, 1).
     """
+    state, rate, acceleration = motion
     jacobian = t.rows(state) * np.reshape(units, (1, 1, -1))
     size = np.linalg.norm(jacobian, axis=2).T
     size = np.where(size > 0.0, size, 1.0)
@@ -281,12 +288,12 @@ def axis_lengths(s: Specimen) -> Iterator[Finding]:
     longer = s.joint.mapped({Kind.DIRECTION: lambda axis: tuple(137.0 * x for x in axis)})
     long = TracedJoint(replace(s.joint, **longer), s.place)
     remedy = "a direction may have any length: use unit() or triad()"
-    met = _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
+    met = _same("axis lengths", s, long, s.motion, remedy)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     apart = np.abs(s.traced.phi(off) - long.phi(off))
     where = "where it is not met"
     unmet = judged("axis lengths", apart, ROUND_OFF, s.traced.names, where, remedy)
-    yield max(met, unmet, key=lambda each: each.badness)
+    yield worst(met, unmet)
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:
@@ -295,7 +302,7 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
         "a length that is not declared so is not scaled: declare it by position(), positions() or"
         " length()"
     )
-    worst: list[Finding] = []
+    found: list[Finding] = []
     slides = [k for k, name in enumerate(s.traced.coordinates) if name.endswith(".translation")]
     for factor in FACTORS:
         large = TracedJoint(s.joint.scaled(factor), s.place.scaled(factor))
@@ -303,14 +310,14 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
         state[[0, 1, 2, 7, 8, 9, *(POSES + k for k in slides)]] *= factor * s.place.unit
         units[[0, 1, 2, 6, 7, 8, *(2 * COLUMNS + k for k in slides)]] *= factor * s.place.unit
         motion, text = (state, s.rate, s.acceleration), f"worst at x {factor:g}"
-        worst.append(_same("size", s, large, motion, remedy, units, text))
-    yield max(worst, key=lambda each: each.badness)
+        found.append(_same("size", s, large, motion, remedy, units, text))
+    yield worst(*found)
     shifted = s.joint.mapped({Kind.POSITION: lambda point: tuple(x + AWAY for x in point)})
     (a, b), unit = s.place.origins, s.place.unit
     away = Place((tuple(x + AWAY for x in a), tuple(x + AWAY for x in b)), unit)
     remedy = "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself"
     far = TracedJoint(replace(s.joint, **shifted), away)
-    yield _same("place", s, far, (s.state, s.rate, s.acceleration), remedy)
+    yield _same("place", s, far, s.motion, remedy)
 
 
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
@@ -339,14 +346,14 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     ]
     remedy = "mixed() must name the joint's own coordinates, body j relative to body i"
     named = judged("mixed style", np.array(off), AMPLIFIED, mixed.coordinates, remedy=remedy)
-    yield max(met, named, key=lambda each: each.badness)
+    yield worst(met, named)
 
 
 def _same(
     check: str,
     s: Specimen,
     other: TracedJoint,
-    motion: tuple[Array, Array, Array],
+    motion: Motion,
     remedy: str,
     units: Any = 1.0,
     message: str = "",
@@ -354,8 +361,157 @@ def _same(
     """Check that a motion of the specimen satisfies other equations too, and that these leave the
     same number of freedoms.
     """
-    worst = np.max(_defects(other, *motion, units), axis=0)
+    largest = np.max(_defects(other, motion, units), axis=0)
     mine = rank(s.exact) - len(s.traced.coordinates)
     theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)
-    figures = np.vstack([worst, np.abs(theirs - mine)])
+    figures = np.vstack([largest, np.abs(theirs - mine)])
     return judged(check, figures, AMPLIFIED, [*other.names, "rank"], message, remedy)
+
+
+# Drivers of a joint's own coordinates, against the definition of these
+
+FREEDOMS = ("rotation", "translation")
+WHATS = ("value", "rate", "acceleration", "force", "turns")
+WAY = 6.0
+"""Largest further angle at which an angle's driver is examined [rad], almost a turn."""
+
+
+def driver(s: Specimen) -> Iterator[Finding]:
+    """Check every drivable coordinate of the joint."""
+    joint = s.joint
+    driven = [each for each in joint.freedoms if each in FREEDOMS]
+    if not isinstance(joint, AxialJoint) or not driven:
+        yield skipped("driver", "it has no coordinate that can be driven")
+        return
+    names = [f"{freedom}: {what}" for freedom in driven for what in WHATS]
+    figures = np.concatenate([_driver_defects(s, joint, freedom) for freedom in driven])
+    remedy = (
+        "measured() is to drive the joint's own coordinate: phi = 0 at the drive's c, nu of its"
+        " c_t, gamma of its c_tt; its rows are a force along the axis through the joint's point, or"
+        " a couple about the axis; its branch tests are positive at c, and not a turn further"
+    )
+    yield judged("driver", figures, AMPLIFIED, names, remedy=remedy)
+
+
+def _carried(s: Specimen, k: int, arm: Array) -> CarriedPoint:
+    state, rate, acceleration = (
+        x[size * k : size * (k + 1)].T
+        for x, size in ((s.state, 7), (s.rate, COLUMNS), (s.acceleration, COLUMNS))
+    )
+    rates = (*np.split(rate, 2, axis=1), *np.split(acceleration, 2, axis=1))
+    return CarriedPoint.of(turned(state[:, 3:], arm), s.traced.origins[k] + state[:, :3], *rates)
+
+
+def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array], Array]:
+    """Return a coordinate of the joint with its rate and acceleration, by their definition, and the
+    wrench of a unit effort on both bodies, lengths in the unit of the place.
+
+    Returns:
+        Three arrays of shape (lanes,), and one of shape (12, lanes): force and torque about the
+        origin, of the first body, then of the second.
+    """
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    point = np.array(joint.point) / s.place.unit
+    i, j = (_carried(s, k, point - s.traced.origins[k]) for k in range(2))
+    h = turned(s.state[3:7].T, axis)
+    return _rotation(s, i, j, h, axis) if freedom == "rotation" else _slide(i, j, h)
+
+
+def _driver_defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
+    """Return the defects of one coordinate's driver as named by `WHATS`, shape (5, lanes)."""
+    (c, c_t, c_tt), wrench = coordinate(s, joint, freedom)
+    scaled = joint.scaled(1.0 / s.place.unit)
+    attached = (Attachment(vec(tuple(origin))) for origin in s.traced.origins)
+    measured: Any = scaled.measured(freedom, *attached)
+    primitive, per_rate = (_driving(measured, c, rate, c_tt) for rate in (c_t, 1.0))
+    poses = _poses(s.state)
+    twists = [Twist(vec(tuple(x[:3])), vec(tuple(x[3:]))) for x in (s.rate[:6], s.rate[6:12])]
+    (row,), (phi,) = primitive.rows(*poses), primitive.phi(*poses)
+    (nu,), (one,), (gamma,) = (
+        primitive.nu(*poses),
+        per_rate.nu(*poses),
+        primitive.gamma(*poses, *twists),
+    )
+    entries = np.array([x + np.zeros(s.lanes) for part in row for x in part])
+    rates, accelerations = s.rate[: 2 * COLUMNS], s.acceleration[: 2 * COLUMNS]
+    speed, pull = np.linalg.norm(rates, axis=0), np.linalg.norm(accelerations, axis=0)
+    there, further = s.state, 0.0
+    if freedom == "rotation":
+        further = np.linspace(-WAY, WAY, s.lanes)
+        there = _turned_on(s, joint, further)
+    lost, far = _turns(measured, there, c + further, turning=freedom == "rotation")
+    figures = (
+        np.maximum(np.abs(phi), np.abs(far)),
+        ((entries * rates).sum(axis=0) - nu) / (1.0 + speed),
+        ((entries * accelerations).sum(axis=0) - gamma) / (1.0 + speed**2 + pull),
+        np.abs(entries - one * wrench).max(axis=0),
+        lost,
+    )
+    size = np.linalg.norm(entries, axis=0)
+    return np.abs(figures) / np.where(size > 0.0, size, 1.0)
+
+
+def _poses(state: Array) -> list[Pose]:
+    return [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (state[:7], state[7:POSES])]
+
+
+def _driving(measured: Any, c: Any, c_t: Any = 0.0, c_tt: Any = 0.0) -> Any:
+    return replace(measured, drive=Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c)))
+
+
+def _turned_on(s: Specimen, joint: AxialJoint, angle: Array) -> Array:
+    """Return the state with body j turned further about the axis."""
+    h, state = turned(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
+    h /= np.linalg.norm(h, axis=1)[:, None]
+    arm = np.array(joint.point) / s.place.unit - s.traced.origins[1]
+    turn = Quat(np.cos(0.5 * angle), vec([*(np.sin(0.5 * angle) * h.T)]))
+    state[10:14] = np.array([*(turn * quat(s.state[10:14]))])
+    state[7:10] += (turned(s.state[10:14].T, arm) - turned(state[10:14].T, arm)).T
+    return state
+
+
+def _turns(measured: Any, state: Array, c: Array, *, turning: bool) -> tuple[Array, Array]:
+    """Return one where a branch test refuses the drive's value, or accepts a zero of phi a turn
+    further; and phi.
+    """
+    pair = _poses(state)
+    wrong = np.zeros(state.shape[1], np.bool_)
+    at_turns: list[Array] = []
+    for turns in (0, 1) if turning else (0,):
+        primitive = _driving(measured, c + 2.0 * np.pi * turns)
+        (phi,) = primitive.phi(*pair)
+        tests = [np.ones_like(c), *primitive.branch(*pair)]
+        accepted = np.min(np.broadcast_arrays(*tests), axis=0) > 0.0
+        wrong |= accepted & (np.abs(phi) < AMPLIFIED.value) if turns else ~accepted
+        at_turns.append(phi + 0.0 * c)
+    return wrong.astype(np.float64), at_turns[0]
+
+
+def _slide(i: CarriedPoint, j: CarriedPoint, h: Array) -> tuple[list[Array], Array]:
+    """Return the displacement with its rates, and the wrench of a unit force on both bodies."""
+    d, d_t, d_tt = j.place - i.place, j.v - i.v, j.a - i.a
+    h_t = np.cross(i.w, h)
+    h_tt = np.cross(i.w_t, h) + np.cross(i.w, h_t)
+    acceleration = _dot(h, d_tt) + 2.0 * _dot(h_t, d_t) + _dot(h_tt, d)
+    values = [_dot(h, d), _dot(h, d_t) + _dot(h_t, d), acceleration]
+    # the force on the first body acts at the same place, beyond its own point
+    torques = -np.cross(i.arm + d, h), np.cross(j.arm, h)
+    return values, np.hstack([-h, torques[0], h, torques[1]]).T
+
+
+def _rotation(
+    s: Specimen, i: CarriedPoint, j: CarriedPoint, h: Array, axis: Array
+) -> tuple[list[Array], Array]:
+    """Return the angle with its rates, and the wrench of a unit couple on both bodies."""
+    p, q = s.state[3:7], s.state[10:14]
+    cosine = (p * q).sum(axis=0)
+    # axis . (vector part of conjugate(p) q)
+    vector = p[0] * q[1:] - q[0] * p[1:] - np.cross(p[1:], q[1:], axis=0)
+    angle = 2.0 * np.arctan2(axis @ vector, cosine)
+    w, w_t = j.w - i.w, j.w_t - i.w_t
+    values = [angle, _dot(h, w), _dot(h, w_t) + _dot(np.cross(i.w, h), w)]
+    return values, np.hstack([0.0 * h, -h, 0.0 * h, h]).T
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return (a * b).sum(axis=1)

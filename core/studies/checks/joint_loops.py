@@ -1,19 +1,26 @@
 """A joint in a small closed loop, solved natively and by every given engine, on the joint itself or
-on its equivalent.
+on its equivalent; and checks of its reaction there, with masses, gravity and a spring.
+
+The reaction does no work on the freedoms of the joint, the first body gets the opposite of what the
+second gets. Bodies are balanced by Newton and Euler from their motion: no equation of the forces
+takes part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...algebra import Quat, quat, vec
 from ...case.case import Case, Series
+from ...case.io.outputs import default
 from ...case.joint_probe import alternatives
-from ...errors import MechanismError
+from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
+from ...case.quantity import AXES, with_markers
+from ...errors import MechanismError, SolveError
+from ...forces import Reaction
 from ...harness.compare import output_series
 from ...harness.engine import Engine
 from ...harness.execution import Answer, Failure, Pair, attempt, error_text
@@ -21,161 +28,15 @@ from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
 from ...harness.standard import STANDARD, Standard
 from ...harness.verdict import judged as verdict_of
-from ...joints import Attachment, AxialJoint, Joint
-from ...mechanism.mechanism import declared_equivalent, with_equivalents
-from ...primitives.base import Drive, Pose, Twist
-from ...trajectory import Array
-from .findings import AMPLIFIED, Finding, Verdict, agreement, judged, skipped, stated
-from .loaded_probe import driven, loaded, reactions, solved
-from .manifold import Specimen
-from .traced_joint import COLUMNS, POSES, CarriedPoint, turned
-
-FREEDOMS = ("rotation", "translation")
-WHATS = ("value", "rate", "acceleration", "force", "turns")
-WAY = 6.0
-"""Largest further angle at which an angle's driver is examined [rad], almost a turn."""
-
-
-def driver(s: Specimen) -> Iterator[Finding]:
-    """Check every drivable coordinate of the joint."""
-    joint = s.joint
-    driven = [each for each in joint.freedoms if each in FREEDOMS]
-    if not isinstance(joint, AxialJoint) or not driven:
-        yield skipped("driver", "it has no coordinate that can be driven")
-        return
-    names = [f"{freedom}: {what}" for freedom in driven for what in WHATS]
-    figures = np.concatenate([_defects(s, joint, freedom) for freedom in driven])
-    remedy = (
-        "measured() is to drive the joint's own coordinate: phi = 0 at the drive's c, nu of its"
-        " c_t, gamma of its c_tt; its rows are a force along the axis through the joint's point, or"
-        " a couple about the axis; its branch tests are positive at c, and not a turn further"
-    )
-    yield judged("driver", figures, AMPLIFIED, names, remedy=remedy)
-
-
-def _moving(s: Specimen, k: int, arm: Array) -> CarriedPoint:
-    state, rate, acceleration = (
-        x[size * k : size * (k + 1)].T
-        for x, size in ((s.state, 7), (s.rate, COLUMNS), (s.acceleration, COLUMNS))
-    )
-    rates = (*np.split(rate, 2, axis=1), *np.split(acceleration, 2, axis=1))
-    return CarriedPoint.of(turned(state[:, 3:], arm), s.traced.origins[k] + state[:, :3], *rates)
-
-
-def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array], Array]:
-    """Return a coordinate of the joint with its rate and acceleration, by their definition, and the
-    wrench of a unit effort on both bodies, lengths in the unit of the place.
-
-    Returns:
-        Three arrays of shape (lanes,), and one of shape (12, lanes): force and torque about the
-        origin, of the first body, then of the second.
-    """
-    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-    point = np.array(joint.point) / s.place.unit
-    i, j = (_moving(s, k, point - s.traced.origins[k]) for k in range(2))
-    h = turned(s.state[3:7].T, axis)
-    return _rotation(s, i, j, h, axis) if freedom == "rotation" else _slide(i, j, h)
-
-
-def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
-    """Return the defects of one coordinate's driver as named by `WHATS`, shape (5, lanes)."""
-    (c, c_t, c_tt), wrench = coordinate(s, joint, freedom)
-    scaled = joint.scaled(1.0 / s.place.unit)
-    attached = (Attachment(vec(tuple(origin))) for origin in s.traced.origins)
-    measured: Any = scaled.measured(freedom, *attached)
-    primitive, per_rate = (_driving(measured, c, rate, c_tt) for rate in (c_t, 1.0))
-    poses = _poses(s.state)
-    twists = [Twist(vec(tuple(x[:3])), vec(tuple(x[3:]))) for x in (s.rate[:6], s.rate[6:12])]
-    (row,), (phi,) = primitive.rows(*poses), primitive.phi(*poses)
-    (nu,), (one,), (gamma,) = (
-        primitive.nu(*poses),
-        per_rate.nu(*poses),
-        primitive.gamma(*poses, *twists),
-    )
-    entries = np.array([x + np.zeros(s.lanes) for part in row for x in part])
-    rates, accelerations = s.rate[: 2 * COLUMNS], s.acceleration[: 2 * COLUMNS]
-    speed, pull = np.linalg.norm(rates, axis=0), np.linalg.norm(accelerations, axis=0)
-    there, further = s.state, 0.0
-    if freedom == "rotation":
-        further = np.linspace(-WAY, WAY, s.lanes)
-        there = _turned_on(s, joint, further)
-    lost, far = _turns(measured, there, c + further, turning=freedom == "rotation")
-    figures = (
-        np.maximum(np.abs(phi), np.abs(far)),
-        ((entries * rates).sum(axis=0) - nu) / (1.0 + speed),
-        ((entries * accelerations).sum(axis=0) - gamma) / (1.0 + speed**2 + pull),
-        np.abs(entries - one * wrench).max(axis=0),
-        lost,
-    )
-    size = np.linalg.norm(entries, axis=0)
-    return np.abs(figures) / np.where(size > 0.0, size, 1.0)
-
-
-def _poses(state: Array) -> list[Pose]:
-    return [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (state[:7], state[7:POSES])]
-
-
-def _driving(measured: Any, c: Any, c_t: Any = 0.0, c_tt: Any = 0.0) -> Any:
-    return replace(measured, drive=Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c)))
-
-
-def _turned_on(s: Specimen, joint: AxialJoint, angle: Array) -> Array:
-    """Return the state with body j turned further about the axis."""
-    h, state = turned(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
-    h /= np.linalg.norm(h, axis=1)[:, None]
-    arm = np.array(joint.point) / s.place.unit - s.traced.origins[1]
-    turn = Quat(np.cos(0.5 * angle), vec([*(np.sin(0.5 * angle) * h.T)]))
-    state[10:14] = np.array([*(turn * quat(s.state[10:14]))])
-    state[7:10] += (turned(s.state[10:14].T, arm) - turned(state[10:14].T, arm)).T
-    return state
-
-
-def _turns(measured: Any, state: Array, c: Array, *, turning: bool) -> tuple[Array, Array]:
-    """Return one where a branch test refuses the drive's value, or accepts a zero of phi a turn
-    further; and phi.
-    """
-    pair = _poses(state)
-    wrong = np.zeros(state.shape[1], np.bool_)
-    at_turns: list[Array] = []
-    for turns in (0, 1) if turning else (0,):
-        primitive = _driving(measured, c + 2.0 * np.pi * turns)
-        (phi,) = primitive.phi(*pair)
-        tests = [np.ones_like(c), *primitive.branch(*pair)]
-        accepted = np.min(np.broadcast_arrays(*tests), axis=0) > 0.0
-        wrong |= accepted & (np.abs(phi) < AMPLIFIED.value) if turns else ~accepted
-        at_turns.append(phi + 0.0 * c)
-    return wrong.astype(np.float64), at_turns[0]
-
-
-def _slide(i: CarriedPoint, j: CarriedPoint, h: Array) -> tuple[list[Array], Array]:
-    """Return the displacement with its rates, and the wrench of a unit force on both bodies."""
-    d, d_t, d_tt = j.place - i.place, j.v - i.v, j.a - i.a
-    h_t = np.cross(i.w, h)
-    h_tt = np.cross(i.w_t, h) + np.cross(i.w, h_t)
-    acceleration = _dot(h, d_tt) + 2.0 * _dot(h_t, d_t) + _dot(h_tt, d)
-    values = [_dot(h, d), _dot(h, d_t) + _dot(h_t, d), acceleration]
-    # the force on the first body acts at the same place, beyond its own point
-    torques = -np.cross(i.arm + d, h), np.cross(j.arm, h)
-    return values, np.hstack([-h, torques[0], h, torques[1]]).T
-
-
-def _rotation(
-    s: Specimen, i: CarriedPoint, j: CarriedPoint, h: Array, axis: Array
-) -> tuple[list[Array], Array]:
-    """Return the angle with its rates, and the wrench of a unit couple on both bodies."""
-    p, q = s.state[3:7], s.state[10:14]
-    cosine = (p * q).sum(axis=0)
-    # axis . (vector part of conjugate(p) q)
-    vector = p[0] * q[1:] - q[0] * p[1:] - np.cross(p[1:], q[1:], axis=0)
-    angle = 2.0 * np.arctan2(axis @ vector, cosine)
-    w, w_t = j.w - i.w, j.w_t - i.w_t
-    values = [angle, _dot(h, w), _dot(h, w_t) + _dot(np.cross(i.w, h), w)]
-    return values, np.hstack([0.0 * h, -h, 0.0 * h, h]).T
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return (a * b).sum(axis=1)
-
+from ...joints import AxialJoint, Joint
+from ...kinematics import NativeSolver
+from ...mechanism.body import Body, inertia_matrix
+from ...mechanism.loads import SpringDamper
+from ...mechanism.mechanism import GROUND, Mechanism, declared_equivalent, with_equivalents
+from ...mechanism.motions import JointAngle, JointDisplacement, JointDriver, Sine
+from ...trajectory import Array, Trajectory
+from .findings import Finding, Limit, Verdict, agreement, judged, skipped, stated
+from .traced_joint import CarriedPoint, turned
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
 # x1000.
@@ -341,3 +202,240 @@ def _compared(
     )
     message = "; ".join(judgement.messages)
     return agreement(name, verdict, judgement.errors, AGREE_WHY, message)
+
+
+# The reaction of the joint, in the loop with loads
+
+# Samples of the probe: forces follow from each pose alone.
+SAMPLES = 3
+GRAVITY = (0.5, -1.0, -9.75)
+INERTIA = (0.04, 0.05, 0.06, 0.004, -0.003, 0.002)
+CENTRE = np.array([0.05, -0.03, 0.04])
+DRIVEN: Mapping[type[JointDriver], Sine] = {
+    JointDisplacement: Sine(0.05, 0.5),
+    JointAngle: Sine(0.5, 0.25),
+}
+"""Drivers of a joint's own coordinates, slides first, and their motions [m, rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """A loaded probe and its native solution."""
+
+    mechanism: Mechanism
+    joint: Joint
+    motion: Trajectory
+
+    @property
+    def reaction(self) -> Reaction:
+        """The reaction of the joint under test."""
+        assert self.motion.forces is not None
+        return self.motion.forces.joints[self.joint.name]
+
+    @property
+    def size(self) -> float:
+        """The largest force of any joint [N]."""
+        assert self.motion.forces is not None
+        every = self.motion.forces.joints.values()
+        return max(float(np.abs(each.force).max()) for each in every)
+
+
+def loaded(case: Case) -> Case:
+    """Return the probe with loads, and the forces of joint and driver as outputs."""
+    mechanism = case.mechanism
+    bodies = [_with_mass(body, k, mechanism) for k, body in enumerate(mechanism.bodies)]
+    last = bodies[-1].name
+    ends = ((0.9, 0.4, -0.3), mechanism.points[0].position)
+    spring = SpringDamper("spring", GROUND, last, ends, 50.0, 2.0, 0.5)
+    heavy = replace(mechanism, bodies=bodies, gravity=GRAVITY, forces=[spring])
+    name, weight = _tested(case).name, 10.0 * len(bodies)
+    outputs: list[ForceMeasure] = [
+        cls(f"{what}_{k}", *default(weight, "N"), joint=name, direction=axis)
+        for cls, what in ((JointForce, "force"), (JointMoment, "moment"))
+        for k, axis in AXES.items()
+    ]
+    outputs.append(DriverEffort("effort", *default(weight, "N m"), driver=case.sweep.driver))
+    bound = tuple(output.bound(heavy) for output in outputs)
+    few = case.sweep.values[np.linspace(0, len(case.sweep.values) - 1, SAMPLES).astype(int)]
+    sweep = replace(case.sweep, values=few)
+    return replace(case, mechanism=with_markers(heavy, bound), sweep=sweep, outputs=bound)
+
+
+def driven(case: Case) -> Case | None:
+    """Return the loaded probe with drivers of the joint's own coordinates in place of rods, and the
+    joint seen from its second body, whose frame is then off the axis; None without coordinates.
+    """
+    heavy = loaded(case)
+    mechanism, tested = heavy.mechanism, _tested(heavy)
+    if not isinstance(tested, AxialJoint):
+        return None
+    rods = [joint for joint in mechanism.joints if joint.name.startswith("rod_")]
+    # a screw has two coordinates and one freedom
+    found = [each for each in DRIVEN if each.freedom in tested.freedoms][: len(rods)]
+    left = rods[len(found) :]
+    joints = [tested.reversed() if each is tested else each for each in mechanism.joints]
+    drivers = [each(f"own {each.freedom}", tested.name) for each in found]
+    mechanism = replace(
+        mechanism,
+        joints=[joint for joint in joints if joint not in rods or joint in left],
+        drivers=[*mechanism.drivers, *drivers],
+    )
+    motions = {driver.name: DRIVEN[type(driver)] for driver in drivers}
+    efforts = [
+        DriverEffort(f"{name} effort", *default(10.0, "N m"), driver=name).bound(mechanism)
+        for name in motions
+    ]
+    return replace(
+        heavy,
+        mechanism=with_markers(mechanism, efforts),
+        sweep=replace(heavy.sweep, motions=motions),
+        outputs=(*heavy.outputs, *efforts),
+    )
+
+
+def _tested(case: Case) -> Joint:
+    # the probe's hinge or rods may be of the same type
+    return next(joint for joint in case.mechanism.joints if {*joint.bodies} == {"a", "b"})
+
+
+def _with_mass(body: Body, number: int, mechanism: Mechanism) -> Body:
+    near = [p for j in mechanism.joints if body.name in j.bodies for p in j.points_on(body.name)]
+    center = np.mean(near or [(0.0, 0.0, 0.0)], axis=0) + CENTRE
+    x, y, z = center.tolist()
+    return replace(body, mass=2.0 + number, center_of_mass=(x, y, z), inertia=INERTIA)
+
+
+def solved(case: Case) -> Probe:
+    """Solve the loaded probe natively.
+
+    Raises:
+        SolveError: samples are missing.
+    """
+    mechanism = case.mechanism
+    names = tuple(body.name for body in mechanism.moving)
+    forces = [each.name for each in (*mechanism.joints, *mechanism.drivers)]
+    solver = NativeSolver().prepare(mechanism, case.sweep.path, bodies=names, forces=forces)
+    found = solver(TOL)
+    if not found.solved.all() or found.forces is None:
+        raise SolveError(f"the probe with masses cannot be solved: {found.message}")
+    return Probe(mechanism, mechanism.joint(_tested(case).name), found)
+
+
+# Balance of the bodies, which have their frame at the global origin at design.
+
+
+def _moving(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoint:
+    """Return a point of a body over the samples."""
+    at = np.asarray(point, dtype=np.float64)
+    motion = probe.motion.bodies.get(body)
+    if motion is None:
+        still = np.zeros((len(probe.motion.solved), 3))
+        return CarriedPoint(at, still + at, *[still] * 4)
+    assert motion.v is not None
+    assert motion.a is not None
+    w, w_t = (turned(motion.p, each[:, 3:]) for each in (motion.v, motion.a))
+    arm = turned(motion.p, at)
+    return CarriedPoint.of(arm, motion.r, motion.v[:, :3], w, motion.a[:, :3], w_t)
+
+
+def work(probe: Probe) -> Array:
+    """Return the power of the joint's reaction on both bodies [W], shape (n,)."""
+    joint = probe.joint
+    j = _moving(probe, joint.j, probe.mechanism.reaction_point(joint))
+    i = _moving(probe, joint.i)
+    v = i.v + np.cross(i.w, j.place - i.place)
+    force, moment = probe.reaction.force, probe.reaction.moment
+    return (force * (j.v - v)).sum(axis=1) + (moment * (j.w - i.w)).sum(axis=1)
+
+
+def speed(probe: Probe) -> float:
+    """Return the largest velocity of any body's frame or turn, in one number [m/s, rad/s]."""
+    motions = [each.v for each in probe.motion.bodies.values() if each.v is not None]
+    return max(float(np.abs(each).max()) for each in motions)
+
+
+def unbalanced(probe: Probe, name: str) -> Array:
+    """Return the wrench missing to a body's balance by Newton and Euler, shape (n, 6)."""
+    n = len(probe.motion.solved)
+    if probe.mechanism.is_fixed(name):
+        return np.zeros((n, 6))
+    body, motion = probe.mechanism.body(name), probe.motion.bodies[name]
+    assert motion.v is not None
+    assert motion.a is not None
+    assert body.inertia is not None
+    centre = _moving(probe, name, body.center_of_mass)
+    force = body.mass * (np.array(GRAVITY) - centre.a)
+    inertia, w, w_t = inertia_matrix(body.inertia), motion.v[:, 3:], motion.a[:, 3:]
+    torque = -turned(motion.p, w_t @ inertia + np.cross(w, w @ inertia))
+    for push, at, moment in _pushes(probe, name):
+        force, torque = force + push, torque + moment + np.cross(at - centre.place, push)
+    return np.hstack([force, torque])
+
+
+def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield the loads of joints, drivers and the spring on a body: force, its place, moment."""
+    mechanism, forces = probe.mechanism, probe.motion.forces
+    assert forces is not None
+    for joint in mechanism.joints:
+        sign = {joint.j: 1.0, joint.i: -1.0}.get(name)
+        if sign is not None:
+            found = forces.joints[joint.name]
+            place = _moving(probe, joint.j, mechanism.reaction_point(joint)).place
+            yield sign * found.force, place, sign * found.moment
+    for driver in mechanism.drivers:
+        effort = forces.drivers[driver.name][:, None]
+        yield from _by_driver(probe, driver, effort, name)
+    (spring,) = (each for each in mechanism.forces if isinstance(each, SpringDamper))
+    if name == spring.j:
+        ends = zip((spring.i, spring.j), spring.points, strict=True)
+        start, end = (_moving(probe, body, at) for body, at in ends)
+        length = np.linalg.norm(end.place - start.place, axis=1)
+        along = (end.place - start.place) / length[:, None]
+        rate = (along * (end.v - start.v)).sum(axis=1)
+        tension = spring.stiffness * (length - (spring.free_length or 0.0)) + spring.damping * rate
+        yield -tension[:, None] * along, end.place, 0.0 * end.place
+
+
+def _by_driver(
+    probe: Probe, driver: Any, effort: Array, name: str
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield the load of a driver: a couple about its joint's axis, or a force along it."""
+    joint: Any = probe.mechanism.joint(driver.joint)
+    if name not in joint.bodies:
+        return
+    axis = _moving(probe, joint.i, joint.axis).arm / np.linalg.norm(joint.axis)
+    push = (1.0 if name == joint.j else -1.0) * effort * axis
+    place = _moving(probe, joint.j, joint.point).place
+    yield (0.0 * push, place, push) if driver.turns else (push, place, 0.0 * push)
+
+
+LIMIT = Limit(
+    1e-10, "round-off over the squared smallest singular value of the probe, relative to the forces"
+)
+"""Round-off of sums of some thirty products over the smallest singular value of the probes (0.01),
+squared for accelerations, and ten times that."""
+
+
+def reactions(probe: Probe, what: str = "reaction") -> Iterator[Finding]:
+    """Yield the findings on the reaction of the joint under test.
+
+    Args:
+        probe: of a case from `loaded` or `driven`.
+        what: first part of the names of the findings.
+    """
+    forces = probe.motion.forces
+    assert forces is not None
+    missing = np.abs(forces.power)[None] / float(np.nanmax(forces.largest_power))
+    remedy = "drivers, masses and springs do not balance: a joint has nu = 0"
+    yield judged(f"{what}: power", missing, LIMIT, ["power"], remedy=remedy)
+    done = np.abs(work(probe))[None] / (probe.size * speed(probe))
+    remedy = "the reaction works on the joint's freedoms: see rows and nu"
+    yield judged(f"{what}: no work", done, LIMIT, ["work"], remedy=remedy)
+    off = np.array([unbalanced(probe, body) for body in probe.joint.bodies])
+    remedy = (
+        "what one body gets is not the opposite of what the other gets: see rows; a driver's"
+        " force acts along the axis through the point: see measured()"
+    )
+    names = [f"body {body}" for body in probe.joint.bodies]
+    figures = np.abs(off).max(axis=2) / probe.size
+    yield judged(f"{what}: acts and reacts", figures, LIMIT, names, remedy=remedy)

@@ -21,6 +21,8 @@ from .findings import Finding, Limit, Verdict
 from .traced_joint import COLUMNS, POSES, Place, TracedJoint
 
 Mask = NDArray[np.bool_]
+Motion = tuple[Array, Array, Array]
+"""States, rates and accelerations, one pose a lane."""
 
 # Newton is quadratic: a step below this value ends at round-off.
 SETTLED = 1e-13
@@ -121,14 +123,14 @@ def walk(
     return states
 
 
-def straight(directions: Array, length: float) -> Callable[[Array, Array], Array]:
+def straight(directions: Array) -> Callable[[Array, Array], Array]:
     """Return aims that start in the given directions and then keep the
     direction of the last step.
     """
 
     def aims(_: Array, last: Array) -> Array:
         ahead = np.where(np.linalg.norm(last, axis=0) > 0.0, last, directions)
-        return ahead * (length / np.linalg.norm(ahead, axis=0))
+        return ahead * (STEP / np.linalg.norm(ahead, axis=0))
 
     return aims
 
@@ -200,6 +202,11 @@ class Specimen:
     rng: np.random.Generator
 
     @property
+    def motion(self) -> Motion:
+        """The poses with their rates and accelerations."""
+        return self.state, self.rate, self.acceleration
+
+    @property
     def lanes(self) -> int:
         """Number of poses."""
         return self.state.shape[1]
@@ -214,7 +221,7 @@ def moved_specimen(joint: Joint, place: Place, lanes: int, rng: np.random.Genera
     traced = TracedJoint(joint, place)
     directions = rng.normal(size=(traced.columns, lanes))
     start, _ = newton(traced, traced.design(lanes), traced.exact, 10)
-    way = walk(traced, start, straight(directions, STEP), STEPS)
+    way = walk(traced, start, straight(directions), STEPS)
     state = way[-1]
     exact = traced.exact(state)
     rate = along(exact, rng.normal(size=directions.shape))
@@ -292,9 +299,7 @@ def connected(s: Specimen, state: Array) -> Mask:
     there = _led(t, state, np.repeat(t.design(1), state.shape[1], axis=1))
     if there.all():
         return there
-    known = np.concatenate(
-        walk(t, t.design(WALKS), straight(directions, STEP), STRIDES, MOVING), axis=1
-    )
+    known = np.concatenate(walk(t, t.design(WALKS), straight(directions), STRIDES, MOVING), axis=1)
     for k in range(AIMS):
         astray = np.flatnonzero(~there)
         if len(astray):

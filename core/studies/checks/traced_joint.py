@@ -102,23 +102,9 @@ def precise(digits: int) -> tuple[Operations, Callable[..., Any]]:
 def execute(
     program: Program, kind: Operations, inputs: Any, lift: Callable[[float], Any] = float
 ) -> list[Any]:
-    """Run a program over a kind of scalar and return its outputs in order.
-
-    Args:
-        inputs: values by slot.
-        lift: conversion of constants to the kind.
-    """
-    values: list[Any] = []
-    for op, *rest in program.nodes:
-        if op == "input":
-            values.append(inputs[int(rest[0])])
-        elif op == "const":
-            values.append(lift(rest[0]))
-        elif len(rest) == 2:  # most operations; a call with any number takes twice as long
-            values.append(kind[op](values[int(rest[0])], values[int(rest[1])]))
-        else:
-            values.append(kind[op](*(values[int(k)] for k in rest)))
-    return [values[program.outputs[slot]] for slot in sorted(program.outputs)]
+    """Run a program over a kind of scalar and return its outputs in order."""
+    found = program.run(kind, inputs, lift)
+    return [found[slot] for slot in sorted(found)]
 
 
 def turned(q: Array, a: Array) -> Array:

@@ -20,8 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...case.case import Case
-from ...case.compliance import Load, Rig
+from ...case.case import Case, Load, Rig
 from ...case.suspension import Convention, Reaction, SuspensionOutput, Vehicle
 from ...errors import KincheckError
 from ...kinematics import LoadPoint

@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Vec3
-from ...case.case import TIME, Balance, Case, Sweep, Truth
-from ...case.compliance import Load, Rig
+from ...case.case import TIME, Balance, Case, Load, Rig, Sweep, Truth
 from ...case.measures import DriverEffort
 from ...case.quantity import ORDERS, Output, Quantity, with_markers
 from ...case.suspension import PerTravel

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ...case.compliance import Load
+from ...case.case import Load
 from ...errors import number_of
 from ...harness.record import Record, Results
+from ...report.axis import ZERO
 from ...report.figures import Figure, Style
-from ...report.page_model import Plot
+from ...report.page_model import ROUND_OFF, Plot
 from ...report.sections import Diagram, Report, Section
 from ...report.sections import page as render
 from ...trajectory import Array
@@ -162,8 +163,9 @@ def lines(results: ComplianceResults) -> Iterator[str]:
         if not np.isfinite(each.values).any():
             yield f"  {with_unit(name, shown)}  –"
             continue
-        low, high = (size * end(each.values) + 0.0 for end in (np.nanmin, np.nanmax))
-        value = size * each.values[k] + 0.0  # no -0
+        shown_values = size * each.values
+        shown_values[abs(shown_values) < ZERO] = 0.0
+        low, high, value = np.nanmin(shown_values), np.nanmax(shown_values), shown_values[k]
         yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
 
 
@@ -176,7 +178,10 @@ def page(results: ComplianceResults) -> str:
     k = _near_design(results.travel)
     matrix = list[list[str]]()
     if math.isfinite(results.travel.wheel_load[k]):
-        matrix = [[f"{x:.4g}" for x in row] for row in results.travel.compliance[k].tolist()]
+        compliance = results.travel.compliance[k]
+        zero = ROUND_OFF * np.abs(compliance).max()
+        known = np.where(np.abs(compliance) > zero, compliance, 0.0)
+        matrix = [[f"{x:.4g}" for x in row] for row in known.tolist()]
     note = (
         "Rows: displacement [m] and turn [rad] at the contact; columns: force [N] and torque [N m]"
         " there; global axes, six for each wheel."

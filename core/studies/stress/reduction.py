@@ -24,19 +24,13 @@ from ...joints import Joint, Kind
 from ...kinematics import require_driven
 from ...mechanism.body import Body
 from ...mechanism.mechanism import GROUND, Mechanism
-from ..truth.motion import Truth, followed
 from .families import Specimen
-from .results import Finding
-from .run import Example
-from .solving import solve_all
-from .verdicts import Judgement, Verdict, judged
+from .run import Example, Finding
+from .verdicts import Judgement, Verdict, judged, solve_all
 
 
-def judge(
-    case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth] | None = followed
-) -> Judgement:
-    """Judge a case of any origin with an engine; by default its reference is followed
-    from the design.
+def judge(case: Case, engine: Engine, tol: float) -> Judgement:
+    """Judge a case of any origin with an engine, by the reference followed from the design.
 
     Raises:
         KincheckError: the reference cannot be computed.
@@ -45,10 +39,10 @@ def judge(
     moved = [name for name in case.points if not name.startswith(MARKER)]
     watched = with_all_coordinates(case, moved or None)
     watched = replace(watched, outputs=(*watched.outputs, *forces))
-    return judge_as(Specimen(case.name, watched, truth, tol), watched, engine)
+    return _judge_as(Specimen(case.name, watched, tol=tol), watched, engine)
 
 
-def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
+def _judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
     """Judge a case in place of a specimen's case, by the specimen's reference and excuses."""
     (answer,) = solve_all([Pair(case, engine, specimen.tol)])
     return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
@@ -63,7 +57,7 @@ def save(example: Example, folder: Path, problems: list[str]) -> Finding:
     specimen, engine, finding = example.specimen, example.engine, example.finding
 
     def bad(case: Case) -> bool:
-        return bool(judge_as(specimen, case, engine).counts[example.verdict])
+        return bool(_judge_as(specimen, case, engine).counts[example.verdict])
 
     def bad_by_itself(case: Case) -> bool:
         return bool(judge(case, engine, specimen.tol).counts[example.verdict])
@@ -105,6 +99,7 @@ def save(example: Example, folder: Path, problems: list[str]) -> Finding:
 Bad = Callable[[Case], bool]
 """Function that returns whether a case still has the outcome; False if it cannot be judged."""
 
+GEOMETRY = (Kind.POSITION, Kind.DIRECTION, Kind.LENGTH)
 # Largest number of candidates: each takes 0.1 s to a few seconds, all take about a minute.
 TRIES = 150
 
@@ -127,24 +122,17 @@ def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
     """Return the case with the fewest samples that keep the outcome, from the design to the bad
     sample or over the whole sweep.
     """
-    still, values = _Budget(bad), case.sweep.values
-    stop = float(values[sample])
-    ends = [(case.sweep.design, stop), (float(values[0]), float(values[-1]))]
-    for start, end in (
-        ends if case.sweep.driver in {d.name for d in case.mechanism.drivers} else ends[1:]
-    ):
-        if start == end:
-            continue
-        for count in (1, 2, 3, 4, 6, 9, 13, 19, 28, 41, 61):
-            if count < len(values):
-                fewer = replace(
-                    case,
-                    sweep=replace(
-                        case.sweep, values=np.linspace(start if count > 1 else end, end, count)
-                    ),
-                )
-                if still(fewer):
-                    return fewer
+    still, sweep = _Budget(bad), case.sweep
+    values = sweep.values
+    ends = [(float(values[0]), float(values[-1]))]
+    if sweep.driver in {driver.name for driver in case.mechanism.drivers}:
+        ends.insert(0, (sweep.design, float(values[sample])))
+    for (start, end), count in product(ends, (1, 2, 3, 4, 6, 9, 13, 19, 28, 41, 61)):
+        if start != end and count < len(values):
+            few = np.linspace(start if count > 1 else end, end, count)
+            fewer = replace(case, sweep=replace(sweep, values=few))
+            if still(fewer):
+                return fewer
     return case
 
 
@@ -152,13 +140,8 @@ def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
     """Return the smallest case found with the outcome, and the reductions as text."""
     still, words = _Budget(bad), list[str]()
     before = len(case.mechanism.bodies), len(case.mechanism.joints)
-    going = True
-    while going:
-        going = False
-        for smaller in _smaller(case):
-            if still(smaller):
-                case, going = smaller, True
-                break
+    while (smaller := next(filter(still, _smaller(case)), None)) is not None:
+        case = smaller
     if (after := (len(case.mechanism.bodies), len(case.mechanism.joints))) != before:
         words.append(f"bodies {before[0]} to {after[0]}, joints {before[1]} to {after[1]}")
     for digits in range(1, 12):
@@ -227,8 +210,7 @@ def _driven(case: Case, bodies: Sequence[Body], joints: Sequence[Joint]) -> Iter
 def _with(case: Case, mechanism: Mechanism, hidden: str = "") -> Case:
     shown = [point for point in mechanism.points if point.name != hidden]
     names = {point.name for point in shown}
-    members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
-    loaded = {each.name for each in members}
+    loaded = {each.name for each in (*mechanism.joints, *mechanism.drivers, *mechanism.forces)}
     outputs = tuple(
         each for each in case.outputs if set(each.points) <= names and set(each.forces) <= loaded
     )
@@ -246,10 +228,7 @@ def rounded(case: Case, digits: int) -> Case | None:
     mechanism = case.mechanism
     try:
         joints = [
-            replace(
-                joint,
-                **joint.mapped(dict.fromkeys((Kind.POSITION, Kind.DIRECTION, Kind.LENGTH), short)),
-            )
+            replace(joint, **joint.mapped(dict.fromkeys(GEOMETRY, short)))
             for joint in mechanism.joints
         ]
         points = [replace(point, position=short(point.position)) for point in mechanism.points]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ...report.sections import Report, Section
 from ...report.table import escaped, row
 from ...trajectory import QUANTITIES
-from .results import Cell, Finding, Stress, largest
+from .run import Cell, Finding, Stress, largest
 from .verdicts import ELSEWHERE, SILENT, Verdict
 
 NAME = "stress"
@@ -42,7 +42,15 @@ NOTES = (
 
 def report(found: Stress) -> Report:
     """Return the tables of a run."""
-    sections = [_shares(found), _families(found)]
+    families = Section(
+        "Families",
+        [],
+        ["Random, from the seed; a specimen does not depend on the rest of the run."],
+        ["family", "what"],
+        2,
+        [*found.abouts.items()],
+    )
+    sections = [_shares(found), families]
     sections += [_findings(found.findings)] if found.findings else []
     sections += [_proofs(found)] if found.proofs else []
     sections += [_acceptances(found)] if found.acceptances else []
@@ -140,18 +148,6 @@ def _count(cells: Sequence[Cell], *verdicts: Verdict) -> int:
     return sum(cell.samples.get(verdict, 0) for cell in cells for verdict in verdicts)
 
 
-def _families(found: Stress) -> Section:
-    rows = [[name, about] for name, about in found.abouts.items()]
-    return Section(
-        "Families",
-        [],
-        ["Random, from the seed; a specimen does not depend on the rest of the run."],
-        ["family", "what"],
-        2,
-        rows,
-    )
-
-
 def _findings(findings: Sequence[Finding]) -> Section:
     rows = [
         [
@@ -166,16 +162,14 @@ def _findings(findings: Sequence[Finding]) -> Section:
         ]
         for each in findings
     ]
-    columns = ["family", "engine", "outcome", "specimen", "at", "errors", "message", "case file"]
-    notes = [
-        f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the size"
-        " counts as another assembly."
-    ]
     return Section(
         "Findings",
         ["Replay a file by: kincheck stress --replay FILE --engine NAME --tol X."],
-        notes,
-        columns,
+        [
+            f"The smallest specimen of each; errors as above. An error beyond {ELSEWHERE:g} of the"
+            " size counts as another assembly."
+        ],
+        ["family", "engine", "outcome", "specimen", "at", "errors", "message", "case file"],
         4,
         rows,
     )
@@ -186,20 +180,27 @@ def _proofs(found: Stress) -> Section:
         [p.family, str(p.tried), str(p.proved), f"{p.worst:.1e}", "; ".join(p.reasons)[:300]]
         for p in found.proofs
     ]
-    notes = [
-        "Krawczyk's test in ball arithmetic on the engine's equations; the distance is relative"
-        " to the round-off bound of an engine."
-    ]
-    columns = ["family", "samples", "proved", "distance of the truth", "not proved"]
-    return Section("Proof of the truth at random samples", [], notes, columns, 1, rows)
+    return Section(
+        "Proof of the truth at random samples",
+        [],
+        [
+            "Krawczyk's test in ball arithmetic on the engine's equations; the distance is relative"
+            " to the round-off bound of an engine."
+        ],
+        ["family", "samples", "proved", "distance of the truth", "not proved"],
+        1,
+        rows,
+    )
 
 
 def _acceptances(found: Stress) -> Section:
     rows: list[list[str]] = []
     for engine in dict.fromkeys(each.engine for each in found.acceptances):
-        mine = [each for each in found.acceptances if each.engine == engine]
-        accepted = sorted((each for each in mine if each.accepted), key=lambda each: each.tilt)
-        refused = [each.tilt for each in mine if not each.accepted]
+        mine = sorted(
+            (each for each in found.acceptances if each.engine == engine), key=lambda a: a.tilt
+        )
+        accepted = [each for each in mine if each.accepted]
+        refused = [each for each in mine if not each.accepted]
         told = [
             f"{each.told:.1e} of {each.unavoidable:.1e} m" for each in accepted if each.unavoidable
         ]
@@ -207,21 +208,20 @@ def _acceptances(found: Stress) -> Section:
             [
                 engine,
                 f"{accepted[-1].tilt:.1e} rad" if accepted else "never",
-                f"{min(refused):.1e} rad" if refused else "never",
+                f"{refused[0].tilt:.1e} rad" if refused else "never",
                 told[-1] if told else "no residual",
             ]
         )
-    columns = [
-        "engine",
-        "accepted up to",
-        "refused from",
-        "reported residual, at the largest accepted",
-    ]
     return Section(
         "Contradictory hinges",
         [],
         ["Unavoidable residual: by least squares over all rows."],
-        columns,
+        [
+            "engine",
+            "accepted up to",
+            "refused from",
+            "reported residual, at the largest accepted",
+        ],
         1,
         rows,
     )
@@ -239,11 +239,9 @@ def markdown(made: Report) -> str:
     """Return the tables in Markdown."""
     lines = [f"# {escaped(made.headline)}", "", escaped(" · ".join(made.facts))]
     for section in made.sections:
-        lines += ["", f"## {section.title}", "", *(escaped(each) for each in section.verdict), ""]
-        lines += [
-            row(section.columns),
-            row(["---"] * section.labels + ["---:"] * (len(section.columns) - section.labels)),
-        ]
+        numbers = len(section.columns) - section.labels
+        lines += ["", f"## {section.title}", "", *map(escaped, section.verdict), ""]
+        lines += [row(section.columns), row(["---"] * section.labels + ["---:"] * numbers)]
         lines += [row(map(escaped, each)) for each in section.rows]
         lines += ["", *(f"{escaped(note)}\n" for note in section.notes)]
     return "\n".join(lines) + "\n"

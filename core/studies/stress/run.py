@@ -1,19 +1,23 @@
-"""A stress run: specimens of all families, their references and the outcomes of every engine."""
+"""A stress run: specimens of all families, their references and the outcomes of every engine; and
+its results, the JSON schema kincheck-stress/1.
+"""
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from time import perf_counter
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
 
 from ...case.case import Case
 from ...errors import KincheckError, SolveError
 from ...harness.engine import Engine
-from ...harness.execution import Answer, Failure, Pair
+from ...harness.execution import Failure, Pair
 from ...harness.provenance import plain
 from ...kinematics import UnprovedError
 from ...version import VERSION
@@ -21,9 +25,7 @@ from ..truth.motion import Reach, Truth
 from ..truth.proofs import distance_from_proof
 from ..truth.rows import require_extended
 from .families import Family, Specimen
-from .results import Acceptance, Cell, Finding, Proofs, Stress, largest
-from .solving import solve_all, suited
-from .verdicts import BAD, Judgement, Verdict, judged, refused_description
+from .verdicts import BAD, Judgement, Verdict, judged, refused_description, solve_all, suited
 
 # Fewest specimens of a small share, and fewest samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
@@ -32,15 +34,115 @@ COARSEST = 5
 LARGEST_PROVED = 6
 
 
-@dataclass(frozen=True, eq=False)
-class Example:
-    """A specimen with a bad outcome, to be reduced and saved."""
+class Finding(msgspec.Struct, frozen=True, kw_only=True):
+    """The smallest example of a bad outcome of an engine in a family.
 
-    engine: Engine
-    specimen: Specimen
-    case: Case
-    verdict: Verdict
-    finding: Finding
+    Attributes:
+        specimen, number: name, and number in the family, which with the seed of the run reproduces
+            the specimen.
+        sample: number of the first bad sample; `value` is its value of the swept driver [m,
+            rad or s].
+        message: message of the engine.
+        tol: largest accepted residual.
+        worst: see `Cell`.
+        file: name of the case file, if one is written.
+        reduced: reductions of the case, as text.
+    """
+
+    family: str
+    engine: str
+    mode: str
+    verdict: str
+    specimen: str
+    number: int
+    sample: int
+    value: float
+    message: str
+    tol: float
+    worst: list[float | None]
+    file: str | None = None
+    reduced: list[str] = []
+
+
+class Cell(msgspec.Struct, frozen=True, kw_only=True):
+    """Results of an engine in a family.
+
+    Attributes:
+        samples: number of samples by verdict.
+        elsewhere: number of silently wrong samples in another assembly, or in none.
+        worst: largest errors of position, velocity, acceleration and force at correct samples, over
+            the round-off bound.
+        bad: number of specimens with a bad sample.
+    """
+
+    family: str
+    engine: str
+    mode: str
+    version: str | None
+    settings: dict[str, Any]
+    specimens: int
+    samples: dict[str, int]
+    elsewhere: int
+    worst: list[float | None]
+    bad: int
+    seconds: float
+
+
+def largest(errors: Iterable[Sequence[float | None]]) -> list[float | None]:
+    """Return the largest error of each quantity; None if nothing was compared."""
+    columns = zip([None] * 4, *errors, strict=True)
+    return [max((x for x in each if x is not None), default=None) for each in columns]
+
+
+class Proofs(msgspec.Struct, frozen=True, kw_only=True):
+    """Samples of a family with a proved reference, by Krawczyk's test in ball arithmetic.
+
+    Attributes:
+        worst: largest distance of the reference from the proved ball, over an
+            engine's round-off bound.
+        reasons: reasons of the failed proofs.
+    """
+
+    family: str
+    tried: int
+    proved: int
+    worst: float
+    reasons: list[str] = []
+
+
+class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
+    """A specimen of contradictory geometry: whether it was accepted, its reported residual, and its
+    unavoidable residual [m].
+    """
+
+    engine: str
+    tilt: float
+    accepted: bool
+    told: float
+    unavoidable: float
+
+
+class Stress(msgspec.Struct, frozen=True, kw_only=True):
+    """Results of a stress run.
+
+    Attributes:
+        abouts: description of each family.
+        seconds: time of each part of the run [s].
+        unfinished: families that could not be run, with the reasons.
+    """
+
+    schema: Literal["kincheck-stress/1"] = "kincheck-stress/1"
+    kincheck: str
+    command: str
+    seed: int
+    samples: int
+    abouts: dict[str, str]
+    cells: list[Cell] = []
+    findings: list[Finding] = []
+    proofs: list[Proofs] = []
+    acceptances: list[Acceptance] = []
+    seconds: dict[str, float]
+    unfinished: dict[str, str] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +159,23 @@ class Draw:
         """The case; None if its description is refused."""
         found = self.specimen.case
         return found if isinstance(found, Case) else None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Numbers of bodies and joints."""
+        mechanism = self.case.mechanism if self.case else None
+        return (len(mechanism.bodies), len(mechanism.joints)) if mechanism else (0, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A specimen with a bad outcome, to be reduced and saved."""
+
+    engine: Engine
+    specimen: Specimen
+    case: Case
+    verdict: Verdict
+    finding: Finding
 
 
 def stress(
@@ -75,39 +194,42 @@ def stress(
     task and the finished part. A KincheckError is raised if this machine has no extended precision.
     """
     require_extended()
-    run, unfinished = _Run(seed), dict[str, str]()
-    share, parts = max(1, samples // len(families)), 1 + len(engines)
-    for number, family in enumerate(families):
-        name, done = family.name, number / len(families)
-        try:
-            progress(f"{name}: making {share} samples", done)
-            with run.timed("truth"):
-                draws = specimens(family, seed, share)
-            if prove:
-                with run.timed("proofs"):
-                    run.prove(name, draws)
-            count = f"{sum(draw.samples for draw in draws)} samples of {len(draws)} specimens"
-            for k, engine in enumerate(engines, 1):
-                progress(f"{name}: {count} by {engine.name}", done + k / parts / len(families))
-                with run.timed("engines"):
-                    run.solve(name, engine, draws)
-        except KincheckError as error:  # the other families keep their results
-            unfinished[name] = str(error)
-            progress(f"{name}: not finished: {error}", (number + 1) / len(families))
-    results = Stress(
+    found = Stress(
         kincheck=VERSION,
         command=command,
         seed=seed,
         samples=samples,
         abouts={family.name: family.about for family in families},
-        cells=run.cells,
-        findings=[example.finding for example in run.examples],
-        proofs=run.proofs,
-        acceptances=run.acceptances,
-        seconds=run.seconds,
-        unfinished=unfinished,
+        seconds={"truth": 0.0, "proofs": 0.0, "engines": 0.0},
     )
-    return results, run.examples
+    examples: list[Example] = []
+
+    @contextmanager
+    def timed(part: str) -> Generator[None]:
+        begun = perf_counter()
+        yield
+        found.seconds[part] += perf_counter() - begun
+
+    share, parts = max(1, samples // len(families)), 1 + len(engines)
+    for number, family in enumerate(families):
+        name, done = family.name, number / len(families)
+        try:
+            progress(f"{name}: making {share} samples", done)
+            with timed("truth"):
+                draws = specimens(family, seed, share)
+            if prove:
+                with timed("proofs"):
+                    found.proofs.extend(_proofs(name, seed, draws))
+            count = f"{sum(draw.samples for draw in draws)} samples of {len(draws)} specimens"
+            for k, engine in enumerate(engines, 1):
+                progress(f"{name}: {count} by {engine.name}", done + k / parts / len(families))
+                with timed("engines"):
+                    examples += _solve(found, name, engine, draws)
+        except KincheckError as error:  # the other families keep their results
+            found.unfinished[name] = str(error)
+            progress(f"{name}: not finished: {error}", (number + 1) / len(families))
+    found.findings.extend(example.finding for example in examples)
+    return found, examples
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Draw]:
@@ -132,71 +254,59 @@ def specimen(family: Family, seed: int, number: int, most: int) -> Draw:
     return Draw(number, samples, one, truth)
 
 
-@dataclass(eq=False)
-class _Run:
-    seed: int
-    cells: list[Cell] = field(default_factory=list[Cell])
-    proofs: list[Proofs] = field(default_factory=list[Proofs])
-    examples: list[Example] = field(default_factory=list[Example])
-    acceptances: list[Acceptance] = field(default_factory=list[Acceptance])
-    seconds: dict[str, float] = field(
-        default_factory=lambda: {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
+def _solve(found: Stress, family: str, engine: Engine, draws: Sequence[Draw]) -> Iterator[Example]:
+    """Solve and judge all specimens of a family with an engine; yield the smallest bad ones."""
+    begun = perf_counter()
+    cases = [(draw, draw.case) for draw in draws if draw.case is not None]
+    answers = iter(
+        solve_all([Pair(case, suited(engine, case, d.number), d.specimen.tol) for d, case in cases])
     )
-
-    @contextmanager
-    def timed(self, part: str) -> Generator[None]:
-        begun = perf_counter()
-        yield
-        self.seconds[part] += perf_counter() - begun
-
-    def solve(self, family: str, engine: Engine, draws: Sequence[Draw]) -> None:
-        """Solve and judge all specimens of a family with an engine."""
-        begun = perf_counter()
-        cases = [(draw, draw.case) for draw in draws if draw.case is not None]
-        answers = iter(
-            solve_all(
-                [Pair(case, suited(engine, case, d.number), d.specimen.tol) for d, case in cases]
-            )
-        )
-        judgements: list[tuple[Draw, Judgement]] = []
-        for draw in draws:
-            if draw.case is None:
-                judgements.append((draw, refused_description(draw.specimen, draw.samples)))
-                continue
-            answer = next(answers)
-            judgement = judged(draw.specimen, draw.case, draw.truth, answer)
-            judgements.append((draw, judgement))
-            if not judgement.counts[Verdict.UNSUPPORTED]:
-                self._accept(engine, draw, answer, judgement)
-        self.cells.append(_cell(family, engine, judgements, perf_counter() - begun))
-        for verdict in BAD:
-            bad = [pair for pair in judgements if pair[1].counts[verdict] and pair[0].case]
-            if bad:
-                self._example(family, engine, verdict, *min(bad, key=lambda pair: _size(pair[0])))
-
-    def _accept(
-        self, engine: Engine, draw: Draw, answer: Answer | Failure, judgement: Judgement
-    ) -> None:
-        """Record whether an engine accepts contradictory geometry."""
-        tilt, truth = draw.specimen.tilt, draw.truth
-        if tilt is None or truth is None or truth.violated is None:
-            return
-        self.acceptances.append(
+    judgements: list[tuple[Draw, Judgement]] = []
+    for draw in draws:
+        one, truth = draw.specimen, draw.truth
+        if draw.case is None:
+            judgements.append((draw, refused_description(one, draw.samples)))
+            continue
+        answer = next(answers)
+        judgement = judged(one, draw.case, truth, answer)
+        judgements.append((draw, judgement))
+        unsupported = judgement.counts[Verdict.UNSUPPORTED]
+        if one.tilt is None or truth is None or truth.violated is None or unsupported:
+            continue
+        found.acceptances.append(
             Acceptance(
                 engine=engine.name,
-                tilt=tilt,
+                tilt=one.tilt,
                 accepted=not isinstance(answer, Failure) and answer.solved == draw.samples,
                 told=judgement.told,
                 unavoidable=float(truth.violated.max()),
             )
         )
-
-    def _example(
-        self, family: str, engine: Engine, verdict: Verdict, draw: Draw, judgement: Judgement
-    ) -> None:
-        case, sample = draw.case, judgement.first(verdict)
-        if case is None or sample is None:
-            raise ValueError("an example needs a case and a bad sample")
+    counts = [each.counts for _, each in judgements]
+    true = [each.worst for _, each in judgements if not each.counts[Verdict.SILENTLY_WRONG]]
+    found.cells.append(
+        Cell(
+            family=family,
+            engine=engine.name,
+            mode=engine.mode,
+            version=engine.version(),
+            settings=plain(engine.settings),
+            specimens=len(judgements),
+            samples={str(verdict): sum(each[verdict] for each in counts) for verdict in Verdict},
+            elsewhere=sum(each.elsewhere for _, each in judgements),
+            worst=largest(true),
+            bad=sum(any(each[verdict] for verdict in BAD) for each in counts),
+            seconds=perf_counter() - begun,
+        )
+    )
+    for verdict in BAD:
+        bad = [
+            (d, case, each) for d, each in judgements if each.counts[verdict] and (case := d.case)
+        ]
+        if not bad:
+            continue
+        draw, case, judgement = min(bad, key=lambda each: each[0].size)
+        sample = int(np.flatnonzero(judgement.verdicts == verdict)[0])
         finding = Finding(
             family=family,
             engine=engine.name,
@@ -211,50 +321,24 @@ class _Run:
             worst=list(judgement.worst),
         )
         solver = suited(engine, case, draw.number)
-        self.examples.append(Example(solver, draw.specimen, case, verdict, finding))
-
-    def prove(self, family: str, draws: Sequence[Draw]) -> None:
-        """Prove a random sample of every other small mechanism with a followed reference."""
-        rng, proved, worst = np.random.default_rng([self.seed, 1]), 0, 0.0
-        reasons: list[str] = []
-        for draw in draws[::2]:
-            truth = draw.truth
-            if truth is None or not truth.parts:
-                continue
-            reached = np.flatnonzero(truth.reach == Reach.REACHED)
-            if not len(reached) or len(truth.system.mechanism.moving) > LARGEST_PROVED:
-                continue
-            try:
-                worst = max(worst, distance_from_proof(truth, int(rng.choice(reached))))
-                proved += 1
-            except (UnprovedError, SolveError) as error:  # SolveError: near a singular design
-                reasons.append(f"{draw.specimen.name}: {error}")
-        if tried := proved + len(reasons):
-            self.proofs.append(
-                Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)
-            )
+        yield Example(solver, draw.specimen, case, verdict, finding)
 
 
-def _size(draw: Draw) -> tuple[int, int]:
-    mechanism = draw.case.mechanism if draw.case else None
-    return (len(mechanism.bodies), len(mechanism.joints)) if mechanism else (0, 0)
-
-
-def _cell(
-    family: str, engine: Engine, judgements: Sequence[tuple[Draw, Judgement]], seconds: float
-) -> Cell:
-    counts = [each.counts for _, each in judgements]
-    true = [each.worst for _, each in judgements if not each.counts[Verdict.SILENTLY_WRONG]]
-    return Cell(
-        family=family,
-        engine=engine.name,
-        mode=engine.mode,
-        version=engine.version(),
-        settings=plain(engine.settings),
-        specimens=len(judgements),
-        samples={str(verdict): sum(each[verdict] for each in counts) for verdict in Verdict},
-        elsewhere=sum(each.elsewhere for _, each in judgements),
-        worst=largest(true),
-        bad=sum(any(each[verdict] for verdict in BAD) for each in counts),
-        seconds=seconds,
-    )
+def _proofs(family: str, seed: int, draws: Sequence[Draw]) -> Iterator[Proofs]:
+    """Prove a random sample of every other small mechanism with a followed reference."""
+    rng, proved, worst = np.random.default_rng([seed, 1]), 0, 0.0
+    reasons: list[str] = []
+    for draw in draws[::2]:
+        truth = draw.truth
+        if truth is None or not truth.parts:
+            continue
+        reached = np.flatnonzero(truth.reach == Reach.REACHED)
+        if not len(reached) or len(truth.system.mechanism.moving) > LARGEST_PROVED:
+            continue
+        try:
+            worst = max(worst, distance_from_proof(truth, int(rng.choice(reached))))
+            proved += 1
+        except (UnprovedError, SolveError) as error:  # SolveError: near a singular design
+            reasons.append(f"{draw.specimen.name}: {error}")
+    if tried := proved + len(reasons):
+        yield Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)

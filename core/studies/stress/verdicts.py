@@ -1,11 +1,14 @@
-"""Verdicts on the samples of a specimen: correct, refused with the right or a wrong reason, or
-silently wrong.
+"""Answers of engines to specimens, and verdicts on their samples: correct, refused with the right
+or a wrong reason, or silently wrong.
+
+The native engine solves in this process, with machine code and with numpy; simulators solve in
+worker processes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -14,8 +17,12 @@ from numpy.typing import NDArray
 from ...case.case import Case
 from ...errors import KincheckError
 from ...failures import FailureKind
-from ...harness.execution import Answer, Failure
+from ...harness.engine import Engine, may_run_here
+from ...harness.execution import Answer, Failure, Pair, error_text
+from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
+from ...harness.resource_limits import Limits
+from ...harness.trajectory_check import check
 from ...trajectory import QUANTITIES, Array
 from ..truth.forces import known_forces
 from ..truth.motion import Reach, Truth
@@ -76,8 +83,7 @@ class Judgement:
 
     def first(self, verdict: Verdict) -> int | None:
         """Return the first sample with a verdict; None if there is none."""
-        found = np.flatnonzero(self.verdicts == verdict)
-        return int(found[0]) if len(found) else None
+        return next(iter(np.flatnonzero(self.verdicts == verdict).tolist()), None)
 
 
 def refused_description(specimen: Specimen, samples: int) -> Judgement:
@@ -104,12 +110,12 @@ def judged(
         if result.outcome is not Outcome.ERROR:  # a crash or a hang is not a valid refusal
             return _all(n, Verdict.REFUSED_WRONGLY, result.message)
         kinds = [] if result.kind is None else [result.kind]
-        return _refused(specimen, truth, n, kinds, result.message)
+        return Judgement(_refused(specimen, truth, n, kinds), message=result.message)
     shown = [output.name for output in case.outputs if not output.forces]
     points = list(dict.fromkeys(name.rpartition(".")[0] for name in shown))
     positions = {name: _moved(result, name, "position") for name in points}
     solved = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in positions.values()])
-    verdicts = _refused(specimen, truth, n, result.failures, result.message).verdicts
+    verdicts = _refused(specimen, truth, n, result.failures)
     if truth is None:
         verdicts[solved] = Verdict.SILENTLY_WRONG
         return Judgement(verdicts, message=result.message, elsewhere=int(solved.sum()))
@@ -185,13 +191,9 @@ def _judged_forces(
 
 
 def _refused(
-    specimen: Specimen,
-    truth: Truth | None,
-    n: int,
-    kinds: Collection[FailureKind],
-    message: str,
-) -> Judgement:
-    """Return the judgement of a refusal of all samples, by its reasons."""
+    specimen: Specimen, truth: Truth | None, n: int, kinds: Collection[FailureKind]
+) -> NDArray[np.object_]:
+    """Return the verdicts on a refusal of all samples, by its reasons."""
     named = not specimen.reasons.isdisjoint(kinds)
     ended = not MOTION_ENDS.isdisjoint(kinds)
     if truth is None:
@@ -199,10 +201,7 @@ def _refused(
     else:
         over = truth.singular | (truth.reach != Reach.REACHED)
         right = (over & ended) | (specimen.excused & named)
-    return Judgement(
-        np.where(right, Verdict.REFUSED_RIGHTLY, Verdict.REFUSED_WRONGLY).astype(object),
-        message=message,
-    )
+    return np.where(right, Verdict.REFUSED_RIGHTLY, Verdict.REFUSED_WRONGLY).astype(object)
 
 
 def _all(n: int, verdict: Verdict, message: str) -> Judgement:
@@ -214,3 +213,63 @@ def _moved(result: Answer, point: str, quantity: str) -> Array:
     series = [getattr(result.outputs[f"{point}.{axis}"], quantity) for axis in "xyz"]
     n = len(result.outputs[f"{point}.x"].position)
     return np.stack([np.full(n, np.nan) if each is None else each for each in series], axis=1)
+
+
+# Answers
+
+# Time limit of a sweep of this size [s]; a slower simulator counts as hanging.
+PATIENCE = 60.0
+MEMORY = 4.0
+# Numpy solves one mechanism in four up to this number of bodies: around singular poses it takes up
+# to ten times as long.
+INTERPRETED, LARGEST_INTERPRETED = 4, 4
+MOST_INTERPRETED = 2000
+"""Largest number of samples solved without compilation."""
+
+
+def suited(engine: Engine, case: Case, number: int) -> Engine:
+    """Return the native engine, interpreted for some of the small mechanisms, which tests both
+    executors. Return simulators unchanged.
+    """
+    small = (
+        len(case.mechanism.moving) <= LARGEST_INTERPRETED
+        and len(case.sweep.values) <= MOST_INTERPRETED
+    )
+    if isinstance(engine, NativeEngine) and number % INTERPRETED == INTERPRETED - 1 and small:
+        return interpreted(engine)
+    return engine
+
+
+def interpreted(engine: NativeEngine) -> NativeEngine:
+    """Return the native engine with numpy as executor: compilation does not pay for a single
+    solution.
+    """
+    return replace(engine, solver=replace(engine.solver, compiled=False))
+
+
+def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
+    """Return the answers in order; an error becomes a failure."""
+    found = {k: once(pair) for k, pair in enumerate(pairs) if may_run_here(pair.engine)}
+    if away := [k for k in range(len(pairs)) if k not in found]:
+        from ...harness.workers.pool import in_workers
+
+        untimed = [replace(pairs[k], timed=False) for k in away]
+        for k, attempt in in_workers(1, Limits(PATIENCE, MEMORY))(untimed):
+            found[away[k]] = attempt.result
+    return [found[k] for k in range(len(pairs))]
+
+
+def once(pair: Pair) -> Answer | Failure:
+    """Solve a pair once in this process, without timing."""
+    case, engine = pair.case, pair.engine
+    try:
+        reason = engine.unsupported(case)
+        if reason is not None:
+            return Failure(Outcome.UNSUPPORTED, reason)
+        trajectory = engine.solve(engine.build(case), case, pair.tol)
+        check(case, engine.name, trajectory)
+    except KincheckError as error:
+        return Failure(Outcome.ERROR, str(error), kind=error.kind)
+    except Exception as error:  # a defect
+        return Failure(Outcome.ERROR, error_text(error))
+    return Answer.of(pair, trajectory)

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from ...harness.labels import notes, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import Axis, driver_axis
-from ...report.figures import Figure, layout_over
+from ...report.figures import Figure, OverDriver, taken
 from ...report.sections import environment, figure_parts
 from ...unit_text import with_unit
 from .conformance import Capability, Histogram
@@ -23,6 +22,7 @@ DIGITS = 7
 """Digits of a drawn number: one more than the page shows when the reader points at a curve."""
 
 
+BLUE = "#0072B2"
 LIMIT: Figure = {"width": 1.5, "color": "#CC79A7", "dash": "8px,3px,2px,3px"}
 """Look of a specification limit."""
 # Bars of a tornado diagram: the largest effects.
@@ -144,66 +144,31 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
     Args:
         about_nominal: show the differences from the nominal design.
     """
-    envelope = view.envelope
-    traces: list[Figure] = []
+    envelope, drawn = view.envelope, OverDriver(axis)
 
-    def curve(values: list[float | None], driver: Any = "driver", **options: Any) -> None:
-        x, y = (values, driver) if axis.up else (driver, values)
-        traces.append({"type": "scatter", "mode": "lines", "x": x, "y": y, **options})
+    def shown(values: Numbers) -> list[float | None]:
+        if about_nominal:
+            pairs = zip(values, envelope.nominal, strict=True)
+            values = [None if None in (v, at) else v - at for v, at in pairs]  # pyright: ignore
+        return taken(values, axis.kept, view.scale, DIGITS)
 
-    def taken(values: Numbers) -> list[float | None]:
-        some = ((values[k], envelope.nominal[k] if about_nominal else 0.0) for k in axis.kept)
-        return [
-            None if v is None or at is None else float(f"{view.scale * (v - at):.{DIGITS}g}")
-            for v, at in some
-        ]
+    def add(name: str, values: Numbers, uid: str, width: float, colour: str, **dash: str) -> None:
+        line = {"width": width, "color": colour, **dash}
+        drawn.add(shown(values), name=name, line=line, uid=uid)
 
     for low, high, opacity in (("0.01", "0.99", 0.14), ("0.05", "0.95", 0.28)):
-        below, above = taken(envelope.quantiles[low]), taken(envelope.quantiles[high])
-        there = [
-            (a, b, d)
-            for a, b, d in zip(below, above, axis.shown, strict=True)
-            if a is not None and b is not None
-        ]
-        around: list[float | None] = [
-            *(a for a, _, _ in there),
-            *(b for _, b, _ in reversed(there)),
-        ]
-        ways = [d for _, _, d in there]
-        look: Figure = {
-            "fill": "toself",
-            "line": {"width": 0},
-            "hoverinfo": "skip",
-            "uid": f"band-{low}",
-        }
-        curve(around, ways + ways[::-1], **look, fillcolor=f"rgba(0,114,178,{opacity})")
-    for name, values in (("least", envelope.min), ("most", envelope.max)):
-        curve(
-            taken(values),
-            name=name,
-            line={"width": 1, "color": "#0072B2", "dash": "3px,3px"},
-            uid=f"s0-{name}",
-        )
-    curve(
-        taken(envelope.quantiles["0.5"]),
-        name="median",
-        line={"width": 2, "color": "#0072B2"},
-        uid="s0",
-    )
-    curve(
-        taken(envelope.nominal),
-        name="nominal",
-        line={"width": 1.5, "color": "#D55E00", "dash": "12px,5px"},
-        uid="s1",
-    )
+        ends = (shown(envelope.quantiles[each]) for each in (low, high))
+        drawn.add_band(*ends, uid=f"band-{low}", fillcolor=f"rgba(0,114,178,{opacity})")
+    add("least", envelope.min, "s0-least", 1, BLUE, dash="3px,3px")
+    add("most", envelope.max, "s0-most", 1, BLUE, dash="3px,3px")
+    add("median", envelope.quantiles["0.5"], "s0", 2, BLUE)
+    add("nominal", envelope.nominal, "s1", 1.5, "#D55E00", dash="12px,5px")
     if not about_nominal:
+        ends = [axis.shown[0], axis.shown[-1]]
         for name, limit in view.limits.items():
-            curve([limit, limit], [axis.shown[0], axis.shown[-1]], name=name, line=LIMIT, uid=name)
-    what = with_unit(
-        output_label(view.name) + (" less nominal" if about_nominal else ""), view.unit
-    )
-    value_axis: Figure = {"title": {"text": what}, "hoverformat": ".5g"}
-    return {"data": traces, "layout": layout_over(axis, value_axis)}
+            drawn.add([limit, limit], ends, name=name, line=LIMIT, uid=name)
+    name = output_label(view.name) + (" less nominal" if about_nominal else "")
+    return drawn.figure(with_unit(name, view.unit), hoverformat=".5g")
 
 
 def tornado_figure(view: OutputView) -> Figure:
@@ -219,7 +184,7 @@ def tornado_figure(view: OutputView) -> Figure:
         "type": "bar",
         "orientation": "h",
         "y": names,
-        "marker": {"color": "#0072B2"},
+        "marker": {"color": BLUE},
         "hovertemplate": "%{x:.3~g}",
     }
     traces = [
@@ -244,7 +209,7 @@ def histogram_figure(view: OutputView, found: Histogram) -> Figure:
         "y": found.counts,
         "width": [float(f"{high - low:.7g}") for low, high in pairs],
         "name": "variants",
-        "marker": {"color": "#0072B2"},
+        "marker": {"color": BLUE},
         "uid": "bars",
     }
     lines: list[Figure] = [

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...case.case import Case
 from ...trajectory import Array
-from .path import System, by_body
+from .motion import System, by_body
 from .rows import Poses, Real, nearest_turn
 
 # Step of the unknowns [units, rad]. Secants on the rate of time find a fold within a step.

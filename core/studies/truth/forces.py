@@ -24,8 +24,7 @@ from ...case.case import Case
 from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...trajectory import Array
-from .motion import ROUND_OFF, Truth, carried
-from .path import Solved, System
+from .motion import ROUND_OFF, Solved, System, Truth, carried
 from .rows import Real, cross, extended, inner, triad
 
 # Fractions of a unit multiplier: values below the first are round-off, values above the second are

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...kinematics import PoseState, prove_pose
 from ...program.ball_executor import flint, precision
-from .motion import Truth
-from .path import Solved
+from .motion import Solved, Truth
 from .rows import Real, Rows, extended, unit
 
 BITS = 160

@@ -95,6 +95,11 @@ def spun(w: Real, q: Real) -> Real:
     return np.concatenate([-inner(w, q[:, 1:])[:, None], vector], axis=1)
 
 
+def about(h: Real, angle: Real) -> Real:
+    """Return the quaternion of a turn about a unit vector, shape (4, n)."""
+    return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
+
+
 def nearest_turn(angles: Real, near: Real) -> Real:
     """Return angles with the full turns that bring them nearest to given ones [rad]."""
     return angles + 2.0 * PI * np.rint((near - angles) / (2.0 * PI))
@@ -217,17 +222,17 @@ class Rows:
         self._curves: list[tuple[int, int, float, Function]] = []
         self._constants: Any = []
         self._products: list[tuple[int, tuple[int, int], float, Any, Vector, Vector]] = []
-        self._turns: list[tuple[int, int, int]] = []
-        self._turn_weights: list[float] = []
-        self._axes: Any = []
+        self._turns: list[tuple[int, int, int, float, tuple[Real, Real, Real]]] = []
         self._write()
         rows, bodies, weights, lengths, *vectors = zip(*self._products, strict=True)
         self._row, self._bodies = np.array(rows), np.array(bodies)
         self._weight, self._length = extended(weights)[:, None], extended(lengths)[:, None]
         self._x, self._y = (Vector(*map(np.stack, zip(*each, strict=True))) for each in vectors)
-        self.turn_rows, self._i, self._j = np.array(self._turns, dtype=np.intp).reshape(-1, 3).T
-        self._turn_weight = extended(self._turn_weights)[:, None]
-        self._axes = np.moveaxis(extended(self._axes).reshape(-1, 3, 3), 1, 0)
+        turns = np.array([turn[:3] for turn in self._turns], dtype=np.intp)
+        self.turn_rows, self._i, self._j = turns.reshape(-1, 3).T
+        self._turn_weight = extended([turn[3] for turn in self._turns])[:, None]
+        axes = extended([turn[4] for turn in self._turns]).reshape(-1, 3, 3)
+        self._axes: Real = np.moveaxis(axes, 1, 0)
 
     # Writing
 
@@ -241,7 +246,7 @@ class Rows:
                     f" {', '.join(JOINTS)}"
                 )
             for condition in JOINTS[joint.type]:
-                condition(self, joint, *map(self.index, joint.bodies))
+                condition(Pair(self, joint, *map(self.index, joint.bodies)))
         for coupler in mechanism.couplers:
             row = self.row(coupler.name)
             units = [self.unit if each == "translation" else 1.0 for each in coupler.freedoms]
@@ -308,6 +313,7 @@ class Rows:
         x: Vector,
         y: Vector,
         weight: float = 1.0,
+        *,
         length: Any = 1.0,
         constant: Any = 0.0,
     ) -> None:
@@ -320,12 +326,10 @@ class Rows:
         (i, j), axes = map(self.index, joint.bodies), triad(joint.axis)
         if freedom == "rotation":
             self.turning.append(joint.name)
-            self._turns.append((row, i, j))
-            self._turn_weights.append(weight)
-            self._axes.append(axes)
+            self._turns.append((row, i, j, weight, axes))
         else:
             shift = self.line(i, j, joint.point, joint.point)
-            self.product(row, i, j, Vector.of(axes[2], -axes[2]), shift, weight)
+            self.product(row, i, j, on_i(axes[2]), shift, weight)
 
     # Values at poses
 
@@ -424,78 +428,103 @@ class Rows:
 # Joint types (formulation section 6)
 
 
-def _meet(rows: Rows, joint: Any, i: int, j: int) -> None:
+class Pair(NamedTuple):
+    """The rows, a joint, and the numbers of its bodies."""
+
+    rows: Rows
+    joint: Any
+    i: int
+    j: int
+
+    def row(self, x: Vector, y: Vector, **more: Any) -> None:
+        """Add a row of one product; see `Rows.product`."""
+        self.rows.product(self.rows.row(self.joint.name), self.i, self.j, x, y, **more)
+
+    def gap(self) -> Vector:
+        """Return the vector from the joint's point on i to that on j."""
+        point = getattr(self.joint, "point", None)
+        # a fixed joint may have no point: any point works
+        both = (self.rows.origin if point is None else point,) * 2
+        return self.rows.line(self.i, self.j, *(getattr(self.joint, "points", None) or both))
+
+
+def on_i(a: Real) -> Vector:
+    """Return a direction of body i."""
+    return Vector.of(a, -a)
+
+
+def on_j(a: Real) -> Vector:
+    """Return a direction of body j."""
+    return Vector.of(a, NO_ARM, a)
+
+
+def _meet(pair: Pair) -> None:
     """Keep the point of both bodies together."""
-    # a fixed joint may have no point: any point works
-    point = rows.origin if joint.point is None else joint.point
     for axis in GROUND_AXES:
-        gap = rows.line(i, j, point, point)
-        rows.product(rows.row(joint.name), i, j, Vector.of(axis), gap)
+        pair.row(Vector.of(axis), pair.gap())
 
 
-def _parallel(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _parallel(pair: Pair) -> None:
     """Keep the direction of the axis in both bodies."""
-    f, g, h = triad(joint.axis)
+    f, g, h = triad(pair.joint.axis)
     for a in (f, g):
-        rows.product(rows.row(joint.name), i, j, Vector.of(a, -a), Vector.of(h, second=h))
+        pair.row(on_i(a), on_j(h))
 
 
-def _alike(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _alike(pair: Pair) -> None:
     """Keep the relative orientation of the bodies."""
-    f, g, h = triad(getattr(joint, "axis", (0.0, 0.0, 1.0)))
+    f, g, h = triad(getattr(pair.joint, "axis", (0.0, 0.0, 1.0)))
     for a, b in ((g, h), (h, f), (f, g)):
-        rows.product(rows.row(joint.name), i, j, Vector.of(a, -a), Vector.of(b, second=b))
+        pair.row(on_i(a), on_j(b))
 
 
-def _line(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _line(pair: Pair) -> None:
     """Keep the point of j on the line of i."""
-    for a in triad(joint.axis)[:2]:
-        gap = rows.line(i, j, joint.point, joint.point)
-        rows.product(rows.row(joint.name), i, j, Vector.of(a, -a), gap)
+    for a in triad(pair.joint.axis)[:2]:
+        pair.row(on_i(a), pair.gap())
 
 
-def _plane(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _plane(pair: Pair) -> None:
     """Keep the distance of the point of j from the plane of i at its design value."""
-    h = triad(joint.axis)[2]
-    d = rows.line(i, j, *(getattr(joint, "points", None) or (joint.point, joint.point)))
-    rows.product(rows.row(joint.name), i, j, Vector.of(h, -h), d, constant=h @ d.start)
+    h, d = triad(pair.joint.axis)[2], pair.gap()
+    pair.row(on_i(h), d, constant=h @ d.start)
 
 
-def _angle(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _angle(pair: Pair) -> None:
     """Keep the angle between the axes."""
-    a, b = map(unit, joint.axes)
-    rows.product(
-        rows.row(joint.name), i, j, Vector.of(a, -a), Vector.of(b, second=b), constant=a @ b
-    )
+    a, b = map(unit, pair.joint.axes)
+    pair.row(on_i(a), on_j(b), constant=a @ b)
 
 
-def _length(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _length(pair: Pair) -> None:
     """Keep the distance between the points: (d . d - L^2) / 2 L."""
-    d, given = rows.line(i, j, *joint.points), getattr(joint, "length", None)
-    length = np.sqrt(d.start @ d.start) if given is None else extended(given) / rows.unit
-    rows.product(rows.row(joint.name), i, j, d, d, length=2.0 * length, constant=0.5 * length)
+    d, given = pair.gap(), getattr(pair.joint, "length", None)
+    length = np.sqrt(d.start @ d.start) if given is None else extended(given) / pair.rows.unit
+    pair.row(d, d, length=2.0 * length, constant=0.5 * length)
 
 
-def _twistless(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _twistless(pair: Pair) -> None:
     """Write f_i . g_j = g_i . f_j. The axes of shaft j are those of shaft i, turned by the shortest
     rotation.
     """
+    rows, joint, i, j = pair
     f, g, h = triad(joint.axes[0])
     k = unit(joint.axes[1])
     n, row = np.cross(h, k), rows.row(joint.name)
     for a, b, sign in ((f, g, 1.0), (g, f, -1.0)):
         turned = b + np.cross(n, b) + np.cross(n, np.cross(n, b)) / (1.0 + h @ k)
-        rows.product(row, i, j, Vector.of(a, -a), Vector.of(turned, second=turned), sign)
+        rows.product(row, i, j, on_i(a), on_j(turned), sign)
 
 
-def _thread(rows: Rows, joint: Any, i: int, j: int) -> None:
+def _thread(pair: Pair) -> None:
     """Set the displacement to the lead times the turns."""
+    rows, joint, *_ = pair
     row, pitch = rows.row(joint.name), joint.lead / (2.0 * math.pi)
     rows.coordinate(row, joint, "translation", 1.0)
     rows.coordinate(row, joint, "rotation", -pitch / rows.unit)
 
 
-JOINTS: Mapping[str, Sequence[Callable[[Rows, Any, int, int], None]]] = {
+JOINTS: Mapping[str, Sequence[Callable[[Pair], None]]] = {
     "revolute": (_meet, _parallel),
     "spherical": (_meet,),
     "universal": (_meet, _angle),
@@ -513,4 +542,4 @@ JOINTS: Mapping[str, Sequence[Callable[[Rows, Any, int, int], None]]] = {
     "revolute_spherical": (_length, _plane),
     "constant_velocity": (_meet, _twistless),
 }
-"""Joint type -> writers of its rows, for a joint between bodies i and j."""
+"""Joint type -> writers of its rows."""

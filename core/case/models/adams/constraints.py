@@ -1,11 +1,22 @@
-"""Joints and couplers of a dataset: constraints of two markers, and relations of two joints."""
+"""Joints and couplers of a dataset: constraints of two markers and their assembly, and relations of
+two joints.
+
+Adams Solver moves parts to agreement. So does the assembly: the least motion of all parts that
+closes the rows, by Gauss-Newton, from the parts as the dataset places them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import re
+import statistics
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from ....errors import shortened
 from ....joints import (
     ConstantVelocity,
     Coupler,
@@ -27,12 +38,245 @@ from ....joints import (
     linear_relation,
 )
 from ....joints.base import AxialJoint
+from ....trajectory import Array
+from ...curves import EXACT
 from ...io.document import explained
-from .assembly import ROWS, Link
-from .dataset import Statement
-from .forces import linear
-from .model import Coordinate, Model
-from .parts import coordinates
+from .dataset import Dataset, Statement
+from .functions import linear
+from .model import Coordinate, Frame, Marker, Model, Places, coordinates, rotations
+
+_POINT, _LINE, _PLANE = ("dx", "dy", "dz"), ("dx", "dy"), ("dz",)
+_AXIS, _FRAME = ("zx", "zy"), ("zx", "zy", "xy")
+ROWS: Mapping[str, Sequence[str]] = {
+    "REVOLUTE": (*_POINT, *_AXIS),
+    "TRANSLATIONAL": (*_LINE, *_FRAME),
+    "CYLINDRICAL": (*_LINE, *_AXIS),
+    "SPHERICAL": _POINT,
+    "UNIVERSAL": (*_POINT, "zz"),
+    "HOOKE": (*_POINT, "xy"),
+    "FIXED": (*_POINT, *_FRAME),
+    "PLANAR": (*_PLANE, *_AXIS),
+    "SCREW": (*_LINE, *_AXIS),
+    "CONVEL": (*_POINT, "xy-yx"),
+    "ATPOINT": _POINT,
+    "INLINE": _LINE,
+    "INPLANE": _PLANE,
+    "ORIENTATION": _FRAME,
+    "PARALLEL_AXES": _AXIS,
+    "PERPENDICULAR": ("zz",),
+    "DISTANCE": ("d",),
+}
+"""Rows of each kind: dx is what I is off J along J's x axis, zy the product of I's z and J's y."""
+MOST_STEPS, LONGEST_STEP = 100, 0.3
+# As in the assembly of other models: rounding of composed frames, what is too far, and gaps of
+# several joints that add up.
+CLOSED, FAR, ADDED_UP = 1e-12, 0.1, 10.0
+# Singular values of rows redundant within rounding.
+WEAK = 1e-9
+# What prints numbers writes six digits and more.
+FEWEST = 6
+_PLACED = ("QP", "QG", "ZP", "XP", "ZG", "XG", "REULER")
+MOST_TOLD = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A constraint of two markers.
+
+    Attributes:
+        length: of a DISTANCE [m].
+    """
+
+    statement: Statement
+    kind: str
+    i: Marker
+    j: Marker
+    length: float = 0.0
+
+    def frames(self, places: Places) -> tuple[Frame, Frame]:
+        """Return the frames of I and J, global."""
+        return self.i.place.seen_from(places[self.i.part]), self.j.place.seen_from(
+            places[self.j.part]
+        )
+
+    @property
+    def rows(self) -> Sequence[str]:
+        """Its rows; without the x axes if one of them is not known."""
+        known = self.i.place.turned and self.j.place.turned
+        return [row for row in ROWS[self.kind] if known or not row.startswith("xy")]
+
+
+def tolerance_of(dataset: Dataset, size: float) -> tuple[float, str]:
+    """Return the gaps that the digits of a dataset leave [m], and why.
+
+    Numbers of six digits and more count, half of which have as many or more; without any, those
+    that somebody set are exact.
+    """
+    placed = (
+        statement.values.get(name, "")
+        for statement in dataset.of("PART", "MARKER")
+        for name in _PLACED
+    )
+    numbers = re.findall(r"[\d.]+", " ".join(placed))
+    counts = [len(each.replace(".", "").strip("0")) for each in numbers]
+    counts = [count for count in counts if count >= FEWEST]
+    digits = int(statistics.median(counts)) if counts else EXACT
+    limit = size * min(1e-5, max(CLOSED, 10.0 ** (1 - digits)))
+    return limit, f"the file's digits, {digits}: {limit:.2g} m"
+
+
+def size_of(model: Model) -> float:
+    """Return the largest extent of the markers along an axis [m]."""
+    points = [model.frame(each).origin for each in model.markers.values()]
+    extent = float(np.ptp(np.array(points), axis=0).max()) if points else 0.0
+    return extent if extent > 1e-9 else 1.0
+
+
+def assembled(model: Model, links: Sequence[Link], size: float, tolerance: float) -> Model:
+    """Return the dataset with both markers of each link together, with a note on how far they were
+    apart unless they agreed.
+
+    Raises:
+        CaseError: axes point in opposite directions, the markers are too far apart, or cannot be
+            brought together.
+    """
+    gaps = dict[str, tuple[float, float]]()
+    for link in links:
+        _require_same_sense(link, model.places)
+        gaps[link.statement.name] = _gap(link, model.places)
+    opened = {name: gap for name, gap in gaps.items() if max(gap[0], size * gap[1]) > CLOSED * size}
+    if not opened:
+        return model
+    for link in links:
+        shift, turn = gaps[link.statement.name]
+        if shift > FAR * size or turn > FAR:
+            raise link.statement.fault(
+                f"its markers {link.i} and {link.j} are {_apart(shift, turn)} apart at the start,"
+                f" expected {FAR * size:.3g} m and {math.degrees(FAR):.2g} degrees at most; Adams"
+                " assembles them first: save the dataset after its assembly, or correct a marker"
+            )
+    found = _closed(model, links, size, max(WEAK, ADDED_UP * tolerance / size))
+    for link in links:
+        shift, turn = _gap(link, found)
+        if max(shift, size * turn) > max(ADDED_UP * tolerance, CLOSED * ADDED_UP * size):
+            raise link.statement.fault(
+                f"its markers {link.i} and {link.j} cannot be brought together: they are"
+                f" {_apart(*gaps[link.statement.name])} apart as the dataset places them, and"
+                f" {_apart(shift, turn)} in the nearest assembly; correct a marker or a part"
+            )
+    told = sorted(opened.items(), key=lambda each: -max(each[1][0], size * each[1][1]))
+    moves = shortened([f"{name} by {_apart(*gap)}" for name, gap in told], MOST_TOLD)
+    model.note(f"markers that were apart at the start are assembled: {moves}")
+    return replace(model, places=found)
+
+
+def _apart(shift: float, turn: float) -> str:
+    parts = [f"{shift:.3g} m"] if shift or not turn else []
+    return " and ".join([*parts, *([f"{math.degrees(turn):.3g} degrees"] if turn else [])])
+
+
+def _require_same_sense(link: Link, places: Places) -> None:
+    if link.kind == "PARALLEL_AXES":
+        return
+    i, j = link.frames(places)
+    pairs = {"zx": ("z", i.z, j.z), "xy": ("x", i.x, j.x)}
+    for row in link.rows:
+        if row in pairs and link.kind != "HOOKE":
+            axis, one, other = pairs[row]
+            if one @ other <= 0.0:
+                angle = math.degrees(math.acos(max(-1.0, float(one @ other))))
+                raise link.statement.fault(
+                    f"the {axis} axes of its markers {link.i} and {link.j} are {angle:.3g} degrees"
+                    " apart, expected the same direction; turn one of the markers"
+                )
+
+
+def _gap(link: Link, places: Places) -> tuple[float, float]:
+    """Return how far the markers of a link are apart [m, rad]."""
+    i, j = link.frames(places)
+    values = {row: _residual(row, i, j, link.length) for row in link.rows}
+    shift = math.hypot(*(x for row, x in values.items() if row[0] == "d"), 0.0)
+    sine = math.hypot(*(x for row, x in values.items() if row[0] != "d"), 0.0)
+    return shift, math.asin(min(1.0, sine))
+
+
+def _products(row: str, i: Frame, j: Frame) -> list[tuple[float, Array, Array]]:
+    """Return sign, axis of I and axis of J of the products of a row."""
+    terms = [(1.0, row[:2]), (-1.0, row[3:])] if "-" in row else [(1.0, row)]
+    return [(sign, getattr(i, a), getattr(j, b)) for sign, (a, b) in terms]
+
+
+def _residual(row: str, i: Frame, j: Frame, length: float) -> float:
+    apart = i.origin - j.origin
+    if row == "d":
+        return float(np.linalg.norm(apart)) - length
+    if row[0] == "d":
+        return float(apart @ getattr(j, row[1]))
+    return float(sum(sign * (a @ b) for sign, a, b in _products(row, i, j)))
+
+
+def _slopes(row: str, i: Frame, j: Frame, arms: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the derivatives of a row by shift and turn of I's part and of J's, shape (6,) each."""
+    if row[0] == "d":
+        apart = i.origin - j.origin
+        e = apart / (np.linalg.norm(apart) or 1.0) if row == "d" else getattr(j, row[1])
+        of_i = np.concatenate([e, np.cross(arms[0], e)])
+        return of_i, -np.concatenate([e, np.cross(arms[1] + apart, e)])
+    turn = sum((s * np.cross(a, b) for s, a, b in _products(row, i, j)), np.zeros(3))
+    of_i = np.concatenate([np.zeros(3), turn])
+    return of_i, -of_i
+
+
+def _rows(
+    links: Sequence[Link], places: Places, columns: Mapping[int, int], size: float
+) -> Iterator[tuple[float, Array]]:
+    """Yield residual and derivatives of all rows, lengths over the size."""
+    for link in links:
+        i, j = link.frames(places)
+        arms = [f.origin - places[m.part].origin for f, m in ((i, link.i), (j, link.j))]
+        for row in link.rows:
+            unit = size if row[0] == "d" else 1.0
+            slope = np.zeros(6 * len(columns))
+            for marker, part in zip((link.i, link.j), _slopes(row, i, j, arms), strict=True):
+                if marker.part in columns:
+                    first = columns[marker.part]
+                    scaled = np.concatenate([size * part[:3], part[3:]]) / unit
+                    slope[first : first + 6] += scaled
+            yield _residual(row, i, j, link.length) / unit, slope
+
+
+def _closed(model: Model, links: Sequence[Link], size: float, weak: float) -> dict[int, Frame]:
+    """Return the frames of the nearest assembly found.
+
+    Args:
+        weak: singular values below this are of rows redundant within the digits.
+    """
+    places = model.places
+    columns = {part: 6 * k for k, part in enumerate(sorted({*places} - {model.ground}))}
+    free = np.ones(6 * len(columns))
+    for part, first in columns.items():
+        exact = model.dataset.statements["PART"][part].values.get("EXACT", "").upper()
+        held = {word.strip() for word in re.split(r"[:,\x1f]", exact)}
+        free[first : first + 3] = [letter not in held for letter in "XYZ"]
+        free[first + 3 : first + 6] = held.isdisjoint(("PSI", "THETA", "PHI"))
+    found, best, least = {**places}, {**places}, math.inf
+    for _ in range(MOST_STEPS):
+        residuals, slopes = map(np.array, zip(*_rows(links, found, columns, size), strict=True))
+        left = float(np.abs(residuals).max())
+        if left < least:
+            best, least = {**found}, left
+        elif left < 1e-9:
+            break
+        step = -free * np.linalg.lstsq(slopes * free, residuals, rcond=weak)[0]
+        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        for part, first in columns.items():
+            shift, turn = size * step[first : first + 3], step[first + 3 : first + 6]
+            old = found[part]
+            found[part] = Frame(
+                old.origin + shift, rotations().from_rotvec(turn).as_matrix() @ old.axes, old.turned
+            )
+    return best
+
 
 _AXIAL = {
     "REVOLUTE": Revolute,
@@ -55,8 +299,8 @@ def read_links(model: Model) -> list[Link]:
     Raises:
         CaseError: a marker is missing, or the type or function is not read.
     """
-    found: list[Link] = []
-    for each in (*model.dataset.of("JOINT"), *model.dataset.of("JPRIM")):
+    found = list[Link]()
+    for each in model.dataset.of("JOINT", "JPRIM"):
         kind = each.choice(*_TYPES, "RACKPIN")
         if not kind:
             raise each.fault(f"found no type, expected one of {', '.join(_TYPES)}; state it")
@@ -83,41 +327,34 @@ def joint_of(model: Model, link: Link) -> Joint:
     bodies = model.body(link.j), model.body(link.i)
     one, other = model.frame(link.i), model.frame(link.j)
     point, axis = coordinates(one.origin), coordinates(other.z)
+    z, lead = coordinates(one.z), 0.0
+    if kind == "SCREW":
+        lead = model.units.length * link.statement.one("PITCH")
+    known: Mapping[str, tuple[Any, ...]] = {
+        "SPHERICAL": (Spherical, point),
+        "ATPOINT": (Spherical, point),
+        "FIXED": (Fixed, point),
+        "UNIVERSAL": (Universal, point, (axis, z)),
+        "HOOKE": (Universal, point, (coordinates(other.y), coordinates(one.x))),
+        # both z axes point away from the centre
+        "CONVEL": (ConstantVelocity, point, (coordinates(-other.z), z)),
+        "SCREW": (Screw, point, axis, lead),
+        "ORIENTATION": (OrientationLock,),
+        "PARALLEL_AXES": (ParallelAxes, axis),
+        "PERPENDICULAR": (PerpendicularAxes, (axis, z)),
+        "DISTANCE": (Distance, (coordinates(other.origin), point), link.length),
+    }
+    made: Any = known.get(kind) or (_AXIAL[kind], point, axis)
+    cls, *geometry = made
     with explained(link.statement.file, link.statement.label):
-        if cls := _AXIAL.get(kind):
-            return cls(name, *bodies, point, axis)
-        match kind:
-            case "SPHERICAL" | "ATPOINT":
-                return Spherical(name, *bodies, point)
-            case "FIXED":
-                return Fixed(name, *bodies, point)
-            case "UNIVERSAL":
-                return Universal(name, *bodies, point, (axis, coordinates(one.z)))
-            case "HOOKE":
-                pair = coordinates(other.y), coordinates(one.x)
-                return Universal(name, *bodies, point, pair)
-            case "CONVEL":  # both z axes point away from the centre
-                pair = coordinates(-other.z), coordinates(one.z)
-                return ConstantVelocity(name, *bodies, point, pair)
-            case "SCREW":
-                lead = model.units.length * link.statement.one("PITCH")
-                return Screw(name, *bodies, point, axis, lead)
-            case "ORIENTATION":
-                return OrientationLock(name, *bodies)
-            case "PARALLEL_AXES":
-                return ParallelAxes(name, *bodies, axis)
-            case "PERPENDICULAR":
-                return PerpendicularAxes(name, *bodies, (axis, coordinates(one.z)))
-            case _:
-                ends = coordinates(other.origin), coordinates(one.origin)
-                return Distance(name, *bodies, ends, link.length)
+        return cls(name, *bodies, *geometry)
 
 
 def coordinates_of(
     model: Model, links: Sequence[Link], joints: Mapping[str, Joint]
 ) -> list[Coordinate]:
     """Return the coordinates of all joints, to be driven."""
-    found: list[Coordinate] = []
+    found = list[Coordinate]()
     for link in links:
         joint = joints[link.statement.name]
         if not isinstance(joint, AxialJoint) or link.kind == "PLANAR":
@@ -136,7 +373,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
     Raises:
         CaseError: a joint has no such coordinate, or the geometry does not say how they couple.
     """
-    found: list[Coupler] = []
+    found = list[Coupler]()
     for each in model.dataset.of("COUPLER"):
         pair = _coupled(each, driven)
         scales = each.numbers("SCALES") if "SCALES" in each.values else []
@@ -153,7 +390,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
         found.append(_coupler(each, pair, weights))
         off = sum(w * one.value for w, one in zip(weights, pair, strict=True))
         if abs(off) > _ROUNDED * sum(map(abs, weights)):
-            model.dataset.notes.append(
+            model.note(
                 f"{each.name}: the scaled sum of its joints' coordinates is {off:.6g} at the start,"
                 " and stays so: joints are coupled from the start"
             )
@@ -172,7 +409,7 @@ def _coupled(statement: Statement, driven: Sequence[Coordinate]) -> list[Coordin
     types = statement.values.get("TYPE", "").upper().replace(",", ":").split(":")
     if not 2 <= len(names) <= 2 + (statement.kind == "COUPLER"):
         raise statement.fault(f"JOINTS: found {len(names)}, expected two; correct it")
-    found: list[Coordinate] = []
+    found = list[Coordinate]()
     for k, name in enumerate(names):
         wanted = {"T": "translation", "R": "rotation"}.get(
             types[k].strip()[:1] if types[k:] else ""
@@ -209,7 +446,7 @@ def _gear_weights(
     """Return weights with which both gears have one velocity along z of the marker CV."""
     marker = model.marker(statement, "CV")
     contact, carrier = model.frame(marker), model.body(marker)
-    found: list[float] = []
+    found = list[float]()
     for one in pair:
         arm = contact.origin - np.array(one.joint.point)
         speed = np.cross(one.axis, arm) if one.turns else one.axis
@@ -245,7 +482,7 @@ def _rack(statement: Statement, model: Model, driven: Sequence[Coordinate]) -> C
         )
     for body, each in ((model.body(pinion), one), (model.body(rack), other)):
         speed = speed if body == each.joint.j else -speed
-    model.dataset.notes.append(
+    model.note(
         f"{statement.name}: the rack rolls on the side of the pinion where {rack} lies, whatever"
         " the sign of PD"
     )

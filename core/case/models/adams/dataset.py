@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ....errors import CaseError, remedy
@@ -133,6 +133,18 @@ class Statement:
             raise self.fault(f"{name}: found {given}, expected an identifier; correct it")
         return [*map(int, words)]
 
+    def id_of(self, name: str) -> int:
+        """Return the only identifier of an argument.
+
+        Raises:
+            CaseError: it is missing, or there are several.
+        """
+        wanted, *more = self.ids(name)
+        if more:
+            problem = f"found {1 + len(more)} identifiers, expected one; correct it"
+            raise self.fault(f"{name}: {problem}")
+        return wanted
+
     def choice(self, *names: str) -> str:
         """Return which of some flags it has; empty without any.
 
@@ -172,7 +184,7 @@ class Statement:
 
 def _in_call(text: str) -> bool:
     """Return whether the end of a text is among the arguments of a function."""
-    stack: list[bool] = []
+    stack = list[bool]()
     for k, letter in enumerate(text):
         if letter == "(":
             stack.append(text[:k].rstrip()[-1:].isalnum())
@@ -203,30 +215,22 @@ class Dataset:
     without: Sequence[str]
     notes: list[str]
 
-    def of(self, kind: str) -> list[Statement]:
-        """Return the statements of a kind."""
-        return [*self.statements.get(kind, {}).values()]
+    def of(self, *kinds: str) -> list[Statement]:
+        """Return the statements of some kinds."""
+        return [each for kind in kinds for each in self.statements.get(kind, {}).values()]
 
     def once(self, kind: str) -> Statement | None:
         """Return the only statement of a kind, or None."""
         return next(iter(self.of(kind)), None)
 
-    def one_id(self, owner: Statement, name: str) -> int:
-        """Return the identifier of an argument.
-
-        Raises:
-            CaseError: it is missing, or there are several.
+    def member(
+        self, owner: Statement, name: str, kind: str, wanted: int | None = None
+    ) -> Statement:
+        """Return a statement by its identifier, by default that in the argument `name` of `owner`,
+        which needs it.
         """
-        (wanted, *more) = owner.ids(name)
-        if more:
-            raise owner.fault(
-                f"{name}: found {1 + len(more)} identifiers, expected one; correct it"
-            )
-        return wanted
-
-    def member(self, owner: Statement, name: str, kind: str, wanted: int) -> Statement:
-        """Return a statement by its identifier; `owner` needs it in the argument `name`."""
         known = self.statements.get(kind, {})
+        wanted = owner.id_of(name) if wanted is None else wanted
         if wanted not in known:
             raise owner.fault(
                 f"{name} = {wanted}: there is no {kind}/{wanted}, expected one of the dataset;"
@@ -246,8 +250,8 @@ def read_dataset(file: Path, text: str, without: Collection[str]) -> Dataset:
     """
     title, lines = _title(file, text)
     wanted = {name.upper() for name in without}
-    used: set[str] = set()
-    found: dict[str, dict[int, Statement]] = {}
+    used = set[str]()
+    found = dict[str, dict[int, Statement]]()
     left_out = Counter[str]()
     for count, (line, statement) in enumerate(_joined(file, lines)):
         if count > MOST_STATEMENTS:
@@ -375,8 +379,8 @@ def full_name(word: str, known: Collection[str]) -> str:
 def _arguments(bare: Statement, rest: str) -> Statement:
     """Return the statement with the arguments of its text."""
     known = ARGUMENTS[bare.kind].split()
-    values: dict[str, str] = {}
-    flags: list[str] = []
+    values = dict[str, str]()
+    flags = list[str]()
     current = ""
     for part in _parts(rest):
         separator, text = part[:1], part[1:]
@@ -406,7 +410,7 @@ def _arguments(bare: Statement, rest: str) -> Statement:
                 )
             flags.append(flag)
             current = ""
-    return Statement(bare.file, bare.kind, bare.id, bare.line, values, flags)
+    return replace(bare, values=values, flags=flags)
 
 
 def _parts(text: str) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from ....errors import shortened
@@ -14,13 +13,21 @@ from ...closing import within_digits
 from ...io.document import explained, fault
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, WITHOUT, Supplied
-from .assembly import ADDED_UP, CLOSED, WEAK, assembled, size_of, tolerance_of
-from .constraints import coordinates_of, joint_of, read_couplers, read_links
+from .constraints import (
+    ADDED_UP,
+    CLOSED,
+    WEAK,
+    assembled,
+    coordinates_of,
+    joint_of,
+    read_couplers,
+    read_links,
+    size_of,
+    tolerance_of,
+)
 from .dataset import Dataset, read_dataset
-from .drives import read_drives, read_motions
-from .forces import read_forces
-from .model import Model
-from .parts import Units, read_bodies, read_markers, read_places, read_units
+from .functions import read_drives, read_forces, read_motions
+from .model import Model, Units, read_bodies, read_markers, read_places, read_units
 
 _LONGEST_TITLE, _MOST_NAMED = 80, 12
 
@@ -37,18 +44,14 @@ def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
     if dataset.without:
         dataset.notes.append(f"{WITHOUT}{', '.join(dataset.without)}")
     units = read_units(dataset)
-    places, ground = read_places(dataset, units)
-    markers = read_markers(dataset, units)
-    model = Model(dataset, units, places, ground, markers)
+    model = Model(dataset, units, *read_places(dataset, units), read_markers(dataset, units))
     links = read_links(model)
-    size = size_of(markers.values(), places)
+    size = size_of(model)
     tolerance, why = tolerance_of(dataset, size)
     if supplied.closure is not None:
         tolerance, why = supplied.closure, "--closure"
-    places, note = assembled(dataset, links, places, {*places} - {ground}, size, tolerance)
-    dataset.notes.extend([note] * bool(note))
-    model = replace(model, places=places)
-    bodies = read_bodies(dataset, units, places, ground, markers)
+    model = assembled(model, links, size, tolerance)
+    bodies = read_bodies(model)
     joints = {link.statement.name: joint_of(model, link) for link in links}
     driven = coordinates_of(model, links, joints)
     couplers = read_couplers(model, driven)

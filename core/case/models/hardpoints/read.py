@@ -25,12 +25,22 @@ from ...notes import SUSPENSIONS
 from ...quantity import with_markers
 from ...suspension import Side
 from ...units import plain
-from .axle import AxleMotion, mechanism_of, read_travels, sides_of
-from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
+from .design import (
+    AxleMotion,
+    far_out,
+    hardpoints_of,
+    mechanism_of,
+    read_travels,
+    sides_of,
+    vehicle_of,
+    with_axis,
+    with_suspension_outputs,
+)
 from .rubber import of_chrono, with_file, with_rubber
-from .shims import no_bump_steer, shims
+from .shims import shims
 from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
 from .templates import (
+    NAMES,
     TEMPLATE_NAMES,
     TEMPLATES,
     WHEEL_CENTER,
@@ -52,20 +62,8 @@ MOST_POINTS = 10_000
 LARGEST_NAMES = 100_000
 # Names as alike as this are taken for misspelt or abridged ones.
 LIKE = 0.75
-_OPPOSITES = (("upper", "lower"), ("front", "rear"), ("inner", "outer"), ("center", "contact"))
 _SPELLINGS: Mapping[str, str] = {
-    other: word
-    for word, others in (
-        ("upper", "upper upp up top u uca uwb"),
-        ("lower", "lower low lwr bottom bot l lca lwb"),
-        ("front", "front frnt fore fwd f"),
-        ("rear", "rear aft back r"),
-        ("inner", "inner inboard in inn chassis body rack i"),
-        ("outer", "outer outboard out outr upright knuckle hub o"),
-        ("center", "center centre cent ctr cntr"),
-        ("contact", "contact cont patch ground road"),
-    )
-    for other in others.split()
+    other: word for word, others in NAMES["spellings"].items() for other in others
 }
 
 
@@ -139,10 +137,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    turned, unsteered = (
-        each(template, at, vehicle.static_toe, vehicle.static_camber)
-        for each in (shims, no_bump_steer)
-    )
+    turned, unsteered = shims(template, at, vehicle.static_toe, vehicle.static_camber)
     hardpoints = hardpoints_of(
         named, at, axes, lambda at: with_markers(design(at)[0], case.outputs), turned, unsteered
     )
@@ -281,7 +276,7 @@ def _filled(
     own = supplied.names
     new = own is not None and not own.exists()
     named = _points_by_role(table)
-    filled: dict[str, str] = {}
+    filled = dict[str, str]()
     if own is not None and not new:
         filled |= _read_own_names(
             own, [role.name for role in (*template.roles, *template.optional)], table.points
@@ -301,8 +296,11 @@ def _filled(
             filled[role.name] = found[0]
     missing = [role for role in template.roles if role.name not in filled]
     unused = {compact(name): name for name in table.points if name not in filled.values()}
-    near = {role.name: _nearest(role, unused) for role in missing}
-    told: list[str] = []
+    near = dict[str, str]()
+    for role in missing:
+        close = (found for each in role.names if (found := similar(each, unused, LIKE)))
+        near[role.name] = unused.get(next(close, ""), "")
+    told = list[str]()
     distinct = len({*near.values()}) == len(near)
     sure = distinct and all(_fits(role, name) for role, name in near.items())
     if missing and sure and not supplied.ask_names:
@@ -315,7 +313,7 @@ def _filled(
         told.append(f"{own}: written, with the names of the points by role")
     if not missing:
         return filled, told
-    lines: list[str] = []
+    lines = list[str]()
     for role in missing:
         name = near[role.name]
         where = table.points[name].where if name else ""
@@ -334,8 +332,8 @@ def _filled(
 
 def _points_by_role(table: HardpointTable) -> Callable[[Role], list[str]]:
     """Return what gives the points with a name of a role, or else with one and their side."""
-    by_compact_name: dict[str, list[str]] = {}
-    by_side_name: dict[str, list[str]] = {}
+    by_compact_name = dict[str, list[str]]()
+    by_side_name = dict[str, list[str]]()
     sides = [side for _, side in map(side_of, table.points)]
     wheel = table.side or ("right" if "left" not in sides else "left")
     for name in table.points:
@@ -359,18 +357,12 @@ def _fills(table: HardpointTable, template: Template) -> bool:
     return all(len(each) == 1 for each in found) and len({each[0] for each in found}) == len(found)
 
 
-def _nearest(role: Role, unused: Mapping[str, str]) -> str:
-    """Return the name of the point most like a name of a role; empty without one."""
-    close = [found for each in role.names if (found := similar(each, unused, LIKE))]
-    return unused[close[0]] if close else ""
-
-
 def _fits(role: str, name: str) -> bool:
     """Return whether a point's name says nothing else than a role: not lower for upper."""
     words, others = _words(role), _words(name)
     return bool(name) and all(
         not (words & kind and others & kind) or words & kind == others & kind
-        for kind in map(frozenset, _OPPOSITES)
+        for kind in map(frozenset, NAMES["opposites"].items())
     )
 
 

@@ -33,7 +33,7 @@ from ...io.table import (
     trimmed,
 )
 from ...units import LENGTHS
-from .matlab import plain_lines
+from .programs import plain_lines
 from .table import (
     Hardpoint,
     HardpointTable,
@@ -106,7 +106,7 @@ def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoint
         CaseError: no head, or a row at odds with the head.
     """
     table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
-    facts: dict[str, str] = {}
+    facts = dict[str, str]()
     for comment in table.comments:
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
         if fact := fact_of(_SIGNS.sub(",", bare)):
@@ -231,7 +231,7 @@ def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied
             " the points, or a name and x, y, z alone in each row",
         )
     head, above, body = parts
-    left_out: list[str] = []
+    left_out = list[str]()
     for where, cells in above:
         if fact := fact_of(_written([cell for cell in cells if cell != ""])):
             facts.setdefault(*fact)
@@ -260,7 +260,7 @@ def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied
             )
     chosen, body, others = _of_one_corner(file, head, body, supplied.corner)
     left_out += others
-    found: list[tuple[str, str, Sequence[Cell]]] = []
+    found = list[tuple[str, str, Sequence[Cell]]]()
     for where, cells in body:
         own = [cells[k] if k < len(cells) else "" for k in head.columns]
         role = isinstance(own[0], str) and compact(own[0]) in ROLES
@@ -294,7 +294,7 @@ def _of_one_corner(
     places = head.of_corners
     if not places or not body:
         return None, body, []
-    corners: list[tuple[str, str]] = []
+    corners = list[tuple[str, str]]()
     above = dict.fromkeys(places, "")
     for _, cells in body:
         above |= {k: str(cells[k]) for k in places if k < len(cells) and cells[k] != ""}
@@ -323,8 +323,8 @@ def _points(
     file: Path, rows: Sequence[tuple[str, str, Sequence[Cell]]], grouping: str
 ) -> dict[str, Hardpoint]:
     """Return the points of rows: place, name, and coordinates each."""
-    lines: dict[str, str] = {}
-    cells: list[tuple[str, Cell]] = []
+    lines = dict[str, str]()
+    cells = list[tuple[str, Cell]]()
     for where, name, coordinates in rows:
         require_name(file, where, name)
         if name in lines:
@@ -397,8 +397,8 @@ def _parts(file: Path, rows: Sequence[Row]) -> _Parts | None:
 
 def _as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     """Return the head of these fields; None if they are not a head."""
-    columns: dict[str, int] = {}
-    units: set[str | None] = set()
+    columns = dict[str, int]()
+    units = set[str | None]()
     texts = [cell if isinstance(cell, str) else "" for cell in cells]
     if sum(text.lower() == "x" for text in texts) > 2:  # a column of the coordinates' names
         return None
@@ -448,9 +448,9 @@ def _column(text: str) -> tuple[str, str | None]:
 
 def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
     """Return the points of rows with one coordinate each."""
-    points: dict[str, dict[str, tuple[str, Cell]]] = {}
-    units: dict[str, str] = {}
-    others: list[Row] = []
+    points = dict[str, dict[str, tuple[str, Cell]]]()
+    units = dict[str, str]()
+    others = list[Row]()
     for where, cells in rows:
         if (coordinate := _coordinate(cells)) is None:
             others.append((where, cells))
@@ -476,7 +476,7 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
     texts = (cell for _, cells in others for cell in cells if isinstance(cell, str))
     stated = (unit for text in texts if length_name(unit := split_head(text)[1]) in LENGTHS)
     unit = one_unit(file, units) or next(stated, None)
-    body: list[Row] = []
+    body = list[Row]()
     for name, place in points.items():
         if name in whole:
             body.append((place["x"][0], [name, *(place[axis][1] for axis in "xyz")]))
@@ -508,8 +508,8 @@ def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | Non
 
 def _by_point(file: Path, rows: Sequence[Row]) -> _Parts | None:
     """Return rows of a name and three numbers, or of three numbers and a name."""
-    body: list[Row] = []
-    others: list[Row] = []
+    body = list[Row]()
+    others = list[Row]()
     for where, cells in rows:
         filled = [cell for cell in cells if cell != ""]
         numbers = [k for k, cell in enumerate(filled) if is_number(cell)]

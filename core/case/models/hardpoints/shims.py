@@ -27,27 +27,37 @@ _AXES = np.eye(3)
 
 def shims(
     template: Template, at: Mapping[str, Vector], toe: float, camber: float
-) -> dict[str, Array]:
-    """Return the derivatives of toe, camber and, where two points make the steering axis, caster
-    [rad/m] by the position of each joint, by role and then by x, y and z, shape (2 or 3, 3);
-    nothing for a carrier that is held otherwise.
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return by role what the position of a joint does; nothing for a carrier that is held
+    otherwise.
+
+    First the derivatives of toe, camber and, where two points make the steering axis, caster
+    [rad/m] by x, y and z of each joint that a shim moves, shape (2 or 3, 3). Then, for each end of
+    the tie rod, by how much it leaves no bump steer at design, to first order, if it is moved alone
+    in the table along x, y or z [m], shape (3,); infinite where that has no effect.
 
     Args:
         at: positions by role of a left wheel [m].
         toe, camber: at design, if no point states the wheel's axis [rad].
     """
     places = {role: np.array(place) for role, place in at.items()}
-    held = _held(template, places)
+    # the height of the wheel's centre is held too
+    held: list[Held] = [*_joints(template, places), (WHEEL_CENTER, _AXES[2], {})]
     if len(held) != 6:
-        return {}
-    x, y, z = _spin(places, toe, camber)
-    moved = dict.fromkeys(role for *_, movers in held for role in movers)
-    found: dict[str, Array] = {}
-    for role in moved:
+        return {}, {}
+    spin = np.array([np.sin(toe), np.cos(toe), -np.tan(camber)])
+    if WHEEL_AXIS in places:
+        spin = places[WHEEL_AXIS] - places[WHEEL_CENTER]
+    spin = spin / np.linalg.norm(spin)
+    x, y, _ = spin
+    arms = [places[role] - places[WHEEL_CENTER] for role, _, _ in held]
+    rows = np.array([np.r_[n, np.cross(r, n)] for (_, n, _), r in zip(held, arms, strict=True)])
+    found = dict[str, Array]()
+    for role in dict.fromkeys(role for *_, movers in held for role in movers):
         right = np.array([movers.get(role, 0.0) * n for _, n, movers in held])
-        solved = np.asarray(np.linalg.solve(_rows(held, places), right), float)
+        solved = np.asarray(np.linalg.solve(rows, right), float)
         v, turns = solved.reshape(2, 3, 3)  # by x, y and z of the joint
-        dx, dy, dz = np.cross(turns.T, (x, y, z)).T
+        dx, dy, dz = np.cross(turns.T, spin).T
         angles = [(y * dx - x * dy) / (x * x + y * y), -dz / np.hypot(x, y)]
         if ends := [end for end in template.kingpin or () if isinstance(end, str)]:
             low, high = (_moved(end, role, held, places, v, turns) for end in ends)
@@ -55,46 +65,19 @@ def shims(
             turned = x_of * (high - low)[2] - z_of * (high - low)[0]
             angles += [turned / (x_of * x_of + z_of * z_of)]
         found[role] = np.array(angles)
-    return found
-
-
-def no_bump_steer(
-    template: Template, at: Mapping[str, Vector], toe: float, camber: float
-) -> dict[str, Array]:
-    """Return by how much each end of the tie rod, moved alone in the table along x, y or z, leaves
-    no bump steer at design, to first order [m], shape (3,), by role; infinite where it has no
-    effect, and nothing for a carrier that is held otherwise.
-
-    Args: see `shims`.
-    """
-    places = {role: np.array(place) for role, place in at.items()}
-    held = _held(template, places)
     rods = [k for k, (*_, movers) in enumerate(held) if TIEROD_INNER in movers]
-    if len(held) != 6 or not rods:
-        return {}
-    rod, outer = rods[0], held[rods[0]][0]
-    spin, along = _spin(places, toe, camber), places[outer] - places[TIEROD_INNER]
-    moving = np.linalg.solve(_rows(held, places), np.eye(6)[:, [5, rod]])
+    if not rods:
+        return found, {}
+    outer = held[rods[0]][0]
+    along = places[outer] - places[TIEROD_INNER]
+    moving = np.linalg.solve(rows, np.eye(6)[:, [5, rods[0]]])
     dx, dy, _ = np.cross(moving[3:].T, spin).T
-    by_travel, by_rod = (spin[1] * dx - spin[0] * dy) / (spin[0] ** 2 + spin[1] ** 2)
-    v, w = moving[:3, 0], moving[3:, 0]
-    end = v + np.cross(w, places[outer] - places[WHEEL_CENTER])
+    by_travel, by_rod = (y * dx - x * dy) / (x**2 + y**2)
+    w = moving[3:, 0]
+    end = moving[:3, 0] + np.cross(w, places[outer] - places[WHEEL_CENTER])
     wanted = -by_travel * np.linalg.norm(along) / by_rod
     with np.errstate(divide="ignore"):
-        return {TIEROD_INNER: wanted / end, outer: -wanted / (end + np.cross(along, w))}
-
-
-def _spin(places: Mapping[str, Array], toe: float, camber: float) -> Array:
-    """Return the direction of the wheel's axis at design."""
-    spin = np.array([np.sin(toe), np.cos(toe), -np.tan(camber)])
-    if WHEEL_AXIS in places:
-        spin = places[WHEEL_AXIS] - places[WHEEL_CENTER]
-    return spin / np.linalg.norm(spin)
-
-
-def _rows(held: Sequence[Held], places: Mapping[str, Array]) -> Array:
-    arms = [places[role] - places[WHEEL_CENTER] for role, _, _ in held]
-    return np.array([np.r_[n, np.cross(r, n)] for (_, n, _), r in zip(held, arms, strict=True)])
+        return found, {TIEROD_INNER: wanted / end, outer: -wanted / (end + np.cross(along, w))}
 
 
 def _moved(
@@ -111,11 +94,6 @@ def _moved(
     if sign > 0.0:  # on the chassis
         return own
     return v + np.cross(turns.T, places[end] - places[WHEEL_CENTER]).T + own
-
-
-def _held(template: Template, at: Mapping[str, Array]) -> list[Held]:
-    """Return what holds the carrier; the height of the wheel's centre comes last."""
-    return [*_joints(template, at), (WHEEL_CENTER, _AXES[2], {})]
 
 
 def _joints(template: Template, at: Mapping[str, Array]) -> Iterator[Held]:

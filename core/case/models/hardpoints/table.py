@@ -172,7 +172,7 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
 
 def placed(table: HardpointTable, unit: Unit, axes: Axes) -> dict[str, Vector]:
     """Return the points in metres, x forward, y left, z up."""
-    points: dict[str, Vector] = {}
+    points = dict[str, Vector]()
     for name, point in table.points.items():
         position = [0.0, 0.0, 0.0]
         for value, (k, sign) in zip(point.position, axes, strict=True):

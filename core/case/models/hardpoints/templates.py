@@ -30,59 +30,17 @@ _SIDES = (
     re.compile(r"(?P<side>left|right|fl|fr|rl|rr)_(?P<name>.+)"),
 )
 """Side or corner at the end of a normal name, or at its start."""
-_FRONT_REAR = {"front": ("front", "f"), "rear": ("rear", "r", "back")}
-_LEFT_RIGHT = {"left": ("left", "l", "lh"), "right": ("right", "r", "rh")}
-_WORDS: Mapping[str, tuple[str, str]] = {
-    **{word: (axle, "") for axle, words in _FRONT_REAR.items() for word in words if len(word) > 1},
-    **{word: ("", side) for side, words in _LEFT_RIGHT.items() for word in words if len(word) > 2},
-    **{
-        pair: (axle, side)
-        for axle, firsts in _FRONT_REAR.items()
-        for side, seconds in _LEFT_RIGHT.items()
-        for first in firsts
-        for second in seconds
-        for pair in (first + second, second + first)
-    },
-    "vl": ("front", "left"),  # in German: vorn, hinten
-    "vr": ("front", "right"),
-    "hl": ("rear", "left"),
-    "hr": ("rear", "right"),
-}
 _ARM = re.compile(r"([ul])ca_(front|rear|outer)")
-_ARMS = ("{}", "{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
-_ENDS: Mapping[str, Sequence[str]] = {
-    end: (
-        *(f"{word}{joined}" for word in words for joined in ("", "_pivot", "_inboard", "_inner")),
-        *(f"{place}_{word}" for word in words for place in ("inboard", "inner", "in", "chassis")),
-        short,
-    )
-    for end, words, short in (("front", ("front", "fore"), "if"), ("rear", ("rear", "aft"), "ir"))
-} | {
-    "outer": (
-        "outer",
-        "outboard",
-        "outer_ball_joint",
-        "ball_joint",
-        "knuckle",
-        "upright",
-        "o",
-        "out",
-    )
-}
-_OPTIMUM = {"front": "CHAS_{}For", "rear": "CHAS_{}Aft", "outer": "UPRI_{}Pnt"}
-_RODS = ("tierod", "trackrod", "track_rod", "steering_rod", "tr")
-_ROD_ENDS: Mapping[str, Sequence[str]] = {
-    TIEROD_INNER: ("inner", "inboard", "chassis", "rack", "i", "in", "inner_ball_joint"),
-    "tierod_outer": (
-        "outer",
-        "outboard",
-        "upright",
-        "knuckle",
-        "hub",
-        "o",
-        "out",
-        "outer_ball_joint",
-    ),
+_WRITTEN: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
+NAMES = _WRITTEN.pop("names")
+"""Words in names of points, as `templates.toml` has them."""
+_CORNERS: Mapping[str, tuple[str, str]] = {
+    word: (axle.replace("any", ""), side.replace("any", ""))
+    for axle, sides in NAMES["corners"].items()
+    for side, words in sides.items()
+    for word in words
 }
 
 
@@ -132,7 +90,7 @@ class Template:
 
     def joints(self, at: Mapping[str, Vector]) -> list[Joint]:
         """Return the joints for the places of the roles; they name the bodies."""
-        joints: list[Joint] = []
+        joints = list[Joint]()
         for name, (kind, i, j, role, *other) in self.joint_rows.items():
             if "bar" in (i, j) and not at.keys() >= {*self.twists["bar_twist"]}:
                 continue
@@ -205,11 +163,10 @@ def corner_of(text: str, column: str = "") -> tuple[str, str] | None:
         column: head of the column of the text; below "side", "R" is right, below "axle" rear.
     """
     word = compact(text)
-    for head, words, k in (("axle", _FRONT_REAR, 0), ("side", _LEFT_RIGHT, 1)):
-        if compact(column) == head:
-            name = next((name for name, others in words.items() if word in others), "")
-            return ((name, "") if k == 0 else ("", name)) if name else None
-    return _WORDS.get(word)
+    if (head := compact(column)) in ("axle", "side"):
+        name = next((name for name, words in NAMES[head].items() if word in words), "")
+        return ((name, "") if head == "axle" else ("", name)) if name else None
+    return _CORNERS.get(word)
 
 
 def corner_in(name: str) -> tuple[str, str]:
@@ -232,30 +189,34 @@ def _further_names(role: str) -> Iterable[str]:
     """Yield names of wishbones and tie rods in tables of Adams/Car, Lotus Suspension Analysis,
     suspension-explorer, OptimumK, Assetto Corsa and others.
     """
-    yield from (f"{rod}_{end}" for rod in _RODS for end in _ROD_ENDS.get(role, ()))
+    ends = NAMES["rod_ends"].get(role, ())
+    yield from (f"{rod}_{end}" for rod in NAMES["rods"] for end in ends)
     if found := _ARM.fullmatch(role):
         level, end = {"u": "upper", "l": "lower"}[found[1]], found[2]
-        yield from (f"{arm.format(level)}_{name}" for arm in _ARMS for name in _ENDS[end])
+        yield from (
+            f"{arm.format(level)}_{name}"
+            for arm in NAMES["arms"]
+            for name in NAMES["arm_ends"][end]
+        )
         if end == "outer":
             yield from (f"{level}_ball_joint", f"{level[0]}bj")
-        yield _OPTIMUM[end].format(level[:3].capitalize())
+        yield NAMES["optimum"][end].format(level[:3].capitalize())
         place = {"u": "top", "l": "bottom"}[found[1]]
         yield f"wbtyre_{place}" if end == "outer" else f"wbcar_{place}_{end}"
 
 
 def _read_templates() -> dict[str, Template]:
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    written: dict[str, Any] = tomllib.loads(text)
+    written = _WRITTEN
     common = written.pop("common")
 
     def roles(rows: Mapping[str, list[str]]) -> list[Role]:
-        found: list[Role] = []
+        found = list[Role]()
         for name, row in rows.items():
             meaning, *also = row or common["roles"][name]
             found.append(Role(name, meaning, (*also, *_further_names(name))))
         return found
 
-    templates: dict[str, Template] = {}
+    templates = dict[str, Template]()
     for name, own in written.items():
         like: dict[str, Any] = written.get(own.get("like"), {})
         both = {key: {**like.get(key, {}), **own.get(key, {})} for key in ("roles", "sample")}

@@ -128,7 +128,7 @@ def read_python(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoin
     Raises:
         CaseError: not Python, no points, or points of several suspensions.
     """
-    left_out: list[str] = []
+    left_out = list[str]()
     leaves = [Leaf((key,), value, key) for key, value in _facts_of_comments(text)]
     try:
         for each, above in _statements(ast.parse(text).body):
@@ -184,7 +184,7 @@ def _literal(node: ast.AST) -> Any:
 
 
 def _named_values(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    found = dict[str, Any]()
     for key, value in pairs:
         if key in found:
             raise ValueError(f"the key {key!r} stands twice")
@@ -261,9 +261,9 @@ def read_assignments(
     Raises:
         CaseError: no points, several units, or points of several suspensions.
     """
-    found: list[Leaf] = []
-    left_out: list[str] = []
-    units: dict[str, str] = {}
+    found = list[Leaf]()
+    left_out = list[str]()
+    units = dict[str, str]()
     for where, line in lines:
         assigned = _ASSIGNED.fullmatch(line)
         if assigned is None:
@@ -343,7 +343,7 @@ def _table(
             " z below a name; give a file of hardpoints (beside a URDF, give the URDF)",
         )
     chosen, dropped, corner = _of_one_suspension(file, [*points], supplied)
-    found: dict[str, Hardpoint] = {}
+    found = dict[str, Hardpoint]()
     for keys, name in chosen.items():
         if name in found:
             raise twice(file, points[keys].where, name, found[name].where)
@@ -363,9 +363,9 @@ def _table(
 
 def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], list[Leaf]]:
     """Return points by the keys of their paths, and the other values."""
-    points: dict[Keys, Hardpoint] = {}
-    single: dict[Keys, dict[str, Leaf]] = {}
-    others: list[Leaf] = []
+    points = dict[Keys, Hardpoint]()
+    single = dict[Keys, dict[str, Leaf]]()
+    others = list[Leaf]()
 
     def add(keys: Keys, where: str, x: float, y: float, z: float) -> None:
         if keys in points:
@@ -398,7 +398,7 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
 
 def _facts(others: Sequence[Leaf]) -> dict[str, str]:
     """Return unit, axes and template, if the tree names them."""
-    facts: dict[str, str] = {}
+    facts = dict[str, str]()
     for leaf in others:
         if not leaf.keys or not isinstance(leaf.value, str):
             continue
@@ -424,7 +424,7 @@ def _of_one_suspension(
     corner that keys name, if it is asked for.
     """
     wanted = supplied.sheet
-    left_out: list[str] = []
+    left_out = list[str]()
     kept = {keys: keys for keys in paths}
     contained = {
         keys: (*keys[:k], *keys[k + 1 :])

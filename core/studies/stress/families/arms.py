@@ -10,10 +10,10 @@ import numpy as np
 from ....algebra import triple
 from ....joints import AxialJoint, Cylindrical, Fixed, Joint, Revolute, Screw, Translational
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import Driver, JointAngle, JointDisplacement, Motion, Ramp, Sine
+from ....mechanism.motions import Driver, JointDriver, Motion, Ramp, Sine
 from ...truth.motion import Motion as Closed
-from ...truth.rows import PI, Poses, Real, extended, unit
-from .base import Rng, Specimen, bodies, direction, family, swept
+from ...truth.rows import NO_ARM, PI, Poses, Real, about, extended, unit
+from .base import Rng, Specimen, bodies, direction, family, own_drivers, swept
 
 KINDS: Sequence[type[Joint]] = (Revolute, Revolute, Translational, Cylindrical, Screw, Fixed)
 LARGEST = 30
@@ -46,21 +46,24 @@ def random_arm(
         parent = list(ends)[-1 if chain else int(rng.integers(len(ends)))]
         name, place = f"b{k + 1}", ends[parent] + rng.uniform(0.1, 0.3) * direction(rng)
         kind = Revolute if not drivers else kinds[int(rng.integers(len(kinds)))]
-        joint = _joint(kind, rng, f"j{k + 1}", parent, name, triple(place))
+        given: dict[str, Any] = {"point": triple(place)}
+        if issubclass(kind, AxialJoint):
+            given["axis"] = triple(direction(rng))
+        if kind is Screw:
+            given["lead"] = float(rng.uniform(-0.2, 0.2))
+        joint = kind(f"j{k + 1}", parent, name, **given)
         parts.append(Body(name))
         joints.append(joint)
         ends[name] = place
         # the rotation of a screw determines its translation
-        for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:
-            of = JointAngle if freedom == "rotation" else JointDisplacement
-            drivers.append(of(f"{joint.name}_{freedom}", joint.name))
-            size = 1.0 if freedom == "rotation" else 0.1
-            swings = rng.random() < 0.5
-            motions[drivers[-1].name] = (
-                Sine(float(size * rng.uniform(0.2, 1.0)), float(rng.uniform(0.1, 0.5)))
-                if swings
-                else Ramp(float(size * rng.uniform(-1.0, 1.0)))
-            )
+        for driver in own_drivers(joint)[: 1 if kind is Screw else None]:
+            size = 1.0 if driver.turns else 0.1
+            if rng.random() < 0.5:
+                swing = float(size * rng.uniform(0.2, 1.0))
+                motions[driver.name] = Sine(swing, float(rng.uniform(0.1, 0.5)))
+            else:
+                motions[driver.name] = Ramp(float(size * rng.uniform(-1.0, 1.0)))
+            drivers.append(driver)
     del motions[drivers[0].name]
     ends.pop(GROUND)
     points = [
@@ -70,22 +73,6 @@ def random_arm(
     return Mechanism("arm", parts, joints, points, drivers), motions
 
 
-def _joint(
-    kind: type[Joint],
-    rng: Rng,
-    name: str,
-    parent: str,
-    child: str,
-    place: tuple[float, float, float],
-) -> Joint:
-    given: dict[str, Any] = {"point": place}
-    if issubclass(kind, AxialJoint):
-        given["axis"] = triple(direction(rng))
-    if kind is Screw:
-        given["lead"] = float(rng.uniform(-0.2, 0.2))
-    return kind(name, parent, child, **given)
-
-
 def forward(mechanism: Mechanism) -> Closed:
     """Return the closed form of a tree; the joints must be ordered from parents to children."""
 
@@ -93,49 +80,29 @@ def forward(mechanism: Mechanism) -> Closed:
         values = {
             (d.joint, d.freedom): x
             for d, x in zip(mechanism.drivers, drives, strict=True)
-            if isinstance(d, _DRIVEN)
+            if isinstance(d, JointDriver)
         }
-        n, zero = drives.shape[1], np.zeros_like(drives[0])
-        still = np.stack([zero + 1.0, zero, zero, zero])
-        found: dict[str, tuple[Real, Real, Real]] = {
-            GROUND: (still, extended(np.zeros(3)), np.zeros((3, n), dtype=np.longdouble))
-        }
+        zero = np.zeros_like(drives[0])
+        still = np.stack([zero, zero, zero])
+        found = {GROUND: (np.stack([zero + 1.0, *still]), NO_ARM, still)}
         for joint in mechanism.joints:
             q, at, come = found[joint.i]
             given: Any = joint
             place = extended(given.point)
             turn, shift = (
-                values.get((joint.name, "rotation"), zero),
-                values.get((joint.name, "translation"), zero),
+                values.get((joint.name, freedom), zero) for freedom in ("rotation", "translation")
             )
             if isinstance(joint, Screw):
                 shift = extended(joint.lead) * turn / (2.0 * PI)
-            h = (
-                unit(extended(given.axis))
-                if isinstance(joint, AxialJoint)
-                else extended((0.0, 0.0, 1.0))
-            )
+            h = unit(getattr(joint, "axis", (0.0, 0.0, 1.0)))
             along = h[:, None] * shift
-            carried = come + along + _swing(q, (place - at)[:, None] + along)
-            found[joint.j] = (
-                _product(
-                    q, np.concatenate([np.cos(turn / 2)[None], h[:, None] * np.sin(turn / 2)])
-                ),
-                place,
-                carried,
-            )
+            arm = (place - at)[:, None] + along
+            swing = np.einsum("abn,bn->an", Poses(arm[None], q[None]).turned[0], arm)
+            found[joint.j] = _product(q, about(h, turn)), place, come + along + swing
         del found[GROUND]
         return found
 
     return motion
-
-
-_DRIVEN = (JointAngle, JointDisplacement)
-
-
-def _swing(q: Real, a: Real) -> Real:
-    """Return (R - 1) a, shape (3, n)."""
-    return np.einsum("abn,bn->an", Poses(a[None], q[None]).turned[0], a)
 
 
 def _product(p: Real, q: Real) -> Real:

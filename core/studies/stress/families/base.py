@@ -4,7 +4,7 @@ its correct refusals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,8 +14,9 @@ from ....case.case import Case, Sweep, Truth
 from ....case.io.outputs import with_all_coordinates
 from ....errors import KincheckError
 from ....failures import FailureKind
+from ....joints import Joint
 from ....mechanism.mechanism import Mechanism
-from ....mechanism.motions import Motion
+from ....mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver, Motion
 from ....trajectory import Array
 from ...truth.motion import Motion as ClosedForm
 from ...truth.motion import Truth as Known
@@ -104,12 +105,11 @@ def as_case(
     *,
     rate: float = 1.0,
     motions: dict[str, Motion] | None = None,
-    source: str = "kincheck stress",
 ) -> Case:
     """Return the case of a mechanism with all coordinates of all its points as outputs."""
     sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
     return with_all_coordinates(
-        Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+        Case(mechanism.name, "kincheck stress", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     )
 
 
@@ -137,10 +137,26 @@ def swept(
     return Specimen(name, case, truth)
 
 
+OWN_DRIVERS: Mapping[str, type[JointDriver]] = {
+    "rotation": JointAngle,
+    "translation": JointDisplacement,
+}
+
+
+def own_drivers(joint: Joint) -> list[Driver]:
+    """Return the drivers of a joint's own coordinates."""
+    driven = [each for each in joint.freedoms if each in OWN_DRIVERS]
+    return [OWN_DRIVERS[each](f"{joint.name}_{each}", joint.name) for each in driven]
+
+
 def direction(rng: Rng) -> Array:
     """Return a random unit vector."""
-    found = rng.normal(size=3)
-    return found / np.linalg.norm(found)
+    return unit_vector(rng.normal(size=3))
+
+
+def unit_vector(a: Array) -> Array:
+    """Return the direction of a vector in doubles."""
+    return np.asarray(a / np.linalg.norm(a))
 
 
 def power(rng: Rng, low: float, high: float) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,8 +17,8 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import JointAngle, JointDisplacement
 from ....trajectory import Array
 from ...truth.motion import Motion
-from ...truth.rows import Real, extended, unit
-from .base import Rng, direction, power, sign
+from ...truth.rows import Real, about, extended, unit
+from .base import Rng, direction, power, sign, unit_vector
 
 Planar: TypeAlias = Any
 """Points or vectors of a plane as complex numbers; arrays of them have extended precision."""
@@ -53,15 +53,13 @@ class Plane:
 
     def turned(self, angle: Real) -> Real:
         """Return the quaternion of a rotation in the plane, shape (4, n)."""
-        h = unit(np.cross(extended(self.e1), extended(self.e2)))
-        return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
+        return about(unit(np.cross(extended(self.e1), extended(self.e2))), angle)
 
 
 def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
     """Return a plane of any direction through a point; by default the point is near the origin."""
     e3, e1 = direction(rng), direction(rng)
-    e1 = np.cross(e3, e1)
-    e1 = e1 / np.linalg.norm(e1)
+    e1 = unit_vector(np.cross(e3, e1))
     at = rng.uniform(-1.0, 1.0, 3) if origin is None else origin
     return Plane(at, e1, np.cross(e3, e1))
 
@@ -135,16 +133,6 @@ def coupled(
     return [Body(coupler)], [*joints[way]]
 
 
-def _loop(
-    way: str, plane: Plane, b: complex, d: complex, c: complex, label: str = ""
-) -> tuple[list[Body], list[Joint], Point]:
-    """Return the coupler from B to C and the rocker from C to D, whose names begin with a label."""
-    rocker = f"{label}rocker"
-    bodies, joints = coupled(way, plane, ("crank", rocker, f"{label}coupler"), b, c, label)
-    rest = Revolute(f"{label}rest", GROUND, rocker, plane.point(d), plane.normal)
-    return [Body(rocker), *bodies], [rest, *joints], Point(f"{label}C", rocker, plane.point(c))
-
-
 Linkage = tuple[Mechanism, Motion]
 """A mechanism and its closed form."""
 
@@ -161,15 +149,21 @@ def four_bar(
     """Return a four-bar: a driven crank from the plane's origin to B, a coupler from B to C, a
     rocker from C to D; a parallelogram passes its turning points.
     """
-    bodies, joints, point = _loop(way, plane, b, d, c)
-    mechanism = Mechanism(
-        "four_bar",
-        [Body("crank"), *bodies],
-        [Revolute("pivot", GROUND, "crank", plane.point(0j), plane.normal), *joints],
-        [Point("B", "crank", plane.point(b)), point],
+    pivot = plane.point(0j)
+    crank = Mechanism(
+        "crank",
+        [Body("crank")],
+        [Revolute("pivot", GROUND, "crank", pivot, plane.normal)],
+        [Point("B", "crank", plane.point(b))],
         [JointAngle("turn", "pivot")],
     )
-    return mechanism, _four_bar_motion(plane, b, d, c, parallel)
+
+    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
+        still = np.zeros((3, drives.shape[1]), dtype=np.longdouble)
+        return {"crank": (plane.turned(drives[0]), extended(pivot), still)}
+
+    found, closed = beside((crank, motion), plane, b, d, c, way, "", parallel=parallel)
+    return replace(found, name="four_bar"), closed
 
 
 def beside(
@@ -183,48 +177,44 @@ def beside(
     *,
     parallel: bool = False,
 ) -> Linkage:
-    """Return a four-bar with a second coupler and rocker on its crank at other points, whose names
-    begin with the label; the closed form is that of both, because only the crank connects them.
+    """Return a linkage with a further coupler and rocker on its crank, whose names begin with the
+    label.
+
+    The closed form is in the assembly of the design, between the turning points of the crank. It is
+    that of all loops, because only the crank connects them.
     """
-    single, motion = first
-    bodies, joints, point = _loop(way, plane, b, d, c, label)
-    other = _four_bar_motion(plane, b, d, c, parallel)
+    single, others = first
+    rocker = f"{label}rocker"
+    bodies, joints = coupled(way, plane, ("crank", rocker, f"{label}coupler"), b, c, label)
+    rest = Revolute(f"{label}rest", GROUND, rocker, plane.point(d), plane.normal)
     mechanism = Mechanism(
         "two_loops",
-        [*single.bodies, *bodies],
-        [*single.joints, *joints],
-        [*single.points, point],
+        [*single.bodies, Body(rocker), *bodies],
+        [*single.joints, rest, *joints],
+        [*single.points, Point(f"{label}C", rocker, plane.point(c))],
         single.drivers,
     )
-    return mechanism, lambda drives: {
-        **motion(drives),
-        **{f"{label}{name}": moved for name, moved in other(drives).items()},
-    }
-
-
-def _four_bar_motion(plane: Plane, b: complex, d: complex, c: complex, parallel: bool) -> Motion:
-    """Return the closed form of a four-bar in the assembly of the design, between the crank's
-    turning points; a parallelogram passes them.
-    """
     B, C, D = (plan(each)[None] for each in (b, c, d))
     p, q = square(C - B), square(C - D)
     side = float(np.sign(area(D - B, C - B)[0]))
-    first, last = (-np.inf, np.inf) if parallel else turning_range(B, D, p, q)
-    pivot, pin, rest = (extended(plane.point(each)) for each in (0j, b, d))
+    first_turn, last_turn = (-np.inf, np.inf) if parallel else turning_range(B, D, p, q)
+    pin = extended(plane.point(b))
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
-        turn = np.where((first < drives[0]) & (drives[0] < last), drives[0], np.nan)
+        turn = drives[0]
+        turn = np.where((first_turn < turn) & (turn < last_turn), turn, np.nan)
         now_b = B * np.exp(1j * turn)
         now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
-        coupler = np.angle(now_c - now_b) - np.angle(C - B)
         still = np.zeros((3, len(turn)), dtype=np.longdouble)
+        swing = plane.turned(np.angle(now_c - D) - np.angle(C - D))
+        coupler = plane.turned(np.angle(now_c - now_b) - np.angle(C - B))
         return {
-            "crank": (plane.turned(turn), pivot, still),
-            "rocker": (plane.turned(np.angle(now_c - D) - np.angle(C - D)), rest, still),
-            "coupler": (plane.turned(coupler), pin, plane.lift(now_b - B)),
+            **others(drives),
+            rocker: (swing, extended(rest.point), still),
+            f"{label}coupler": (coupler, pin, plane.lift(now_b - B)),
         }
 
-    return motion
+    return mechanism, motion
 
 
 def turning_range(b: Planar, d: Planar, p: Real, q: Real) -> tuple[float, float]:
@@ -261,30 +251,25 @@ def flats(b: complex, d: complex) -> list[float]:
 def slider_crank(plane: Plane, b: complex, c: complex, way: str, drive: str) -> Linkage:
     """Return a slider-crank: a crank from the plane's origin to B, a coupler from B to C on a
     slider along the first axis; "turn" or "slide" is driven.
+
+    In the closed form, a quadratic equation gives the slider, or two circles give the crank.
     """
+    pivot, pin, slider = (plane.point(each) for each in (0j, b, c))
     bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), b, c)
     mechanism = Mechanism(
         "slider_crank",
-        [Body("crank"), Body("slider", plane.point(c)), *bodies],
+        [Body("crank"), Body("slider", slider), *bodies],
         [
-            Revolute("pivot", GROUND, "crank", plane.point(0j), plane.normal),
-            Translational("guide", GROUND, "slider", plane.point(c), plane.along(1.0 + 0j)),
+            Revolute("pivot", GROUND, "crank", pivot, plane.normal),
+            Translational("guide", GROUND, "slider", slider, plane.along(1.0 + 0j)),
             *joints,
         ],
-        [Point("B", "crank", plane.point(b)), Point("C", "slider", plane.point(c))],
+        [Point("B", "crank", pin), Point("C", "slider", slider)],
         [JointAngle("turn", "pivot") if drive == "turn" else JointDisplacement("slide", "guide")],
     )
-    return mechanism, _slider_crank_motion(plane, b, c, drive)
-
-
-def _slider_crank_motion(plane: Plane, b: complex, c: complex, drive: str) -> Motion:
-    """Return the closed form of a slider-crank: a quadratic equation gives the slider, or two
-    circles give the crank.
-    """
     B, C = plan(b)[None], plan(c)[None]
     r2, l2 = square(B), square(C - B)
     side, ahead = float(np.sign(area(C, B)[0])), float(np.sign((C - B).real[0]))
-    pivot, pin, slider = (extended(plane.point(each)) for each in (0j, b, c))
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
         turn = value = drives[0]
@@ -299,15 +284,15 @@ def _slider_crank_motion(plane: Plane, b: complex, c: complex, drive: str) -> Mo
             now_c = C + np.where((C + value).real * C.real > 0.0, value, np.nan)
             now_b = meet(0.0 * now_c, r2, now_c, l2, side)
             turn = np.angle(now_b) - np.angle(B)
-        coupler = np.angle(now_c - now_b) - np.angle(C - B)
+        coupler = plane.turned(np.angle(now_c - now_b) - np.angle(C - B))
         still = np.zeros((3, len(turn)), dtype=np.longdouble)
         return {
-            "crank": (plane.turned(turn), pivot, still),
-            "slider": (plane.turned(0.0 * turn), slider, plane.lift(now_c - C)),
-            "coupler": (plane.turned(coupler), pin, plane.lift(now_b - B)),
+            "crank": (plane.turned(turn), extended(pivot), still),
+            "slider": (plane.turned(0.0 * turn), extended(slider), plane.lift(now_c - C)),
+            "coupler": (coupler, extended(pin), plane.lift(now_b - B)),
         }
 
-    return motion
+    return mechanism, motion
 
 
 # Random dimensions

@@ -9,29 +9,35 @@ remaining motions. The reference is followed from the design.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import MISSING, fields, replace
+from dataclasses import Field, replace
 from typing import Any
 
 import numpy as np
 
 from ....algebra import triple
 from ....case.case import TIME
+from ....case.joint_probe import fitting
 from ....errors import MechanismError
 from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion, Revolute, Translational
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import (
-    Absolute,
-    Driver,
-    JointAngle,
-    JointDisplacement,
-    Motion,
-    PointCoordinate,
-    Sine,
-)
+from ....mechanism.motions import Absolute, Driver, Motion, PointCoordinate, Sine
 from ....trajectory import Array
 from ...truth.fold import first_fold
 from ...truth.rows import Poses, Rows
-from .base import Rng, Specimen, as_case, bodies, direction, family, power, sign, swept
+from .base import (
+    OWN_DRIVERS,
+    Rng,
+    Specimen,
+    as_case,
+    bodies,
+    direction,
+    family,
+    own_drivers,
+    power,
+    sign,
+    swept,
+    unit_vector,
+)
 from .linkages import any_plane, flat_plane, polar
 
 LARGEST = 30
@@ -221,6 +227,7 @@ class _Builder:
         self.joints: list[Joint] = []
         self.couplers: list[Coupler] = []
         self.motions: Array = np.eye(6 * count)
+        self.left = 1  # freedoms that no further part may take
 
     def built(self) -> tuple[Mechanism, float] | None:
         """Return the mechanism and the reach of its drivers; None if it cannot be closed."""
@@ -233,20 +240,15 @@ class _Builder:
             nearest = min(before, key=lambda name: np.linalg.norm(self.places[name] - place))
             while not self._join(str(self.rng.choice(CARRIERS)), nearest, body.name):
                 pass
-        drivers, tries = int(self.rng.integers(1, self.most + 1)), 0
-        while self.freedoms > drivers:
+        self.left, tries = int(self.rng.integers(1, self.most + 1)), 0
+        while self.motions.shape[1] > self.left:
             if (tries := tries + 1) > 40 * len(self.bodies):
                 return None
-            if tries % 9 == 0 and self._couple(drivers):
+            if tries % 9 == 0 and self._couple():
                 continue
             one, other = self.rng.choice(list(self.places), 2, replace=False)
-            self._join(str(self.rng.choice(CLOSERS)), str(one), str(other), drivers)
-        return self._driven(drivers) if self.freedoms == drivers else None
-
-    @property
-    def freedoms(self) -> int:
-        """Number of remaining freedoms."""
-        return self.motions.shape[1]
+            self._join(str(self.rng.choice(CLOSERS)), str(one), str(other))
+        return self._driven() if self.motions.shape[1] == self.left else None
 
     def _mechanism(
         self,
@@ -267,12 +269,12 @@ class _Builder:
         found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.unit
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
-    def _take(self, rows: Array, leave: int) -> bool:
+    def _take(self, rows: Array) -> bool:
         """Remove rows from the remaining motions; return whether they were accepted.
 
-        All rows must be independent, and at least `leave` motions must remain.
+        All rows must be independent, and enough motions must remain.
         """
-        if self.freedoms - len(rows) < leave:
+        if self.motions.shape[1] - len(rows) < self.left:
             return False
         _, sizes, basis = np.linalg.svd(rows @ self.motions)
         if len(rows) and sizes[-1] < SOUND:
@@ -280,20 +282,13 @@ class _Builder:
         self.motions = self.motions @ basis[len(rows) :].T
         return True
 
-    def _join(self, kind: str, one: str, other: str, leave: int = 1) -> bool:
-        joint = self._joint(kind, one, other)
-        if joint is None or not self._take(self._rows(self._mechanism([joint])), leave):
-            return False
-        self.joints.append(joint)
-        return True
-
-    def _joint(self, kind: str, one: str, other: str) -> Joint | None:
-        rng, cls = self.rng, Joint.registry[kind]
+    def _join(self, kind: str, one: str, other: str) -> bool:
+        """Add a joint of random geometry; return whether it was accepted."""
+        rng = self.rng
         middle = 0.5 * (self.places[one] + self.places[other])
         ends = tuple(triple(self.places[name] + 0.2 * direction(rng)) for name in (one, other))
         h = direction(rng)
-        across = np.cross(h, direction(rng))
-        across = across / np.linalg.norm(across)
+        across = unit_vector(np.cross(h, direction(rng)))
         second = across if kind != "constant_velocity" else np.cos(0.5) * h + np.sin(0.5) * across
         values: dict[Any, Any] = {
             Kind.POSITION: triple(middle + 0.1 * direction(rng)),
@@ -302,25 +297,25 @@ class _Builder:
             Kind.DIRECTIONS: (triple(h), triple(second)),
             Kind.LENGTH: float(rng.uniform(0.02, 0.2)),
         }
-        required = [
-            f for f in fields(cls) if f.default is MISSING and f.name not in ("name", "i", "j")
-        ]
-        given = {f.name: values[f.metadata["kind"]] for f in required}
-        try:
-            return cls(f"{kind}_{len(self.joints) + 1}", one, other, **given)
-        except MechanismError:
-            return None
+        given = {"name": f"{kind}_{len(self.joints) + 1}", "i": one, "j": other}
 
-    def _couple(self, leave: int) -> bool:
+        def value(field: Field[Any]) -> Any:
+            return values[field.metadata["kind"]]
+
+        try:
+            joint = fitting(Joint.registry[kind], given, [value])
+        except MechanismError:
+            return False
+        if accepted := self._take(self._rows(self._mechanism([joint]))):
+            self.joints.append(joint)
+        return accepted
+
+    def _couple(self) -> bool:
         """Add a gear or a rack between two coordinates of joints; return whether one was added."""
-        axial = [
-            (joint, freedom)
-            for joint in self.joints
-            if isinstance(joint, AxialJoint)
-            for freedom in joint.freedoms
-        ]
-        turning = [joint.name for joint, freedom in axial if freedom == "rotation"]
-        sliding = [joint.name for joint, freedom in axial if freedom == "translation"]
+        axial = [joint for joint in self.joints if isinstance(joint, AxialJoint)]
+        turning, sliding = (
+            [joint.name for joint in axial if freedom in joint.freedoms] for freedom in OWN_DRIVERS
+        )
         seconds = sliding if self.rng.random() < 0.5 and sliding else turning
         if not turning or not seconds:
             return False
@@ -332,25 +327,18 @@ class _Builder:
         coupler = Gear(name, pair, size) if gears else RackPinion(name, pair, 0.2 * size)
         joined = [joint for joint in self.joints if joint.name in pair]
         rows = sum(joint.rows for joint in joined)
-        if not self._take(self._rows(self._mechanism(joined, couplers=[coupler]), rows), leave):
-            return False
-        self.couplers.append(coupler)
-        return True
+        if accepted := self._take(self._rows(self._mechanism(joined, couplers=[coupler]), rows)):
+            self.couplers.append(coupler)
+        return accepted
 
-    def _driven(self, count: int) -> tuple[Mechanism, float] | None:
+    def _driven(self) -> tuple[Mechanism, float] | None:
         """Return the mechanism with drivers of its remaining freedoms, and the reach of the
         drivers.
 
         The rates at design turn or shift something by 0.3 to 1 over the reach [rad or m].
         """
-        of = {"rotation": JointAngle, "translation": JointDisplacement}
         axial = [joint for joint in self.joints if isinstance(joint, AxialJoint)]
-        drivers: list[Driver] = [
-            of[f](f"{joint.name}_{f}", joint.name)
-            for joint in axial
-            for f in joint.freedoms
-            if f in of
-        ]
+        drivers = [driver for joint in axial for driver in own_drivers(joint)]
         drivers += [
             PointCoordinate(f"shift_{b.name}", f"p_{b.name}", triple(direction(self.rng)))
             for b in self.bodies[:3]
@@ -360,9 +348,9 @@ class _Builder:
         taken: list[int] = []
         for k in self.rng.permutation(len(drivers)):
             trial = [*taken, int(k)]
-            if len(taken) < count and np.linalg.svd(rows[trial], compute_uv=False)[-1] > SOUND:
+            if len(taken) < self.left and np.linalg.svd(rows[trial], compute_uv=False)[-1] > SOUND:
                 taken = trial
-        if len(taken) < count:
+        if len(taken) < self.left:
             return None
         rates = self.motions @ np.linalg.pinv(rows[taken])
         found = self._mechanism(self.joints, [drivers[k] for k in taken], self.couplers)

@@ -15,8 +15,7 @@ from ....algebra import triple
 from ....case.case import Case
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
-from ...truth.motion import Motion, Truth, chunks, closed, closed_poses
-from ...truth.path import System
+from ...truth.motion import Motion, System, Truth, chunks, closed, closed_poses
 from ...truth.rows import extended
 from .base import TOL, Rng, Specimen, direction, family, power, sign, swept
 from .linkages import (
@@ -180,37 +179,33 @@ def reach(rng: Rng, samples: int) -> Specimen:
 # Near change points
 
 
-def parallelogram(rng: Rng, samples: int) -> Specimen:
-    """Return a parallelogram; it folds flat twice a turn.
-
-    Correct answers for an exact parallelogram are its own motion or a refusal, never the motion
-    that crosses there. With an error of one sign it becomes the antiparallel linkage, within the
-    root of the error. With an error of the other sign it cannot pass.
-    """
-    return _near_change_points(rng, samples, "parallelogram", nearly_parallel)
-
-
-def kite(rng: Rng, samples: int) -> Specimen:
-    """Return a kite, whose crank is nearly as long as the ground and passes the rocker's pivot."""
-    return _near_change_points(rng, samples, "kite", nearly_kite)
-
-
-Dimensions = Callable[[Rng], tuple[complex, complex, complex, float]]
-
-
-def _near_change_points(rng: Rng, samples: int, kind: str, dimensions: Dimensions) -> Specimen:
-    plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
-    b, d, c, off = dimensions(rng)
-    found = four_bar(plane, b, d, c, way, parallel=kind == "parallelogram" and off == 0.0)
-    name, last = f"{kind} with {way}, off by {off:.2g}", NEARLY_A_TURN
-    return swept(name, *found, -last, last, samples, nearest=flats(b, d))
-
-
-PAIRS: Mapping[str, Dimensions] = {
-    "parallelograms": nearly_parallel,
-    "kites": nearly_kite,
-    "rockers": lambda rng: (*rockers(rng), 1.0),  # far from any singular shape
+FLAT: Mapping[str, Callable[[Rng], tuple[complex, complex, complex, float]]] = {
+    "parallelogram": nearly_parallel,
+    "kite": nearly_kite,
+    "rocker": lambda rng: (*rockers(rng), 1.0),  # far from any singular shape
 }
+"""Makers of B, D, C and an error."""
+
+
+def near_change_points(rng: Rng, samples: int, kind: str = "") -> Specimen:
+    """Return a four-bar of a kind; without one, two equal four-bars of any kind on one crank.
+
+    A parallelogram folds flat twice a turn. Correct answers for an exact one are its own motion or
+    a refusal, never the motion that crosses there. With an error of one sign it becomes the
+    antiparallel linkage, within the root of the error. With an error of the other sign it cannot
+    pass. The crank of a kite is nearly as long as the ground and passes the rocker's pivot.
+    """
+    plane = any_plane(rng)
+    way, *twins = rng.choice(JOINTS_OF_A_LOOP, 1 if kind else 2).tolist()
+    kind = kind or [*FLAT][int(rng.integers(len(FLAT)))]
+    b, d, c, off = FLAT[kind](rng)
+    parallel = kind == "parallelogram" and off == 0.0
+    found, name = four_bar(plane, b, d, c, way, parallel=parallel), f"{kind} with {way}"
+    for twin in twins:
+        found = beside(found, plane, b, d, c, twin, "twin ", parallel=parallel)
+        name = f"{kind}s with {way} and {twin}"
+    name, last = f"{name}, off by {off:.2g}", NEARLY_A_TURN
+    return swept(name, *found, -last, last, samples, nearest=flats(b, d))
 
 
 @family(
@@ -223,14 +218,7 @@ def twins(rng: Rng, samples: int) -> Specimen:
     """Return two equal loops on one crank with the same singular poses: the determinant of all rows
     changes its sign twice there, so that it shows nothing.
     """
-    plane, (first, second) = any_plane(rng), rng.choice(JOINTS_OF_A_LOOP, 2).tolist()
-    kind = [*PAIRS][int(rng.integers(len(PAIRS)))]
-    b, d, c, off = PAIRS[kind](rng)
-    parallel = kind == "parallelograms" and off == 0.0
-    found = four_bar(plane, b, d, c, first, parallel=parallel)
-    found = beside(found, plane, b, d, c, second, "twin ", parallel=parallel)
-    name, last = f"{kind} with {first} and {second}, off by {off:.2g}", NEARLY_A_TURN
-    return swept(name, *found, -last, last, samples, nearest=flats(b, d))
+    return near_change_points(rng, samples)
 
 
 # Smallest relative area of a design: the coordinates of a nearly folded shape have too few digits.

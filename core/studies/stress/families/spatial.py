@@ -4,8 +4,10 @@ their hardpoints.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from ....trajectory import Array
 from .base import Rng, Specimen, direction, family, power, swept
-from .planar import kite, parallelogram
+from .planar import near_change_points
 
 # A platform with a smaller error may be refused for an excess freedom: its smallest singular value
 # is a tenth of the error or less, and the rank tolerance is 1e-9.
@@ -32,8 +34,10 @@ UNTOLD = 3e-8
 )
 def singular(rng: Rng, samples: int) -> Specimen:
     """Return a mechanism close to a singular shape."""
-    make = (parallelogram, kite, _bennett, _bricard, _platform)[int(rng.integers(5))]
-    return make(rng, samples)
+    kind = int(rng.integers(5))
+    if kind < 2:
+        return near_change_points(rng, samples, ("parallelogram", "kite")[kind])
+    return (_bennett, _bricard, _platform)[kind - 2](rng, samples)
 
 
 def _bennett(rng: Rng, samples: int) -> Specimen:
@@ -136,10 +140,9 @@ def _platform(rng: Rng, samples: int) -> Specimen:
 
 # Suspensions
 
-
-Place = tuple[float, float, float]
-At = Callable[[float, float, float], Place]
-"""Function from a hardpoint to the perturbed hardpoint [m]."""
+CORNERS: Mapping[str, Any] = tomllib.loads(
+    Path(__file__).with_name("corners.toml").read_text(encoding="utf-8")
+)
 
 
 @family(
@@ -151,64 +154,26 @@ def hardpoints(rng: Rng, samples: int) -> Specimen:
     wrong cell.
     """
     off = power(rng, -6.0, -1.3)
-
-    def at(x: float, y: float, z: float) -> Place:
-        return triple(np.array([x, y, z]) + off * rng.normal(size=3))
-
-    mechanism = (_mcpherson, _wishbones, _five_link)[int(rng.integers(3))](at)
-    name = f"{mechanism.name}, hardpoints off by {off:.2g} m"
+    kind = [*CORNERS][int(rng.integers(len(CORNERS)))]
+    corner, joints = CORNERS[kind], list[Joint]()
+    places = {
+        name: triple(np.array(place) + off * rng.normal(size=3))
+        for name, place in corner["hardpoints"].items()
+    }
+    for name, (joint, i, j, *names) in corner["joints"].items():
+        at, *others = (places[each] for each in names)
+        given: dict[str, Any] = {"point": at}
+        if joint == "distance":
+            given = {"points": (at, *others)}
+        elif others:
+            given["axis"] = triple(np.subtract(others[1], others[0]))
+        joints.append(Joint.registry[joint](name, i, j, **given))
+    mechanism = Mechanism(
+        kind,
+        [*map(Body, corner["bodies"])],
+        joints,
+        [Point("wheel", "knuckle", places["wheel"])],
+        [PointCoordinate("stroke", "wheel", (0.0, 0.0, 1.0))],
+    )
+    name = f"{kind}, hardpoints off by {off:.2g} m"
     return swept(name, mechanism, None, -0.1, 0.1, samples)
-
-
-def _corner(name: str, bodies: Sequence[str], joints: Sequence[Any], wheel: Place) -> Mechanism:
-    stroke = PointCoordinate("stroke", "wheel", (0.0, 0.0, 1.0))
-    points = [Point("wheel", "knuckle", wheel)]
-    return Mechanism(name, [Body(each) for each in bodies], joints, points, [stroke])
-
-
-def _pivot(name: str, body: str, front: Place, rear: Place) -> Revolute:
-    return Revolute(name, GROUND, body, front, triple(np.subtract(rear, front)))
-
-
-def _mcpherson(at: At) -> Mechanism:
-    top, lower, ball, pivot = (
-        at(0.0, 0.55, 0.6),
-        at(-0.02, 0.61, 0.18),
-        at(-0.03, 0.66, -0.01),
-        at(0.17, 0.35, 0.0),
-    )
-    joints = [
-        _pivot("pivot", "arm", pivot, at(-0.17, 0.35, 0.0)),
-        Spherical("ball", "arm", "knuckle", ball),
-        Spherical("top", "strut", GROUND, top),
-        Translational("slide", "knuckle", "strut", top, triple(np.subtract(top, lower))),
-        Distance("tie_rod", "knuckle", GROUND, (at(0.12, 0.66, 0.12), at(0.14, 0.35, 0.15))),
-    ]
-    return _corner("mcpherson", ("arm", "knuckle", "strut"), joints, at(0.0, 0.72, 0.1))
-
-
-def _wishbones(at: At) -> Mechanism:
-    lower, upper = at(0.15, 0.3, 0.0), at(0.12, 0.4, 0.4)
-    joints = [
-        _pivot("lower_pivot", "lower", lower, at(-0.15, 0.3, 0.02)),
-        _pivot("upper_pivot", "upper", upper, at(-0.12, 0.4, 0.38)),
-        Spherical("lower_ball", "lower", "knuckle", at(-0.02, 0.7, 0.0)),
-        Spherical("upper_ball", "upper", "knuckle", at(0.02, 0.66, 0.38)),
-        Distance("tie_rod", "knuckle", GROUND, (at(0.15, 0.68, 0.1), at(0.15, 0.33, 0.1))),
-    ]
-    return _corner("double_wishbone", ("lower", "upper", "knuckle"), joints, at(0.0, 0.75, 0.2))
-
-
-def _five_link(at: At) -> Mechanism:
-    rods = (
-        ((0.15, 0.3, 0.0), (0.02, 0.7, -0.02)),
-        ((-0.2, 0.35, 0.02), (-0.03, 0.7, 0.0)),
-        ((0.12, 0.4, 0.36), (0.03, 0.66, 0.35)),
-        ((-0.18, 0.42, 0.38), (-0.02, 0.66, 0.36)),
-        ((0.2, 0.33, 0.12), (0.15, 0.68, 0.13)),
-    )
-    joints = [
-        Distance(f"rod_{k}", "knuckle", GROUND, (at(*outer), at(*inner)))
-        for k, (inner, outer) in enumerate(rods, 1)
-    ]
-    return _corner("five_link", ("knuckle",), joints, at(0.0, 0.75, 0.2))

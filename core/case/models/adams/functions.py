@@ -1,9 +1,11 @@
-"""Drivers of a dataset: its motions, and joints driven or held by the user."""
+"""What acts in a dataset: springs and dampers (SPRINGDAMPER, and SFORCE of linear form), its
+motions, and joints driven or held by the user.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +13,8 @@ from numpy.polynomial import Polynomial
 
 from ....errors import CaseError, MechanismError, shortened
 from ....kinematics import Ranks
-from ....mechanism.formula import evaluate, polynomial
+from ....mechanism.formula import CURVES, evaluate, polynomial
+from ....mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ....mechanism.mechanism import GROUND, Mechanism, Point
 from ....mechanism.motions import (
     Absolute,
@@ -28,8 +31,137 @@ from ...io.document import decimal, fault, shown, unknown_name
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from .dataset import Statement
-from .model import Coordinate, Model
-from .parts import coordinates
+from .model import Coordinate, Model, coordinates
+
+# Where a function is tried: a linear one is known from three points, and right at the others.
+_TRIED = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, -1.3), (-2.1, 0.4), (13.7, 3.9))
+_NONLINEAR = 1e-12
+_PARALLEL = 1e-6
+
+
+def linear(
+    statement: Statement, length: str, rate: str, form: str
+) -> tuple[float, float, float, tuple[int, int]]:
+    """Return constant and slopes of a function of a length or angle and its rate, and its two
+    markers.
+
+    Args:
+        length, rate: names of both; an angle changes its sign with the order of its markers.
+        form: the known text, for messages.
+
+    Raises:
+        CaseError: it measures something else, or is not linear.
+    """
+    measured = list[tuple[float, float]]()
+
+    def measure(value: float) -> Callable[..., float]:
+        def of(i: float, j: float, *_: float) -> float:
+            measured.append((i, j))
+            first = measured[0]
+            if sorted(first) != sorted((i, j)):
+                raise MechanismError(f"found markers {i:g} and {j:g} beside others, expected two")
+            return -value if length == "AZ" and (i, j) != first else value
+
+        return of
+
+    def tried(values: tuple[float, float]) -> float:
+        own = {name: measure(x) for name, x in zip((length, rate), values, strict=True)}
+        return float(evaluate(statement.function, {"SQRT": CURVES["SQRT"], **own}))
+
+    try:
+        c, of_length, of_rate, *others = map(tried, _TRIED)
+        a, b = of_length - c, of_rate - c
+        for (x, y), value in zip(_TRIED[3:], others, strict=True):
+            parts = c, a * x, b * y
+            if abs(value - sum(parts)) > _NONLINEAR * sum(map(abs, parts)):
+                raise MechanismError("found a function that is not linear")
+        if not measured:
+            raise MechanismError("found a constant, expected a spring or damper")
+    except MechanismError as error:
+        leave = f"--without {statement.kind}/{statement.id}"
+        problem = f"FUNCTION: {error}; write {form}, or leave it out by {leave}"
+        raise statement.fault(problem) from None
+    i, j = measured[0]
+    return c, a, b, (int(i), int(j))
+
+
+def read_forces(model: Model, driven: Sequence[Coordinate]) -> list[ForceElement]:
+    """Read the springs and dampers.
+
+    Raises:
+        CaseError: a force is not linear in the length or angle of its own markers and its rate.
+    """
+    found = list[ForceElement]()
+    for each in model.dataset.of("SFORCE", "SPRINGDAMPER"):
+        i, j = model.ends(each)
+        kind = each.choice("TRANSLATIONAL", "ROTATIONAL")
+        if not kind or "ACTIONONLY" in each.flags:
+            raise each.fault("expected TRANSLATIONAL or ROTATIONAL between two markers; state it")
+        turns = kind == "ROTATIONAL"
+        if each.kind == "SFORCE":
+            form = "-KT*AZ(I,J)-CT*WZ(I,J,J)" if turns else "-K*(DM(I,J)-L)-C*VR(I,J)"
+            names = ("AZ", "WZ") if turns else ("DM", "VR")
+            constant, a, b, measured = linear(each, *names, form)
+            ends = i.statement.id, j.statement.id
+            if sorted(measured) != sorted(ends):
+                listed = " and ".join(map(str, measured))
+                raise each.fault(
+                    f"FUNCTION: found markers {listed}, expected I and J; write {form}"
+                )
+            sign = 1.0 if turns and measured != ends else -1.0
+            stiffness, damping = sign * a, sign * b
+        else:
+            names = ("KT", "CT", "ANGLE", "TORQUE") if turns else ("K", "C", "LENGTH", "FORCE")
+            stiffness, damping, free, preload = (each.one(name, 0.0) for name in names)
+            constant = stiffness * free + preload
+        if (constant and not stiffness) or not (stiffness or damping):
+            raise each.fault(
+                "found a constant force, expected a spring or damper; leave it out by --without"
+                f" {each.kind}/{each.id}"
+            )
+        free = constant / stiffness if stiffness else 0.0
+        units = model.units
+        unit = units.force * units.length if turns else units.force / units.length
+        numbers = stiffness * unit, damping * unit * units.time
+        try:
+            if turns:
+                joint, angle = _turning(model, each, driven, free)
+                angle = angle if stiffness else 0.0
+                found.append(TorsionSpringDamper(each.name, joint, *numbers, angle))
+            else:
+                ends = coordinates(model.frame(j).origin), coordinates(model.frame(i).origin)
+                length = units.length * free if stiffness else None
+                # a positive SFORCE pushes I and J apart
+                pair = model.body(j), model.body(i)
+                found.append(SpringDamper(each.name, *pair, ends, *numbers, length))
+        except MechanismError as error:
+            leave = f"--without {each.kind}/{each.id}"
+            raise each.fault(f"{error}; or leave it out by {leave}") from None
+    return found
+
+
+def _turning(
+    model: Model, statement: Statement, driven: Sequence[Coordinate], free: float
+) -> tuple[str, float]:
+    """Return the joint between the parts of two markers that turns about their z axis, and its free
+    angle [rad].
+    """
+    i, j = model.ends(statement)
+    model.require_x(statement, i, j)
+    axis, bodies = model.frame(j).z, [model.body(j), model.body(i)]
+    for each in driven:
+        along = float(each.axis @ axis)
+        if not each.turns or sorted(each.joint.bodies) != sorted(bodies):
+            continue
+        if abs(along) < 1.0 - _PARALLEL:
+            continue
+        sense = math.copysign(1.0, along) * (1.0 if [*each.joint.bodies] == bodies else -1.0)
+        return each.joint.name, sense * (free - model.turn(i, j))
+    raise statement.fault(
+        f"found no joint that turns {' against '.join(bodies)} about the z axis of {j}, expected"
+        f" one; leave it out by --without {statement.kind}/{statement.id}"
+    )
+
 
 _FORM = (
     "JOINT:START:STOP[:SAMPLES] [rad, m] or time:START:STOP[:SAMPLES] [s], 2 to"
@@ -38,7 +170,6 @@ _FORM = (
 _SAMPLES, _SECOND = 41, (0.0, 1.0, 101)
 # Of motions of length one: less of a coordinate is rounding, or at rest within the digits.
 _AT_REST = 1e-6
-_PARALLEL = 1e-6
 # A motion that begins off the place of its markers by less is rounded [rad, m].
 _THERE = 1e-9
 _MOST_NAMED = 8
@@ -70,8 +201,8 @@ def read_motions(
     Raises:
         CaseError: a motion is not of a joint's coordinate, or its function is not read.
     """
-    drives: list[Drive] = []
-    points: list[Point] = []
+    drives = list[Drive]()
+    points = list[Point]()
     for each in model.dataset.of("MOTION"):
         if "JOINT" in each.values:
             drive = Drive.of(each.name, _of_joint(model, each, driven))
@@ -84,12 +215,12 @@ def read_motions(
             if not recorded:
                 raise
             note = f"{each.name}: its function is not read; it follows the recording"
-            model.dataset.notes.append(note)
+            model.note(note)
             drives.append(drive)
             continue
         begins = float(motion.at(np.zeros(1))[0][0])
         if abs(begins) > _THERE:
-            model.dataset.notes.append(
+            model.note(
                 f"{each.name} begins {begins:.6g} {'rad' if drive.driver.turns else 'm'} from where"
                 " its markers stand: parts start there, and the motion is the one of the function"
             )
@@ -128,8 +259,7 @@ def _motion(statement: Statement, start: float, unit: float, second: float) -> F
 
 def _of_joint(model: Model, statement: Statement, driven: Sequence[Coordinate]) -> Coordinate:
     """Return the coordinate of the joint of a motion."""
-    joint = model.dataset.one_id(statement, "JOINT")
-    name = model.dataset.member(statement, "JOINT", "JOINT", joint).name
+    name = model.dataset.member(statement, "JOINT", "JOINT").name
     kind = statement.choice("TRANSLATION", "ROTATION").lower()
     own = [each for each in driven if each.joint.name == name]
     chosen = [each for each in own if kind in ("", each.freedom)]
@@ -226,10 +356,10 @@ def read_drives(
     if supplied.recorded and (rest or not all(each.motion for each in moved)):
         if any(each.motion for each in moved):
             note = "freedoms are left without a motion that is read: all follow the recording"
-            model.dataset.notes.append(note)
+            model.note(note)
         drives = [replace(each, motion=None) for each in drives]
     if left:
-        model.dataset.notes.append(
+        model.note(
             f"{left} freedom{'s' * (left > 1)} of {_bodies(mechanism)} of no joint that could be"
             " driven: no engine follows the recording, which is judged by its joints and loads"
         )
@@ -289,7 +419,7 @@ def _independent(
     if len(joints):
         _, sizes, right = np.linalg.svd(joints, full_matrices=True)
         free = right[int((sizes > weak * sizes[0]).sum()) :]
-    taken: list[int] = []
+    taken = list[int]()
     for k, row in enumerate(rows):
         along = free @ row
         if np.linalg.norm(along) > _AT_REST:
