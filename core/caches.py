@@ -2,13 +2,15 @@
 
 `keep_last` keeps the last results of a function, for the process or for each thread. `ThreadCache`
 keeps the data of one object in each thread, such as lanes solved in place, and ends with the
-object. Both are bounded: a new result replaces the least recently used one.
+object. Both are bounded: a new result replaces the least recently used one. `ByContent` makes a
+large argument cheap to find again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from functools import lru_cache
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
 from threading import Lock, local
 from typing import Any, ParamSpec, TypeVar
 from weakref import WeakSet
@@ -57,6 +59,31 @@ def _kept(count: int, function: Callable[..., Any]) -> Any:
     with _lock:
         _results.add(kept)
     return kept
+
+
+@dataclass(frozen=True, eq=False)
+class ByContent:
+    """A frozen data class of many parts: equal by them, and hashed once.
+
+    Pickles and copies have its fields alone: a hash of texts holds in its own process only.
+    """
+
+    @cached_property
+    def _content(self) -> Hashable:
+        return tuple(vars(self)[each.name] for each in fields(self))
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._content)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and self._content == other._content
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: vars(self)[each.name] for each in fields(self)}
 
 
 class _OfThread(local):

@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .dataset import Dataset, Variable
+from .dataset import AXIS, Dataset, Variable
 from .driving import Driving, in_words
 from .errors import MARKER as MARKER
 from .errors import UnknownNameError, number_of
@@ -206,9 +206,9 @@ def as_variables(
         dims: of the samples, the last one "sample".
     """
     along = {} if drive is None else drive.coords()
-    count = _samples(points)
+    count = next((each.position.shape[-2] for each in points.values()), 0)
     points = {name: points[name] for name in shown(points)}
-    axes = {"point": Variable("point", [*points]), "axis": Variable("axis", ["x", "y", "z"])}
+    axes = {"point": Variable("point", [*points]), "axis": AXIS}
     variables = dict[str, Variable]()
     for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
         series = [getattr(each, quantity) for each in points.values()]
@@ -217,7 +217,3 @@ def as_variables(
             variables[quantity] = Variable((*dims, "point", "axis"), stacked, f"m{per_time}")
     numbered = {} if along else {"sample": Variable("sample", np.arange(count))}
     return {**along, **numbered, **axes}, variables, next(iter(along), "sample")
-
-
-def _samples(points: Mapping[str, PointMotion]) -> int:
-    return next((each.position.shape[-2] for each in points.values()), 0)

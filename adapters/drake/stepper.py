@@ -37,7 +37,13 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
     unit = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
     anchor = plant.AddRigidBody("anchor", unit)
     plant.WeldFrames(plant.world_frame(), anchor.body_frame())
-    balls = list[Any]()
+    balls, welds = list[Any](), dict[str, Any]()
+
+    def inertia(body: Any, origin: Any) -> Any:
+        c, own = np.array(body["center"]) - origin, np.array(body["inertia"])
+        own = own / body["mass"] + (c @ c) * np.eye(3) - np.outer(c, c)
+        six = own[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        return tree.SpatialInertia(body["mass"], c, tree.UnitInertia(*six))
 
     def frame(body: Any, at: Any) -> Any:
         name = f"frame {plant.num_frames()}"
@@ -47,13 +53,8 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
         parent, before, last = bodies[body["parent"]], origin[body["parent"]], len(body["moves"])
         for k, move in enumerate(body["moves"], 1):
             P, axis = np.array(move["point"]), np.array(move["axis"])
-            inertia = tree.SpatialInertia.Zero()
-            if k == last:
-                c, own = np.array(body["center"]) - P, np.array(body["inertia"])
-                own = own / body["mass"] + (c @ c) * np.eye(3) - np.outer(c, c)
-                six = own[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-                inertia = tree.SpatialInertia(body["mass"], c, tree.UnitInertia(*six))
-            child = plant.AddRigidBody(f"{body['name']} {k}", inertia)
+            own = inertia(body, P) if k == last else tree.SpatialInertia.Zero()
+            child = plant.AddRigidBody(f"{body['name']} {k}", own)
             ends = f"joint {len(moves)}", frame(parent, P - before), child.body_frame()
             if move["kind"] == "ball":
                 made = tree.QuaternionFloatingJoint(*ends)
@@ -63,6 +64,10 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
                 made = kind(*ends, axis)
             moves.append(plant.AddJoint(made))
             parent, before = child, P
+        if not last:
+            child = plant.AddRigidBody(body["name"], inertia(body, before))
+            welds[body["name"]] = plant.WeldFrames(parent.body_frame(), child.body_frame())
+            parent = child
         bodies[body["name"]], origin[body["name"]] = parent, before
 
     def ends_of(each: Any, ground: Any) -> list[Any]:
@@ -131,8 +136,9 @@ def stepper(model: Any, settings: Any, effort: Any, times: Any) -> Any:
             return found
         every, ends = port.Eval(simulator.get_context()), iter(moves)
         for body in model["bodies"]:
-            last = [next(ends) for _ in body["moves"]][-1]
-            if body["moves"][-1]["kind"] == "ball":  # Drake gives no forces of constraints
+            joints = [next(ends) for _ in body["moves"]]
+            last = joints[-1] if joints else welds[body["name"]]
+            if joints and body["moves"][-1]["kind"] == "ball":  # Drake gives none of constraints
                 continue
             frame = last.frame_on_child().CalcPoseInWorld(simulator.get_context())
             force = frame.rotation() @ every[int(last.index())].translational()

@@ -68,13 +68,15 @@ def mjcf(model: Plain) -> str:
 def urdf(model: Plain) -> str:
     """Return the tree of the model as URDF; links of a chain between bodies have no mass."""
     root, kinds = ET.Element("robot", name=model["name"]), {"hinge": "continuous"}
-    kinds |= {"slide": "prismatic", "ball": "spherical"}
+    kinds |= {"slide": "prismatic", "ball": "spherical", "fixed": "fixed"}
     ET.SubElement(root, "link", name="ground")
     at = {"ground": [0.0, 0.0, 0.0]}
     for body in model["bodies"]:
         parent = body["parent"]
-        for k, move in enumerate(body["moves"], 1):
-            last = k == len(body["moves"])
+        weld: Plain = {"kind": "fixed", "axis": [0.0, 0.0, 1.0], "point": at[parent]}
+        moves = body["moves"] or [weld]
+        for k, move in enumerate(moves, 1):
+            last = k == len(moves)
             name = body["name"] if last else f"{body['name']} {k}"
             link = ET.SubElement(root, "link", name=name)
             at[name] = move["point"]

@@ -76,7 +76,11 @@ def stepper_model(mechanism: Mechanism, twists: Mapping[str, Array]) -> Plain:
     for joint in cut:
         if not isinstance(joint, TIED):
             raise UnsupportedError(f"{joint} closes a loop, and no tie of points replaces it")
-    chains = {each.child: each for each in parts if isinstance(each, Chain)}
+    chains = {
+        each.child: replace(each, parent=_carrier(mechanism, each.parent))
+        for each in parts
+        if isinstance(each, Chain)
+    }
     for name, chain in chains.items():
         if chain.joint is None:
             raise UnsupportedError(f"body {name!r} has no joint that carries it")

@@ -163,7 +163,7 @@ class Sweep:
         """Rate of the path: so slow for rest, that no inertia and no damper shows in a double."""
         return self.rate or 1.0 / SLOW
 
-    @property
+    @cached_property
     def path(self) -> Path:
         """Motions of all moving drivers over time, and the times of the samples."""
         motions: Mapping[str, Motion] = self.motions

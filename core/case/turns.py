@@ -68,7 +68,7 @@ def turns_of(
         samples: indices of these among the samples of the path.
     """
     assert isinstance(output, JointAngle)
-    part, x = replace(path, times=path.times[samples]), x - output.at_design
+    part, x = _at(path, samples), x - output.at_design
     count = turns(x, v, output.period, part)
     if near_design(mechanism, path) and not in_doubt(x + output.period * count, v, part.times):
         return count
@@ -98,16 +98,23 @@ def oriented(
         samples: indices of these among the samples of the path.
     """
     e = output.parameters(at, design)
-    part = replace(path, times=path.times[samples])
+    part = _at(path, samples)
     values = floats(e)
     sign, doubt = signs(values, angular_velocity(e), part)
-    moves = any(body.name == output.body for body in mechanism.moving)
-    if moves and (doubt or not near_design(mechanism, path)):
+    if not mechanism.is_fixed(output.body) and (doubt or not near_design(mechanism, path)):
         near = _reached(followed_attitude(mechanism, path, output.body), samples, part.times)
         if near is not None:
             near = near.T.reshape(4, -1, *(1,) * (values.ndim - 2))
             sign = np.where((near * values).sum(axis=0) < 0.0, -1.0, 1.0)
     return output.component_of(signed(sign, e))
+
+
+def _at(path: Path, samples: NDArray[np.intp] | slice) -> Path:
+    """Return a path at some of its samples; all of them are the path itself, whose values at the
+    design are known.
+    """
+    whole = isinstance(samples, slice) and samples == slice(None)
+    return path if whole else replace(path, times=path.times[samples])
 
 
 def _reached(
@@ -144,7 +151,7 @@ def turns(x: Array, v: Array, period: float, path: Path) -> Array:
     gone = speed * (t - np.take_along_axis(t, before, 0))
     count = np.cumsum(_whole((np.nan_to_num(gone) - change) / period), axis=0)
     x0, v0, n0, since = (np.take_along_axis(each, first, 0) for each in (x, v, count, t))
-    expected = np.nan_to_num(v0 * since) * float(_through_design(path))
+    expected = np.nan_to_num(v0 * since) * float(path.passes_design)
     count = count - n0 + _whole((expected - x0) / period)
     found = np.empty_like(x)
     found[order] = count
@@ -172,16 +179,11 @@ def signs(e: Array, rate: Array, path: Path) -> tuple[Array, bool]:
     doubt = bool((np.isfinite(mean.sum(axis=0)) & (np.abs(agrees) < DOUBTFUL)).any())
     sign = np.cumprod(np.where(agrees < 0.0, -1.0, 1.0), axis=0)
     e0, rate0 = (np.take_along_axis(each, first[None], 1) for each in (e, rate))
-    since = np.take_along_axis(t, first, 0) * float(_through_design(path))
+    since = np.take_along_axis(t, first, 0) * float(path.passes_design)
     own = np.where(agreement(quat(e0), rate0, since) < 0.0, -1.0, 1.0)
     found = np.empty(sign.shape)
     found[order] = sign * np.take_along_axis(sign, first, 0) * own
     return found, doubt
-
-
-def _through_design(path: Path) -> bool:
-    """Return whether all drivers have their design values at time zero."""
-    return path.covers(0.0) and bool(np.allclose(path.values(np.zeros(1)), 0.0, atol=1e-9))
 
 
 def _whole(x: Array) -> Array:

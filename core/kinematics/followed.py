@@ -98,6 +98,10 @@ def _counted(
 
 def near_design(mechanism: Mechanism, path: Path) -> bool:
     """Return whether the drivers go from the design to all samples in short steps."""
+    return (_recent_near if path.is_builtin else _is_near)(mechanism, path)
+
+
+def _is_near(mechanism: Mechanism, path: Path) -> bool:
     times = path.times[np.isfinite(path.times)]
     if not len(times) or not path.motions:  # a free motion is known at all its steps
         return True
@@ -106,6 +110,10 @@ def near_design(mechanism: Mechanism, path: Path) -> bool:
     if not start.stands or start.time != 0.0:
         return False
     return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
+
+
+# asked for each angle and attitude of a motion
+_recent_near = keep_last(8)(_is_near)
 
 
 def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
@@ -135,21 +143,34 @@ _recent = keep_last(32)(_finer)
 
 def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> tuple[Array, bool]:
     """Return the values by further samples, and whether no number of turns is in doubt."""
-    start = start_of(mechanism, path)
-    times = _divided(mechanism, path, _sorted(path, start.time), part)
-    # the samples first: they decide where the motion starts
-    fine = replace(path, times=np.concatenate([path.times, times]))
+    fine = (_recent_fine if path.is_builtin else _fine)(mechanism, path, part)
     motion = _motion(mechanism, fine, what)
     taken = motion.details.get("start", {"time": 0.0, "lead": {}})
     at_start, sure = what.at_design, True
     if any(taken["lead"].values()):
-        lead = path.lead_in(taken["time"])
-        lead = replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
+        lead = (_recent_lead if path.is_builtin else _lead)(mechanism, path, taken["time"], part)
         led = _motion(mechanism, lead, what)
         values, sure = _counted(what, mechanism, lead.times, led, 0.0, at_start)
         at_start = np.asarray(values[-1])
     found, certain = _counted(what, mechanism, fine.times, motion, taken["time"], at_start)
     return found[: len(path.times)], sure and certain
+
+
+def _fine(mechanism: Mechanism, path: Path, part: float) -> Path:
+    """Return a path with further samples."""
+    times = _sorted(path, start_of(mechanism, path).time)
+    # the samples first: they decide where the motion starts
+    return replace(path, times=np.concatenate([path.times, _divided(mechanism, path, times, part)]))
+
+
+def _lead(mechanism: Mechanism, path: Path, to: float, part: float) -> Path:
+    """Return the way from the design to a time of a path, with further samples."""
+    lead = path.lead_in(to)
+    return replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
+
+
+# the same for all that is followed along a path
+_recent_fine, _recent_lead = keep_last(4)(_fine), keep_last(4)(_lead)
 
 
 def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self, cast
 
 from ..errors import MechanismError, Phrase
 from ..input_checks import finite, finite_numbers, held, plain, require_direction
-from ..joints.base import Joint, Kind, position, positions, unit
+from ..joints.base import Kind, position, positions, unit
 from .body import (
     ANGLE,
     DAMPING,
@@ -206,15 +206,6 @@ class TorsionSpringDamper(ForceElement):
     def __post_init__(self) -> None:
         self._numbers()
         self._curve()
-
-    def check(self, joint: Joint) -> None:
-        """Raise MechanismError unless the joint turns about an axis."""
-        if "rotation" not in joint.freedoms:
-            raise MechanismError(
-                f"{self}: joint {joint.name!r} is {joint.type} and has no rotation; its freedoms:"
-                f" {', '.join(joint.freedoms) or 'none'}",
-                self._key("joint"),
-            )
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
+from ..caches import ByContent
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import finite_numbers, held
 from ..joints import Distance
@@ -77,8 +78,8 @@ KINDS: Mapping[str, type] = {
 """Members of a mechanism, and the class of each."""
 
 
-@dataclass(frozen=True)
-class Mechanism:
+@dataclass(frozen=True, eq=False)
+class Mechanism(ByContent):
     """A named set of bodies, joints, points, drivers and loads.
 
     Attributes:
@@ -142,12 +143,7 @@ class Mechanism:
             who, key = str(coupler), f"joints.{coupler.name}.joints"
             for name, freedom in zip(coupler.joints, coupler.freedoms, strict=True):
                 joint = self._require("joint", who, name, key)
-                if freedom not in joint.freedoms:
-                    raise MechanismError(
-                        f"{who}: joint {name!r} is {joint.type} and has no {freedom} to couple; "
-                        f"its freedoms: {', '.join(joint.freedoms) or 'none'}",
-                        key,
-                    )
+                _require_freedom(who, joint, freedom, f"{freedom} to couple", key)
         for driver in self.drivers:
             if isinstance(driver, PointCoordinate):
                 who, key = f"driver {driver.name!r}", f"drivers.{driver.name}.point"
@@ -160,7 +156,9 @@ class Mechanism:
                     )
             elif isinstance(driver, JointDriver):
                 who, key = f"driver {driver.name!r}", f"drivers.{driver.name}.joint"
-                driver.check(self._require("joint", who, driver.joint, key))
+                joint, wanted = self._require("joint", who, driver.joint, key), driver.freedom
+                who = f"{who} ({driver.type})"
+                _require_freedom(who, joint, wanted, f"{wanted} to drive", key)
         self._check_loads()
 
     def __repr__(self) -> str:
@@ -214,7 +212,8 @@ class Mechanism:
         for force in self.forces:
             key = f"forces.{force.name}"
             if isinstance(force, TorsionSpringDamper):
-                force.check(self._require("joint", str(force), force.joint, f"{key}.joint"))
+                joint = self._require("joint", str(force), force.joint, f"{key}.joint")
+                _require_freedom(str(force), joint, "rotation", "rotation", f"{key}.joint")
                 continue
             key = f"{key}.{'body' if len(force.bodies) == 1 else 'bodies'}"
             for name in force.bodies:
@@ -486,6 +485,15 @@ class Mechanism:
     def moving(self) -> tuple[Body, ...]:
         """The bodies not fixed, in order."""
         return tuple(body for body in self.bodies if not body.fixed)
+
+
+def _require_freedom(who: str, joint: Joint, freedom: str, missing: str, key: str) -> None:
+    if freedom not in joint.freedoms:
+        raise MechanismError(
+            f"{who}: joint {joint.name!r} is {joint.type} and has no {missing}; its freedoms:"
+            f" {', '.join(joint.freedoms) or 'none'}",
+            key,
+        )
 
 
 def extent(points: Sequence[Sequence[float]]) -> float:

@@ -17,9 +17,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..caches import ByContent
 from ..errors import MechanismError
 from ..input_checks import finite, finite_numbers, held, require_direction
-from ..joints.base import Joint, Kind
+from ..joints.base import Kind
 from ..trajectory import Array
 from .formula import jet_of
 
@@ -216,7 +217,7 @@ def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> di
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(ByContent):
     """Motions of the drivers over time; drivers without a motion hold their design value.
 
     Two paths are equal if motions and times are, to the last bit. The times do not change.
@@ -231,17 +232,11 @@ class Path:
     times: Array
     design: Mapping[str, float] = field(default_factory=dict[str, float])
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Path) and self._content == other._content
-
-    def __hash__(self) -> int:
-        return hash(self._content)
-
     @cached_property
     def _content(self) -> tuple[Any, ...]:
         return tuple(self.motions.items()), self.times.tobytes(), tuple(self.design.items())
 
-    @property
+    @cached_property
     def is_builtin(self) -> bool:
         """Whether all motions are of this module with immutable numbers: equal ones then mean the
         same.
@@ -250,7 +245,7 @@ class Path:
             each.motion if isinstance(each, Absolute) else each for each in self.motions.values()
         )
         try:
-            hash(self._content)
+            hash(self)
         except TypeError:  # a number given as an array
             return False
         return all(type(each).__module__ == __name__ for each in motions)
@@ -295,6 +290,11 @@ class Path:
     def covers(self, t: float) -> bool:
         """Return whether all motions include time t, up to its rounding."""
         return all(_within(motion.span, t) for motion in self.motions.values())
+
+    @cached_property
+    def passes_design(self) -> bool:
+        """Whether all drivers have their design values at time zero."""
+        return self.covers(0.0) and bool(np.allclose(self.values(np.zeros(1)), 0.0, atol=1e-9))
 
     def lead_in(self, to: float) -> Path:
         """Return the straight path of all drivers from the design, at time zero, to their values at
@@ -402,15 +402,6 @@ class JointDriver(Driver):
     freedom: ClassVar[str]
     joint: str
     relative: bool = True
-
-    def check(self, joint: Joint) -> None:
-        """Raise MechanismError unless the joint has the freedom this driver drives."""
-        if self.freedom not in joint.freedoms:
-            raise MechanismError(
-                f"driver {self.name!r} ({self.type}): joint {joint.name!r} is {joint.type} and has"
-                f" no {self.freedom} to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}",
-                f"drivers.{self.name}.joint",
-            )
 
 
 @dataclass(frozen=True)

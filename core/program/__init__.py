@@ -22,7 +22,7 @@ From a plan to machine code:
 - `llvm.programs`: schedule a program, assign registers, and write LLVM text; the interpreter of
   tables.
 - `llvm.loops`: loops over lanes as LLVM text, the same for all plans. `llvm.plan` lays out a plan
-  in memory for them.
+  in memory for them, with the loops over its tables.
 - `llvm.fixed_order`: sparse LU factors of several matrices at once, as loops over lists of places.
 - `llvm.compiler`: compile the text, link the object file, and load it.
 - `llvm.jit`: choose cached code, interpretation or compilation for a plan.

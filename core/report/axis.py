@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from rich.console import Console
@@ -15,12 +16,15 @@ from rich.text import Text
 from ..case.case import PER_TRAVEL
 from ..case.io.escape import visible
 from ..case.units import ANGLES, LENGTHS
+from ..errors import shortened
 from ..harness.record import Outcome, Record, Results
 from ..unit_text import unit_text, value_text, with_unit
 from . import terminal
 
 # a figure's width in pixels; longer series are thinned, but keep their worst samples
 SAMPLES = 500
+# beside each figure
+MOST_DRIVERS = 8
 
 DISPLAY = {
     "m": ("mm", 1e3),
@@ -96,19 +100,15 @@ class Axis(Moved):
 
     def at(self, step: int) -> str:
         """Return the values of all drivers at a sample as text."""
-        return ", ".join(
-            filter(None, (super().at(step), *(moved.at(step) for moved, _ in self.further)))
-        )
+        texts = [super().at(step), *(moved.at(step) for moved, _ in self.further)]
+        return shortened([*filter(None, texts)], MOST_DRIVERS)
 
-    @property
+    @cached_property
     def besides(self) -> str:
         """Return a sentence on the drivers in `further`; empty without them."""
         named = [f"{moved.name} ({how})" if how else moved.name for moved, how in self.further]
-        return (
-            f"{'Driven' if self.unit == 's' else 'Also driven'}: {', '.join(named)}."
-            if named
-            else ""
-        )
+        word = "Driven" if self.unit == "s" else "Also driven"
+        return f"{word}: {shortened(named, MOST_DRIVERS)}." if named else ""
 
     @property
     def label(self) -> str:

@@ -165,30 +165,35 @@ def curves(results: Results, case: str | None = None) -> Iterator[Rows]:
     Args:
         case: name of the only case; None for all.
     """
-    written: set[str] = set()
+    written, otherwise = set[str](), _counts_otherwise(results)
     for record in results.records:
         if case not in (None, record.case) or not record.driver:
             continue
+        about: Mapping[str, Any] = results.run.get("cases", {}).get(record.case, {})
         if record.case not in written:
             written.add(record.case)
             for name, series in results.references.get(record.case, {}).items():
-                yield _rows(results, record, REFERENCE, record.truth, name, series)
+                yield _rows(about, record, (REFERENCE, record.truth), name, series, otherwise)
         for name, series in record.outputs.items():
-            yield _rows(results, record, record.engine, record.mode, name, series)
+            yield _rows(about, record, (record.engine, record.mode), name, series, otherwise)
 
 
 def _rows(
-    results: Results, record: Record, engine: str, mode: str, output: str, series: OutputSeries
+    about: Mapping[str, Any],
+    record: Record,
+    who: tuple[str, str],
+    output: str,
+    series: OutputSeries,
+    otherwise: bool,
 ) -> Rows:
     driver, values = next(iter(record.driver.items()))
-    about: Mapping[str, Any] = results.run.get("cases", {}).get(record.case, {})
     facts: Mapping[str, Any] = about.get("driver", {})
-    head = record.case, engine, mode, output, series.unit
+    head = record.case, *who, output, series.unit
     unit = DRIVER_UNITS.get(facts.get("type", ""))
     unknown = [None] * len(values)
     motions = (each or unknown for each in (series.position, series.velocity, series.acceleration))
     counted: list[str] = []
-    if _counts_otherwise(results):
+    if otherwise:
         zeros = about.get("outputs", {}).get(output, {}).get("at_design"), facts.get("design")
         counted = ["" if zero is None else "model" if zero else "design" for zero in zeros]
     return [

@@ -353,9 +353,7 @@ def test_a_planted_mistake_is_found(mistake, monkeypatch):
 # Where drivers and couplers act in every engine, against free-body diagrams
 
 
-# Of the largest force. Exudyn has no acceleration: it is a difference of Jacobians.
-AGREE_ACTION = dict.fromkeys(["native", "mujoco", "pinocchio", "dart", "drake", "simbody"], 1e-12)
-AGREE_ACTION["exudyn"] = 1e-9
+AGREE_ACTION = {"native": 1e-12} | AGREE
 HINGE = Link(Revolute)
 DRIVEN = {
     "translational": Link(Translational),
@@ -370,9 +368,7 @@ def forces(made, engine):
     sweep = Sweep(TIME, made.path.times, motions=made.path.motions)
     mechanism = with_markers(made.mechanism, outputs)
     case = Case("chain", "made here", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
-    given = adapters.engine(engine)
-    if given.version() is None:
-        pytest.skip(f"{engine} is not installed")
+    given = adapters.engine(here(engine))
     assert given.unsupported(case) is None
     found = given.solve(given.build(case), case, 1e-12)
     assert found.solved.all(), found.message
@@ -412,10 +408,8 @@ def test_a_coupled_joint(name, engine):
 # Forces of random mechanisms with slides, screws, racks and polynomials, in every engine
 
 
-# Of the largest force: round-off over a smallest singular value of a hundredth. Exudyn has no
-# acceleration: it is a difference of Jacobians.
-AGREE_MECHANISMS = dict.fromkeys(["mujoco", "pinocchio", "dart", "drake", "simbody"], 1e-11)
-AGREE_MECHANISMS["exudyn"] = 1e-9
+# Of the largest force: round-off over a smallest singular value of a hundredth.
+AGREE_MECHANISMS = {name: max(limit, 1e-11) for name, limit in AGREE.items()}
 # Arms and loops; racks in 1, 21 and 37, polynomials in 9, 27, 45 and 63, a gear in 45.
 SEEDS = (0, 1, 9, 21, 24, 27, 32, 37, 45, 63)
 
@@ -429,10 +423,8 @@ def native(seed):
 @pytest.mark.parametrize("engine", AGREE_MECHANISMS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forces_are_those_of_the_native_engine(seed, engine):
-    if adapters.engine(engine).version() is None:
-        pytest.skip(f"{engine} is not installed")
     case, expected = native(seed)
-    compared = Beside(expected, values(case, engine)[0])
+    compared = Beside(expected, values(case, here(engine))[0])
     assert np.isfinite(expected).all()
     assert compared.same_missing
     assert compared.worst < AGREE_MECHANISMS[engine]

@@ -144,13 +144,19 @@ def texts(to, mechanism):
     return adapters.writer(to)(mechanism, way_to(case, ANGLE), {})
 
 
-def test_mujoco_begins_to_turn():
+def started(text):
+    """Return MuJoCo's model of a file, and its data at the start."""
     mj = pytest.importorskip("mujoco")
-    text = texts("mjcf", arm(forces=[*SPRINGS, *LOADS]))[".xml"]
     model = mj.MjModel.from_xml_string(text)
     data = mj.MjData(model)
     mj.mj_resetDataKeyframe(model, data, model.key("start").id)
     mj.mj_forward(model, data)
+    return model, data
+
+
+def test_mujoco_begins_to_turn():
+    text = texts("mjcf", arm(forces=[*SPRINGS, *LOADS]))[".xml"]
+    model, data = started(text)
     assert data.qacc[0] == pytest.approx(start(springs=True, loads=False), rel=STOOD_IN)
     body = data.body("arm")
     axes = body.ximat.reshape(3, 3)
@@ -331,15 +337,10 @@ def test_the_file_of_a_case_without_masses_has_none(to):
 
 def test_joints_that_carry_backwards_have_springs_of_the_same_sign():
     """The tree goes from ground to the joint's first body."""
-    mj = importlib.import_module("mujoco")
     mechanism = arm()
     pin = replace(mechanism.joint("pin"), i="arm", j="ground")
     spring = TorsionSpringDamper("clock", "pin", 7.0, 0.25, -0.5)
-    text = texts("mjcf", replace(mechanism, joints=[pin], forces=[spring]))[".xml"]
-    model = mj.MjModel.from_xml_string(text)
-    data = mj.MjData(model)
-    mj.mj_resetDataKeyframe(model, data, model.key("start").id)
-    mj.mj_forward(model, data)
+    _, data = started(texts("mjcf", replace(mechanism, joints=[pin], forces=[spring]))[".xml"])
     # the joint's angle is that of ground relative to the arm, in the file as in the case
     assert data.qpos[0] == pytest.approx(ANGLE)
     assert data.qfrc_spring[0] == pytest.approx(-7.0 * (ANGLE + 0.5))

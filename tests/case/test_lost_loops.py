@@ -378,16 +378,6 @@ MISTYPED = {
 }
 
 
-@pytest.mark.parametrize(("old", "new", "said"), MISTYPED.values(), ids=MISTYPED)
-def test_mistyped_elements_of_sdf_are_refused(old: str, new: str, said: str, tmp_path: Path):
-    text = IN_SDF.format("").replace(old, new, 1)
-    if new == "<xzy>":
-        text = text.replace("</xyz>", "</xzy>", 1)
-    with pytest.raises(CaseError, match=r"line \d+: ") as caught:
-        read(tmp_path, text, "gate.sdf")
-    assert said in str(caught.value)
-
-
 MISTYPED_IN_URDF = {
     "axis": ('<axis xyz="0 1 0"/>', '<axis xzy="0 1 0"/>', "did you mean 'xyz'?"),
     "origin": ('<origin xyz="0 0', '<origin degrees="1" xyz="0 0', "'degrees'"),
@@ -417,15 +407,6 @@ MISTYPED_IN_URDF = {
 }
 
 
-@pytest.mark.parametrize(("old", "new", "said"), MISTYPED_IN_URDF.values(), ids=MISTYPED_IN_URDF)
-def test_mistyped_elements_of_urdf_are_refused(old: str, new: str, said: str, tmp_path: Path):
-    text = GATE.format("")
-    assert old in text
-    with pytest.raises(CaseError) as caught:
-        read(tmp_path, text.replace(old, new, 1))
-    assert said in str(caught.value)
-
-
 IN_MJCF = """<mujoco><option gravity="0 0 -1"/><default><geom density="1"/></default><worldbody>
 <body name="a"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="drive"/>
 <geom name="g" size="0.1"/><body name="b" pos="1 0 0"><joint name="pin"/>
@@ -446,11 +427,25 @@ def test_exclusions_and_sensors_join_nothing(tmp_path: Path):
     assert case.mechanism.gravity == (0.0, 0.0, -1.0)
 
 
-@pytest.mark.parametrize(("old", "new", "said"), MISTYPED_IN_MJCF.values(), ids=MISTYPED_IN_MJCF)
-def test_mistyped_attributes_of_mjcf_are_refused(old: str, new: str, said: str, tmp_path: Path):
-    text = IN_MJCF.format("").replace(old, new, 1)
-    with pytest.raises(CaseError, match="which MJCF does not have here") as caught:
-        read(tmp_path, text, "model.xml")
+MISTYPED_IN = {
+    "gate.sdf": (IN_SDF, MISTYPED),
+    "gate.urdf": (GATE, MISTYPED_IN_URDF),
+    "model.xml": (IN_MJCF, MISTYPED_IN_MJCF),
+}
+
+
+@pytest.mark.parametrize(
+    ("file", "what"), [(file, what) for file, (_, table) in MISTYPED_IN.items() for what in table]
+)
+def test_mistyped_names_are_refused(file: str, what: str, tmp_path: Path):
+    text, table = MISTYPED_IN[file]
+    old, new, said = table[what]
+    assert old in text
+    mistyped = text.format("").replace(old, new, 1)
+    if new == "<xzy>":
+        mistyped = mistyped.replace("</xyz>", "</xzy>", 1)
+    with pytest.raises(CaseError, match=r"line \d+: ") as caught:
+        read(tmp_path, mistyped, file)
     assert said in str(caught.value)
 
 

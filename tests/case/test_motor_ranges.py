@@ -65,20 +65,38 @@ def test_motor_of_tendon_moves_its_joints(tmp_path):
     (file := tmp_path / "gripper.xml").write_text(GRIPPER.replace("COUPLING", coupling))
     assert load(file).sweep.driver == "right"
     file.write_text(GRIPPER.replace("COUPLING", ""))
-    with pytest.raises(CaseError, match="nothing said of what drives it"):
+    with pytest.raises(CaseError, match=r"drives it \(its motors, of right, move 1 of them\)"):
         load(file)
 
 
-@pytest.mark.parametrize(("motors", "upper"), [(("shoulder",), "1"), (("shoulder", "elbow"), "-1")])
-def test_too_few_motors_or_limits_ask(motors, upper, tmp_path):
-    with pytest.raises(CaseError, match="nothing said of what drives it"):
+@pytest.mark.parametrize(
+    ("motors", "upper", "why"),
+    [
+        ((), "1", "the file marks no motors"),
+        (("shoulder",), "1", "its motors, of shoulder, move 1 of them"),
+        (("elbow", "shoulder"), "-1", "its motors, of shoulder, elbow, have no limits at shoulder"),
+    ],
+)
+def test_unused_motors_say_why(motors, upper, why, tmp_path):
+    with pytest.raises(CaseError, match=rf"nothing said of what drives it \({why}\)"):
         load(arm(tmp_path, *motors, upper=upper))
+
+
+def test_motor_held_by_rest_is_offered(tmp_path):
+    with pytest.raises(CaseError, match=r"of shoulder, elbow, do without --hold-rest\)"):
+        load(arm(tmp_path, "shoulder", "elbow"), Supplied(hold_rest=True))
 
 
 WIPER = """<mujoco><worldbody>
 <body name="arm"><joint name="motor" range="-180 180"/></body></worldbody>
 <actuator><motor joint="motor"/><position tendon="none"/></actuator>
 <keyframe><key name="up" qpos="1"/><key name="down" qpos="0"/></keyframe></mujoco>"""
+
+
+def test_motor_in_parent_drives_its_joint(tmp_path):
+    text = WIPER.replace('<motor joint="motor"/>', '<motor jointinparent="motor"/>')
+    (file := tmp_path / "wiper.xml").write_text(text)
+    assert load(file).sweep.driver == "motor"
 
 
 def test_what_drives_a_model_is_not_left_out(tmp_path):
@@ -91,3 +109,13 @@ def test_what_drives_a_model_is_not_left_out(tmp_path):
     assert {"ranges of joints (1)", "actuator: motor (1)"} < {
         *driven.split(LEFT_OUT)[1].split(", ")
     }
+
+
+def test_locked_joint_with_a_link_s_name_is_refused(tmp_path):
+    (file := tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="upper"><joint name="arm"/><body name="arm" pos="1 0 0">'
+        '<joint name="elbow" axis="0 1 0"/></body></body></worldbody>'
+        '<equality><joint joint1="arm" polycoef="0 0"/></equality></mujoco>'
+    )
+    with pytest.raises(CaseError, match="found 'arm', which an equality of the file locks"):
+        load(file, Supplied(drive=("arm:0:1",), hold=("elbow",)))

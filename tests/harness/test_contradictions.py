@@ -164,16 +164,19 @@ def test_residual_above_tolerance_fails():
     )
 
 
-def test_residual_within_tolerance_passes():
-    assert run([crank()], [leaving(1e-6)], tol=1e-5).records[0].outcome is Outcome.PASS
-    assert run([crank()], [leaving(1e-12)], tol=TOL).records[0].outcome is Outcome.PASS
-    # a simulation promises no residual, and an effort leaves one on purpose
-    assert (
-        run([crank()], [leaving(1e-6, mode="simulate")], tol=TOL).records[0].outcome is Outcome.PASS
-    )
-    assert (
-        run([crank()], [leaving(1e-6)], tol=TOL, residuals=False).records[0].outcome is Outcome.PASS
-    )
+@pytest.mark.parametrize(
+    ("residual", "options", "engine"),
+    [
+        (1e-6, {"tol": 1e-5}, {}),
+        (1e-12, {}, {}),
+        # a simulation promises no residual, and an effort leaves one on purpose
+        (1e-6, {}, {"mode": "simulate"}),
+        (1e-6, {"residuals": False}, {}),
+    ],
+)
+def test_residual_within_tolerance_passes(residual, options, engine):
+    given = {"tol": TOL, **options}
+    assert run([crank()], [leaving(residual, **engine)], **given).records[0].outcome is Outcome.PASS
 
 
 def test_residual_fails_uncompared_pair():
@@ -206,22 +209,15 @@ def test_uncertain_samples_contradict_nobody():
     )
 
 
-def test_contradictions_are_written_and_read():
+def test_contradictions_are_written_read_and_resumed():
     results = run(
         [crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL
     )
-    assert from_json(to_json(results)) == results
+    read = from_json(to_json(results))
+    assert read == results
     assert "contradict" in headline(results)
-
-
-def test_resumed_run_reuses_native_record():
-    results = run(
-        [crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL
-    )
     engines = [Fake("native", answer=raising(AssertionError("not again"))), Fake()]
-    again = run(
-        [crank(reference=False)], engines, tol=TOL, made=from_json(to_json(results)).records[:1]
-    )
+    again = run([crank(reference=False)], engines, tol=TOL, made=read.records[:1])
     assert again.records[1].message == results.records[1].message
 
 

@@ -7,7 +7,6 @@ import zlib
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree import ElementTree as ET
 
 import msgspec
@@ -149,29 +148,23 @@ def test_unjudged_case_keeps_status_0(kincheck_main, capsys):
     assert "1 pass, 1 not judged" in capsys.readouterr().out
 
 
-def test_an_engine_that_is_named_is_required(kincheck_main, capsys):
-    engines = [RIGHT, MISSING]
-    assert kincheck_main("run", engines=engines) == 0
-    assert kincheck_main("run", "--engine", "native", engines=engines) == 0
-    capsys.readouterr()
-    assert kincheck_main("run", "--engine", "native", "missing", engines=engines) == 2
-    assert (
-        "kincheck: engine 'missing' is requested, but missing: missing is not installed"
-        in capsys.readouterr().err
-    )
-    assert kincheck_main("run", "--engine", "missing", engines=engines) == 2
-    assert kincheck_main("run", "--engine", "native", "unable", engines=[RIGHT, UNABLE]) == 0
-    capsys.readouterr()
-    assert (
-        kincheck_main(
-            "run", "--engine", "native", "missing", "--require", "missing", engines=engines
-        )
-        == 2
-    )
-    told = [
-        line for line in capsys.readouterr().err.splitlines() if "missing is not installed" in line
-    ]
-    assert len(told) == 1  # not once for each option
+@pytest.mark.parametrize(
+    ("named", "engines", "status"),
+    [
+        ("", [RIGHT, MISSING], 0),
+        ("--engine native", [RIGHT, MISSING], 0),
+        ("--engine native missing", [RIGHT, MISSING], 2),
+        ("--engine missing", [RIGHT, MISSING], 2),
+        ("--engine native unable", [RIGHT, UNABLE], 0),
+        ("--engine native missing --require missing", [RIGHT, MISSING], 2),  # told once
+    ],
+)
+def test_an_engine_that_is_named_is_required(kincheck_main, capsys, named, engines, status):
+    assert kincheck_main("run", *named.split(), engines=engines) == status
+    lines = capsys.readouterr().err.splitlines()
+    told = [line for line in lines if "missing is not installed" in line and "engine '" in line]
+    assert len(told) == (status == 2)
+    assert all(line.startswith("kincheck: ") for line in told)
 
 
 def test_broken_native_leaves_others_unjudged(kincheck_main, capsys):
@@ -376,7 +369,7 @@ def test_output_without_values_fails(complete):
         f"x: position: {SAMPLES} samples without a value where closed form has one"
         in record.message
     ) is complete
-    failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")
+    failed = ET.fromstring(to_junit(results)).findall(".//testcase[failure]")
     assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
 
 

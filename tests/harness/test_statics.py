@@ -100,6 +100,17 @@ def held(lift, bend):
     return -weight + elbow + 50.0 * lift, elbow
 
 
+def components(frame, kind, joint, more=""):
+    """Return the outputs of a reaction in a frame."""
+    return "".join(
+        f'[outputs.{frame}_{x}]\ntype = "joint_{kind}"\njoint = "{joint}"\ncomponent = "{x}"\n'
+        f'frame = "{frame}"\n{more}'
+        for x in "xyz"
+    )
+
+
+WRIST = "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
+ANGLE = '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
 ENGINES = ["native", "pinocchio", "mujoco", "exudyn"]
 
 
@@ -147,10 +158,7 @@ def test_option_static_equals_rate_zero(tmp_path, capsys):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_resting_pose_needs_no_effort(tmp_path, engine):
     """Both drivers are free: a coil at the shoulder, and the hand hangs straight down."""
-    text = ARM + "[equilibrium]\n" + EFFORTS
-    text += '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
-    text += "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
-    found = values(read(tmp_path, text), engine)
+    found = values(read(tmp_path, ARM + "[equilibrium]\n" + EFFORTS + ANGLE + WRIST), engine)
     assert found["lift"] == pytest.approx([0.0], abs=1e-12)
     assert found["bend"] == pytest.approx([0.0], abs=1e-12)
 
@@ -166,8 +174,7 @@ def test_resting_pose_needs_no_drivers(tmp_path):
     names; one of both is enough to be driven.
     """
     bare = ARM[: ARM.index("[drivers.lift]")] + ARM[ARM.index("[forces.coil]") :]
-    bare += "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
-    bare += '[outputs.z]\npoint = "tip"\ncomponent = "z"\n[equilibrium]\n'
+    bare += WRIST + '[outputs.z]\npoint = "tip"\ncomponent = "z"\n[equilibrium]\n'
     lift = '[drivers.lift]\ntype = "joint_angle"\njoint = "shoulder"\n'
     heights = [values(read(tmp_path, text))["z"] for text in (bare, bare + lift)]
     assert heights[0] == pytest.approx(heights[1], abs=1e-14)
@@ -225,8 +232,7 @@ class Heavy(NativeEngine):
 
 def test_equilibrium_without_outputs_of_efforts_is_judged(tmp_path):
     """The efforts of free drivers vanish; bushings of joints wait for a compliance study."""
-    text = ARM + "[equilibrium]\n" + '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
-    text += "[forces.wrist]\ntype = 'torsion_spring_damper'\njoint = 'elbow'\nstiffness = 8.0\n"
+    text = ARM + "[equilibrium]\n" + ANGLE + WRIST
     text += "[joints.shoulder.bushings.rubber]\nstiffness = 1e5\nturning_stiffness = 90.0\n"
     case = read(tmp_path, text)
     found = values(case, "native")
@@ -237,8 +243,7 @@ def test_equilibrium_without_outputs_of_efforts_is_judged(tmp_path):
 
 
 def test_resting_pose_follows_a_held_driver(tmp_path):
-    text = ARM + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS
-    text += '[outputs.angle]\ntype = "joint_angle"\njoint = "shoulder"\n'
+    text = ARM + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS + ANGLE
     text += '[sweep]\ndriver = "bend"\nstart = -0.5\nstop = 0.5\nsteps = 3\n'
     case = read(tmp_path, text)
     found = values(case, "mujoco")
@@ -251,7 +256,6 @@ def test_resting_pose_follows_a_held_driver(tmp_path):
 
 def test_unstable_resting_pose_is_noted(tmp_path):
     upright = ARM.replace("gravity = [0.0, 0.0, -9.81]", "gravity = [-100.0, 0.0, 0.0]")
-    upright = upright.replace("gravity = [-100", "gravity = [-100")
     case = read(tmp_path, upright + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS)
     assert "unstable: body" in "".join(case.assembly)
 
@@ -373,12 +377,9 @@ rate = 0
 def test_reactions_about_a_point_in_turned_frames(tmp_path, engine):
     """The beam's own y is up at design, its z forward; the joint's z is its axis."""
     head = ARM.partition("[bodies.arm]")[0]
-    outputs = "".join(
-        f'[outputs.{frame}_{x}]\ntype = "joint_{kind}"\njoint = "pin"\ncomponent = "{x}"\n'
-        f'frame = "{frame}"\n' + 'about = "post"\n' * (kind == "moment")
-        for frame, kind in (("global", "moment"), ("body", "force"), ("joint", "moment"))
-        for x in "xyz"
-    )
+    about = 'about = "post"\n'
+    outputs = components("global", "moment", "pin", about) + components("body", "force", "pin")
+    outputs += components("joint", "moment", "pin", about)
     found = values(read(tmp_path, head + TURNED + outputs), engine)
     turn, weight = np.array([0.0, 0.3, 0.6]), np.full(3, 2.0 * G)
     expected = {
@@ -426,12 +427,7 @@ def test_redundant_rows_leave_turned_components_undetermined(tmp_path):
     rigid bodies tell nothing.
     """
     head, sweep = ARM.partition("[bodies.arm]")[0], TURNED[TURNED.index("[drivers.turn]") :]
-    outputs = "".join(
-        f'[outputs.{frame}_{x}]\ntype = "joint_force"\njoint = "b"\ncomponent = "{x}"\n'
-        f'frame = "{frame}"\n'
-        for frame in ("global", "body", "joint")
-        for x in "xyz"
-    )
+    outputs = "".join(components(frame, "force", "b") for frame in ("global", "body", "joint"))
     text = head + PARALLEL + sweep.replace('"pin"', '"a"') + outputs
     found = values(read(tmp_path, text), "pinocchio")
     assert found["global_z"] == pytest.approx(np.full(3, 1.5 * G), abs=1e-11)

@@ -22,10 +22,12 @@ from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.mechanism.motions import Absolute, Ramp, Sine
 from kincheck.core.studies.diagnosis import diagnose
 
+from ..support.mechanisms import Z
+
 ARM = Mechanism(
     "arm",
     [Body("arm")],
-    [Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+    [Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), Z)],
     [Point("tip", "arm", (0.8, 0.6, 0.0))],
     [PointCoordinate("y", "tip", (0.0, 2.0, 0.0), relative=False)],
 )
@@ -60,11 +62,11 @@ def test_motions_of_further_drivers_are_absolute_too():
     sleeve = Mechanism(
         "sleeve",
         [Body("sleeve")],
-        [Cylindrical("sleeve", "ground", "sleeve", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        [Cylindrical("sleeve", "ground", "sleeve", (0.0, 0.0, 0.0), Z)],
         [Point("tip", "sleeve", (0.8, 0.6, 0.5))],
         [
             PointCoordinate("y", "tip", (0.0, 1.0, 0.0)),
-            PointCoordinate("z", "tip", (0.0, 0.0, 1.0), relative=False),
+            PointCoordinate("z", "tip", Z, relative=False),
         ],
     )
     times = np.linspace(0.0, 0.2, 5)

@@ -23,6 +23,7 @@ from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
 from kincheck.core.primitives.dot12 import LockTest, PaperDot12
 
 from ..oracles import naive
+from ..support.mechanisms import ORIGIN
 from ..support.specimens import LANES, MAKERS, admissible, body, lanes, make, orientation, rotation
 
 
@@ -100,12 +101,10 @@ def test_a_shaft_is_bent_up_to_where_it_is_folded():
     their turns stay the same.
     """
     joints = [
-        Revolute("spin", "ground", "first", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        Revolute("bend", "ground", "carrier", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        Revolute("bearing", "carrier", "second", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        ConstantVelocity(
-            "cv", "first", "second", (0.0, 0.0, 0.0), ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
-        ),
+        Revolute("spin", "ground", "first", ORIGIN, (0.0, 0.0, 1.0)),
+        Revolute("bend", "ground", "carrier", ORIGIN, (1.0, 0.0, 0.0)),
+        Revolute("bearing", "carrier", "second", ORIGIN, (0.0, 0.0, 1.0)),
+        ConstantVelocity("cv", "first", "second", ORIGIN, ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))),
     ]
     bodies = [Body(name) for name in ("first", "carrier", "second")]
     drivers = [JointAngle("turn", "spin"), JointAngle("fold", "bend")]
@@ -219,7 +218,7 @@ def test_branch_of_driven_angle(coupled):
         assert np.abs(driven.phi(GROUND_POSE, j)).max() < 1e-14
         assert driven.branch(GROUND_POSE, j)[0] == pytest.approx(sign)
     joints = [
-        Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("first", "ground", "wheel", ORIGIN, (0.0, 0.0, 1.0)),
         Revolute("second", "ground", "other", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
     ]
     bodies, couplers = [Body("wheel"), Body("other")], [Gear("gear", ("second", "first"), 0.5)]
@@ -248,7 +247,7 @@ def test_a_turn_between_two_samples_is_not_lost(turns, style):
     times = np.concatenate([rest - 1.0, 0.04 * move, 0.04 + rest])
     values = 2.0 * np.pi * turns * np.concatenate([0.0 * rest, move, 1.0 + 0.0 * rest])
     joints = [
-        Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("first", "ground", "wheel", ORIGIN, (0.0, 0.0, 1.0)),
         Revolute("second", "ground", "driven", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         Translational("guide", "ground", "slide", (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
     ]

@@ -22,6 +22,7 @@ from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 from kincheck.core.primitives.base import Pose
 
 from ..support.loads import solved, traced
+from ..support.mechanisms import ORIGIN
 
 ROTATION = np.array([0.08, -0.05, 0.12])
 TORQUES = {
@@ -46,14 +47,14 @@ def at_pose(element, u, q):
 
 @pytest.mark.parametrize("law", TORQUES)
 def test_bushing_turned_has_its_laws_torque(law):
-    element = Bushing("b", GROUND, "block", (0, 0, 0), turning_stiffness=(100, 200, 50), law=law)
-    found = at_pose(element, (0.0, 0.0, 0.0), rotated(ROTATION))
+    element = Bushing("b", GROUND, "block", ORIGIN, turning_stiffness=(100, 200, 50), law=law)
+    found = at_pose(element, ORIGIN, rotated(ROTATION))
     assert [*found.wrenches[GROUND].torque] == pytest.approx(TORQUES[law], abs=6e-9)
     assert [*found.wrenches["block"].torque] == pytest.approx([-x for x in TORQUES[law]], abs=6e-9)
 
 
 def test_bushing_displaced_has_force_along_first_bodys_axes():
-    element = Bushing("b", GROUND, "block", (0, 0, 0), stiffness=(1e5, 2e5, 3e5), preload=(1, 2, 3))
+    element = Bushing("b", GROUND, "block", ORIGIN, stiffness=(1e5, 2e5, 3e5), preload=(1, 2, 3))
     found = at_pose(element, (0.003, -0.002, 0.004), rotated(ROTATION))
     assert [*found.wrenches[GROUND].force] == pytest.approx([301.0, -398.0, 1203.0], rel=1e-14)
     # the force acts at the second body's point
@@ -67,16 +68,14 @@ def test_bushing_displaced_has_force_along_first_bodys_axes():
 def test_torque_of_large_turns_equals_matrix_form(law, angle):
     """The adapters' torque, from a rotation matrix, against the one from Euler parameters."""
     axes = ((1.0, 2.0, 0.5), (2.0, -1.0, 0.0))
-    element = Bushing(
-        "b", GROUND, "block", (0, 0, 0), axes, turning_stiffness=(30, 70, 110), law=law
-    )
+    element = Bushing("b", GROUND, "block", ORIGIN, axes, turning_stiffness=(30, 70, 110), law=law)
     direction = np.array([0.9, -0.1, 0.2] if law == "cardan" else [0.3, -0.8, 0.5])
     q = rotated(angle * direction / np.linalg.norm(direction))
     triad = np.array(element.triad)
     A = Pose.of(ZERO, q).A
     matrix = np.array([[*(A @ vec(column))] for column in np.eye(3).tolist()]).T
     own = elastic_torque(element, triad @ matrix @ triad.T)
-    found = at_pose(element, (0.0, 0.0, 0.0), q).wrenches[GROUND].torque
+    found = at_pose(element, ORIGIN, q).wrenches[GROUND].torque
     assert [*found] == pytest.approx((triad.T @ own).tolist(), abs=1e-12 * 330)
 
 
@@ -181,9 +180,7 @@ def test_spring_without_stiffness_or_curve_is_refused(tmp_path):
 
 def test_bushing_on_unknown_body_is_refused():
     with pytest.raises(MechanismError, match="'wheel'"):
-        Mechanism(
-            "m", [Body("a")], [], forces=[Bushing("b", "wheel", "a", (0, 0, 0), stiffness=1.0)]
-        )
+        Mechanism("m", [Body("a")], [], forces=[Bushing("b", "wheel", "a", ORIGIN, stiffness=1.0)])
 
 
 @pytest.mark.parametrize("target", adapters.WRITERS)

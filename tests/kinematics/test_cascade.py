@@ -2,9 +2,21 @@
 and programs are shared.
 """
 
+import math
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
-from kincheck.core import Body, Point, solve
+from kincheck.core import (
+    Body,
+    JointAngle,
+    Mechanism,
+    Point,
+    Revolute,
+    Spherical,
+    primitives,
+    solve,
+)
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import WORST
@@ -88,11 +100,85 @@ def test_components_iterate_no_more_than_is_asked_for():
 
 
 def test_components_built_alike_share_a_program():
-    cascade = ComponentLanes(chain(40), Request(("turn",), ("end",)))
+    """Whatever the numbers, those of outputs too."""
+    whole = chain(40)
+    bodies = [
+        replace(body, origin=(float(k), 0.1, 0.0)) for k, body in enumerate(whole.bodies[1:], 1)
+    ]
+    whole = replace(whole, bodies=[whole.bodies[0], *bodies])
+    every = tuple(body.name for body in whole.bodies)
+    cascade = ComponentLanes(whole, Request(("turn",), ("end",), every))
     assert len(cascade.parts) == 41
     # the crank, the one with the point, all others
     assert sorted(len(kind.members) for kind in cascade.kinds) == [1, 1, 39]
     assert cascade.details["largest_component"] == 12
+
+
+def test_driven_components_alike_share_a_program():
+    names = [f"j{k}" for k in range(12)]
+    cranks = Mechanism(
+        "cranks",
+        [Body(f"body {name}") for name in names],
+        [
+            Revolute(name, "ground", f"body {name}", (k, 0.0, 0.0), (0.0, 1.0, 0.0))
+            for k, name in enumerate(names, 1)
+        ],
+        [Point(f"tip {name}", f"body {name}", (k, 0.0, 1.0)) for k, name in enumerate(names, 1)],
+        [JointAngle(f"motor {name}", name) for name in names],
+    )
+    lanes = ComponentLanes(cranks, Request(tuple(f"motor {name}" for name in names), ("tip j3",)))
+    assert len(lanes.kinds) == 12
+    assert len({id(kind.model) for kind in lanes.kinds}) == 2  # that with the point, and all others
+    path = Path(
+        {f"motor {name}": Ramp(0.1 * k) for k, name in enumerate(names, 1)},
+        np.linspace(0.0, 3.0, 9),
+    )
+    found = solve_components(cranks, path, [f"tip {name}" for name in names], ())
+    for k, name in enumerate(names, 1):
+        angle = 0.1 * k * path.times
+        tip = np.stack([k + np.sin(angle), np.zeros(9), np.cos(angle)], axis=1)
+        assert np.allclose(found.points[f"tip {name}"].position, tip, rtol=0.0, atol=1e-12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tilted(primitives.Spherical):
+    """Rows with a plain number, and something beside it."""
+
+    tilt: float
+    beside: object
+
+    def phi(self, i, j):
+        assert math.cos(self.tilt) > 0.0
+        return super().phi(i, j)
+
+
+@pytest.mark.usefixtures("own_joint_types")
+@pytest.mark.parametrize("beside", [tuple, list])
+def test_settings_of_own_joints_stay_plain_numbers(beside):
+    @dataclass(frozen=True)
+    class Ball(Spherical):
+        type = "tilted_ball"
+        tilt: float = 0.0
+
+        def primitives(self, i, j):
+            return [
+                Tilted(s_i=each.s_i, s_j=each.s_j, d0=each.d0, tilt=self.tilt, beside=beside())
+                for each in super().primitives(i, j)
+            ]
+
+    whole, balls = chain(3), iter(range(3))
+    joints = [
+        Ball(each.name, each.i, each.j, each.point, 0.1 * next(balls))
+        if type(each) is Spherical
+        else each
+        for each in whole.joints
+    ]
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
+    own, plain = (
+        solve_components(replace(whole, joints=each), path, ("end",))
+        for each in (joints, whole.joints)
+    )
+    assert_alike(own, plain)
 
 
 def test_a_chain_of_two_hundred_loops_closes_to_round_off():

@@ -14,6 +14,7 @@ from kincheck.core import (
 )
 from kincheck.core.kinematics.continuation.trace import trace
 
+from ..support.mechanisms import Z
 from .test_chain import chain
 
 # The closing step and the first one
@@ -37,8 +38,8 @@ def driven_slider(crank_angle):
         "slider",
         [Body("crank"), Body("rod"), Body("slider")],
         [
-            Revolute("pivot", "ground", "crank", (0, 0, 0), (0, 0, 1)),
-            Revolute("pin", "crank", "rod", tip, (0, 0, 1)),
+            Revolute("pivot", "ground", "crank", (0, 0, 0), Z),
+            Revolute("pin", "crank", "rod", tip, Z),
             Spherical("ball", "rod", "slider", (x, 0, 0)),
             Translational("guide", "ground", "slider", (x, 0, 0), (1, 0, 0)),
         ],
@@ -96,7 +97,7 @@ def test_both_dead_centres_of_a_rocker(past, direction):
     at = np.arctan2(-pin[1], base - pin[0]) + np.arccos(
         (d**2 + coupler**2 - rocker**2) / (2.0 * d * coupler)
     )
-    end, z = (pin[0] + coupler * np.cos(at), pin[1] + coupler * np.sin(at), 0.0), (0.0, 0.0, 1.0)
+    end, z = (pin[0] + coupler * np.cos(at), pin[1] + coupler * np.sin(at), 0.0), Z
     mechanism = Mechanism(
         "rocked",
         [Body("crank"), Body("coupler"), Body("rocker")],

@@ -21,6 +21,8 @@ from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, minimize_scalar
 
+from ..support.mechanisms import Z
+
 DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -64,9 +66,7 @@ def skew(a):
 def test_compliance_of_bushings_is_inverse_of_their_stiffness():
     """C = (sum S^T K S)^-1 at zero load."""
     facts = read("1_body_on_three_bushings.json")
-    bushings = [
-        bushing_of(each, f"b{k}", GROUND, "block") for k, each in enumerate(facts["bushings"])
-    ]
+    bushings = three(facts)
     stiffness = np.zeros((6, 6))
     for each in bushings:
         axes, S = np.array(each.triad), np.eye(6)
@@ -89,7 +89,7 @@ def test_compliance_of_bushings_is_inverse_of_their_stiffness():
 ARM = Mechanism(
     "arm",
     [Body("arm")],
-    [Revolute("hinge", GROUND, "arm", point=ORIGIN, axis=(0.0, 0.0, 1.0))],
+    [Revolute("hinge", GROUND, "arm", point=ORIGIN, axis=Z)],
 )
 STOP = ((-0.1, -100.0), (0.0, 0.0), (0.1, 100.0), (0.1001, 120.0), (0.2, 18100.0))
 PROGRESSIVE = PchipInterpolator(*np.array(STOP).T)
@@ -153,7 +153,7 @@ def snap():
         SpringDamper(f"s{x:g}", "slider", GROUND, (at, (x, 0.0, 0.0)), facts["k"])
         for x in (facts["a"], -facts["a"])
     ]
-    guide = Translational("guide", GROUND, "slider", at, (0.0, 0.0, 1.0))
+    guide = Translational("guide", GROUND, "slider", at, Z)
     mechanism = Mechanism("snap", [Body("slider", at)], [guide], forces=springs)
     return StaticModel(mechanism, [LoadPoint("top", "slider", at)]), facts
 
@@ -205,7 +205,7 @@ def test_load_far_beyond_snap_through_is_refused(a, h, stiffness, side):
     forces = [*springs, Bushing("soft", "slider", "top", at, stiffness=soft)]
     forces.append(SpringDamper("side", "slider", GROUND, (at, (0.0, 0.0, h + 1.0)), side))
     bodies = {"slider": at, "top": top}
-    guides = [Translational(f"{x} guide", GROUND, x, bodies[x], (0.0, 0.0, 1.0)) for x in bodies]
+    guides = [Translational(f"{x} guide", GROUND, x, bodies[x], Z) for x in bodies]
     mechanism = Mechanism("snap", [Body(*x) for x in bodies.items()], guides, forces=forces)
     factors = np.array([0.3, 0.99, 1.01, 1.5, 7.0, 30.0, 100.0])
     loads = np.zeros((len(factors), 6))
@@ -223,9 +223,7 @@ def test_torque_over_dead_centre_is_refused():
     r, d, k = 0.2, 0.5, 4e3
     base = (0.6 * d, 0.8 * d, 0.0)
     spring = SpringDamper("s", "arm", GROUND, ((r, 0.0, 0.0), base), k, free_length=0.0)
-    hinge = Revolute("hinge", GROUND, "arm", ORIGIN, (0.0, 0.0, 1.0))
-    mechanism = Mechanism("arm", [Body("arm", ORIGIN)], [hinge], forces=[spring])
-    model = StaticModel(mechanism, [LoadPoint("o", "arm", ORIGIN)])
+    model = StaticModel(replace(ARM, forces=[spring]), [LoadPoint("o", "arm", ORIGIN)])
     # at rest it points to the base; turned from there, the torque k r d sin(turn) holds it
     loads = np.zeros((4, 6))
     loads[:, 5] = k * r * d * np.array([-0.7, 0.999, 1.001, 40.0])
@@ -323,9 +321,7 @@ def test_stiff_bushings_tend_to_the_rigid_mechanism():
 def test_work_of_a_load_is_stored():
     """Gauss's rule over the ramp; the energy is written down in terms of places alone."""
     facts = read("1_body_on_three_bushings.json")
-    bushings = [
-        bushing_of(each, f"b{k}", GROUND, "block") for k, each in enumerate(facts["bushings"])
-    ]
+    bushings = three(facts)
     load = 2.0 * np.array(facts["finite_load"])
     load[3:] = 0.0
     nodes, weights = np.polynomial.legendre.leggauss(8)
@@ -376,7 +372,7 @@ def test_driver_that_holds_nothing_is_refused():
 
 
 def test_both_free_coordinates_of_a_joint_are_driven():
-    rod = Cylindrical("rod", GROUND, "arm", ORIGIN, (0.0, 0.0, 1.0))
+    rod = Cylindrical("rod", GROUND, "arm", ORIGIN, Z)
     found = with_free_coordinates(replace(ARM, joints=[rod], drivers=[]))
     assert [each.name for each in found.drivers] == ["rod.rotation", "rod.translation"]
     held = with_free_coordinates(replace(ARM, joints=[rod], drivers=[JointAngle("turn", "rod")]))

@@ -25,6 +25,8 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
 
+from ..support.mechanisms import X, Z
+
 BEND = 0.8  # cosine of the angle between the shafts
 
 
@@ -34,8 +36,8 @@ def shafts() -> Mechanism:
         "shafts",
         [Body("first", mass=1.0), Body("second", mass=1.0)],
         [
-            Revolute("a", "ground", "first", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-            Universal("u", "first", "second", (1.0, 0.0, 0.0), ((0.0, 0.0, 1.0), (-0.6, 0.8, 0.0))),
+            Revolute("a", "ground", "first", (0.0, 0.0, 0.0), X),
+            Universal("u", "first", "second", X, (Z, (-0.6, 0.8, 0.0))),
             Cylindrical("b", "ground", "second", (1.8, 0.6, 0.0), (0.8, 0.6, 0.0)),
         ],
         [Point("P", "second", (1.8, 0.6, 0.0))],
@@ -114,10 +116,10 @@ def test_rates_without_bound_towards_a_fold_are_no_turns():
         "crank",
         [Body("crank"), Body("rod"), Body("slide")],
         [
-            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Z),
             Spherical("pin", "crank", "rod", (0.6, 0.8, 0.0)),
-            Revolute("wrist", "rod", "slide", (2.1, 0.8, 0.0), (0.0, 0.0, 1.0)),
-            Translational("guide", "ground", "slide", (2.1, 0.8, 0.0), (1.0, 0.0, 0.0)),
+            Revolute("wrist", "rod", "slide", (2.1, 0.8, 0.0), Z),
+            Translational("guide", "ground", "slide", (2.1, 0.8, 0.0), X),
         ],
         [],
         [JointDisplacement("push", "guide")],

@@ -10,15 +10,9 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.joints import (
-    Cylindrical,
-    Distance,
     Gear,
     Revolute,
-    RevoluteSpherical,
     Screw,
-    Spherical,
-    Translational,
-    Universal,
 )
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.forces.reactions import forces_of
@@ -31,32 +25,16 @@ from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.trajectory import BodyMotion, Trajectory
 
 from ..oracles import naive, newton_euler
+from ..support.adams_single_joints import CASES, right
 from ..support.loads import GRAVITY, six
+from ..support.mechanisms import X
 
 DATA = Path(__file__).parents[1] / "data"
 REACTIONS = json.loads((DATA / "adams_joint_reactions.json").read_text(encoding="utf-8"))["cases"]
 ANDREWS = json.loads((DATA / "andrews_squeezer.json").read_text(encoding="utf-8"))
-REPLAYED = json.loads((DATA / "adams_single_joints.json").read_text(encoding="utf-8"))["cases"]
 
 
 # ADAMS
-
-
-def right(case):
-    """The joint of a recorded case; the ground is its first body."""
-    names = ("joint", "ground", "body")
-    if case["joint"] == "distance":
-        return Distance(*names, (case["ground_point"], case["body_point"]), case["length"])
-    if case["joint"] == "revolute_spherical":
-        return RevoluteSpherical(*names, (case["ground_point"], case["body_point"]), case["axis"])
-    if case["joint"] == "spherical":
-        return Spherical(*names, case["point"])
-    p = np.array(case["frame"])
-    x, y, z = map(tuple, naive.A(p / np.linalg.norm(p)).T)
-    if case["joint"] == "universal":
-        return Universal(*names, case["point"], (x, y))
-    kinds = {"revolute": Revolute, "translational": Translational, "cylindrical": Cylindrical}
-    return kinds[case["joint"]](*names, case["point"], z)
 
 
 @pytest.mark.parametrize("name", sorted(REACTIONS))
@@ -65,14 +43,13 @@ def test_reactions_of_adams(name):
 
     The motion is printed with six digits, so reactions agree to a few parts in a million.
     """
-    replayed, expected = REPLAYED[name], REACTIONS[name]
+    replayed, expected = CASES[name], REACTIONS[name]
     numbers = np.array(replayed["samples"])[:, 1:]
     r, p, v, w, v_t, w_t = np.split(numbers, [3, 7, 10, 13, 16], axis=1)
     p = p / np.linalg.norm(p, axis=1)[:, None]
     A = np.array([naive.A(each) for each in p])
     own = np.diag(expected["inertia_diagonal_body_frame"])
-    at = A[0] @ own @ A[0].T
-    inertia = six(at)
+    inertia = six(A[0] @ own @ A[0].T)
     body = Body("body", tuple(r[0]), tuple(p[0]), mass=expected["mass"], inertia=inertia)
     joint = right(replayed)
     mechanism = Mechanism("m", [body], [joint], gravity=expected["gravity"])
@@ -100,7 +77,7 @@ def test_reactions_of_adams(name):
 def pendulum(**options):
     body = Body("arm", mass=2.0, center_of_mass=(0.5, 0.0, 0.0), inertia=(0.1, 0.3, 0.3, 0, 0, 0))
     hinge = Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    tip = Point("tip", "arm", (1.0, 0.0, 0.0))
+    tip = Point("tip", "arm", X)
     return Mechanism("pendulum", [body], [hinge], [tip], [JointAngle("turn", "hinge")], **options)
 
 
@@ -144,7 +121,7 @@ def test_springs_and_loads_by_hand():
     pull = -tension[:, None] * d / length[:, None]
     cases_of = [
         (
-            SpringDamper("x", "ground", "arm", ((0, 2, 0), (1, 0, 0)), 100.0, 5.0, 0.7),
+            SpringDamper("x", "ground", "arm", ((0, 2, 0), X), 100.0, 5.0, 0.7),
             tension,
             tip[:, 0] * pull[:, 1] - tip[:, 1] * pull[:, 0],
             pull,
@@ -156,13 +133,13 @@ def test_springs_and_loads_by_hand():
             np.zeros((len(c), 3)),
         ),
         (
-            Force("x", "arm", (1.0, 0.0, 0.0), (0.0, 7.0, 0.0)),
+            Force("x", "arm", X, (0.0, 7.0, 0.0)),
             np.full(len(c), 7.0),
             7.0 * c,
             np.stack([0 * c, 7.0 + 0 * c, 0 * c], axis=1),
         ),
         (
-            Force("x", "arm", (1.0, 0.0, 0.0), (0.0, 7.0, 0.0), "body"),
+            Force("x", "arm", X, (0.0, 7.0, 0.0), "body"),
             np.full(len(c), 7.0),
             7.0 + 0 * c,
             np.stack([-7.0 * s, 7.0 * c, 0 * c], axis=1),
@@ -179,16 +156,24 @@ def test_springs_and_loads_by_hand():
         assert np.abs(found.power).max() <= 1e-12 * max(found.largest_power.max(), 1.0)
 
 
+def sine_driven(mechanism, sine):
+    """Motion of all bodies, and forces, of a driver that follows a sine."""
+    path = motions.Path({"turn": sine}, np.linspace(0.1, 1.0, 5))
+    names = tuple(body.name for body in mechanism.moving)
+    motion = prepare(mechanism, Request(("turn",), (), names, 2), path)(1e-12)
+    return motion, forces_of(mechanism, path, motion), path.times
+
+
 def test_a_gear_loads_the_driven_shaft_and_not_the_hinges():
     """Two shafts: the effort carries the second one's inertia by the ratio squared."""
     z = (0.0, 0.0, 1.0)
     bodies = [
         Body("one", mass=1.0, inertia=(1.0, 1.0, 0.3, 0, 0, 0)),
-        Body("two", (1.0, 0.0, 0.0), mass=1.0, inertia=(1.0, 1.0, 0.5, 0, 0, 0)),
+        Body("two", X, mass=1.0, inertia=(1.0, 1.0, 0.5, 0, 0, 0)),
     ]
     joints = [
         Revolute("first", "ground", "one", (0.0, 0.0, 0.0), z),
-        Revolute("second", "ground", "two", (1.0, 0.0, 0.0), z),
+        Revolute("second", "ground", "two", X, z),
     ]
     mechanism = Mechanism(
         "m",
@@ -199,11 +184,7 @@ def test_a_gear_loads_the_driven_shaft_and_not_the_hinges():
         [Gear("gear", ("first", "second"), 2.0)],
     )
     sine = motions.Sine(0.5, 0.3)
-    times = np.linspace(0.1, 1.0, 5)
-    path = motions.Path({"turn": sine}, times)
-    request = Request(("turn",), (), ("one", "two"), 2)
-    motion = prepare(mechanism, request, path)(1e-12)
-    found = forces_of(mechanism, path, motion)
+    motion, found, times = sine_driven(mechanism, sine)
     acceleration = sine.at(times)[2]
     ratio = motion.bodies["two"].a[:, 5] / acceleration
     expected = (0.3 + ratio**2 * 0.5) * acceleration
@@ -218,9 +199,7 @@ def test_a_screw_does_no_work():
     nut = Body("nut", mass=2.0, inertia=(1.0, 1.0, 1.0, 0, 0, 0))
     joint = Screw("screw", "ground", "nut", (0.1, 0.2, 0.3), tuple(axis), 0.05)
     mechanism = Mechanism("m", [nut], [joint], [], [JointAngle("turn", "screw")], gravity=GRAVITY)
-    path = motions.Path({"turn": motions.Sine(2.0, 0.3)}, np.linspace(0.1, 1.0, 5))
-    motion = prepare(mechanism, Request(("turn",), (), ("nut",), 2), path)(1e-12)
-    found = forces_of(mechanism, path, motion)
+    motion, found, _ = sine_driven(mechanism, motions.Sine(2.0, 0.3))
     reaction, moved = found.joints["screw"], motion.bodies["nut"]
     thrust, torque = reaction.force @ axis, reaction.moment @ axis
     slide = np.einsum("ni,i->n", moved.v[:, :3], axis)

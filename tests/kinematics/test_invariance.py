@@ -14,7 +14,15 @@ from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.formulation.parameters import places
 from kincheck.core.kinematics.one_design import solve
 
-from ..support.mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
+from ..support.mechanisms import (
+    ORIGIN,
+    Z,
+    mcpherson,
+    placed,
+    slider_crank,
+    swapped,
+    without_fixed_bodies,
+)
 
 TURNS = 2.0 * np.pi * np.linspace(-1.0, 1.0, 31)
 STROKES = np.linspace(-0.08, 0.08, 33)
@@ -158,7 +166,7 @@ def test_orientation_does_not_matter():
         return tuple(turn @ point)
 
     m = placed(mcpherson(), turned, turned)
-    m = replace(m, drivers=[PointCoordinate("stroke", "wheel", turned((0.0, 0.0, 1.0)))])
+    m = replace(m, drivers=[PointCoordinate("stroke", "wheel", turned(Z))])
     found, expected = wheel(m), wheel()
     # turning rounds every hardpoint, as scaling does
     assert found.position @ turn == pytest.approx(expected.position, abs=3e-15)
@@ -178,8 +186,8 @@ def test_units_of_axes_do_not_matter():
 @pytest.mark.parametrize(
     "joint",
     [
-        Revolute("r", "ground", "a", (0, 0, 0), (0, 0, 1)),
-        ParallelAxes("r", "ground", "a", (0, 0, 1)),
+        Revolute("r", "ground", "a", ORIGIN, Z),
+        ParallelAxes("r", "ground", "a", Z),
     ],
 )
 def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, joint):
@@ -196,7 +204,7 @@ def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, j
         "pivot",
         [Body("a")],
         [joint],
-        [Point("P", "a", across), Point("O", "a", (0.0, 0.0, 0.0))],
+        [Point("P", "a", across), Point("O", "a", ORIGIN)],
         [
             PointCoordinate("y", "P", along),
             *(PointCoordinate(name, "O", direction) for name, direction in free),
@@ -228,14 +236,14 @@ def test_the_points_of_a_joint_are_known_by_their_kind():
 
     size = 2.0**-20
     corners = [
-        (0.0, 0.0, 0.0),
+        ORIGIN,
         (0.0, size, 0.0),
         (3.0 * size, 2.0 * size, 0.0),
         (2.0 * size, 0.0, 0.0),
     ]
     links = ["ground", "crank", "coupler", "rocker", "ground"]
     pins = [
-        Pinned(f"pin {k}", *links[k : k + 2], axis=(0.0, 0.0, 1.0), pin=corner)
+        Pinned(f"pin {k}", *links[k : k + 2], axis=Z, pin=corner)
         for k, corner in enumerate(corners)
     ]
     mechanism = Mechanism("four-bar", [Body(name) for name in links[1:4]], pins)
@@ -248,13 +256,13 @@ def test_a_step_of_too_many_turns_is_not_called_singular():
     """A fine thread: its smallest singular value is small all along, and nothing is wrong with any
     pose.
     """
-    axis, lead = (0.0, 0.0, 1.0), 0.05
+    axis, lead = Z, 0.05
     mechanism = Mechanism(
         "jack",
         [Body("spindle"), Body("nut")],
         [
-            Revolute("bearing", "ground", "spindle", (0.0, 0.0, 0.0), axis),
-            Screw("thread", "spindle", "nut", (0.0, 0.0, 0.0), axis, lead=lead),
+            Revolute("bearing", "ground", "spindle", ORIGIN, axis),
+            Screw("thread", "spindle", "nut", ORIGIN, axis, lead=lead),
             Translational("guide", "ground", "nut", (4.0, 0.0, 0.0), axis),
         ],
         [Point("top", "nut", (4.0, 0.0, 0.0))],

@@ -66,7 +66,7 @@ def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
         "pin_1",
         "pin_2",
     }
-    traced = Tracer(mechanism, Request(("turn",), mechanism.points))
+    traced = Tracer(mechanism, Request(("turn",), ()))
     assert traced.selection.chosen == selection.chosen
     rows = traced.formulation.rows(traced.at)
     assert Elimination([rows[k] for k in selection.chosen]).core_size == 4

@@ -4,15 +4,12 @@ ADAMS' data (source and licence in the data file) are of one body that hangs on 
 - nu and J a - gamma of the right joint vanish within what was printed, those of a wrong one don't.
 """
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from kincheck import (
     Body,
-    Cylindrical,
     Distance,
     Gear,
     JointAngle,
@@ -30,12 +27,8 @@ from kincheck import (
 )
 
 from ..oracles import naive
+from ..support.adams_single_joints import CASES, NAMES, axes, right
 from ..support.mechanisms import four_bar
-
-CASES = json.loads(
-    (Path(__file__).parents[1] / "data" / "adams_single_joints.json").read_text(encoding="utf-8")
-)["cases"]
-NAMES = ("joint", "ground", "body")
 
 # The data have six significant digits, trailing zeros left out.
 DIGITS = 6
@@ -47,29 +40,6 @@ INTEGRATED = {"velocity": 2e-5, "acceleration": 2e-4}
 BEYOND_DOUBT = 100.0
 
 POSE, VELOCITY, ACCELERATION = slice(0, 7), slice(7, 13), slice(13, 19)
-
-
-def axes(case):
-    """The axes x, y, z of the joint frame, global."""
-    p = np.array(case["frame"])
-    return tuple(map(tuple, naive.Body(np.zeros(3), p / np.linalg.norm(p)).A.T))
-
-
-def right(case):
-    """The joint of a case: revolute, prismatic and cylindrical along z; universal with x on the
-    ground and y on the body.
-    """
-    if case["joint"] == "distance":
-        return Distance(*NAMES, (case["ground_point"], case["body_point"]), case["length"])
-    if case["joint"] == "revolute_spherical":
-        return RevoluteSpherical(*NAMES, (case["ground_point"], case["body_point"]), case["axis"])
-    if case["joint"] == "spherical":
-        return Spherical(*NAMES, case["point"])
-    x, y, z = axes(case)
-    if case["joint"] == "universal":
-        return Universal(*NAMES, case["point"], (x, y))
-    kinds = {"revolute": Revolute, "translational": Translational, "cylindrical": Cylindrical}
-    return kinds[case["joint"]](*NAMES, case["point"], z)
 
 
 def half_widths(numbers):

@@ -28,7 +28,7 @@ from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 
 from ..support.block_structures import solve_sparse
-from ..support.mechanisms import slider_crank
+from ..support.mechanisms import X, slider_crank
 from .test_chain import chain
 
 RADIUS = 0.1
@@ -61,11 +61,11 @@ def arm(degrees, *, relative=False):
         [
             Revolute("h", "ground", "a", (0.0, 0.0, 0.0), Z),
             Revolute("k", "a", "b", joint, Z),
-            Translational("s", "ground", "rack", (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)),
+            Translational("s", "ground", "rack", (0.0, -1.0, 0.0), X),
         ],
         [Point("tip", "b", at), Point("r", "rack", (0.0, -1.0, 0.0))],
         [
-            PointCoordinate("x", "tip", (1.0, 0.0, 0.0), relative=relative),
+            PointCoordinate("x", "tip", X, relative=relative),
             PointCoordinate("y", "tip", (0.0, 1.0, 0.0), relative=relative),
         ],
         [RackPinion("rp", ("h", "s"), RADIUS)],
@@ -94,9 +94,7 @@ def phases_of(degrees):
 
 def case_of(mechanism, motions, times=TIMES):
     points = [each.name for each in mechanism.points]
-    outputs = tuple(
-        Output(f"{name}_x", name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "a test") for name in points
-    )
+    outputs = tuple(Output(f"{name}_x", name, X, False, 1e-9, 0.0, "a test") for name in points)
     return Case(
         "case",
         "made up",

@@ -15,12 +15,14 @@ from kincheck.core.mechanism.loads import (
 )
 from kincheck.core.mechanism.mechanism import Mechanism
 
+from ..support.mechanisms import ORIGIN, X
+
 BALL = (2.0, 2.0, 2.0, 0.0, 0.0, 0.0)
-APART = ((0.0, 0.0, 0.0), (0.0, 3.0, 4.0))
+APART = (ORIGIN, (0.0, 3.0, 4.0))
 
 
 def test_a_body_without_mass_is_as_before():
-    assert Body("a") == Body("a", (0.0, 0.0, 0.0), mass=0.0)
+    assert Body("a") == Body("a", ORIGIN, mass=0.0)
     assert Body("a").center_of_mass is None
     assert not Mechanism("m", [Body("a")], []).has_loads
 
@@ -67,7 +69,7 @@ def test_a_flat_plate_printed_with_six_digits_is_accepted():
     ("make", "message"),
     [
         (
-            lambda: SpringDamper("s", "a", "b", ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 1.0),
+            lambda: SpringDamper("s", "a", "b", (X, X), 1.0),
             "its points coincide at x = 1 m, y = 0 m, z = 0 m",
         ),
         (lambda: SpringDamper("s", "a", "a", APART, 1.0), "needs two different bodies"),
@@ -75,8 +77,8 @@ def test_a_flat_plate_printed_with_six_digits_is_accepted():
         (lambda: SpringDamper("s", "a", "b", APART, 1.0, damping=-2.0), "damping is -2.0"),
         (lambda: SpringDamper("s", "a", "b", APART, 1.0, 0.0, -1.0), "free_length is -1.0"),
         (lambda: TorsionSpringDamper("s", "hinge", float("inf")), "stiffness is inf"),
-        (lambda: Force("s", "a", (0.0, 0.0, 0.0), (1.0, 0.0)), "a force [x, y, z]"),
-        (lambda: Force("s", "a", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "local"), "frame is 'local'"),
+        (lambda: Force("s", "a", ORIGIN, (1.0, 0.0)), "a force [x, y, z]"),
+        (lambda: Force("s", "a", ORIGIN, X, "local"), "frame is 'local'"),
         (lambda: Torque("s", "a", (float("nan"), 0.0, 0.0)), "is not finite"),
     ],
 )
@@ -92,8 +94,8 @@ def test_a_spring_is_free_at_design_unless_told_otherwise():
 
 
 def test_names_of_elements_are_checked_in_the_mechanism():
-    hinge = Revolute("hinge", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    ball = Spherical("ball", "ground", "b", (0.0, 0.0, 0.0))
+    hinge = Revolute("hinge", "ground", "a", ORIGIN, (0.0, 0.0, 1.0))
+    ball = Spherical("ball", "ground", "b", ORIGIN)
     bodies = [Body("a"), Body("b")]
 
     def with_force(*forces):
@@ -102,13 +104,13 @@ def test_names_of_elements_are_checked_in_the_mechanism():
     good = with_force(
         SpringDamper("spring", "ground", "a", APART, 1.0),
         TorsionSpringDamper("torsion", "hinge", 1.0),
-        Force("push", "a", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "body"),
+        Force("push", "a", ORIGIN, X, "body"),
     )
     assert good.has_loads
     assert good.force("push").frame is Axes.BODY
     for force, message in (
         (SpringDamper("s", "ground", "c", APART, 1.0), "there is no body 'c'"),
-        (Torque("s", "c", (1.0, 0.0, 0.0)), "there is no body 'c'"),
+        (Torque("s", "c", X), "there is no body 'c'"),
         (TorsionSpringDamper("s", "hing", 1.0), "did you mean 'hinge'"),
         (TorsionSpringDamper("s", "ball", 1.0), "has no rotation"),
     ):
@@ -117,7 +119,7 @@ def test_names_of_elements_are_checked_in_the_mechanism():
         assert message in str(caught.value)
         assert caught.value.key.startswith("forces.s")
     with pytest.raises(MechanismError, match="used more than once"):
-        with_force(Torque("s", "a", (1.0, 0.0, 0.0)), Torque("s", "a", (1.0, 0.0, 0.0)))
+        with_force(Torque("s", "a", X), Torque("s", "a", X))
 
 
 def test_gravity_is_three_finite_numbers():

@@ -28,6 +28,8 @@ from kincheck.core.mechanism.motions import Formula, Ramp, Table
 from kincheck.core.mechanism.tree import spanning_tree
 from kincheck.core.studies.checks.check_joint import specimens_of
 
+from ..support.mechanisms import ORIGIN, X
+
 
 def rssr(held=tuple):
     """An RSSR linkage of points held in tuples, lists or arrays."""
@@ -35,11 +37,9 @@ def rssr(held=tuple):
         "rssr",
         [Body("crank", held((0.1, 0.2, 0.3)), held((1.0, 0.0, 0.0, 0.0))), Body("rocker")],
         [
-            Revolute("input", "ground", "crank", held((0.0, 0.0, 0.0)), held((0.0, 0.0, 1.0))),
-            Revolute("output", "ground", "rocker", held((2.0, 1.0, 3.0)), held((1.0, 0.0, 0.0))),
-            Distance(
-                "rod", "crank", "rocker", held([held((1.0, 0.0, 0.0)), held((2.0, 4.9, 2.2))])
-            ),
+            Revolute("input", "ground", "crank", held(ORIGIN), held((0.0, 0.0, 1.0))),
+            Revolute("output", "ground", "rocker", held((2.0, 1.0, 3.0)), held(X)),
+            Distance("rod", "crank", "rocker", held([held(X), held((2.0, 4.9, 2.2))])),
         ],
         [Point("end", "rocker", held((2.0, 4.9, 2.2)))],
         [JointAngle("turn", "input")],
@@ -199,9 +199,7 @@ def test_what_is_no_point_is_told_so(name):
     assert message in str(told.value)
 
 
-@pytest.mark.parametrize(
-    "given", [None, "abcd", 1.0, (1.0, 0.0, 0.0), (float("nan"), 0.0, 0.0, 0.0)]
-)
+@pytest.mark.parametrize("given", [None, "abcd", 1.0, X, (float("nan"), 0.0, 0.0, 0.0)])
 def test_euler_parameters_that_are_none_are_told(given):
     with pytest.raises(MechanismError, match="body 'a': euler_parameters"):
         Body("a", euler_parameters=given)
@@ -222,8 +220,8 @@ def test_an_array_that_is_a_number_is_one():
 def held(*joints, drivers=(), couplers=()):
     """A crank on a bed, and joints between the bed and the bench, which are both fixed."""
     bodies = [Body("bed", fixed=True), Body("bench", (1.0, 2.0, 3.0), fixed=True), Body("crank")]
-    pivot = Revolute("pivot", "bed", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    tip = Point("tip", "crank", (1.0, 0.0, 0.0))
+    pivot = Revolute("pivot", "bed", "crank", ORIGIN, (0.0, 0.0, 1.0))
+    tip = Point("tip", "crank", X)
     return Mechanism(
         "held", bodies, [*joints, pivot], [tip], [JointAngle("turn", "pivot"), *drivers], couplers
     )
@@ -254,7 +252,7 @@ def test_a_joint_between_fixed_bodies_is_left_out(name):
 
 
 def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move():
-    apart = ((0.0, 0.0, 0.0), (0.4, 0.0, 0.0))
+    apart = (ORIGIN, (0.4, 0.0, 0.0))
     assert held(Distance("rod", "bed", "ground", apart, 0.4 + 1e-10)).grounded
     with pytest.raises(
         MechanismError,
@@ -264,7 +262,7 @@ def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move(
         ),
     ):
         held(Distance("rod", "bed", "ground", apart, 0.5124))
-    hinge = Revolute("hinge", "ground", "bench", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    hinge = Revolute("hinge", "ground", "bench", ORIGIN, (0.0, 0.0, 1.0))
     with pytest.raises(
         MechanismError,
         match="'bench' are both fixed, and driver 'd' needs it to move; free one of them",
@@ -284,8 +282,8 @@ def test_a_look_up_of_an_unknown_name_suggests_another(kind: str):
     mechanism = Mechanism(
         "arm",
         [Body("turned", mass=1.0)],
-        [Revolute("turns", "ground", "turned", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
-        [Point("turning", "turned", (1.0, 0.0, 0.0)), Point("~hidden", "turned", (0.0, 0.0, 0.0))],
+        [Revolute("turns", "ground", "turned", ORIGIN, (0.0, 0.0, 1.0))],
+        [Point("turning", "turned", X), Point("~hidden", "turned", ORIGIN)],
         [JointAngle("turn", "turns")],
         forces=[TorsionSpringDamper("turner", "turns", 1.0, 0.0)],
     )
@@ -303,6 +301,18 @@ def test_a_look_up_of_an_unknown_name_suggests_another(kind: str):
         getattr(mechanism, kind)("xyz")
     assert "~" not in str(caught.value)
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_pickled_mechanism_has_its_fields_alone():
+    bodies = [Body("turned")]
+    mechanism = Mechanism(
+        "arm", bodies, [Revolute("pivot", "ground", "turned", (0, 0, 0), (0, 0, 1))]
+    )
+    packed = pickle.dumps(mechanism)
+    assert hash(mechanism) == hash(replace(mechanism))
+    assert mechanism.moving  # kept for the next question
+    assert pickle.dumps(mechanism) == packed  # programs on disk are found by it
+    assert pickle.loads(packed) == mechanism != replace(mechanism, name="leg")
 
 
 def test_look_ups_through_a_mechanism_are_told_too():

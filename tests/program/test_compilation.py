@@ -115,13 +115,6 @@ def test_who_measures_has_programs_compiled_at_once_and_nobody_else():
     assert compile_model(four_bar(), Request(("turn",), ()))._code.interpreted
 
 
-def test_what_was_compiled_is_found_by_the_next_process():
-    plan = compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan
-    assert LlvmCode(plan).interpreted
-    LlvmCode(plan).count(10**9)
-    assert not LlvmCode(plan).interpreted
-
-
 def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
     made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
     wanted = every_slot(made, "newton")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from ctypes import CFUNCTYPE, c_double, c_int64
+from ctypes import CFUNCTYPE, c_double
 
 import numpy as np
 import pytest
@@ -58,19 +58,6 @@ def test_an_image_does_what_its_text_says():
     assert [code.calls["chosen"](k) for k in range(6)] == [7, 21, -7, 3 << 33, ~4, -1]
     assert [code.calls["of_next"](k) for k in range(5)] == [21, -7, 3 << 33, ~4, -1]
     assert CFUNCTYPE(c_double, c_double)(code.address("scaled"))(2.0) == 2.0 * np.pi
-
-
-@images
-def test_many_images_stand_side_by_side():
-    text = "define i64 @f(i64 %k) {{ %sum = add i64 %k, {} ret i64 %sum }}".format
-    made = [compiler.placed(compiler.joined(compiler.emitted(text(k)))) for k in range(5)]
-    assert [CFUNCTYPE(c_int64, c_int64)(address("f"))(100) for address in made] == [
-        100,
-        101,
-        102,
-        103,
-        104,
-    ]
 
 
 @images

@@ -102,6 +102,42 @@ def test_drake_without_loops_is_also_continuous(tmp_path):
     assert "no constraints" in found["free_four_bar", "runge_kutta3"]["message"]
 
 
+def welded(tmp_path):
+    """The four-bar with a plate on its coupler, in the tree."""
+    plate = "[bodies.plate]\nmass = 0.7\ncenter_of_mass = [0.5, 0.6, 0.1]\n"
+    plate += "inertia = [0.002, 0.003, 0.004, 0, 0, 0]\n"
+    plate += '[joints.weld]\ntype = "fixed"\nbodies = ["coupler", "plate"]\n\n'
+    case = tmp_path / "welded.toml"
+    text = short(tmp_path, 0.2, 11).read_text("utf-8")
+    case.write_text(text.replace("[joints.A]", f"{plate}[joints.A]").replace('"free_', '"welded_'))
+    return case
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "drake"])
+def test_welded_body_of_the_tree_is_stepped(engine, tmp_path):
+    pytest.importorskip({"drake": "pydrake"}.get(engine, engine), exc_type=ImportError)
+    given = ["--engine", engine, "--case", str(welded(tmp_path))]
+    row = [each for each in measured(tmp_path, *given) if each["case"] == "welded_four_bar"][-1]
+    *_, longer, shorter = row["runs"]
+    for key in ("error", "reaction"):
+        assert shorter[key] <= 0.6 * longer[key]
+
+
+def test_tree_of_the_board_hangs_on_fixed_bodies(tmp_path):
+    """The strut's chassis is fixed, and has a name of its own."""
+    truth = truth_of(kincheck.load(short_strut(tmp_path)))
+    files = adapters.stepper_files("drake", truth.case.mechanism, truth.twists)
+    found = {each["name"]: each["parent"] for each in json.loads(files["model.json"])["bodies"]}
+    assert found == {"lca": "ground", "knuckle": "lca", "strut": "knuckle"}
+
+
+def test_urdf_of_the_board_has_welded_bodies(tmp_path):
+    truth = truth_of(kincheck.load(welded(tmp_path)))
+    text = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)["model.urdf"]
+    assert re.search(r'<joint name="plate joint" type="fixed">', text)
+    assert re.search(r'<mass value="0.7" />', text)
+
+
 def short_strut(tmp_path):  # rod, spring, damper; a ball in the tree
     strut = tmp_path / "strut.toml"
     text = (Path(kincheck.__path__[0]) / "cases" / "mcpherson_strut_loaded.toml").read_text("utf-8")

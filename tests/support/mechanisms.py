@@ -16,6 +16,8 @@ from kincheck.core import (
     Translational,
 )
 
+ORIGIN, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
 
 def mcpherson():
     """The suspension of SAE 943745: body frames of its Table 4, joint points reconstructed to fit

@@ -14,7 +14,7 @@ from ..case import Case
 from .files import MODEL, kind_of, load, read_tree, root_of
 from .trees.case import undriven
 from .trees.element import Element, printed_digits
-from .trees.limits import NO_LIMIT, Limit
+from .trees.tree import NO_LIMIT, Limit
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12

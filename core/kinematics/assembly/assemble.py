@@ -21,7 +21,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dataset import Dataset, Variable
+from ...dataset import AXIS, PARAMETER, Dataset, Variable
 from ...errors import SolveError, number_of
 from ...input_checks import real, require_kind, require_known, require_positive
 from ...mechanism.mechanism import Mechanism
@@ -76,8 +76,8 @@ class Assembled(Tabular):
         """Return the outcome of each estimate and the poses of its bodies."""
         coords = {
             "body": Variable("body", [*self.bodies]),
-            "axis": Variable("axis", ["x", "y", "z"]),
-            "parameter": Variable("parameter", ["e0", "e1", "e2", "e3"]),
+            "axis": AXIS,
+            "parameter": PARAMETER,
         }
         variables = {
             name: Variable("estimate", getattr(self, name))

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Quat, Vec3, cross, quat, vec
-from ...dataset import Dataset, Variable
+from ...dataset import AXIS, PARAMETER, Dataset, Variable
 from ...errors import number_of
 from ...input_checks import require_positive
 from ...joints import Joint
@@ -275,8 +275,8 @@ class Assemblies(Tabular):
         coords = {
             "assembly": Variable("assembly", np.arange(1, len(self.found) + 1)),
             "body": Variable("body", bodies),
-            "axis": Variable("axis", ["x", "y", "z"]),
-            "parameter": Variable("parameter", ["e0", "e1", "e2", "e3"]),
+            "axis": AXIS,
+            "parameter": PARAMETER,
         }
         variables = {
             name: Variable("assembly", [getattr(each, name) for each in self.found])
@@ -409,20 +409,11 @@ def _starts(
         parent = found.get(branch.parent, GROUND_POSE)
         origin = tuple(frame.unit * frame.origins[branch.child])
         carried = parent.u + parent.swing(frame.arm(branch.parent, origin))
-        apart = (
-            ANYWHERE * rng.normal(size=(3, n))
-            if branch.joint is not None
-            else rng.normal(size=(3, n))
-        )
-        pose = Pose.of(carried + vec([*apart]), _any_rotation(n, rng))
+        apart = (1.0 if branch.joint is None else ANYWHERE) * rng.normal(size=(3, n))
+        e = rng.normal(size=(4, n))  # of such rotations none is likelier than another
+        pose = Pose.of(carried + vec([*apart]), quat(e / np.linalg.norm(e, axis=0)))
         found[branch.child] = pose if known is None else _where(first, known, pose)
     return found
-
-
-def _any_rotation(n: int, rng: np.random.Generator) -> Quat:
-    """Rotations of which none is likelier than another."""
-    e = rng.normal(size=(4, n))
-    return quat(e / np.linalg.norm(e, axis=0))
 
 
 def _shaken(pose: Pose, angle: Array, shift: float, n: int, rng: np.random.Generator) -> Pose:

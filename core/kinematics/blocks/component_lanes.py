@@ -6,7 +6,7 @@ world) and adds its own. `ComponentLanes` binds them to lanes, one sample a lane
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -36,8 +36,9 @@ from ..compiled.request import (
 )
 from ..compiled.solution import Columns
 from ..continuation.singular_poses import SOUND, Anchor, Numbers
-from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
+from ..formulation.acceptance_criteria import doubtful
 from ..formulation.constraints import frames, structure
+from ..formulation.state_vectors import samples
 from ..structure.components import Alike, components, described
 from ..structure.degrees_of_freedom import counted
 from .sparse_lanes import SparseLanes
@@ -46,9 +47,10 @@ from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
 @dataclass(frozen=True, eq=False)
 class ComponentType:
-    """Components of one structure: one model, and numbers for each.
+    """Components of one structure and drive: one model, and numbers for each.
 
     Attributes:
+        drivers: of each; components of one structure that others drive have the same model.
         members: numbers of the components.
         fixed: values of the slots `Plan.fixed`, the same in all lanes, at the design position,
             shape (members, fixed).
@@ -56,6 +58,7 @@ class ComponentType:
     """
 
     model: Model
+    drivers: tuple[str, ...]
     members: tuple[int, ...]
     fixed: Array
     base: int
@@ -120,13 +123,13 @@ class ComponentLanes(Lanes):
         numbers: list[list[float]] = [[] for _ in self.parts]
         alike: dict[Hashable, list[int]] = {}
         for k, part in enumerate(self.parts):
-            alike.setdefault(structure(part.section, numbers[k]), []).append(k)
+            alike.setdefault(structure(part.section.unnamed, numbers[k]), []).append(k)
         self.kinds: list[ComponentType] = []
         rows = 0
         for members in alike.values():
-            kind = self._kind(members, np.array([numbers[k] for k in members]), rows)
-            self.kinds.append(kind)
-            rows += len(members) * kind.model.kept
+            for kind in self._kinds(members, np.array([numbers[k] for k in members]), rows):
+                self.kinds.append(kind)
+                rows += len(kind.members) * kind.model.kept
         self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
         self.many = LANES if rows * LANES <= CACHED else LANES // 2
         self.details = self._details()
@@ -149,9 +152,8 @@ class ComponentLanes(Lanes):
         # from what is fixed now, and from what is ahead
         self._calls: list[list[Callable[[int], object]]] = [[], []]
         self._tables: list[Parts] = []  # calls know addresses, not arrays
-        for k, run in groupby(
-            range(len(self.parts)), key=lambda part: self.kinds.index(self.place[part][0])
-        ):
+        kind_of = {part: k for k, kind in enumerate(self.kinds) for part in kind.members}
+        for k, run in groupby(range(len(self.parts)), key=kind_of.__getitem__):
             parts, both = [*run], (self._fixed[k], self._ahead[k])
             members = np.array([self.place[part][1] for part in parts], dtype=np.int64)
             given = [
@@ -167,17 +169,20 @@ class ComponentLanes(Lanes):
 
     def _details(self) -> dict[str, Any]:
         unknowns, rows, redundant, sizes = 0, 0, list[str](), dict[str, dict[str, int]]()
+        alike: dict[Model, list[int]] = {}
         for kind in self.kinds:
-            account, like = kind.model.selection.account, self.parts[kind.members[0]].bodies[0]
-            unknowns += account.moving_coordinates * len(kind.members)
-            rows += account.rows * len(kind.members)
-            for part in (self.parts[k] for k in kind.members):
+            alike.setdefault(kind.model, []).extend(kind.members)
+        for model, members in alike.items():
+            account, like = model.selection.account, self.parts[members[0]].bodies[0]
+            unknowns += account.moving_coordinates * len(members)
+            rows += account.rows * len(members)
+            for part in (self.parts[k] for k in members):
                 # as they are called in a section
                 joints = {f"j{k}": name for k, name in enumerate(part.joints)}
                 named = (name.partition(":") for name in account.redundant_rows)
                 redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
-            which = f"components like that of {like} ({len(kind.members)})"
-            sizes |= {f"{name}, {which}": size for name, size in kind.model.sizes.items()}
+            which = f"components like that of {like} ({len(members)})"
+            sizes |= {f"{name}, {which}": size for name, size in model.sizes.items()}
         return {
             **counted(self.mechanism, unknowns, rows, redundant).details,
             "components": len(self.parts),
@@ -187,7 +192,7 @@ class ComponentLanes(Lanes):
             "program": sizes,
         }
 
-    def _kind(self, members: Sequence[int], numbers: Array, base: int) -> ComponentType:
+    def _kinds(self, members: Sequence[int], numbers: Array, base: int) -> Iterator[ComponentType]:
         first = self.parts[members[0]].section
         varied = np.flatnonzero((numbers != numbers[0]).any(axis=0))
         request = Request(
@@ -210,9 +215,13 @@ class ComponentLanes(Lanes):
             )
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]
-        return ComponentType(
-            model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), base
-        )
+        fixed = np.ascontiguousarray(lanes[list(model.plan.fixed)].T)
+        driven: dict[tuple[str, ...], list[int]] = {}
+        for row, k in enumerate(members):
+            driven.setdefault(tuple(self.parts[k].section.drivers), []).append(row)
+        for names, own in driven.items():
+            yield ComponentType(model, names, tuple(members[row] for row in own), fixed[own], base)
+            base += len(own) * model.kept
 
     def body_rows(self, name: str) -> list[int]:
         """Return the rows of the world with the motion of a body, in the order of `PRESCRIBED`."""
@@ -225,36 +234,28 @@ class ComponentLanes(Lanes):
         """Return the columns of moving outputs with their rows of the world, and a column of the
         outputs at rest.
         """
-        request = self.request
-        every = Columns.of(request)
+        every = Columns(self.request)
         columns, rows, still = list[int](), list[int](), np.zeros((every.count, 1))
-
-        def add(
-            name: str,
-            part: int | None,
-            own: str,
-            labels: Sequence[str],
-            at_rest: Mapping[str, Sequence[float]],
-        ) -> None:
+        points = map(self.mechanism.point, self.request.points)
+        bodies = map(self.mechanism.body, self.request.bodies)
+        wanted: list[tuple[str, str, Sequence[str], Mapping[str, Sequence[float]]]] = [
+            *((x.name, x.body, QUANTITIES, {"position": x.position}) for x in points),
+            *((x.name, x.name, BODY, {"r": x.origin, "p": x.euler_parameters}) for x in bodies),
+        ]
+        for name, body, labels, at_rest in wanted:
+            part = self.part_of.get(body)
             for label in labels:
-                place = every.by_vector[f"{label} {name}"]
+                place = every.by_vector.get(f"{label} {name}")
+                if place is None:  # of a higher order
+                    continue
                 if part is None:
                     still[place, 0] = at_rest.get(label, STILL)
                     continue
                 kind, member = self.place[part]
+                which = self.parts[part].bodies if labels is BODY else self.parts[part].points
+                own = f"{'b' if labels is BODY else 'p'}{which.index(name)}"
                 columns.extend(range(place.start, place.stop))
                 rows.extend(kind.rows(f"{label} {own}", member))
-
-        for name in request.points:
-            point = self.mechanism.point(name)
-            part = self.part_of.get(point.body)
-            own = "" if part is None else f"p{self.parts[part].points.index(name)}"
-            add(name, part, own, QUANTITIES[: request.order + 1], {"position": point.position})
-        for name in request.bodies:
-            body, part = self.mechanism.body(name), self.part_of.get(name)
-            own = "" if part is None else f"b{self.parts[part].bodies.index(name)}"
-            at_rest = {"r": body.origin, "p": body.euler_parameters}
-            add(name, part, own, BODY[: 2 * (request.order + 1)], at_rest)
         return np.array(columns, np.intp), np.array(rows, np.intp), still
 
     def accept_by(self, limits: Mapping[str, float]) -> None:
@@ -282,16 +283,19 @@ class ComponentLanes(Lanes):
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`: by component type; types without drivers share one table."""
-        models, alone = (kind.model for kind in self.kinds), times[None]
-        return [each.samples(path, times) if each.request.drivers else alone for each in models]
+        alone = times[None]
+        return [
+            samples(self.mechanism, kind.drivers, self.unit, path, times) if kind.drivers else alone
+            for kind in self.kinds
+        ]
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
         """See `Lanes`."""
         count = tables[0].shape[1]
         self.last, self._times = count - 1, tables[0][0]
-        for table, samples in zip(tables, self._samples, strict=True):
-            samples[:, :count] = table
-            samples[:, count:] = table[:, count - 1 :]
+        for table, room in zip(tables, self._samples, strict=True):
+            room[:, :count] = table
+            room[:, count:] = table[:, count - 1 :]
         self.worst[:] = self._best
         groups = self._groups(count)
         for call in self._calls[0]:
@@ -315,8 +319,7 @@ class ComponentLanes(Lanes):
         state = np.stack([self._state(k) for k in at.tolist()], axis=1)
         sample = self._whole.sampled(self._times[at], path)[0]
         errors = self._whole.error_bounds(state, sample)
-        limit, found = AMPLIFIED * self._tol, zip(at.tolist(), errors.tolist(), strict=True)
-        return {k: error for k, error in found if not error <= limit}  # or it is no number
+        return self.refused(at, errors, self._tol)
 
     @cached_property
     def _whole(self) -> SparseLanes:
@@ -376,12 +379,12 @@ class ComponentLanes(Lanes):
 
     def carry(self, lane: int) -> None:
         """See `Lanes`."""
-        for kind, fixed, samples, carried in zip(
+        for kind, fixed, sample, carried in zip(
             self.kinds, self._fixed, self._samples, self._carried, strict=True
         ):
             size, count = kind.model.kept, len(kind.members)
             solved = self.world[kind.base : kind.base + size * count, lane].reshape(count, size)
-            tables = solved, samples[None, :, lane], fixed
+            tables = solved, sample[None, :, lane], fixed
             values = [
                 table[:, sources] for table, (sources, _) in zip(tables, carried, strict=True)
             ]

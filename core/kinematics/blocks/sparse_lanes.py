@@ -30,7 +30,6 @@ from ..continuation.segments import BETTER, SEEN
 from ..continuation.singular_poses import SOUND, Anchor, Numbers
 from ..continuation.walk import failure_kind
 from ..formulation.acceptance_criteria import (
-    AMPLIFIED,
     EPSILON,
     LOW,
     Block,
@@ -213,7 +212,7 @@ class SparseLanes(Lanes):
                 self._scale[at] = frame.unit / extent
         names = ["time", *(f"drive {name}.{k}" for name in request.drivers for k in range(5))]
         self._angles = [names.index(name) for name in turns(mechanism, request.drivers)]
-        self._vectors = [*Columns.of(request).by_vector]
+        self._vectors = [*Columns(request).by_vector]
         self.worst = np.zeros((len(WORST), POSES))
         self.here = self._closed()
         self.design = self.anchor(0.0)
@@ -511,11 +510,7 @@ class SparseLanes(Lanes):
         closure, sigma = self.worst[CLOSURES, :count], self.worst[SIGMAS, :count]
         at = np.flatnonzero(doubtful(sigma, closure, tol))
         errors = self.error_bounds(found.state[:, at], found.sample[:, at])
-        return {
-            k: error
-            for k, error in zip(at.tolist(), errors.tolist(), strict=True)
-            if not error <= AMPLIFIED * tol  # or it is no number
-        }
+        return self.refused(at, errors, tol)
 
     def error_bounds(self, state: Array, sample: Array) -> Array:
         """Return bounds of the errors of poses [of the mechanism's size] and of their rates and

@@ -134,6 +134,11 @@ class Lanes(ABC):
         error of each.
         """
 
+    def refused(self, lanes: Indices, errors: Array, tol: float) -> dict[int, float]:
+        """Return the errors of lanes that are too large, or no numbers."""
+        found = zip(lanes.tolist(), errors.tolist(), strict=True)
+        return {k: error for k, error in found if not error <= AMPLIFIED * tol}
+
     @property
     def findings(self) -> Mapping[str, Any]:
         """What the record of a solution says beside the tests, since `begin`."""
@@ -260,7 +265,7 @@ class _Run:
     """
 
     def __init__(self, lanes: Lanes, tol: float, count: int = 0) -> None:
-        self.lanes, self.tol, self.columns = lanes, tol, Columns.of(lanes.request)
+        self.lanes, self.tol, self.columns = lanes, tol, Columns(lanes.request)
         self.table = np.full((self.columns.count, count), np.nan)
         self.worst = np.full((len(WORST), count), np.nan)
         self.refused = dict[int, float]()

@@ -376,11 +376,12 @@ class Route:
 
     def for_motions(self, parts: int = 1) -> tuple[Array, ...]:
         """Return the samples of each side, for lanes with motions of their own."""
-        return self.bound(parts, lambda: self._for_motions(parts))
 
-    def _for_motions(self, parts: int) -> tuple[Array, ...]:
-        given = [side.samples[: len(self.origin), : side.count] for side in self.divided(parts)]
-        return tuple(np.concatenate([each, weights_of_samples(each[0])]) for each in given)
+        def made() -> tuple[Array, ...]:
+            given = [side.samples[: len(self.origin), : side.count] for side in self.divided(parts)]
+            return tuple(np.concatenate([each, weights_of_samples(each[0])]) for each in given)
+
+        return self.bound(parts, made)
 
     @cached_property
     def lanes(self) -> int:

@@ -33,9 +33,8 @@ from .request import (
 _Columns = Mapping[str, Sequence[slice | None]]
 
 
-@dataclass(frozen=True, eq=False)
 class Columns:
-    """Columns of the table of samples.
+    """Columns of the table of samples for the motions of a request, side by side.
 
     Attributes:
         count: number of the columns that hold motions.
@@ -44,19 +43,12 @@ class Columns:
         bodies: by body, columns of r, p, v and a; None for an absent one.
     """
 
-    count: int
-    by_vector: Mapping[str, slice]
-    points: _Columns
-    bodies: _Columns
-
-    @staticmethod
-    def of(request: Request) -> Columns:
-        """Return the columns of the motions of a request, side by side."""
+    def __init__(self, request: Request) -> None:
         names = kept_motions(request, ())
         sizes = {name: 4 if name.startswith("p ") else 3 for name in names}
-        found = row_ranges(sizes, ())
-        points, bodies = rows_of_points(request, found), rows_of_bodies(request, found)
-        return Columns(sum(sizes.values()), found, points, bodies)
+        self.count, self.by_vector = sum(sizes.values()), row_ranges(sizes, ())
+        self.points = rows_of_points(request, self.by_vector)
+        self.bodies = rows_of_bodies(request, self.by_vector)
 
 
 def solution(
@@ -184,6 +176,7 @@ class ForceTable:
         )
 
 
+@dataclass(frozen=True, eq=False)
 class _Samples:
     """The forces of the samples in one table.
 
@@ -191,8 +184,8 @@ class _Samples:
     not depend on the choice of rows.
     """
 
-    def __init__(self, of: ForceTable, table: Array) -> None:
-        self._of, self._table = of, table
+    of: ForceTable
+    table: Array
 
     def element(self, name: str) -> Array:
         """Return the amount of a force element, shape (n,)."""
@@ -200,8 +193,8 @@ class _Samples:
 
     def reaction(self, name: str) -> Reaction:
         """Return the reaction of a joint."""
-        values = self._vector(REACTION, name).reshape(-1, 1 + self._of.redundant, 6)
-        si = np.repeat([1.0 / self._of.unit, 1.0], 3)
+        values = self._vector(REACTION, name).reshape(-1, 1 + self.of.redundant, 6)
+        si = np.repeat([1.0 / self.of.unit, 1.0], 3)
         found, free = self._shortest(values.swapaxes(1, 2), si)
         return Reaction(found[:, :3], found[:, 3:], free)
 
@@ -210,14 +203,14 @@ class _Samples:
         return self._vector(EFFORT, name)[:, 0]
 
     def _vector(self, kind: str, name: str) -> Array:
-        return self._table[:, self._of.rows[kind + name]]
+        return self.table[:, self.of.rows[kind + name]]
 
     @cached_property
     def _basis(self) -> tuple[Array, Array]:
         """Matrices to orthonormalise the undetermined directions, shape (n, r, r), and the part of
         each direction in the multipliers, shape (n, r); NaN at samples that were not reached.
         """
-        r, values = self._of.redundant, self._vector(REDUNDANT, "")
+        r, values = self.of.redundant, self._vector(REDUNDANT, "")
         known = np.isfinite(values).all(axis=1)
         gram = np.tile(np.eye(r), (len(values), 1, 1))
         pairs = [(i, j) for i in range(r) for j in range(i, r)]
@@ -237,7 +230,7 @@ class _Samples:
                 components, 1 + r).
             si: size in SI of the components of a direction, shape (components,).
         """
-        if not self._of.redundant:
+        if not self.of.redundant:
             return values[..., 0], values[..., 1:]
         to_orthonormal, part = self._basis
         free = values[..., 1:] @ to_orthonormal

@@ -253,17 +253,15 @@ class Followed:
 
     def _beyond(self, end: End) -> list[End] | None:
         """Return the next end of the motion beyond an end; None if the motion does not continue."""
-        slots = end.route.model.slots
-        if (
-            end.failure is not FailureKind.LEFT_OFF
-            and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]
-        ):
+        if end.failure is not FailureKind.LEFT_OFF and end.sigma > NEAR:
             return None
         here, number = end.time, self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0
         missing = np.empty(0, np.intp)
-        if number is not None:
-            missing = self._missing(number, side, end.wanted)
+        if number is not None:  # the samples of that side from the first wanted one on
+            start = self.parts[number].route.start
+            ahead = side * (self.times - start) >= side * (end.wanted - start)
+            missing = np.flatnonzero(~self.found.solved & ahead)
         path = end.route.path if number is None else self._path(missing)
         other = None
         if self.renewed < MOST:
@@ -281,11 +279,9 @@ class Followed:
         if len(self.passages) == MOST:
             return None
         lane = self.before(here, side, number) if number is not None else end.route.departure
-        passed = (
-            bridge(end.route, lane, here, self.tol, end.lane, rates=False)
-            if lane is not None
-            else None
-        )
+        if lane is None:
+            return None
+        passed = bridge(end.route, lane, here, self.tol, end.lane, rates=False)
         if passed is None:
             return None
         self.passages.append(end)
@@ -297,36 +293,19 @@ class Followed:
         # a sample right beyond the pose is not given up for want of better rows
         while back and back[0].failure is FailureKind.LEFT_OFF:
             back = self._further(back[0], len(self.parts) - 1, -side)
-        short = {
-            k
+        self.stuck += [
+            Stuck(k, end.route, lane, end.lane)
             for k in missing.tolist()
             if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0
-        }
-        self.stuck += (
-            [Stuck(k, end.route, lane, end.lane) for k in sorted(short)] if lane is not None else []
-        )
+        ]
         return [each for each in ends if side * (each.wanted - beyond) >= 0.0]
 
     def _further(self, end: End, number: int, side: float) -> list[End]:
         """Run a route again, and continue it beyond its earlier end."""
-        samples, slots = self.parts[number].samples, end.route.model.slots
-        low = LOW * float(end.lane[slots[FROM + SIGMA]] / end.lane[slots[FROM + LARGEST_SIGMA]])
-        found = march(end.route, self.tol, low=low)
-        further = found.solved & ~self.found.solved[samples]
-        taken = samples[further]
-        self.found.kept[:, taken], self.found.solved[taken], self.part_of[taken] = (
-            found.kept[:, further],
-            True,
-            number,
-        )
+        samples = self.parts[number].samples
+        found = march(end.route, self.tol, low=LOW * end.sigma)
+        self._take(found, samples, found.solved & ~self.found.solved[samples], number)
         return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
-
-    def _missing(self, number: int, side: float, wanted: float) -> NDArray[np.intp]:
-        """Return the samples of a side not reached by a part, from the first wanted one on."""
-        start = self.parts[number].route.start
-        return np.flatnonzero(
-            ~self.found.solved & (side * (self.times - start) >= side * (wanted - start))
-        )
 
     def _path(self, samples: NDArray[np.intp]) -> Path:
         """The path at samples."""
@@ -349,11 +328,17 @@ class Followed:
         found, sigma = march(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
         nearer = BETTER * self.found.kept[sigma, samples] < found.kept[sigma]
         reached = found.solved & (nearer | ~self.found.solved[samples])
-        taken = samples[reached]
-        self.found.kept[:, taken], self.found.solved[taken] = found.kept[:, reached], True
-        self.part_of[taken] = len(self.parts)
+        self._take(found, samples, reached, len(self.parts))
         self.parts.append(Part(route, samples))
         return list(found.ends)
+
+    def _take(
+        self, found: March, samples: NDArray[np.intp], reached: NDArray[np.bool_], number: int
+    ) -> None:
+        """Store samples that a part reached."""
+        taken = samples[reached]
+        self.found.kept[:, taken], self.found.solved[taken] = found.kept[:, reached], True
+        self.part_of[taken] = number
 
     def visit(self, samples: Collection[int]) -> dict[int, Array]:
         """Return lanes at samples; samples not reached again are absent."""

@@ -86,6 +86,11 @@ class Findings:
             found["uncertain_samples"] = sorted(self.uncertain)
         return found | ({"notes": [*self.notes]} if self.notes else {})
 
+    def add_failure(self, message: str, kind: FailureKind) -> None:
+        """Add the reason of missing samples."""
+        self.messages.append(message)
+        self.failures.append(kind)
+
     def add_pose(
         self,
         outcome: str,
@@ -128,7 +133,7 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
     again gives the same poses, to the last digit.
     """
     if len(found.solved) > LONGEST_KEPT:
-        return _scrutinised(route, found, tol)
+        return _Scrutiny(Followed(route, found, tol)).run()
     poses, before = (found.kept, found.solved), (found.kept.copy(), found.solved.copy())
     known = route.bound(("scrutinised", tol), list[tuple[_Poses, _Poses, Findings]])
     for same, after, findings in known:
@@ -136,53 +141,44 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
             for array, values in zip(poses, after, strict=True):
                 array[:] = values
             return findings
-    findings = _scrutinised(route, found, tol)
+    findings = _Scrutiny(Followed(route, found, tol)).run()
     known[:] = [(before, (found.kept.copy(), found.solved.copy()), findings)]
     return findings
 
 
-def _scrutinised(route: Route, found: March, tol: float) -> Findings:
-    scrutiny = _Scrutiny(Followed(route, found, tol))
-    if len(route.model.selection.chosen) > LARGEST:
-        return scrutiny.too_large()
-    scrutiny.followed.go_on()
-    scrutiny.samples()
-    scrutiny.stuck()
-    scrutiny.passages()
-    for end in scrutiny.followed.ends:
-        scrutiny.end(end)
-    scrutiny.findings.renewed = scrutiny.followed.renewed
-    scrutiny.findings.uncertain = [k for k in scrutiny.findings.uncertain if not found.solved[k]]
-    return scrutiny.findings
-
-
 class _Scrutiny:
     def __init__(self, followed: Followed) -> None:
-        self.followed, self.route, self.found, self.tol = (
-            followed,
-            followed.route,
-            followed.found,
-            followed.tol,
-        )
+        self.followed, self.route = followed, followed.route
+        self.found, self.tol = followed.found, followed.tol
         self.rows, self.times = self.route.model.rows, self.route.path.times
         self.limit, self.orders = AMPLIFIED * self.tol, self.route.model.orders
         self.findings = Findings()
 
-    def too_large(self) -> Findings:
-        """Add the message of a mechanism too large to be examined."""
-        count, unknowns = int(self.followed.doubtful.sum()), len(self.route.model.selection.chosen)
-        if count:
-            self.findings.notes.append(
-                f"{count} samples seem to be nearly singular, and were not examined: {unknowns}"
-                f" unknowns are more than {LARGEST}"
-            )
-        self.findings.messages += self.found.messages
-        self.findings.failures += self.found.failures
-        return self.findings
+    def run(self) -> Findings:
+        """Return the findings; samples are solved again in place."""
+        findings, unknowns = self.findings, len(self.route.model.selection.chosen)
+        if unknowns > LARGEST:
+            if count := int(self.followed.doubtful.sum()):
+                findings.notes.append(
+                    f"{count} samples seem to be nearly singular, and were not examined:"
+                    f" {unknowns} unknowns are more than {LARGEST}"
+                )
+            findings.messages += self.found.messages
+            findings.failures += self.found.failures
+            return findings
+        self.followed.go_on()
+        self._samples()
+        self._stuck()
+        self._passages()
+        for end in self.followed.ends:
+            self._end(end)
+        findings.renewed = self.followed.renewed
+        findings.uncertain = [k for k in findings.uncertain if not self.found.solved[k]]
+        return findings
 
     # Samples
 
-    def samples(self) -> None:
+    def _samples(self) -> None:
         """Follow samples with better rows, solve doubtful ones closely, and interpolate or refuse
         the rest.
         """
@@ -234,12 +230,8 @@ class _Scrutiny:
         near = moved <= np.maximum(
             self.limit, WORSE * kept[rows["closure"].start, indices] / solved.sigma
         )
-        good = (
-            (solved.error[: self.orders].max(axis=0) <= self.limit)
-            & near
-            & (closure <= self.tol)
-            & (branch > 0.0)
-        )
+        good = (closure <= self.tol) & (branch > 0.0) & near
+        good &= solved.error[: self.orders].max(axis=0) <= self.limit
         for name, values in [*outputs.items(), ("closure", closure), ("leftover", leftover)]:
             kept[rows[name], indices[good]] = values[..., good]
         self.findings.retried += len(indices)
@@ -251,28 +243,22 @@ class _Scrutiny:
         passed = {at for at in tried if self._passed(int(indices[at]), lanes[:, at])}
         refused = [at for at in doubted if at not in passed]
         if refused:
-            self._refuse(
-                system,
-                indices[refused],
-                state[:, refused],
-                sample[:, refused],
-                solved.error[: self.orders, refused],
-            )
+            error = solved.error[: self.orders, refused]
+            self._refuse(system, indices[refused], state[:, refused], error)
 
     def _lost(self, samples: list[int]) -> None:
         """Refuse doubtful samples not reached a second time: rounding made them acceptable."""
         if samples:
             self.found.kept[:, samples], self.found.solved[samples] = np.nan, False
             self.findings.uncertain += samples
-            places = listed([self._where(float(self.times[k])) for k in samples])
+            places = listed([self._where(k) for k in samples])
             why = (
                 "reached once and not again, so near are residuals to the tolerance"
                 f" {self.tol:.3g}; allow more"
             )
-            self.findings.messages.append(f"refused at {places}: {why}")
-            self.findings.failures.append(FailureKind.UNREPEATABLE)
+            self.findings.add_failure(f"refused at {places}: {why}", FailureKind.UNREPEATABLE)
 
-    def stuck(self) -> None:
+    def _stuck(self) -> None:
         """Interpolate samples not reached from either side of a passage, or refuse them."""
         stuck = [each for each in self.followed.stuck if not self.found.solved[each.sample]]
         for each in stuck[:BRIDGED]:
@@ -282,14 +268,9 @@ class _Scrutiny:
         for each in stuck:
             k = each.sample
             if not self.found.solved[k]:
-                system, sample = system_of(each.route.model), self.route.sampled(self.times[[k]])
-                self._refuse(
-                    system,
-                    np.array([k]),
-                    system.state(each.near[:, None]),
-                    sample,
-                    np.full((1, 1), self.tol**0.5),
-                )
+                system = system_of(each.route.model)
+                state, error = system.state(each.near[:, None]), np.full((1, 1), self.tol**0.5)
+                self._refuse(system, np.array([k]), state, error)
 
     def _passed(self, k: int, near: Array) -> bool:
         """Replace a sample by interpolation between both sides of it, if the motion continues."""
@@ -313,14 +294,15 @@ class _Scrutiny:
         self.findings.add_pose("passed", self.route.path, time, singularity, k)
         what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
-            f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated"
+            f"passes {what}{self._where(k)}: {singularity.words}; {CONTINUED}, interpolated"
             f" there to {found.error:.1g} of the mechanism's size and of the rates"
         )
         return True
 
     def _refuse(
-        self, system: System, indices: NDArray[np.intp], state: Array, sample: Array, error: Array
+        self, system: System, indices: NDArray[np.intp], state: Array, error: Array
     ) -> None:
+        sample = self.route.sampled(self.times[indices])
         self.found.kept[:, indices], self.found.solved[indices] = np.nan, False
         self.findings.uncertain += indices.tolist()
         found = [examine(system, state[:, [at]], sample[:, [at]]) for at in range(len(indices))]
@@ -333,10 +315,8 @@ class _Scrutiny:
         uncertain += (
             f", rates by {error[1:, worst].max():.2g} of their own" if len(error) > 1 else ""
         )
-        places = listed([self._where(float(self.times[k])) for k in indices.tolist()])
-        uncertain += (
-            f" (at {self._where(float(self.times[indices[worst]]))}), allowed {self.limit:.2g}"
-        )
+        places = listed([self._where(k) for k in indices.tolist()])
+        uncertain += f" (at {self._where(indices[worst])}), allowed {self.limit:.2g}"
         if singularity.sigma < REGULAR:
             why = (
                 f"so near a singular pose that residuals leave {uncertain}; {singularity.words};"
@@ -348,10 +328,9 @@ class _Scrutiny:
                 f"rounding alone leaves {uncertain} by the tolerance {self.tol:.3g}; {sigma}, the"
                 " pose is regular; allow more"
             )
-        self.findings.messages.append(f"refused at {places}: {why}")
-        self.findings.failures.append(FailureKind.UNCERTAIN)
+        self.findings.add_failure(f"refused at {places}: {why}", FailureKind.UNCERTAIN)
 
-    def passages(self) -> None:
+    def _passages(self) -> None:
         """Add the singular poses passed between samples."""
         said = [pose["time"] for pose in self.findings.poses if pose["outcome"] == "passed"]
         others = [
@@ -373,11 +352,8 @@ class _Scrutiny:
         self.findings.add_pose("crossed", path, time, singularity)
         if path.motions is self.route.path.motions:
             places = np.append(self.times, self.route.start)
-            low, high = (
-                path.where(float(side))
-                for side in (places[places <= time].max(), places[places >= time].min())
-            )
-            beside = f"between {low} and {high}, "
+            low, high = places[places <= time].max(), places[places >= time].min()
+            beside = f"between {path.where(float(low))} and {path.where(float(high))}, "
         else:
             beside = f"on the way to {self.route.begin.name}, "
         self.findings.notes.append(
@@ -385,7 +361,7 @@ class _Scrutiny:
             f" {CONTINUED}"
         )
 
-    def end(self, end: End) -> None:
+    def _end(self, end: End) -> None:
         """Add the reason why a side ended: a limit point ahead, or the singularity nearest to its
         last pose.
         """
@@ -406,8 +382,7 @@ class _Scrutiny:
                 message += (
                     f"; the pose is regular there, smallest singular value {nearest.sigma:.3g}"
                 )
-        self.findings.messages.append(message)
-        self.findings.failures.append(end.failure)
+        self.findings.add_failure(message, end.failure)
 
-    def _where(self, time: float) -> str:
-        return self.route.path.where(time)
+    def _where(self, k: int) -> str:
+        return self.route.path.where(float(self.times[k]))

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ...dataset import Dataset, Variable
+from ...dataset import AXIS, Dataset, Variable
 from ...errors import SolveError, number_of
 from ...input_checks import names_of, require_kind, require_known, require_positive
 from ...mechanism.mechanism import Mechanism
@@ -94,7 +94,7 @@ class Curve(Tabular):
         coords = {
             "arc": Variable("pose", self.arc),
             "point": Variable("point", [*self.points]),
-            "axis": Variable("axis", ["x", "y", "z"]),
+            "axis": AXIS,
         }
         variables = {
             self.driver: Variable("pose", self.values, self.unit),

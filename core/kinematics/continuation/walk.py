@@ -249,6 +249,12 @@ class End:
         """The time of the last pose [s]."""
         return time_of(self.route.model, self.lane)
 
+    @property
+    def sigma(self) -> float:
+        """The smallest singular value at the last pose, by the largest there was."""
+        slots = self.route.model.slots
+        return float(self.lane[slots[FROM + SIGMA]] / self.lane[slots[FROM + LARGEST_SIGMA]])
+
 
 def time_of(model: Model, lane: Array) -> float:
     """Return the time at which a lane stands [s]."""

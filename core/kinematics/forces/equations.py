@@ -194,18 +194,19 @@ def at_work(
         SolveError: the native solver does not know an element's type.
     """
 
-    def at_work_now(each: Any) -> Applied:
+    found: dict[str, Applied] = {}
+    for each in mechanism.forces:
         if isinstance(each, SpringDamper):
-            return spring(each, at)
-        if isinstance(each, TorsionSpringDamper):
-            return torsion(each, mechanism, at, angle(each.joint))
-        if isinstance(each, Bushing):
-            return bushing(each, at)
-        if isinstance(each, Force | Torque):
-            return constant(each, at)
-        raise SolveError(f"{each}: the native engine knows no force element of this kind")
-
-    return {each.name: at_work_now(each) for each in mechanism.forces}
+            found[each.name] = spring(each, at)
+        elif isinstance(each, TorsionSpringDamper):
+            found[each.name] = torsion(each, mechanism, at, angle(each.joint))
+        elif isinstance(each, Bushing):
+            found[each.name] = bushing(each, at)
+        elif isinstance(each, Force | Torque):
+            found[each.name] = constant(each, at)
+        else:
+            raise SolveError(f"{each}: the native engine knows no force element of this kind")
+    return found
 
 
 def spring(each: SpringDamper, at: BodyStates) -> Applied:

@@ -8,20 +8,19 @@ forces left undetermined by redundant rows.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from itertools import islice
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...algebra import IDENTITY, ZERO, Vec3, angle_about, cross, quat, vec
 from ...errors import SolveError
 from ...forces import AMPLIFIED, Forces, Multipliers, Reaction, in_wrenches
 from ...joints.base import Joint, unit
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import Driver, JointDriver, Path
+from ...mechanism.motions import JointDriver, Path
 from ...primitives.base import Drive, Pose, Twist
 from ...trajectory import QUANTITIES, Array, BodyMotion, Trajectory
 from ..formulation.cartesian import Cartesian
@@ -227,11 +226,6 @@ class ForceRows:
         each = [np.hstack(self.wrench(joint, multipliers)) for multipliers in columns]
         return np.stack(each, axis=2) if each else np.empty((self.n, 6, 0))
 
-    def effort(self, driver: Driver, found: Multipliers) -> Array:
-        """Return the effort of a driver [N or N m], shape (n,)."""
-        effort: Array = self.equations.effort(driver, [*found.values.T])
-        return effort + np.zeros(self.n)
-
     def left(self, at: Configuration | None = None) -> Iterator[tuple[Array, Array]]:
         """Yield what is left of the rows by order of the motion, phi, J v - nu and J a - gamma, and
         their right-hand sides, shape (n, rows) each.
@@ -289,9 +283,6 @@ def _inverse(rows: Array) -> Array | None:
     return found if (rows.shape[1] * condition < AMPLIFIED).all() else None
 
 
-Lanes: TypeAlias = NDArray[np.bool_]
-
-
 def with_forces(
     mechanism: Mechanism,
     path: Path,
@@ -331,12 +322,23 @@ def forces_of(
     wanted = wanted_forces(mechanism, names)
     lines = ForceRows(mechanism, path, motion, follow, freedoms)
     solution, still = lines.solve(), np.zeros(lines.n)
-    efforts = {each.name: lines.effort(each, solution) for each in mechanism.drivers}
+    values = [*solution.values.T]
+    efforts = {x.name: lines.equations.effort(x, values) + still for x in mechanism.drivers}
     elements = {name: each.amount + still for name, each in lines.applied.items()}
     every = powers(mechanism, lines.at, lines.applied, efforts, lines.rates)
     # its shape is given: without a mass, or without a solved sample, the list alone has none
     table: Array = np.array([each + still for each in every]).reshape(len(every), lines.n)
-    spread = _Spread(motion.solved, solution.singular)
+
+    def spread(values: Array, *, ill: bool = True) -> Array:
+        """Place values of the solved samples among all, with NaN at the others and, if they are ill
+        defined at singular poses, there.
+        """
+        found = np.full((len(motion.solved), *values.shape[1:]), np.nan)
+        found[motion.solved] = values
+        if ill:
+            found[np.flatnonzero(motion.solved)[solution.singular]] = np.nan
+        return found
+
     joints = [j for j in mechanism.given_joints if mechanism.reduced or j.name in wanted.joints]
     free = {joint.name: lines.free(joint, solution) for joint in joints}
     if mechanism.reduced:
@@ -355,21 +357,6 @@ def forces_of(
         spread(np.abs(table).max(axis=0, initial=0.0)),
         solution.message(lines.times),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Spread:
-    """Place values of the solved samples among all samples, with NaN at the others."""
-
-    solved: Lanes
-    singular: Lanes
-
-    def __call__(self, values: Array, *, ill: bool = True) -> Array:
-        found = np.full((len(self.solved), *values.shape[1:]), np.nan)
-        keep = ~self.singular if ill else np.ones_like(self.singular)
-        shown = np.where(keep.reshape(-1, *(1,) * (values.ndim - 1)), values, np.nan)
-        found[self.solved] = shown
-        return found
 
 
 def motion_defects(mechanism: Mechanism, path: Path, motion: Trajectory) -> Mapping[str, Array]:

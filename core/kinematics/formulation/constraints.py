@@ -49,6 +49,9 @@ class Constraint:
         return self.primitive.n
 
 
+_Joint = TypeVar("_Joint", bound=Joint)
+
+
 @dataclass(frozen=True)
 class Frames:
     """The length unit [m], the internal origin of every body [units], and the moving bodies."""
@@ -64,6 +67,11 @@ class Frames:
     def end(self, body: str, position: Vector) -> tuple[Vector, Vec3]:
         """Return a point of a body: its position and arm."""
         return position, self.arm(body, position)
+
+    def attached(self, joint: _Joint) -> tuple[_Joint, Attachment, Attachment]:
+        """Return a joint in units, and how it is attached to both bodies."""
+        i, j = (Attachment(self.origins[body]) for body in joint.bodies)
+        return joint.scaled(1.0 / self.unit), i, j
 
     def in_units(self, unit: float) -> Frames:
         """Return the same frames with another length unit, a power of two of metres."""
@@ -176,8 +184,8 @@ def _composed(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Cons
     # the ground as body i: its rows are constant and the simplified ones need nothing of body j
     backwards = original.symmetric and mechanism.is_fixed(original.j)
     joint = original.reversed() if backwards else original
-    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
-    composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
+    scaled, i, j = frame.attached(joint)
+    composed = scaled.primitives(i, j)
     return [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
 
 
@@ -198,16 +206,15 @@ def _axial(
     # the ground as body i: its rows are constant; but a named coordinate is that of body j relative
     # to body i, in this order
     joint = original.reversed() if fixed_last and not named else original
-    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
-    scaled = joint.scaled(1.0 / frame.unit)
-    composed = [(primitive, "") for primitive in scaled.primitives(i, j)]
-    if mixed:
-        composed = [
-            (primitive, freedom if freedom in names else "")
-            for primitive, freedom in scaled.mixed(i, j)
+    scaled, i, j = frame.attached(joint)
+    composed = (
+        [*scaled.mixed(i, j)]
+        if mixed
+        else [
+            *((primitive, "") for primitive in scaled.primitives(i, j)),
+            *((scaled.measured(freedom, i, j), freedom) for freedom in named),
         ]
-    else:
-        composed += [(scaled.measured(freedom, i, j), freedom) for freedom in named]
+    )
     found: list[Constraint | Relation] = [
         Constraint(joint.name, primitive, joint.i, joint.j, names.get(freedom, ""))
         for primitive, freedom in composed
@@ -262,8 +269,8 @@ def _driven(
         )
     if mixed:
         return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
-    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
-    primitive: Any = joint.scaled(1.0 / frame.unit).measured(driver.freedom, i, j)
+    scaled, i, j = frame.attached(joint)
+    primitive: Any = scaled.measured(driver.freedom, i, j)
     return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
 
 
@@ -313,7 +320,7 @@ def structure(value: Any, numbers: list[Scalar]) -> Hashable:
         return Traced if isinstance(value, Traced) else float
     names, parts = _parts(value)
     if parts is None:
-        return value
+        return value if isinstance(value, Hashable) else id(value)
     found = tuple(structure(part, numbers) for part in parts)
     if isinstance(value, Vec3):
         return Vec3, any(isinstance(x, Traced) or x != 0.0 for x in value)

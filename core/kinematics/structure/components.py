@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from graphlib import TopologicalSorter
 from typing import Any, cast
 
@@ -44,14 +44,16 @@ from .redundancy import independent_rows
 class Section:
     """A component with numbered names: those of one structure differ in their numbers only.
 
-    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ...
+    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., drivers d0, ..., points p0,
+    ...
 
     Attributes:
         unit: length unit [m].
         given: moving bodies that are solved elsewhere.
         joints: types of the joints.
+        settings: what the joints are besides their geometry: of equal joints.
         constraints: of the joints.
-        drivers: the constraint of each driver.
+        drivers: the constraint of each driver, by its own name.
         points: body, position [m] and arm [units] of those whose motion is wanted.
         outputs: position, arm and Euler parameters of the bodies whose motion is wanted.
     """
@@ -60,10 +62,16 @@ class Section:
     bodies: tuple[str, ...]
     given: tuple[str, ...]
     joints: tuple[str, ...]
+    settings: tuple[str, ...]
     constraints: tuple[Constraint | Relation, ...]
     drivers: Mapping[str, Constraint]
     points: Mapping[str, tuple[str, Vector, Vec3]]
     outputs: Mapping[str, tuple[Vector, Vec3, Quat]]
+
+    @property
+    def unnamed(self) -> Section:
+        """The section with numbered names of its drivers too."""
+        return replace(self, drivers={str(n): c for n, c in enumerate(self.drivers.values())})
 
     def formulation(
         self, prescribed: Mapping[str, PrescribedBody], drives: Mapping[str, Drive]
@@ -212,6 +220,7 @@ def described(
     for c in cast("list[Constraint]", every[last:]):  # native ones
         drivers[place((c.i, c.j))][c.owner] = c
     wanted: list[list[Point]] = [[] for _ in parts]
+    points, bodies = {*points}, {*bodies}
     for point in mechanism.points:
         if point.name in points and point.body in level:
             wanted[level[point.body]].append(point)
@@ -226,6 +235,7 @@ def described(
             tuple(own.values()),
             tuple(numbered.values())[len(own) :],
             tuple(joint.type for joint in held),
+            tuple(map(_settings, held)),
             tuple(
                 renamed(
                     c, f"j{n}", numbered, [f"j{n}{x[len(c.owner) :]}" for x in coordinates_of(c)]
@@ -234,8 +244,8 @@ def described(
                 for c in of_joint.get(joint.name, ())
             ),
             {
-                name: cast("Constraint", renamed(c, name, numbered, ()))
-                for name, c in drivers[k].items()
+                name: cast("Constraint", renamed(c, f"d{n}", numbered, ()))
+                for n, (name, c) in enumerate(drivers[k].items())
             },
             {f"p{n}": (own[p.body], *frame.end(p.body, p.position)) for n, p in enumerate(ends)},
             {
@@ -247,6 +257,11 @@ def described(
         point_names = tuple(point.name for point in ends)
         found.append(Component(names, tuple(others), joint_names, point_names, section))
     return found
+
+
+def _settings(joint: Joint) -> str:
+    own = (each.name for each in fields(joint) if "kind" not in each.metadata)
+    return repr([getattr(joint, name) for name in own if name not in ("name", "i", "j")])
 
 
 def select_section(section: Section) -> Selection:

@@ -376,9 +376,9 @@ def largest_residual(
     poses = displaced(mechanism, frame, {name: (each.r, each.p) for name, each in bodies.items()})
     found = 0.0
     for joint in joints:
-        i, j = (Attachment(frame.origins[body]) for body in joint.bodies)
+        scaled, i, j = frame.attached(joint)
         pair = [poses.get(body, GROUND_POSE) for body in joint.bodies]
-        for each in joint.scaled(1.0 / frame.unit).primitives(i, j):
+        for each in scaled.primitives(i, j):
             found = max(found, *(float(np.max(np.abs(x), initial=0.0)) for x in each.phi(*pair)))
     return frame.unit * found
 

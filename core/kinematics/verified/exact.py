@@ -237,13 +237,13 @@ class _Inputs:
 @dataclass(frozen=True, eq=False)
 class ExactEquations:
     """The equations of a mechanism for a proof; inputs are state, drivers, those of forces, then
-    `geometry`.
+    `geometry`. Each moving driver has three: value [units or rad], cosine and sine of its half.
+    With forces the drivers that stand still are among them.
 
     Attributes:
+        names: of the output points.
         state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler
             parameters "q BODY", coordinates "x JOINT.FREEDOM" [units or rad].
-        drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its
-            half. With forces the drivers that stand still are among them.
         geometry: values of the further inputs.
         residuals: as many as scalars of the state: the kept rows, then the lengths of the Euler
             parameters.
@@ -255,8 +255,8 @@ class ExactEquations:
     """
 
     frame: Frames
+    names: Sequence[str]
     state: Mapping[str, int]
-    drivers: tuple[str, ...]
     geometry: Sequence[Ball]
     residuals: Program
     derivative: Program
@@ -338,8 +338,8 @@ def equations(
         forces = exact.programs(inputs.tape, wanted, left_out)
     return ExactEquations(
         frame,
+        points,
         {name: len(value) for name, value in design.items()},
-        tuple(drivers),
         inputs.geometry,
         numbered("residuals", inputs.tape, [*(phi[k] for k in kept), *lengths]),
         program("derivative", inputs.tape, entries),

@@ -63,7 +63,6 @@ class Enclosure:
 
 def enclose(
     equations: ExactEquations,
-    points: Sequence[str],
     pose: Array,
     drives: Sequence[Sequence[Ball]],
     bits: int,
@@ -72,7 +71,6 @@ def enclose(
     """Prove one sample, at the precision of the equations.
 
     Args:
-        points: names of the points of the equations.
         pose: approximate state, shape (size,).
         drives: for each moving driver value [units or rad], velocity and acceleration, as exact
             numbers or balls.
@@ -109,7 +107,7 @@ def enclose(
         ) from None
     motion = sample.motion(solution, inverse)
     return Enclosure(
-        dict(zip(points, sample.points(motion), strict=True)),
+        dict(zip(equations.names, sample.points(motion), strict=True)),
         alone,
         _float(contraction),
         left_out,

@@ -84,7 +84,7 @@ def prove_pose(
     with precision(bits):
         traced = equations(exact_mechanism(mechanism, as_double), tuple(drives), points, kept)
         driven = _balls(mechanism, traced.frame.unit, drives)
-        return enclose(traced, points, pose, driven, bits)
+        return enclose(traced, pose, driven, bits)
 
 
 def _balls(
@@ -193,7 +193,7 @@ def prove(
                 if rows != kept:
                     others[k] = [names[row] for row in range(len(names)) if row not in rows]
                 near = angles[k].tolist()
-                samples.append(enclose(traced[rows], points, poses[k], driven, bits, near))
+                samples.append(enclose(traced[rows], poses[k], driven, bits, near))
             except UnprovedError as error:
                 samples.append(error)
             seconds.append(perf_counter() - started)

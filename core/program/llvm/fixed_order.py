@@ -248,7 +248,7 @@ def _sweep(name: str) -> str:
         run = _less("left", "%entry_here", "%other", "%x")
     else:
         before, first, found, after = scaled, "%scaled", "%x", ""
-        run = f"""{_less("left", "%entry_here", "%x", "%other")}
+        run = f"""{_less("left", "%entry_here", "%scaled", "%other")}
   {_store("%left", "%b", "%column")}"""
     head = "ptr %begins, ptr %ends, ptr %columns, ptr %table, ptr %scale, ptr %b"
     return f"""define void @{name}(i64 %n, i64 %start, i64 %step, {head}) {{

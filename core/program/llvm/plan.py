@@ -1,5 +1,5 @@
 """Memory layout of a plan for the loops over lanes: integers of eight bytes, and addresses of
-tables.
+tables; and the loops over the rows of those tables, as LLVM text.
 """
 
 from __future__ import annotations

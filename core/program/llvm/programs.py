@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 
-from ..straight_line import ARITY, FUSED, KINDS, Program, lowered
+from ..straight_line import ARITY, FUSED, KINDS, Program, lowered, unrolled
 from ..tape import LEAVES, Node, operands, place_of
 
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after
@@ -36,8 +36,8 @@ CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
 class Lines:
     """Body of a function over vectors of W lanes, line by line in static single assignment."""
 
-    def __init__(self, width: int, prefix: str = "x", lane: str = "%lane") -> None:
-        self.width, self.prefix, self.lines, self._lane = width, prefix, list[str](), lane
+    def __init__(self, width: int, prefix: str = "x") -> None:
+        self.width, self.prefix, self.lines = width, prefix, list[str]()
         self.vector = f"<{width} x double>"
         self._known: dict[str, str] = {}
 
@@ -72,7 +72,7 @@ class Lines:
 
     def slot(self, number: str | int) -> str:
         """Return the address of a slot."""
-        return self.let(f"getelementptr {self.vector}, ptr {self._lane}, i64 {number}")
+        return self.let(f"getelementptr {self.vector}, ptr %lane, i64 {number}")
 
     def read(self, number: str | int) -> str:
         """Return the value of a slot."""
@@ -353,9 +353,7 @@ def function(program: Program, width: int) -> str:
     The order with the shortest waits is used if 32 registers allow it: with 16 it takes up to half
     as long again.
     """
-    program = lowered(program)
-    if program.times > 1:
-        return _repeated(program, width)
+    program = lowered(unrolled(program))
     straight = _Straight(program, width)
     if width == WIDE and (waiting := ordered(program)) is not program:
         other = _Straight(waiting, width)
@@ -365,45 +363,6 @@ def function(program: Program, width: int) -> str:
         f"define void @{program.name}(ptr noalias %lane, ptr %table) {{\n  {straight.text}\n  ret"
         " void\n}\n"
     )
-
-
-def _repeated(program: Program, width: int) -> str:
-    """Return a repeated program as a loop that keeps the largest of each output."""
-    body, end = Lines(width, lane="%here"), Lines(width, "e")
-    values = list[str]()
-    for node in program.nodes:
-        known = (
-            body.read(int(node[1]))
-            if node[0] == "input"
-            else body.constant(float(node[1]))
-            if node[0] == "const"
-            else None
-        )
-        values.append(known or body.operation(node[0], [values[k] for k in operands(node)]))
-    largest = list[str]()
-    for k, (slot, number) in enumerate(program.outputs.items()):
-        found = body.umax(f"%largest{k}", values[number])
-        largest.append(
-            f"%largest{k} = phi {body.vector} [zeroinitializer, %entry], [{found}, %run]"
-        )
-        end.write(slot, found)
-    phis = "\n  ".join(largest)
-    return f"""define void @{program.name}(ptr noalias %lane, ptr %table) {{
-entry:
-  br label %run
-run:
-  %k = phi i64 [0, %entry], [%next, %run]
-  {phis}
-  %here = getelementptr {body.vector}, ptr %lane, i64 %k
-  {body.text}
-  %next = add i64 %k, 1
-  %more = icmp ult i64 %next, {program.times}
-  br i1 %more, label %run, label %end
-end:
-  {end.text}
-  ret void
-}}
-"""
 
 
 class _Straight(Lines):

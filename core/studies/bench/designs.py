@@ -62,12 +62,9 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
     Args:
         case: the case with its reference.
     """
-    values = places(case.mechanism)
-    varied = tuple(
-        name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION
-    )
+    hardpoints = _every_hardpoint(case)
+    varied, nominal = tuple(hardpoints.places), hardpoints.nominal
     designs = NativeSolver().prepare_designs(case.mechanism, case.sweep.path, varied, case.points)
-    nominal = np.array([number for name in varied for number in values[name]])
     scatter = (
         np.random.default_rng(SEED).normal(size=(len(nominal), max(SIZES))) * SCATTER * size(case)
     )

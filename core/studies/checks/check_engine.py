@@ -280,8 +280,7 @@ def _same(
         off = _difference(first[case], attempt)
         if off > worst:
             worst, where = off, case
-    remedy = "keeps a state from one case to the next, or uses random numbers"
-    return replace(judged(name, np.array([worst]), SAME, [where], remedy=remedy), pose=None)
+    return replace(judged(name, np.array([worst]), SAME, [where]), pose=None)
 
 
 def _difference(one: Attempt, other: Attempt) -> float:

@@ -95,6 +95,58 @@ def stated(check: str, fault: str, message: str = "") -> Finding:
     return Finding(check, Verdict.FAIL if fault else Verdict.PASS, message=fault or message)
 
 
+REMEDIES = {
+    "design": (
+        "phi must vanish at the design position: check the constants that primitives() makes of"
+        " the geometry"
+    ),
+    "rank": "take out the dependent row, or repair it",
+    "freedoms": "name each freedom that is left, or add the missing row",
+    "rows": "what is named is no combination of the others' rows: differentiate phi again",
+    "nu": "rows . v must be nu where phi stays zero; a joint has nu = 0",
+    "gamma": (
+        "rows . a must be gamma where phi stays zero: differentiate rows . v = nu once more,"
+        " and move all but rows . a to the right"
+    ),
+    "newton": (
+        "the rows have the right space but not the size or sign of the derivative, so a step is"
+        " too long or too short"
+    ),
+    "branch tests": "a test must be positive on the branch of the design position: turn its sign",
+    "round-off": "a difference of large numbers is formed: start from what changed",
+    "axis lengths": "a direction may have any length: use unit() or triad()",
+    "exchange": (
+        "the joint is another one with its bodies exchanged: set symmetric = False, or repair it"
+    ),
+    "rigid motion": (
+        "it must not matter where the two bodies are together: check which body each arm and"
+        " axis belongs to"
+    ),
+    "size": (
+        "a length that is not declared so is not scaled: declare it by position(), positions()"
+        " or length()"
+    ),
+    "place": "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself",
+    "mixed style": "mixed() must say the same as primitives(): define both",
+    "driver": (
+        "measured() is to drive the joint's own coordinate: phi = 0 at the drive's c, nu of its"
+        " c_t, gamma of its c_tt; its rows are a force along the axis through the joint's"
+        " point, or a couple about the axis; its branch tests are positive at c, and not a turn"
+        " further"
+    ),
+    "power": "drivers, masses and springs do not balance: a joint has nu = 0",
+    "no work": "the reaction works on the joint's freedoms: see rows and nu",
+    "acts and reacts": (
+        "what one body gets is not the opposite of what the other gets: see rows; a driver's"
+        " force acts along the axis through the point: see measured()"
+    ),
+    "determinism": "keeps a state from one case to the next, or uses random numbers",
+}
+"""Texts for checks that fail, by the last part of their names."""
+REMEDIES["residual elsewhere"] = REMEDIES["rigid motion"]
+REMEDIES["in this process"] = REMEDIES["determinism"]
+
+
 def judged(
     check: str,
     figures: Array,
@@ -107,12 +159,13 @@ def judged(
 
     Args:
         message: text of the finding, whatever the verdict.
-        remedy: text added to a failure.
+        remedy: text added to a failure; by default that of the check in `REMEDIES`.
     """
     figures = np.where(np.isnan(figures), math.inf, np.atleast_2d(figures))
     row, pose = np.unravel_index(int(figures.argmax()), figures.shape)
     worst = float(figures[row, pose])
     good = worst <= limit.value
+    remedy = remedy or REMEDIES.get(check.rpartition(": ")[2], "")
     return Finding(
         check,
         Verdict.PASS if good else Verdict.FAIL,

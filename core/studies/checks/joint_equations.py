@@ -43,12 +43,8 @@ AWAY = 1e6
 
 def composition(s: Specimen) -> Iterator[Finding]:
     """Check phi at the design position: zero, of finite numbers."""
-    remedy = (
-        "phi must vanish at the design position: check the constants that primitives() makes of the"
-        " geometry"
-    )
     off = np.abs(s.traced.phi(s.traced.design(1)))
-    yield judged("design", off, ROUND_OFF, s.traced.names, remedy=remedy)
+    yield judged("design", off, ROUND_OFF, s.traced.names)
 
 
 def freedoms(s: Specimen) -> Iterator[Finding]:
@@ -56,8 +52,7 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
     found, t = rank(s.traced.rows(s.state)), s.traced
     apart = f"smallest singular value {smallest(s.exact).min():.2g}, rows of size one"
     lost = np.abs(len(t.names) - found)[None, :].astype(float)
-    remedy = "take out the dependent row, or repair it"
-    yield judged("rank", lost, INDEPENDENT, ["rows less rank"], apart, remedy)
+    yield judged("rank", lost, INDEPENDENT, ["rows less rank"], apart)
     left = 6 - (found - len(t.coordinates))
     relations = len(s.joint.relations) if isinstance(s.joint, AxialJoint) else 0
     names, named = s.joint.freedoms, len(s.joint.freedoms) - relations
@@ -73,8 +68,7 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
     else:
         text = f"leaves {int(left.max())}, names {named}: {', '.join(names)}"
         wrong = np.abs(left - named)[None, :].astype(float)
-        remedy = "name each freedom that is left, or add the missing row"
-        yield judged("freedoms", wrong, NAMED, message=text, remedy=remedy)
+        yield judged("freedoms", wrong, NAMED, message=text)
 
 
 def derivatives(s: Specimen) -> Iterator[Finding]:
@@ -89,8 +83,7 @@ def derivatives(s: Specimen) -> Iterator[Finding]:
     )
     astray = np.concatenate([_outside(declared, s.exact), _outside(s.exact, declared)])
     names = [*t.names, *(f"derivative of {name}" for name in t.names)]
-    remedy = "what is named is no combination of the others' rows: differentiate phi again"
-    yield judged("rows", astray, AMPLIFIED, names, kind, remedy)
+    yield judged("rows", astray, AMPLIFIED, names, kind)
 
 
 def _outside(rows: Array, space: Array) -> Array:
@@ -108,13 +101,8 @@ def _outside(rows: Array, space: Array) -> Array:
 def right_sides(s: Specimen) -> Iterator[Finding]:
     """Check rows . v = nu and rows . a = gamma along motions admitted by phi."""
     _, velocity, acceleration = _defects(s.traced, s.motion)
-    remedy = "rows . v must be nu where phi stays zero; a joint has nu = 0"
-    yield judged("nu", velocity, AMPLIFIED, s.traced.names, remedy=remedy)
-    remedy = (
-        "rows . a must be gamma where phi stays zero: differentiate rows . v = nu once more, and"
-        " move all but rows . a to the right"
-    )
-    yield judged("gamma", acceleration, AMPLIFIED, s.traced.names, remedy=remedy)
+    yield judged("nu", velocity, AMPLIFIED, s.traced.names)
+    yield judged("gamma", acceleration, AMPLIFIED, s.traced.names)
 
 
 def _defects(t: TracedJoint, motion: Motion, units: Any = 1.0) -> tuple[Array, Array, Array]:
@@ -143,12 +131,8 @@ def convergence(s: Specimen) -> Iterator[Finding]:
     off = s.rng.normal(size=s.rate.shape)
     start = s.traced.retract(s.state, 1e-3 * off / np.linalg.norm(off, axis=0))
     _, taken = newton(s.traced, start, s.traced.rows, 20)
-    remedy = (
-        "the rows have the right space but not the size or sign of the derivative, so a step is too"
-        " long or too short"
-    )
     names = ["iterations from 1e-3"]
-    yield judged("newton", taken[None, :].astype(float), QUADRATIC, names, remedy=remedy)
+    yield judged("newton", taken[None, :].astype(float), QUADRATIC, names)
 
 
 def intended_branch(s: Specimen) -> Iterator[Finding]:
@@ -162,8 +146,7 @@ def intended_branch(s: Specimen) -> Iterator[Finding]:
     text = f"{tests} declared" + f"; {far} of {s.lanes} poses far from the design are refused" * (
         far > 0
     )
-    remedy = "a test must be positive on the branch of the design position: turn its sign"
-    yield judged("branch tests", refused, ON_BRANCH, ["refused"], text, remedy)
+    yield judged("branch tests", refused, ON_BRANCH, ["refused"], text)
 
 
 def cost(s: Specimen) -> Iterator[Finding]:
@@ -213,9 +196,8 @@ def round_off(s: Specimen) -> Iterator[Finding]:
     text = f"of a displacement of {tiny:g} from the design phi loses " + ", ".join(
         f"{x:.1g} {where}" for where, x in lost.items()
     )
-    remedy = "a difference of large numbers is formed: start from what changed"
     off = error(s.traced, s.state[:, :8])
-    yield judged("round-off", off, ROUND_OFF, s.traced.names, text, remedy)
+    yield judged("round-off", off, ROUND_OFF, s.traced.names, text)
 
 
 def exchange(s: Specimen) -> Iterator[Finding]:
@@ -235,8 +217,7 @@ def exchange(s: Specimen) -> Iterator[Finding]:
         exchanged(s.rate, COLUMNS),
         exchanged(s.acceleration, COLUMNS),
     )
-    remedy = "the joint is another one with its bodies exchanged: set symmetric = False, or repair"
-    yield _same("exchange", s, other, motion, f"{remedy} it")
+    yield _same("exchange", s, other, motion)
 
 
 def rigid_motion(s: Specimen) -> Iterator[Finding]:
@@ -260,12 +241,8 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
     def rates(a: Array) -> Array:
         return np.concatenate([*(turn(a[3 * k : 3 * k + 3]) for k in range(4)), a[2 * COLUMNS :]])
 
-    remedy = (
-        "it must not matter where the two bodies are together: check which body each arm and axis"
-        " belongs to"
-    )
     motion = (pose(s.state), rates(s.rate), rates(s.acceleration))
-    yield _same("rigid motion", s, s.traced, motion, remedy)
+    yield _same("rigid motion", s, s.traced, motion)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     here, there = s.traced.phi(off), s.traced.phi(pose(off))
     parts = s.traced.parts
@@ -276,7 +253,7 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
         ]
     )
     names = [s.traced.names[first].split(" row")[0] for first, _ in parts]
-    yield judged("residual elsewhere", apart, ROUND_OFF, names, remedy=remedy)
+    yield judged("residual elsewhere", apart, ROUND_OFF, names)
 
 
 def axis_lengths(s: Specimen) -> Iterator[Finding]:
@@ -287,21 +264,16 @@ def axis_lengths(s: Specimen) -> Iterator[Finding]:
     """
     longer = s.joint.mapped({Kind.DIRECTION: lambda axis: tuple(137.0 * x for x in axis)})
     long = TracedJoint(replace(s.joint, **longer), s.place)
-    remedy = "a direction may have any length: use unit() or triad()"
-    met = _same("axis lengths", s, long, s.motion, remedy)
+    met = _same("axis lengths", s, long, s.motion)
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     apart = np.abs(s.traced.phi(off) - long.phi(off))
     where = "where it is not met"
-    unmet = judged("axis lengths", apart, ROUND_OFF, s.traced.names, where, remedy)
+    unmet = judged("axis lengths", apart, ROUND_OFF, s.traced.names, where)
     yield worst(met, unmet)
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:
     """Check the same motion of the joint scaled up and down, and far from the origin."""
-    remedy = (
-        "a length that is not declared so is not scaled: declare it by position(), positions() or"
-        " length()"
-    )
     found: list[Finding] = []
     slides = [k for k, name in enumerate(s.traced.coordinates) if name.endswith(".translation")]
     for factor in FACTORS:
@@ -310,14 +282,13 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
         state[[0, 1, 2, 7, 8, 9, *(POSES + k for k in slides)]] *= factor * s.place.unit
         units[[0, 1, 2, 6, 7, 8, *(2 * COLUMNS + k for k in slides)]] *= factor * s.place.unit
         motion, text = (state, s.rate, s.acceleration), f"worst at x {factor:g}"
-        found.append(_same("size", s, large, motion, remedy, units, text))
+        found.append(_same("size", s, large, motion, units, text))
     yield worst(*found)
     shifted = s.joint.mapped({Kind.POSITION: lambda point: tuple(x + AWAY for x in point)})
     (a, b), unit = s.place.origins, s.place.unit
     away = Place((tuple(x + AWAY for x in a), tuple(x + AWAY for x in b)), unit)
-    remedy = "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself"
     far = TracedJoint(replace(s.joint, **shifted), away)
-    yield _same("place", s, far, s.motion, remedy)
+    yield _same("place", s, far, s.motion)
 
 
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
@@ -337,8 +308,7 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
     rate[own] = min_norm(jacobian, mixed.nu(state) - times(jacobian, rate), own)
     bent = mixed.gamma(state, rate) - times(jacobian, acceleration)
     acceleration[own] = min_norm(jacobian, bent, own)
-    remedy = "mixed() must say the same as primitives(): define both"
-    met = _same("mixed style", s, mixed, (state, rate, acceleration), remedy)
+    met = _same("mixed style", s, mixed, (state, rate, acceleration))
     speed = 1.0 + np.linalg.norm(rate, axis=0)
     off = [
         np.abs(coordinate(s, s.joint, name.rpartition(".")[2])[0][1] - own_rate) / speed
@@ -354,7 +324,6 @@ def _same(
     s: Specimen,
     other: TracedJoint,
     motion: Motion,
-    remedy: str,
     units: Any = 1.0,
     message: str = "",
 ) -> Finding:
@@ -365,7 +334,7 @@ def _same(
     mine = rank(s.exact) - len(s.traced.coordinates)
     theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)
     figures = np.vstack([largest, np.abs(theirs - mine)])
-    return judged(check, figures, AMPLIFIED, [*other.names, "rank"], message, remedy)
+    return judged(check, figures, AMPLIFIED, [*other.names, "rank"], message)
 
 
 # Drivers of a joint's own coordinates, against the definition of these
@@ -385,12 +354,7 @@ def driver(s: Specimen) -> Iterator[Finding]:
         return
     names = [f"{freedom}: {what}" for freedom in driven for what in WHATS]
     figures = np.concatenate([_driver_defects(s, joint, freedom) for freedom in driven])
-    remedy = (
-        "measured() is to drive the joint's own coordinate: phi = 0 at the drive's c, nu of its"
-        " c_t, gamma of its c_tt; its rows are a force along the axis through the joint's point, or"
-        " a couple about the axis; its branch tests are positive at c, and not a turn further"
-    )
-    yield judged("driver", figures, AMPLIFIED, names, remedy=remedy)
+    yield judged("driver", figures, AMPLIFIED, names)
 
 
 def _carried(s: Specimen, k: int, arm: Array) -> CarriedPoint:

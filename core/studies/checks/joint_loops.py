@@ -426,16 +426,10 @@ def reactions(probe: Probe, what: str = "reaction") -> Iterator[Finding]:
     forces = probe.motion.forces
     assert forces is not None
     missing = np.abs(forces.power)[None] / float(np.nanmax(forces.largest_power))
-    remedy = "drivers, masses and springs do not balance: a joint has nu = 0"
-    yield judged(f"{what}: power", missing, LIMIT, ["power"], remedy=remedy)
+    yield judged(f"{what}: power", missing, LIMIT, ["power"])
     done = np.abs(work(probe))[None] / (probe.size * speed(probe))
-    remedy = "the reaction works on the joint's freedoms: see rows and nu"
-    yield judged(f"{what}: no work", done, LIMIT, ["work"], remedy=remedy)
+    yield judged(f"{what}: no work", done, LIMIT, ["work"])
     off = np.array([unbalanced(probe, body) for body in probe.joint.bodies])
-    remedy = (
-        "what one body gets is not the opposite of what the other gets: see rows; a driver's"
-        " force acts along the axis through the point: see measured()"
-    )
     names = [f"body {body}" for body in probe.joint.bodies]
     figures = np.abs(off).max(axis=2) / probe.size
-    yield judged(f"{what}: acts and reacts", figures, LIMIT, names, remedy=remedy)
+    yield judged(f"{what}: acts and reacts", figures, LIMIT, names)

@@ -28,6 +28,7 @@ from ...joints import Joint
 from ...kinematics import COLUMNS, Cartesian, Frames, Relation, Style, constraints
 from ...mechanism.mechanism import Body, Mechanism
 from ...program import Program, Tape, program
+from ...program.tape import OPERATIONS
 from ...trajectory import Array
 
 BODIES = "i", "j"
@@ -47,20 +48,13 @@ def _operations(
         key: real numbers by which scalars are compared.
         where: choice by a mask between two scalars.
     """
-    of_one: dict[str, Callable[[Any], Any]] = {
-        "neg": operator.neg,
-        "abs": lambda a: where(key(a) < 0.0, -a, a),
-    }
+    of_one: dict[str, Callable[[Any], Any]] = {"abs": lambda a: where(key(a) < 0.0, -a, a)}
     of_two: dict[str, Callable[[Any, Any], Any]] = {
-        "+": operator.add,
-        "-": operator.sub,
-        "*": operator.mul,
-        "/": lambda a, b: a / b,
         "min": lambda a, b: where(key(a) <= key(b), a, b),
         "max": lambda a, b: where(key(a) >= key(b), a, b),
         "larger": lambda a, b: abs(key(a)) > abs(key(b)),
     }
-    return {**of_one, **of_two, "where": where, **functions}
+    return {**OPERATIONS, **of_one, **of_two, "where": where, **functions}
 
 
 # Complex numbers are ordered by their real parts, so the imaginary parts stay derivatives.

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...case.models.undriven import Undriven, plain_name
 from ...errors import KincheckError, UnknownNameError
-from ...joints.base import Joint
-from ...mechanism.mechanism import GROUND, Mechanism
+from ...mechanism.mechanism import GROUND
 
 # Places and distances of one model are equal within this part of its size.
 NEAR = 1e-4
@@ -96,23 +95,14 @@ def _by_feature(
     return bool(new)
 
 
-def _joints_on(mechanism: Mechanism, link: str) -> list[Joint]:
-    return [joint for joint in mechanism.joints if link in joint.bodies]
-
-
-def _size(mechanism: Mechanism) -> float:
-    points = [point for joint in mechanism.joints for point in joint.points_on()]
-    return float(np.ptp(np.array(points), axis=0).max()) if points else 1.0
-
-
 def _places(file: Undriven, found: Mapping[str, str]) -> dict[str, object]:
     """Return the places of the joints of each link without a partner."""
-    grid = NEAR * (_size(file.mechanism) or 1.0)
+    grid = NEAR * file.mechanism.size
     return {
         link: tuple(
             sorted(
                 tuple(round(x / grid) for x in point)
-                for joint in _joints_on(file.mechanism, link)
+                for joint in file.mechanism.joints_on.get(link, ())
                 for point in joint.points_on(link)[:1]
             )
         )
@@ -130,7 +120,7 @@ def _graph(file: Undriven, found: Mapping[str, str]) -> dict[str, object]:
     colors = {body.name: 0 for body in mechanism.moving}
     colors |= {name: hash(frozenset((name, other))) for name, other in found.items()}
     colors |= dict.fromkeys(ground, hash(GROUND))
-    grid = NEAR * (_size(mechanism) or 1.0)
+    grid = NEAR * mechanism.size
     still = {*found, *ground}
     for _ in range(len(mechanism.moving)):  # as far as neighbours tell links apart
         fresh = {
@@ -141,7 +131,7 @@ def _graph(file: Undriven, found: Mapping[str, str]) -> dict[str, object]:
                     color,
                     *sorted(
                         hash((joint.freedoms, colors[joint.j if joint.i == name else joint.i]))
-                        for joint in _joints_on(mechanism, name)
+                        for joint in mechanism.joints_on.get(name, ())
                     ),
                 )
             )
@@ -153,7 +143,8 @@ def _graph(file: Undriven, found: Mapping[str, str]) -> dict[str, object]:
     features: dict[str, object] = {}
     for link in file.links:
         if link not in found:
-            points = [p for j in _joints_on(mechanism, link) for p in j.points_on(link)[:1]]
+            joints = mechanism.joints_on.get(link, ())
+            points = [p for joint in joints for p in joint.points_on(link)[:1]]
             apart = [np.linalg.norm(np.subtract(p, q)) for p in points for q in points]
             features[link] = colors[link], tuple(sorted(round(x / grid) for x in apart))
     return features

@@ -92,23 +92,25 @@ class Solved:
 
     def at(self, lanes: Any) -> Solved:
         """Return some of the samples, as often as they are named."""
-        first = {name: getattr(self, name)[lanes] for name in LANES_FIRST}
-        last = {name: getattr(self, name)[..., lanes] for name in LANES_LAST}
-        return Solved(poses=self.poses.at(lanes), **first, **last)
+        parts = {
+            name: np.take(getattr(self, name), lanes, axis) for name, axis in LANE_AXES.items()
+        }
+        return Solved(poses=self.poses.at(lanes), **parts)
 
     @staticmethod
     def joined(parts: Sequence[Solved]) -> Solved:
         """Return the samples of all parts."""
+        u, q = zip(*((part.poses.u, part.poses.q) for part in parts), strict=True)
+        poses = Poses(np.concatenate(u, -1), np.concatenate(q, -1))
+        arrays = {
+            name: np.concatenate([getattr(part, name) for part in parts], axis)
+            for name, axis in LANE_AXES.items()
+        }
+        return Solved(poses=poses, **arrays)
 
-        def lanes(names: Sequence[str], axis: int, of: Sequence[Any]) -> dict[str, Any]:
-            return {name: np.concatenate([getattr(x, name) for x in of], axis) for name in names}
 
-        poses = Poses(**lanes(("u", "q"), -1, [part.poses for part in parts]))
-        return Solved(poses=poses, **lanes(LANES_FIRST, 0, parts), **lanes(LANES_LAST, -1, parts))
-
-
-LANES_FIRST = ("times", "jacobian", "inverse", "step")
-LANES_LAST = ("angles", "v", "a")
+LANE_AXES = {"times": 0, "jacobian": 0, "inverse": 0, "step": 0, "angles": -1, "v": -1, "a": -1}
+"""Axis of the samples in each array of `Solved`."""
 
 
 def condition(inverse: Array) -> Array:

@@ -9,7 +9,7 @@ no help before that: its joints coincide at design, and its rows hold to round-o
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
@@ -20,7 +20,6 @@ from ....algebra import ZERO, Vec3, X, Y, Z, cross
 from ....errors import CaseError, shortened
 from ....mechanism.mechanism import GROUND
 from ....trajectory import Array
-from ...io.document import fault
 from .place import ORIGIN, Place, rotation_vector, turn_about, turn_by
 from .tree import UNKNOWNS, Closure, Coupling, Move, Strut, Tie, Tree
 
@@ -44,6 +43,8 @@ CLEAR = 0.1
 # Tolerances that the digits of a file leave, relative to the size: six digits, and all.
 COARSEST, FINEST = 1e-5, 1e-12
 MOST_SHOWN = 12
+# Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
+AT_REST = 1e-6
 
 Value: TypeAlias = float | Place
 """Change of a move since the pose of the tree: a coordinate [rad or m]; of a ball or a free link,
@@ -70,10 +71,7 @@ class Pose:
     @cached_property
     def columns(self) -> Mapping[str, range]:
         """Unknowns of each move, by its name."""
-        found, count = dict[str, range](), 0
-        for name, move in self.tree.moves.items():
-            found[name] = range(count, count := count + UNKNOWNS[move.kind])
-        return found
+        return _columns((name, UNKNOWNS[move.kind]) for name, move in self.tree.moves.items())
 
     @property
     def unknowns(self) -> int:
@@ -178,13 +176,21 @@ class Pose:
         )
 
     def ends(self, joining: Closure | Strut) -> tuple[Place, Place]:
-        """Return the present places of the frames of what joins two links."""
+        """Return the present places of both frames of a closure or strut."""
         first, second = map(self._end, joining.links, joining.places)
         return first, second
 
     def _end(self, link: str, place: Place) -> Place:
         carried = self.displacements[link]
         return Place(carried.point(place.at), carried.turn * place.turn)
+
+
+def _columns(counts: Iterable[tuple[str, int]]) -> dict[str, range]:
+    """Return the ranges of names one after the other, by how many each has."""
+    found, start = dict[str, range](), 0
+    for name, count in counts:
+        found[name] = range(start, start := start + count)
+    return found
 
 
 def _about(point: Vec3, moved: Place) -> Place:
@@ -206,6 +212,37 @@ class Start:
     given: tuple[str, ...]
     text: str
     closes: bool
+
+
+@dataclass(eq=False)
+class FreeMotions:
+    """Motions of moves joined by ties, or of one move alone.
+
+    Attributes:
+        columns: unknowns of each of these moves, by its name.
+        basis: orthonormal, shape (motions, unknowns).
+    """
+
+    columns: Mapping[str, range]
+    basis: Array
+
+    def of(self, move: str) -> Array:
+        """Return the part of a move's unknowns in the motions, shape (motions, unknowns)."""
+        return self.basis[:, [*self.columns[move]]]
+
+    def leave(self, rows: Array) -> None:
+        """Leave the motions on which rows over them vanish, shape (rows, motions).
+
+        Each independent row is turned to the first motion by a reflection, which is left out.
+        """
+        _, sizes, right = np.linalg.svd(rows, full_matrices=False)
+        right = right[sizes > AT_REST]
+        while len(right):
+            normal = right[0].copy()
+            normal[0] += math.copysign(1.0, normal[0])
+            normal /= np.linalg.norm(normal)
+            self.basis = (self.basis - 2.0 * np.outer(normal, normal @ self.basis))[1:]
+            right = (right - 2.0 * np.outer(right @ normal, normal))[1:, 1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,9 +291,14 @@ class Closing:
         """Largest gap of an assembly [m or rad]."""
         return max(ADDED_UP * self.tolerance, CLOSED * self.size)
 
+    def gaps(self, pose: Pose) -> list[tuple[float, Tie]]:
+        """Return the ties with their residuals [m or rad], the largest first."""
+        found = [(float(np.abs(_residual(each, pose)).max()), each) for each in self.ties]
+        return sorted(found, key=lambda each: -each[0])
+
     def gap(self, pose: Pose) -> float:
         """Return the largest residual [m or rad]."""
-        return max((_gap(each, pose) for each in self.ties), default=0.0)
+        return self.gaps(pose)[0][0] if self.ties else 0.0
 
     def apart(self, pose: Pose) -> float:
         """Return the largest gap of closures [m], angles at arms of the size; offsets of coupled
@@ -268,10 +310,6 @@ class Closing:
                 residual = np.abs(_residual(each, pose))
                 found = max(found, *residual[:3], *(self.size * residual[3:]))
         return found
-
-    def widest(self, pose: Pose) -> Tie:
-        """Return the tie with the largest residual."""
-        return max(self.ties, key=lambda each: _gap(each, pose))
 
     def rows(self, pose: Pose) -> tuple[Array, Array]:
         """Return residuals and their derivatives, lengths over the size: (rows,), (rows, n)."""
@@ -296,7 +334,25 @@ class Closing:
                 found[columns[:3] if kind == "free" else columns[0]] = self.size
         return found
 
-    def null(self, rows: Array) -> Array:
+    def free(self, pose: Pose) -> list[FreeMotions]:
+        """Return the motions left by the rows, by sets of moves without a row in common."""
+        rows, columns = self.rows(pose)[1], pose.columns
+        part = np.arange(pose.unknowns)
+        for joined in (*map(list, columns.values()), *map(np.flatnonzero, rows)):
+            if len(labels := np.unique(part[joined])) > 1:
+                part[np.isin(part, labels)] = labels[0]
+        together: dict[int, list[str]] = {}
+        for name, unknowns in columns.items():
+            together.setdefault(int(part[unknowns[0]]), []).append(name)
+        found: list[FreeMotions] = []
+        for names in together.values():
+            unknowns = [k for name in names for k in columns[name]]
+            own = rows[:, unknowns]
+            basis = self._null(own[own.any(axis=1)])
+            found.append(FreeMotions(_columns((each, len(columns[each])) for each in names), basis))
+        return found
+
+    def _null(self, rows: Array) -> Array:
         """Return an orthonormal basis of the motions left by rows, shape (freedoms, n)."""
         lonely = _lonely(rows)
         given = {*lonely.values()}
@@ -336,10 +392,6 @@ def _lonely(rows: Array) -> Mapping[int, int]:
                     if len(owners[other]) == 1:
                         waiting.append(other)
     return found
-
-
-def _gap(tie: Tie, pose: Pose) -> float:
-    return float(np.abs(_residual(tie, pose)).max())
 
 
 def _residual(tie: Tie, pose: Pose) -> Array:
@@ -392,16 +444,13 @@ class Assembled:
     """A model in its closed start.
 
     Attributes:
-        free: motions left by the ties, orthonormal, by the unknowns of `Pose`, shape (freedoms,
-            unknowns).
-        columns: unknowns of each move.
+        free: motions left by the ties, of moves joined by ties together.
         start: origin of the start, in words.
         notes: how it was closed.
     """
 
     tree: Tree
-    free: Array
-    columns: Mapping[str, range]
+    free: Sequence[FreeMotions]
     closing: Closing
     start: str
     notes: tuple[str, ...]
@@ -428,22 +477,22 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
     if opened > CLOSED * closing.size:
         # who gives some moves' values leaves the others to the assembly
         if start.closes and (apart := closing.apart(pose)) > FAR * closing.size:
-            raise closing.widest(pose).element.fault(
+            raise closing.gaps(pose)[0][1].element.fault(
                 f"is open in the start ({start.text}) by {apart:.4g} m, expected"
                 f" {FAR * closing.size:.3g} m at most, a tenth of the model's size; give a start"
                 " that is nearer by --start keyframe:NAME, or values of some joints by --start"
                 " JOINT=VALUE ..., from which the nearest closed pose is taken however far it is"
             )
         pose = _nearest_closed(closing, pose, ((*start.given, *driven), start.given, ()))
-        left = closing.gap(pose)
-        if left > closing.limit:
-            raise _open(closing, start, pose, opened, left)
-        notes.append(_note(closing, start, pose, opened, left))
+        left = closing.gaps(pose)
+        if left[0][0] > closing.limit:
+            raise _open(closing, start, opened, left)
+        notes.append(_note(closing, start, pose, left[0][0]))
     closed = Pose.of(pose.as_tree())
     # of the tree in this pose, whose changes since the zero pose it knows itself
     closing = replace(closing, ties=closed.tree.ties)
-    free = closing.null(closing.rows(closed)[1])
-    return Assembled(closed.tree, free, closed.columns, closing, start.text, tuple(notes))
+    free = closing.free(closed)
+    return Assembled(closed.tree, free, closing, start.text, tuple(notes))
 
 
 def _nearest_closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:
@@ -486,29 +535,30 @@ def _descend(closing: Closing, pose: Pose, moving: Array) -> Pose:
     return best
 
 
-def _open(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> CaseError:
-    """Return the error of a model that does not close."""
-    gaps = sorted(((_gap(each, pose), each.name) for each in closing.ties), reverse=True)
-    texts = [f"{name} by {gap:.2g}" for gap, name in gaps if gap > closing.limit]
-    return fault(
-        pose.tree.file,
-        str(closing.widest(pose).element),
+def _open(
+    closing: Closing, start: Start, opened: float, left: Sequence[tuple[float, Tie]]
+) -> CaseError:
+    """Return the error of an open model."""
+    texts = [f"{tie.name} by {gap:.2g}" for gap, tie in left if gap > closing.limit]
+    gap, widest = left[0]
+    return widest.element.fault(
         f"is open: the start ({start.text}) by {opened:.4g} m or rad, and the nearest pose that was"
-        f" found by {left:.4g}, expected {closing.tolerance:.3g} m at most ({closing.why}); still"
+        f" found by {gap:.4g}, expected {closing.tolerance:.3g} m at most ({closing.why}); still"
         f" open are {shortened(texts, MOST_SHOWN)}; give a start that can be closed by --start,"
         " another tolerance by --closure, or correct the model",
     )
 
 
-def _note(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> str:
+def _note(closing: Closing, start: Start, pose: Pose, left: float) -> str:
     """Return the note on the assembly: the gap, and how far each move went."""
     moved = sorted(_movements(start.pose, pose), key=lambda each: -each[0])
     texts = [text for size, text in moved if size > 1e-3 * moved[0][0]]
     kept = f", of which {left:.2g} m are left, within {closing.why}" * (
         left > CLOSED * closing.size
     )
+    opened, widest = closing.gaps(start.pose)[0]
     return (
-        f"the start ({start.text}) is assembled: {closing.widest(start.pose).element} was open by"
+        f"the start ({start.text}) is assembled: {widest.element} was open by"
         f" {opened:.3g} m or rad{kept};"
         f" {f'moved were {shortened(texts, MOST_SHOWN)}' if texts else 'no joint moved'}"
     )

@@ -30,7 +30,7 @@ from ....joints.polynomial import HIGHEST
 from ....mechanism.mechanism import Vector
 from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
 from .element import Element
-from .graph import Freedom, Graph, Joint, Loop
+from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, unit_quaternion, unit_vector
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
@@ -249,8 +249,8 @@ def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
         title = f"{names[0]} = {names[1]}"
         element = Element(file, "", {}, 1, words=f"closed_loop: {title}")
         freedoms: list[Freedom] = [("", "ball", X)] if kind.lower() == "3d" else []
-        joint = Joint.of(title, (first, second), places[0].at, freedoms, element)
-        graph.loops.append(Loop(joint, places))
+        links, at = (first, second), places[0].at
+        graph.loops.append(Joint.of(title, links, at, freedoms, element, frames=places))
     coordinates = {move.name for joint in graph.joints for move in joint.moves}
     graph.tree.actuated |= coordinates & {*pairs.name_mot}
 
@@ -311,7 +311,7 @@ class _Group:
             (f".{k}" * (len(found) > 1), *each) for k, each in enumerate(found, 1)
         ]
         joint = Joint.of(self.name, self.links, self._pivot(), freedoms, self.element)
-        self.graph.loops.append(Loop(joint))
+        self.graph.loops.append(joint)
 
     def _fault(self, problem: str) -> CaseError:
         return self.element.fault(f"{problem}; export the case anew")
@@ -367,7 +367,7 @@ class _Group:
         (across,) = self.offset
         hinge = Move(self.name, "hinge", p, self._axis(across.x), self.element)
         moves = hinge, Move(f"{self.name}.ball", "ball", q, X, self.element)
-        self.graph.loops.append(Loop(Joint(self.name, self.links, moves, self.element)))
+        self.graph.loops.append(Joint(self.name, self.links, moves, self.element))
 
     def _slides(self) -> list[tuple[Kind, Vec3]]:
         """Return the slides left by offsets; none with a common point."""

@@ -35,7 +35,7 @@ from ....mechanism.motions import Absolute, Driver, JointAngle, JointDisplacemen
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
-from ...io.document import SMALLEST, explained, fault, usable
+from ...io.document import SMALLEST, explained, usable
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
@@ -82,7 +82,6 @@ def undriven(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
     Raises:
         CaseError: its start does not close, or there is no joint for one of its ties.
     """
-    _require_coupled(tree)
     model = assemble(read_start(tree, ()), None)
     spins = find_spins(model.tree, ())
     whole = _Parts(model, Driving({}, (), ()), spins).mechanism()
@@ -98,7 +97,6 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
         CaseError: see `case_of`.
     """
     driving = read_driving(tree, supplied)
-    _require_coupled(tree)
     start = read_start(tree, supplied.start)
     model = assemble(start, supplied.closure, driving.moves)
     spins = find_spins(model.tree, driving.fixed)
@@ -118,19 +116,6 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
         note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
-
-
-def _require_coupled(tree: Tree) -> None:
-    """Refuse curves between sums of moves."""
-    for each in tree.ties:
-        if not isinstance(each, Coupling) or each.is_linear:
-            continue
-        if not len(each.driven) == len(each.driving) == len(each.moves) - 1:
-            own = each.element.attributes.get("name")
-            raise each.element.fault(
-                "polycoef: is a curve between sums of joints, expected one joint on either side, or"
-                f" a line; leave it out by --without {own or each.element.tag}"
-            )
 
 
 class _Parts:
@@ -198,8 +183,7 @@ class _Parts:
                 case = within_digits(case, closing.tolerance, closing.why, [*tree.joints])
             dof = degrees_of_freedom(case.mechanism)
         if dof != len(drivers):
-            raise fault(
-                tree.file,
+            raise tree.fault(
                 "",
                 f"its joints and equalities leave {len(drivers)} freedoms within"
                 f" {closing.tolerance:.2g} m ({closing.why}), but {dof} as exact ones, expected as"
@@ -232,7 +216,9 @@ class _Parts:
         replaced = {id(end.by) for spin in rods.values() for end in spin.ends}
         for name, spin in rods.items():
             del self.bodies[spin.move.inner]
-            self.joints[name] = spin.as_distance()
+            first, second = spin.ends
+            points = coordinates(first.point), coordinates(second.point)
+            self.joints[name] = Distance(name, first.other, second.other, points)
             self.left_out.append(
                 f"body {spin.move.inner!r} and its turn about itself: it is a rod of constant"
                 " length"
@@ -524,12 +510,6 @@ class Spin:
         """The line's direction, shape (3,)."""
         a = np.array([*self.arm], dtype=np.float64)
         return a / np.linalg.norm(a)
-
-    def as_distance(self) -> Distance:
-        """Return the distance between the links at both ends, under the move's name."""
-        (first, second) = self.ends
-        points = coordinates(first.point), coordinates(second.point)
-        return Distance(self.move.name, first.other, second.other, points)
 
     def lock(self, name: str) -> PerpendicularAxes:
         """Return a joint against the turn about the line, with the link of the first end."""

@@ -16,11 +16,11 @@ import numpy as np
 from ....algebra import quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ....trajectory import Array
-from ...io.document import decimal, fault, interval, measure, shown, unknown_name, usable
+from ...io.document import decimal, interval, measure, shown, unknown_name, usable
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...units import ANGLES, LENGTHS
-from .assembly import Assembled, Pose, Start, Value
+from .assembly import AT_REST, Assembled, Pose, Start, Value
 from .element import Element
 from .place import ORIGIN, Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
@@ -30,8 +30,6 @@ KEYFRAME = "keyframe:"
 SAMPLES = 41
 # A range of more turns without a unit is more likely in degrees than in radians.
 MANY_TURNS = 2.0
-# Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
-AT_REST = 1e-6
 # A move that has less of them may have it by the file's digits alone, which lead the mechanism
 # anywhere when it is held. It is held if no other one can be.
 CLEARLY = 0.01
@@ -48,13 +46,13 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
         CaseError: there is no such keyframe or move, one is given twice, or its numbers are not
             those of the move.
     """
-    file, values = tree.file, dict(Pose.of(tree).value_of)
+    values = dict(Pose.of(tree).value_of)
     given: list[str] = []
     text = ", ".join(said) if said else tree.zero
     said = [own for each in said for own in tree.starts.get(each.removeprefix(KEYFRAME), [each])]
     keyframes = [each for each in said if each.startswith(KEYFRAME)]
     if len(keyframes) > 1:
-        raise fault(file, "--start", f"found {len(keyframes)} keyframes, expected one; name one")
+        raise tree.fault("--start", f"found {len(keyframes)} keyframes, expected one; name one")
     if keyframes:
         values |= _keyframe(tree, keyframes[0].removeprefix(KEYFRAME))
     for each in said:
@@ -63,11 +61,11 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
         name, sign, value = each.rpartition("=")
         if not sign:
             form = f"{KEYFRAME}NAME or JOINT=VALUE [rad or m, as qpos]"
-            raise fault(file, "--start", f"found {shown(each)}, expected {form}; say the value")
+            raise tree.fault("--start", f"found {shown(each)}, expected {form}; say the value")
         if name not in tree.moves:
-            raise unknown_name(file, "--start", name, tree.moves, "a joint")
+            raise unknown_name(tree.file, "--start", name, tree.moves, "a joint")
         if name in given:
-            raise fault(file, "--start", f"found {shown(name)} twice; give one value")
+            raise tree.fault("--start", f"found {shown(name)} twice; give one value")
         values[name] = _value(tree, tree.moves[name], value.split(","))
         given.append(name)
     return Start(Pose(tree, [*values.values()]), tuple(given), text, tree.closes and not given)
@@ -75,8 +73,7 @@ def read_start(tree: Tree, said: Sequence[str]) -> Start:
 
 def _keyframe(tree: Tree, name: str) -> dict[str, Value]:
     if name not in tree.keyframes:
-        raise fault(
-            tree.file,
+        raise tree.fault(
             "--start",
             f"found {shown(KEYFRAME + name)}, expected a keyframe of the model, by name or by"
             f" number from 0; {remedy(name, [*tree.keyframes, *tree.starts])}",
@@ -104,7 +101,7 @@ def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = N
 
     def error(problem: str) -> CaseError:
         problem = f"{problem}; correct it"
-        return key.fault(f"qpos: {problem}") if key else fault(tree.file, "--start", problem)
+        return key.fault(f"qpos: {problem}") if key else tree.fault("--start", problem)
 
     expected = COORDINATES[move.kind]
     try:
@@ -176,22 +173,18 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     Raises:
         CaseError: they name an unknown move, name one twice, or give different samples.
     """
-
-    def error(option: str, problem: str) -> CaseError:
-        return fault(tree.file, option, problem)
-
     driven: dict[str, Array] = {}
     given: dict[str, int] = {}
     for text in supplied.drive:
         name, values, samples = _swept(tree, text)
         if name in driven:
-            raise error("--drive", f"found {name!r} twice; give one range")
+            raise tree.fault("--drive", f"found {name!r} twice; give one range")
         driven[name] = values
         if samples is not None:
             given[name] = samples
     if len({*given.values()}) > 1:
         counts = ", ".join(f"{count} of {name!r}" for name, count in given.items())
-        raise error(
+        raise tree.fault(
             "--drive",
             f"found {counts} samples, expected as many of each; all joints move together",
         )
@@ -201,7 +194,7 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     fixed: list[str] = []
     for name in dict.fromkeys(supplied.hold):
         if name in driven:
-            raise error(
+            raise tree.fault(
                 "--hold", f"found {name!r}, which is driven, expected another joint; leave it out"
             )
         if name in tree.joints and tree.joints[name].is_axial:
@@ -220,22 +213,23 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
         "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates, rad or m unless"
         f" a unit is given, 2 to {MOST_SAMPLES} samples"
     )
-
-    def error(problem: str) -> CaseError:
-        return fault(tree.file, "--drive", problem)
-
     parts = text.split(":")
     named = {":".join(parts[:k]): parts[k:] for k in range(max(1, len(parts) - 3), len(parts) + 1)}
     name = next((name for name in named if name in tree.joints), None)
     if name is None:
         axial = [name for name, move in tree.joints.items() if move.is_axial]
-        raise error(f"found {shown(text)}, expected {form}; {remedy(next(iter(named)), axial)}")
+        raise tree.fault(
+            "--drive", f"found {shown(text)}, expected {form}; {remedy(next(iter(named)), axial)}"
+        )
     if not tree.joints[name].is_axial:
-        raise error(f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those")
+        raise tree.fault(
+            "--drive", f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those"
+        )
     numbers = named[name]
     if len(numbers) < 2:
-        raise error(
-            f"found {shown(text)}, expected {form}; say from where to where: {name}:START:STOP"
+        raise tree.fault(
+            "--drive",
+            f"found {shown(text)}, expected {form}; say from where to where: {name}:START:STOP",
         )
     turns, samples, unit = tree.joints[name].kind == "hinge", None, ""
     try:
@@ -247,14 +241,15 @@ def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
         start = stop = math.nan
     count = SAMPLES if samples is None else samples
     if not (math.isfinite(stop - start) and start != stop and 1 < count <= MOST_SAMPLES):
-        raise error(f"found {shown(text)}, expected {form}; correct the numbers")
+        raise tree.fault("--drive", f"found {shown(text)}, expected {form}; correct the numbers")
     if turns and not unit and (count_of := abs(stop - start) / math.tau) > MANY_TURNS:
         samples_of = "".join(f":{each}" for each in numbers[2:])
         ends = ":".join(numbers[:2])
-        raise error(
+        raise tree.fault(
+            "--drive",
             f"{name} would turn {count_of:.3g} times from {start:g} to {stop:g} rad; write"
             f" {name}:{ends}deg{samples_of} for degrees, or {name}:{ends}rad{samples_of} if radians"
-            " are meant"
+            " are meant",
         )
     return name, np.linspace(start, stop, count), samples
 
@@ -291,21 +286,22 @@ class Freedom:
         Args:
             spins: by ball or free move, the axis about which its rod turns freely, shape (3,).
         """
-        self._columns, self._free = model.columns, model.free
+        self._parts = [replace(each) for each in model.free]
+        self._part_of = {move: part for part in self._parts for move in part.columns}
         for name, axis in spins.items():
-            turning = [*self._columns[name]][-3:]
-            self._leave(axis[None] @ self._free[:, turning].T)
-        self.dof, self.taken = len(self._free), 0
+            part = self._part_of[name]
+            part.leave(axis[None] @ part.of(name)[:, -3:].T)
+        self.dof, self.taken = self.left, 0
 
     @property
     def left(self) -> int:
         """Number of motions left."""
-        return len(self._free)
+        return sum(len(each.basis) for each in self._parts)
 
     def sizes(self, move: str) -> Array:
         """Return how much of a move's unknowns the motions have, the most first."""
-        rows = self._free[:, [*self._columns[move]]]
-        return np.linalg.svd(rows, full_matrices=False)[1] if rows.size else np.zeros(0)
+        own = self._part_of[move].of(move)
+        return np.linalg.svd(own, full_matrices=False)[1] if own.size else np.zeros(0)
 
     def count(self, move: str) -> int:
         """Return how many of a move's motions are left."""
@@ -313,27 +309,14 @@ class Freedom:
 
     def can_hold(self, move: str, clearly: float) -> bool:
         """Return whether each of a move's unknowns can be held: it has more than this."""
-        sizes = self.sizes(move)
-        return len(sizes) == len(self._columns[move]) and bool(sizes[-1] > clearly)
+        sizes, wanted = self.sizes(move), len(self._part_of[move].columns[move])
+        return len(sizes) == wanted and bool(sizes[-1] > clearly)
 
     def take(self, move: str) -> None:
         """Drive or hold a move."""
-        self.taken += len(self._columns[move])
-        self._leave(self._free[:, [*self._columns[move]]].T)
-
-    def _leave(self, rows: Array) -> None:
-        """Leave the motions on which rows over them vanish, shape (rows, motions).
-
-        Each independent row is turned to the first motion by a reflection, which is left out.
-        """
-        _, sizes, right = np.linalg.svd(rows, full_matrices=False)
-        right = right[sizes > AT_REST]
-        while len(right):
-            normal = right[0].copy()
-            normal[0] += math.copysign(1.0, normal[0])
-            normal /= np.linalg.norm(normal)
-            self._free = (self._free - 2.0 * np.outer(normal, normal @ self._free))[1:]
-            right = (right - 2.0 * np.outer(right @ normal, normal))[1:, 1:]
+        part = self._part_of[move]
+        self.taken += len(part.columns[move])
+        part.leave(part.of(move).T)
 
 
 def choose_held(
@@ -347,19 +330,19 @@ def choose_held(
             hold many joints that no motor moves.
     """
     freedom, tree, named = Freedom(model, spins), model.tree, driving.held
-    free = {link: move.name for move in tree.moves.values() for link in (move.name, move.inner)}
+    # a joint may have the name of a link that another one moves
+    moves = {move.inner: name for name, move in tree.moves.items()} | {x: x for x in tree.moves}
     for option, names in (("--drive", driving.driven), ("--hold", driving.held + driving.fixed)):
         for name in names:
-            if not freedom.count(free.get(name, name)):
+            if not freedom.count(moves[name]):
                 advice = "name another" if option == "--drive" else "leave it out"
-                raise fault(
-                    tree.file,
+                raise tree.fault(
                     option,
                     f"found {name!r}, which an equality of the file locks, expected a joint that"
                     f" moves; {advice}, or start elsewhere by --start",
                 )
     for name in (*driving.moves, *driving.fixed):
-        freedom.take(free[name] if name in tree.free else name)
+        freedom.take(moves[name])
     candidates = _candidates(tree, driving)
     if hold_rest and driving.driven:
         for clearly in (CLEARLY, AT_REST):
@@ -378,8 +361,7 @@ def choose_held(
         raise _undriven(tree, driving, freedom)
     passive = [each for each in driving.held if each not in (*named, *tree.actuated)]
     if len(passive) > MOST_HELD:
-        raise fault(
-            tree.file,
+        raise tree.fault(
             "--hold-rest",
             f"would hold {len(passive)} joints without a motor, of {freedom.dof} freedoms: does the"
             " file lack loops? If they are meant to stand still, name them: --hold"
@@ -405,13 +387,14 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
     """Return the error of a model whose degrees of freedom differ from the driven ones."""
     dof, count = freedom.dof, freedom.taken
     if dof == 0:
-        return fault(
-            tree.file,
+        return tree.fault(
             "",
             "the model has no freedom in its start, expected one that moves; give another model or"
             " another start by --start",
         )
-    what = f"{count} driven or held" if count else "nothing said of what drives it"
+    what = f"{count} driven or held"
+    if not count:
+        what = f"nothing said of what drives it ({_motors(tree, dof)})"
     advice: list[str] = []
     if not driving.driven:
         advice.append("--drive JOINT:START:STOP for the one that moves")
@@ -427,12 +410,25 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
         advice.append(
             f"others for {freedom.left + count - dof} that depend on each other by the equalities"
         )
-    return fault(
-        tree.file,
+    return tree.fault(
         "",
         f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}, expected as many of"
         f" either; say {' and '.join(advice)}{_to_hold(_candidates(tree, driving), freedom)}",
     )
+
+
+def _motors(tree: Tree, dof: int) -> str:
+    """Return in words why the motors of a file do not drive it."""
+    names = [name for name in tree.joints if name in tree.actuated]
+    if not names:
+        return "the file marks no motors"
+    which = f"its motors, of {shortened(names, MOST_MOTORS)},"
+    endless = [name for name in names if not tree.joints[name].limit.is_range]
+    if endless:
+        return f"{which} have no limits at {shortened(endless, MOST_MOTORS)}"
+    if len(names) != dof:
+        return f"{which} move {len(names)} of them"
+    return f"{which} do without --hold-rest"
 
 
 def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:

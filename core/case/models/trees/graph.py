@@ -21,9 +21,8 @@ from ....algebra import IDENTITY, ZERO, Quat, Vec3, X
 from ....mechanism.mechanism import GROUND
 from ...io.document import SMALLEST
 from .element import Element, significant_digits
-from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .tree import WORLD, Closure, Coupling, Kind, Mass, Move, Strut, Tree
+from .tree import NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
 
 FIXED = (WORLD, GROUND)
 """Names of a fixed link at the origin, which is the world."""
@@ -38,6 +37,8 @@ class Joint:
     """A joint: the second link moves on the first by a chain of moves; without any it is fixed.
 
     Attributes:
+        frames: of one that closes a loop, on the first link behind the moves, and on the second
+            one; None without a gap in the zero pose.
         is_free: the second link is not held at all.
     """
 
@@ -45,6 +46,7 @@ class Joint:
     links: tuple[str, str]
     moves: Sequence[Move]
     element: Element
+    frames: tuple[Place, Place] | None = None
     is_free: bool = False
 
     @staticmethod
@@ -55,32 +57,20 @@ class Joint:
         freedoms: Sequence[Freedom],
         element: Element,
         limit: Limit = NO_LIMIT,
+        frames: tuple[Place, Place] | None = None,
     ) -> Joint:
         """Return a joint whose moves go through one point."""
         moves = [
             Move(f"{name}{end}", kind, at, axis, element, limit=limit)
             for end, kind, axis in freedoms
         ]
-        return Joint(name, links, moves, element)
+        return Joint(name, links, moves, element, frames)
 
     @property
     def reverse(self) -> Joint:
         """The same joint with the links exchanged; its coordinates keep their values."""
         moves = [replace(move, axis=-move.axis) for move in reversed(self.moves)]
         return replace(self, links=(self.links[1], self.links[0]), moves=moves)
-
-
-@dataclass(frozen=True)
-class Loop:
-    """A joint of a loop, between a frame of each link.
-
-    Attributes:
-        frames: on the first link behind the moves, and on the second one; None for a joint without
-            a gap in the zero pose.
-    """
-
-    joint: Joint
-    frames: tuple[Place, Place] | None = None
 
 
 @dataclass(eq=False)
@@ -106,7 +96,7 @@ class Graph:
     masses: dict[str, Mass | None] = field(default_factory=dict[str, Mass | None])
     frames: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
     joints: list[Joint] = field(default_factory=list[Joint])
-    loops: list[Loop] = field(default_factory=list[Loop])
+    loops: list[Joint] = field(default_factory=list[Joint])
     rods: list[Closure] = field(default_factory=list[Closure])
     couplings: list[Coupling] = field(default_factory=list[Coupling])
     struts: list[Strut] = field(default_factory=list[Strut])
@@ -143,7 +133,7 @@ class Graph:
         self.tree.require_moving(self.root)
         return self.tree
 
-    def spanning_tree(self) -> tuple[list[Joint], list[Loop]]:
+    def spanning_tree(self) -> tuple[list[Joint], list[Joint]]:
         """Return the joints of a spanning tree, outer ones first, and the loops.
 
         The tree begins at the fixed links, then at links without a joint above them, then
@@ -175,7 +165,7 @@ class Graph:
         seconds = {joint.links[1] for joint in self.joints}
         for name in (*(each for each in self.places if each not in seconds), *self.places):
             grow([name])
-        loops = [Loop(joint) for joint in self.joints if id(joint) not in used]
+        loops = [joint for joint in self.joints if id(joint) not in used]
         return spanning, [*loops, *self.loops]
 
 
@@ -228,7 +218,10 @@ class _Hanging:
         for rod in graph.rods:
             self._mark_ends(rod.name, rod.links, rod.places, rod.element)
             self.closures.append(rod)
-        struts = [replace(each, name=self._mark_strut(each)) for each in graph.struts]
+        struts: list[Strut] = []
+        for strut in graph.struts:
+            struts.append(replace(strut, name=tree.names.new(strut.name)))
+            self._mark_ends(strut.name, strut.links, strut.places, strut.element)
         self._walk()
         for closure in self.closures:
             tree.tie(replace(closure, links=self._carriers(closure.links)))
@@ -238,7 +231,7 @@ class _Hanging:
             self._couple(coupling)
 
     def _add(self, part: _Part) -> bool:
-        """Add a link; return false for one that is the world by another name."""
+        """Add a link; return false for the world by another name."""
         world = self.inside[WORLD]
         is_world = part.name in FIXED and part.place == ORIGIN and not part.moves
         if is_world and self.inside[part.outer] is world:
@@ -261,31 +254,24 @@ class _Hanging:
         for end, link, place in zip(("parent", "child"), links, places, strict=True):
             self._mark(self.tree.names.new(f"{name}.{end}"), link, place, element)
 
-    def _mark_strut(self, strut: Strut) -> str:
-        """Mark the ends of a strut; return a name of its own."""
-        name = self.tree.names.new(strut.name)
-        self._mark_ends(strut.name, strut.links, strut.places, strut.element)
-        return name
-
-    def _close(self, loop: Loop) -> None:
+    def _close(self, joint: Joint) -> None:
         """Add the closure of a loop, and the copy that its joint moves."""
-        joint, graph = loop.joint, self.graph
         outer, inner = joint.links
-        places = loop.frames or (graph.places[inner], graph.places[inner])
+        at = joint.frames[0] if joint.frames else self.graph.places[inner]
+        places = joint.frames or (at, at)
         moves, closure = joint.moves, joint.name
         ball = bool(moves) and moves[-1].kind == "ball"
         if ball:  # a common point leaves the same free
-            if loop.frames is None:
+            if joint.frames is None:
                 places = (Place(moves[-1].point), Place(moves[-1].point))
             moves = moves[:-1]
         if moves:
             closure = f"{joint.name}.closure"
             copy = self.tree.names.new(f"{joint.name}.copy")
-            at = loop.frames[0] if loop.frames else graph.places[inner]
             self._add(_Part(copy, outer, at, joint.element, moves))
             outer = copy
-        if loop.frames:
-            self._mark_ends(joint.name, (outer, inner), loop.frames, joint.element)
+        if joint.frames:
+            self._mark_ends(joint.name, (outer, inner), joint.frames, joint.element)
         holds = "point" if ball else "frame"
         self.closures.append(Closure(closure, (outer, inner), places, joint.element, holds))
 
@@ -424,17 +410,15 @@ def join(graph: Graph, joints: Collection[FramedJoint]) -> dict[str, list[Move]]
             placed = graph.places[b].then(g).then(ORIGIN.seen_from(motion))
             graph.places[a] = placed.then(ORIGIN.seen_from(f))
     moves: dict[str, list[Move]] = {}
-    closing = [each.joint.name for each in loops]
+    closing = [each.name for each in loops]
     closing += [each.name for each in joints if each.closes]
-    graph.joints = [_joined(graph, named[each.name], moves)[0] for each in spanning]
-    graph.loops += [Loop(*_joined(graph, named[name], moves)) for name in closing]
+    graph.joints = [_joined(graph, named[each.name], moves) for each in spanning]
+    graph.loops += [_joined(graph, named[name], moves) for name in closing]
     return moves
 
 
-def _joined(
-    graph: Graph, joint: FramedJoint, moves: dict[str, list[Move]]
-) -> tuple[Joint, tuple[Place, Place]]:
-    """Return a joint of the graph, and its frames: the first one behind its moves."""
+def _joined(graph: Graph, joint: FramedJoint, moves: dict[str, list[Move]]) -> Joint:
+    """Return a joint of the graph with its frames, the first one behind its moves."""
     first, second = joint.between(graph.places)
     motion, moved = joint.motion(second.seen_from(first))
     behind = first.then(motion)
@@ -445,4 +429,4 @@ def _joined(
         )
         for each, axis, value in moved
     ]
-    return Joint(joint.name, joint.links, moves[joint.name], joint.element), (behind, second)
+    return Joint(joint.name, joint.links, moves[joint.name], joint.element, (behind, second))

@@ -16,7 +16,6 @@ from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
 from ...io.document import shown
 from .element import Element, significant_digits, words
-from .limits import Limit, limit_of
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     DYNAMIC,
@@ -40,10 +39,12 @@ from .tree import (
     Closure,
     Coupling,
     Kind,
+    Limit,
     Move,
     Spring,
     Strut,
     Tree,
+    limit_of,
 )
 
 # What these hold is for looks, actuators and measurements.
@@ -168,8 +169,8 @@ class _Reader:
                 moved = motor
                 if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
                     moved = next(tendon.only("joint"), motor)
-                joint = {moved.attributes.get("joint", "")} & tree.moves.keys()
-                tree.add_motor(f"actuator: {motor.tag}", joint)
+                named = {moved.attributes.get(key, "") for key in ("joint", "jointinparent")}
+                tree.add_motor(f"actuator: {motor.tag}", named & tree.moves.keys())
         ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
         tree.motors[RANGES] = sum(ranges)
         if tree.masses:
@@ -187,7 +188,11 @@ class _Reader:
             element, place, childclass = found
             match element.tag:
                 case "body":
-                    waiting.append(self._body(element, place, link, _class(element, childclass)))
+                    waiting.append(
+                        self._body(
+                            element, place, link, element.attributes.get("childclass", childclass)
+                        )
+                    )
                 case "site":
                     site = self.classes.complete(element, "site", childclass)
                     if (name := site.attributes.get("name")) is not None:
@@ -242,7 +247,10 @@ class _Reader:
             if element.tag != "frame":
                 yield element, at, within
                 continue
-            inner, own = at.then(self.compiler.place(element)), _class(element, within)
+            inner, own = (
+                at.then(self.compiler.place(element)),
+                element.attributes.get("childclass", within),
+            )
             waiting += [(each, inner, own) for each in reversed(element.children)]
 
     def _moves(self, body: Element, name: str, place: Place, childclass: str) -> Iterator[Move]:
@@ -513,10 +521,6 @@ class _Reader:
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z
         return found
-
-
-def _class(element: Element, childclass: str) -> str:
-    return element.attributes.get("childclass", childclass)
 
 
 def _coefficients(element: Element) -> tuple[float, ...]:

@@ -28,12 +28,23 @@ from ....joints import PiecewisePolynomial, Spline
 from ...io.case_file import LARGEST_FILE
 from ...io.document import fault, read_text, shown
 from .element import Element, parse_xml, words
-from .graph import FramedFreedom, FramedJoint, Graph, Joint, Loop, join
-from .limits import NO_LIMIT, Limit
+from .graph import FramedFreedom, FramedJoint, Graph, Joint, join
 from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .robot_elements import HALFWAY
-from .tree import BushingLaw, Closure, Coupling, Kind, Move, Spring, Strut, Tree, require_spline
+from .tree import (
+    NO_LIMIT,
+    BushingLaw,
+    Closure,
+    Coupling,
+    Kind,
+    Limit,
+    Move,
+    Spring,
+    Strut,
+    Tree,
+    require_spline,
+)
 
 VERSION_4 = 40_000
 """Oldest version of documents that are read as they are."""
@@ -392,7 +403,7 @@ class _Reader:
             graph.rods.append(replace(rod, length=length))
             return
         moves = () if welded else (Move(name, "ball", first.at, X, element),)
-        graph.loops.append(Loop(Joint(name, links, moves, element), (first, second)))
+        graph.loops.append(Joint(name, links, moves, element, (first, second)))
 
     def _couple(self, name: str, element: Element) -> None:
         """Let a coordinate follow others."""

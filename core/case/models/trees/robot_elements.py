@@ -21,7 +21,7 @@ from ....algebra import Vec3, X, cross, vec
 from ....errors import CaseError
 from ...io.document import decimal, shown, usable
 from .element import Element, Names, words
-from .graph import Freedom, Graph, Joint, Loop
+from .graph import Freedom, Graph, Joint
 from .place import Place, coordinates, turn_of_axes
 from .tree import BushingLaw, Coupling, Spring, Strut
 
@@ -139,8 +139,8 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
         first, second = (
             graph.places[link].then(end) for link, end in zip(links, ends, strict=True)
         )
-        joint = Joint.of(name, links, first.at, freedoms, element)
-        graph.loops.append(Loop(joint, (first, second)))
+        frames = first, second
+        graph.loops.append(Joint.of(name, links, first.at, freedoms, element, frames=frames))
 
     for links, ties in found.items():
         ties[0][0].require_two(*links)

@@ -19,7 +19,6 @@ from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from .element import Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
-from .limits import NO_LIMIT, Limit, limit_of
 from .masses import mass_in
 from .place import ORIGIN, Place
 from .robot_elements import (
@@ -49,7 +48,7 @@ from .sdf_frames import (
     text_of,
     within,
 )
-from .tree import WORLD, Coupling, Mass, Move, Tree
+from .tree import NO_LIMIT, WORLD, Coupling, Limit, Mass, Move, Tree, limit_of
 
 TYPES = words("revolute continuous prismatic fixed ball universal revolute2 screw gearbox")
 TWO_AXES = ("universal", "revolute2")

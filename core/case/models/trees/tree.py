@@ -18,13 +18,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ....algebra import ZERO, Vec3, X, Y, Z
-from ....errors import MechanismError
+from ....errors import CaseError, MechanismError
 from ....joints import PiecewisePolynomial, Spline
 from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
-from ...io.document import LARGEST, shown
+from ...io.document import LARGEST, decimal, fault, shown
 from .element import Element, Names
-from .limits import NO_LIMIT, Limit
 from .place import ORIGIN, Place
 
 WORLD = "world"
@@ -69,6 +68,52 @@ class BushingLaw:
     turning_stiffness: Vector
     damping: Vector
     turning_damping: Vector
+
+
+INFINITE = 1e15
+"""Simulators write numbers beyond this for no limit; SDF has 1e16."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Bounds of a joint with one coordinate; infinite without one.
+
+    Attributes:
+        lower, upper: of its coordinate [rad or m].
+        effort: of its motor, by size [N m or N].
+        velocity: by size [rad/s or m/s].
+    """
+
+    lower: float = -math.inf
+    upper: float = math.inf
+    effort: float = math.inf
+    velocity: float = math.inf
+
+    @property
+    def is_range(self) -> bool:
+        """Whether its coordinate has two bounds, the lower one first."""
+        return self.lower < self.upper and math.isfinite(self.upper - self.lower)
+
+
+NO_LIMIT = Limit()
+
+
+def limit_of(element: Element, texts: Mapping[str, str]) -> Limit:
+    """Return the limit of the texts of its numbers, which may be missing or too large for one.
+
+    Raises:
+        CaseError: one is no number.
+    """
+    found = dict(vars(NO_LIMIT))
+    for key, none in vars(NO_LIMIT).items():
+        try:
+            number = decimal(texts.get(key) or str(none))
+        except ValueError:
+            number = math.nan
+        if math.isnan(number):
+            raise element.fault(f"found {shown(texts[key])}, expected a number; correct the limit")
+        found[key] = number if abs(number) < INFINITE else none
+    return Limit(**found)
 
 
 @dataclass(frozen=True)
@@ -154,6 +199,11 @@ class Coupling:
     def is_linear(self) -> bool:
         """Whether no power above the first takes part."""
         return not (self.driving and (self.points or any(self.coefficients[2:])))
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether it is between two moves."""
+        return len(self.driven) == len(self.driving) == len(self.moves) - 1
 
     @property
     def moves(self) -> set[str]:
@@ -304,8 +354,12 @@ class Tree:
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:
-        """The moves of links that something holds."""
+        """The moves of links held by something."""
         return {name: move for name, move in self.moves.items() if move.kind != "free"}
+
+    def fault(self, option: str, problem: str) -> CaseError:
+        """Return the error to raise: 'FILE: OPTION: PROBLEM'."""
+        return fault(self.file, option, problem)
 
     def count(self, what: str) -> None:
         """Count one more omitted item."""
@@ -387,7 +441,8 @@ class Tree:
         """Add a tie; one between parts of the ground is counted.
 
         Raises:
-            CaseError: it ties a link to itself, or there are too many.
+            CaseError: it ties a link to itself, is a curve between sums of moves, or there are too
+                many.
         """
         _require_few(tie.element, MOST_TIES, len(self.ties) + 1, f"equalities; {_TAKE_OUT}")
         if isinstance(tie, Closure) and tie.links[0] == tie.links[1]:
@@ -397,6 +452,12 @@ class Tree:
             raise tie.element.fault(
                 f"joins {tie.links[0]!r} with itself, expected two bodies that move otherwise;"
                 " remove it"
+            )
+        if isinstance(tie, Coupling) and not (tie.is_linear or tie.is_curve):
+            own = tie.element.attributes.get("name") or tie.element.tag
+            raise tie.element.fault(
+                "polycoef: is a curve between sums of joints, expected one joint on either side, or"
+                f" a line; leave it out by --without {own}"
             )
         self.ties.append(tie)
 

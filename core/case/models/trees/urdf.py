@@ -15,14 +15,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
+from ....algebra import Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
 from .beside import read_beside
 from .element import Element, words
-from .graph import Freedom, Graph, Joint, Loop
-from .limits import NO_LIMIT, Limit, limit_of
+from .graph import Freedom, Graph, Joint
 from .masses import mass_in
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
@@ -40,7 +39,7 @@ from .robot_elements import (
     screw,
 )
 from .sdf import Frames, joints_of
-from .tree import WORLD, Kind, Mass, Move, Tree
+from .tree import NO_LIMIT, WORLD, Kind, Limit, Mass, Move, Tree, limit_of
 
 GAZEBO, PITCH = "gazebo", "drake:screw_thread_pitch"
 JOINTS, CONSTRAINTS = ("joint", DRAKE_JOINT), ("constraint", "loop_joint")
@@ -281,7 +280,7 @@ class _Robot:
                 freedoms = [(f"_{k}", "hinge", place.direction(a)) for k, a in letters.items()]
         return Joint.of(name, links, place.at, freedoms, element, _limit(element))
 
-    def _constraint(self, element: Element, default: str) -> Loop:
+    def _constraint(self, element: Element, default: str) -> Joint:
         """Return the joint of a <constraint> or <loop_joint>."""
         element.require_known(("name", "type"), "URDF")
         loop = element.tag == "loop_joint"
@@ -319,8 +318,8 @@ class _Robot:
         ]
         joint = Joint.of(name, (links[0], links[1]), first.at, freedoms, element)
         if ball:
-            return Loop(joint, (Place(first.at, IDENTITY), Place(second.at, IDENTITY)))
-        return Loop(joint, (_frame_behind(first, second, joint.moves), second))
+            return replace(joint, frames=(Place(first.at), Place(second.at)))
+        return replace(joint, frames=(_frame_behind(first, second, joint.moves), second))
 
     def _gazebo(self) -> Frames:
         """Add the joints of SDF in <gazebo>, which close loops; return all frames.
@@ -346,7 +345,7 @@ class _Robot:
             if any(_joints_of_sdf(gazebo)):
                 frames.read(gazebo, "")
         still = {*graph.fixed}
-        graph.loops += [Loop(joint) for joint in joints_of(graph, frames, SDF_VERSION)]
+        graph.loops += joints_of(graph, frames, SDF_VERSION)
         for full, framed in frames.joints.items():
             base = frames.link(framed.element, framed.attached)
             if base in still and framed.element.attributes.get("type") != "fixed":

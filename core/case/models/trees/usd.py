@@ -23,10 +23,20 @@ from ....errors import remedy, shortened, similar
 from ....mechanism.mechanism import Vector
 from .element import Element, words
 from .graph import FramedFreedom, FramedJoint, Graph, join
-from .limits import INFINITE, NO_LIMIT, Limit, limit_of
 from .masses import COLLIDER, masses_of
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
-from .tree import UNKNOWNS, Closure, Coupling, Kind, Move, Tree
+from .tree import (
+    INFINITE,
+    NO_LIMIT,
+    UNKNOWNS,
+    Closure,
+    Coupling,
+    Kind,
+    Limit,
+    Move,
+    Tree,
+    limit_of,
+)
 from .usd_stage import UNITS
 
 AXES = {"X": X, "Y": Y, "Z": Z}

@@ -20,6 +20,8 @@ from ...truth.motion import Motion
 from ...truth.rows import Real, about, extended, unit
 from .base import Rng, direction, power, sign, unit_vector
 
+Moved: TypeAlias = tuple[Real, Real, Real]
+"""Turn of a body, a point of it, and the point's displacement; see `Motion`."""
 Planar: TypeAlias = Any
 """Points or vectors of a plane as complex numbers; arrays of them have extended precision."""
 
@@ -54,6 +56,11 @@ class Plane:
     def turned(self, angle: Real) -> Real:
         """Return the quaternion of a rotation in the plane, shape (4, n)."""
         return about(unit(np.cross(extended(self.e1), extended(self.e2))), angle)
+
+    def link(self, a: Planar, b: Planar, now_a: Planar, now_b: Planar) -> Moved:
+        """Return the motion of a body from two of its points, at design and now."""
+        turn = np.angle(now_b - now_a) - np.angle(b - a)
+        return self.turned(turn), extended(self.point(complex(a[0]))), self.lift(now_a - a)
 
 
 def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
@@ -158,7 +165,7 @@ def four_bar(
         [JointAngle("turn", "pivot")],
     )
 
-    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
+    def motion(drives: Real) -> Mapping[str, Moved]:
         still = np.zeros((3, drives.shape[1]), dtype=np.longdouble)
         return {"crank": (plane.turned(drives[0]), extended(pivot), still)}
 
@@ -198,20 +205,16 @@ def beside(
     p, q = square(C - B), square(C - D)
     side = float(np.sign(area(D - B, C - B)[0]))
     first_turn, last_turn = (-np.inf, np.inf) if parallel else turning_range(B, D, p, q)
-    pin = extended(plane.point(b))
 
-    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
+    def motion(drives: Real) -> Mapping[str, Moved]:
         turn = drives[0]
         turn = np.where((first_turn < turn) & (turn < last_turn), turn, np.nan)
         now_b = B * np.exp(1j * turn)
         now_c = now_b + (C - B) if parallel else meet(now_b, p, D + 0.0 * now_b, q, side)
-        still = np.zeros((3, len(turn)), dtype=np.longdouble)
-        swing = plane.turned(np.angle(now_c - D) - np.angle(C - D))
-        coupler = plane.turned(np.angle(now_c - now_b) - np.angle(C - B))
         return {
             **others(drives),
-            rocker: (swing, extended(rest.point), still),
-            f"{label}coupler": (coupler, pin, plane.lift(now_b - B)),
+            rocker: plane.link(D, C, D, now_c),
+            f"{label}coupler": plane.link(B, C, now_b, now_c),
         }
 
     return mechanism, motion
@@ -271,7 +274,7 @@ def slider_crank(plane: Plane, b: complex, c: complex, way: str, drive: str) -> 
     r2, l2 = square(B), square(C - B)
     side, ahead = float(np.sign(area(C, B)[0])), float(np.sign((C - B).real[0]))
 
-    def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
+    def motion(drives: Real) -> Mapping[str, Moved]:
         turn = value = drives[0]
         if drive == "turn":
             now_b = B * np.exp(1j * turn)
@@ -284,12 +287,11 @@ def slider_crank(plane: Plane, b: complex, c: complex, way: str, drive: str) -> 
             now_c = C + np.where((C + value).real * C.real > 0.0, value, np.nan)
             now_b = meet(0.0 * now_c, r2, now_c, l2, side)
             turn = np.angle(now_b) - np.angle(B)
-        coupler = plane.turned(np.angle(now_c - now_b) - np.angle(C - B))
         still = np.zeros((3, len(turn)), dtype=np.longdouble)
         return {
             "crank": (plane.turned(turn), extended(pivot), still),
             "slider": (plane.turned(0.0 * turn), extended(slider), plane.lift(now_c - C)),
-            "coupler": (coupler, extended(pin), plane.lift(now_b - B)),
+            "coupler": plane.link(B, C, now_b, now_c),
         }
 
     return mechanism, motion
