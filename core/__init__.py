@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         RevoluteSpherical,
         Screw,
         Spherical,
+        Spline,
         Translational,
         Universal,
     )
@@ -104,6 +105,7 @@ __all__ = [
     "Sine",
     "SolveError",
     "Spherical",
+    "Spline",
     "Supplied",
     "Table",
     "Trajectory",
@@ -130,7 +132,7 @@ _NAMES = {
     "joints": (
         "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
         "Joint LinearCoupler OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial "
-        "RackPinion Revolute RevoluteSpherical Screw Spherical Translational Universal"
+        "RackPinion Revolute RevoluteSpherical Screw Spherical Spline Translational Universal"
     ),
     "case.case": "Case",
     "case.io.reader_options": "Supplied",

@@ -225,9 +225,10 @@ class DrakePlant(SteppedTree, DrakeModel):
 
     def relate(self, relation: Relation) -> None:
         super().relate(relation)
-        if len(relation.terms) > 2:  # a row of the projection; steps refuse it
+        if relation.curve or len(relation.terms) > 2:  # a row of the projection; steps refuse it
             return
-        one, other, (_, factor) = relation.follower(signed=True)
+        one, other, function = relation.follower(signed=True)
+        factor = function.at(0.0)[1]
         self.couplings.append((self.coordinates[one][0], self.coordinates[other][0], factor))
 
     def finish(self) -> None:

@@ -364,7 +364,7 @@ class ExudynModel:
         for row, value, weight in rows.following:
             self.followed[row, value] = weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
-        # rows that follow a polynomial: row, index of its unknown, polynomial
+        # rows that follow a function: row, index of its unknown, minus the function
         drivers = len(case.mechanism.drivers)
         self.bent = [(row, value - drivers, curve) for row, value, curve in rows.bent]
         self.unknowns = self.coordinates + rows.values - drivers
@@ -411,7 +411,7 @@ class ExudynModel:
     def residual(self, c: Array) -> Array:
         values = self.followed @ np.concatenate([c, self.x[self.coordinates :]])
         for row, place, curve in self.bent:
-            values[row] = curve(self.x[self.coordinates + place])
+            values[row] = -curve.at(float(self.x[self.coordinates + place]))[0]
         for row, (first, second), frame in self.turning:
             self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
             # The frame has turned by the value: the row is the sine of the remaining angle. From
@@ -439,7 +439,7 @@ class ExudynModel:
         if not self.shared.size:
             return found
         for row, place, curve in self.bent:
-            self.shared[row, place] = curve.deriv()(self.x[self.coordinates + place])
+            self.shared[row, place] = -curve.at(float(self.x[self.coordinates + place]))[1]
         return np.hstack([found, -self.shared])
 
     def driver_columns(self) -> Array:
@@ -463,7 +463,7 @@ class ExudynModel:
         self.state.SetODE2Coordinates(self.q)
         bias *= speed**2
         for row, place, curve in self.bent:
-            bias[row] -= curve.deriv(2)(self.x[self.coordinates + place]) * rates[place] ** 2
+            bias[row] += curve.at(float(self.x[self.coordinates + place]))[2] * rates[place] ** 2
         return bias
 
     def _rates(self, q: Array, q_t: Array) -> Array:

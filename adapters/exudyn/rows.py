@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from ...core import joints
+from ...core.joints import PiecewisePolynomial
 from ...core.joints.base import unit
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
@@ -78,7 +78,7 @@ class Rows:
             value, weight.
         turning: rows that follow an angle, with their markers on the first and second body; the
             first marker turns about its z axis.
-        bent: rows that follow a polynomial of a value: row, value, polynomial.
+        bent: rows that follow a function of a value: row, value, minus the function.
         values: the number of drivers and further unknowns.
     """
 
@@ -91,7 +91,7 @@ class Rows:
         self.rows: list[Equation] = []
         self.following: list[tuple[int, int, float]] = []
         self.turning: dict[int, tuple[int, int]] = {}
-        self.bent: list[tuple[int, int, Polynomial]] = []
+        self.bent: list[tuple[int, int, PiecewisePolynomial]] = []
         self.values = len(mechanism.drivers)
         self._add_bodies()
         self.owned: dict[str, slice] = {}
@@ -235,13 +235,12 @@ class Rows:
             row = self.coordinate(driver.joint, driver.freedom)
         self.follow(row, value)
 
-    def curve(self, terms: Sequence[tuple[str, str, float]], curve: Sequence[float]) -> None:
-        """Make the first coordinate, of weight one, follow the polynomial of the second."""
-        (first, freedom, _), (second, other_freedom, weight) = terms
+    def curve(self, terms: Sequence[tuple[str, str, float]], curve: PiecewisePolynomial) -> None:
+        """Keep the sum of the first coordinate, of weight one, and a function of the second."""
+        (first, freedom, _), (second, other_freedom, _) = terms
         value = self.unknown()
         self.follow(self.coordinate(second, other_freedom), value)
-        bent = -Polynomial(curve) - Polynomial([0.0, weight])
-        self.bent.append((self.coordinate(first, freedom), value, bent))
+        self.bent.append((self.coordinate(first, freedom), value, curve))
 
     def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of coordinates (joint, freedom, weight) at zero: they follow as

@@ -144,7 +144,7 @@ def limitation_of(case: Case) -> str | None:
                 )
     for coupler in case.mechanism.couplers:
         if coupler.curve:
-            return f"{coupler}: Exudyn's own solvers have no object that keeps a polynomial"
+            return f"{coupler}: Exudyn's own solvers have no object that keeps a curve"
         if len(coupler.joints) > 2:
             return f"{coupler}: this adapter gives Exudyn's own solvers relations of two joints"
     if case.balance is None and (reason := uneven(case, "Exudyn")) is not None:

@@ -229,7 +229,11 @@ class MuJoCoModel(TreeModel):
         if len(relation.terms) > 2:
             self._sum(relation)
             return
-        *ends, curve = relation.follower(signed=True)
+        if relation.curve and relation.curve.knots:  # MuJoCo has powers up to the fourth
+            super().relate(relation)
+            return
+        *ends, function = relation.follower(signed=True)
+        (curve,) = function.powers
         names = [self.coordinates[end][0] for end in ends]
         one, other = map(" ".join, ends)
         equality = self.spec.add_equality(

@@ -88,6 +88,13 @@ class Stepping(Simulation):
         }
         return {**own[self.kind], **shared, "options": "no gravity, no contact, no autoreset"}
 
+    def unsupported(self, case: Case) -> str | None:
+        """Return a message on the joint or driver that is not supported here, or None."""
+        for coupler in case.mechanism.couplers:
+            if coupler.curve and coupler.curve.knots:
+                return f"{coupler}: MuJoCo's equality has powers up to the fourth; use projection"
+        return super().unsupported(case)
+
     def efforts(self) -> Mapping[str, Stepping]:
         """Return the efforts by the number of steps."""
         counts = (1, 2, 3, 5, 8) if self.kind == "projecting" else (1, 2, 4, 8, 16)

@@ -33,7 +33,6 @@ from functools import cached_property
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from ...core.algebra import Vec3
 from ...core.errors import number_of
@@ -48,6 +47,7 @@ from ...core.joints import (
     OrientationLock,
     ParallelAxes,
     PerpendicularAxes,
+    PiecewisePolynomial,
     Planar,
     Revolute,
     RevoluteSpherical,
@@ -405,14 +405,14 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """A linear row plus a polynomial in its last coordinate.
+    """A linear row plus a function of its last coordinate.
 
     Attributes:
         sign: sign of the coordinate in the tree.
     """
 
     linear: Linear
-    curve: Polynomial
+    curve: PiecewisePolynomial
     sign: float
     n = 1
 
@@ -421,17 +421,18 @@ class Curved:
         return self.linear.of.coordinate(self.linear.bodies[-1])
 
     @property
-    def _x(self) -> float:
-        return self.sign * self.linear.of.q[self._at[0]]
+    def _curve(self) -> tuple[float, float, float]:
+        return self.curve.at(self.sign * float(self.linear.of.q[self._at[0]]))
 
     def rows(self) -> tuple[Any, Array]:
         value, row = self.linear.rows()
+        bent, slope, _ = self._curve
         row = row.copy()
-        row[self._at[1]] += self.sign * self.curve.deriv()(self._x)
-        return value + self.curve(self._x), row
+        row[self._at[1]] += self.sign * slope
+        return value + bent, row
 
     def bias(self) -> Any:
-        return self.curve.deriv(2)(self._x) * self.linear.of.v[self._at[1]] ** 2
+        return self._curve[2] * self.linear.of.v[self._at[1]] ** 2
 
 
 @dataclass(frozen=True, eq=False)

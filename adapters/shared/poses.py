@@ -17,10 +17,9 @@ from operator import mul
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cross, quat, vec
-from ...core.joints import Coupler, Distance, Joint, Polynomial
+from ...core.joints import Coupler, Distance, Follower, Joint
 from ...core.joints.base import Kind, triad
 from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import Bushing, ForceElement, SpringDamper, TorsionSpringDamper
@@ -216,17 +215,16 @@ def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
 
     A joint's point moves with its second body and its axis with its first, so that a point stays on
     its line or plane; of a pair, each element moves with its body. Distances keep their lengths.
-    Coordinates of polynomials and of torsional springs count from the start. Drivers, forces and
+    Coordinates of curves and of torsional springs count from the start. Drivers, forces and
     torques are left out.
     """
     placed, coordinates = displacements(mechanism, way), joint_coordinates(mechanism, way)
 
     def coupler(each: Coupler) -> Coupler:
-        if not isinstance(each, Polynomial):
+        if not isinstance(each, Follower):
             return each
         y, x = (coordinates[named] for named in zip(each.joints, each.freedoms, strict=True))
-        moved = Powers(each.coefficients)(Powers((x, 1.0))) - y
-        return replace(each, coefficients=(*moved.coef.tolist(),))
+        return each.counted_from(y, x)
 
     def springs() -> Iterator[ForceElement]:
         for each in mechanism.forces:

@@ -326,7 +326,7 @@ class Stepping(Simulation):
             if not self.couples:
                 return self._without(coupler, "that couples coordinates")
             if coupler.curve:
-                return self._without(coupler, "that keeps a polynomial")
+                return self._without(coupler, "that keeps a curve")
             if len(coupler.joints) > 2:
                 return self._without(coupler, "that couples more than two coordinates")
         return uneven(case, engine.title) if self.equal else None

@@ -14,7 +14,6 @@ from itertools import accumulate
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
@@ -155,9 +154,9 @@ class TreeModel(TreeSimulator):
         moved = [(*self.coordinates[joint, freedom], w) for joint, freedom, w in relation.terms]
         weights = np.array([sign * weight for _, sign, weight in moved])
         row = Linear(self, [body for body, _, _ in moved], weights)
-        curve = Polynomial(relation.curve) if relation.curve else None
-        self.conditions.append(Curved(row, curve, moved[-1][1]) if curve else row)
-        self.related.append((self.conditions[-1], relation))
+        bent = Curved(row, relation.curve, moved[-1][1]) if relation.curve else row
+        self.conditions.append(bent)
+        self.related.append((bent, relation))
 
     @property
     def details(self) -> Mapping[str, Any]:

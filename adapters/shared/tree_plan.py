@@ -34,6 +34,7 @@ from ...core.joints import (
     OrientationLock,
     ParallelAxes,
     PerpendicularAxes,
+    PiecewisePolynomial,
     Planar,
     Revolute,
     RevoluteSpherical,
@@ -186,22 +187,24 @@ class Chain:
 
 @dataclass(frozen=True)
 class Relation:
-    """A weighted sum of coordinates that stays zero; of two, with a polynomial of the second added.
+    """A weighted sum of coordinates that stays zero; of two, with a function of the second added.
 
     Attributes:
         name: of the coupler, or of the joint whose own relation it is.
         signs: of the coordinates in the tree.
-        curve: coefficients of the polynomial, the constant first, or empty; see `Coupler.curve`.
+        curve: see `Coupler.curve`.
     """
 
     name: str
     terms: Terms
     signs: tuple[int, ...]
-    curve: Sequence[float] = ()
+    curve: PiecewisePolynomial | None = None
 
-    def follower(self, *, signed: bool) -> tuple[tuple[str, str], tuple[str, str], list[float]]:
+    def follower(
+        self, *, signed: bool
+    ) -> tuple[tuple[str, str], tuple[str, str], PiecewisePolynomial]:
         """Return the coordinate that follows another, the other, by joint and freedom, and the
-        coefficients of the polynomial that it follows, the constant first; of two coordinates.
+        function that it follows; of two coordinates.
 
         Without a curve the factor is at most one.
 
@@ -212,14 +215,11 @@ class Relation:
         (joint, freedom, weight), (other, other_freedom, other_weight) = self.terms
         one, two = (joint, freedom), (other, other_freedom)
         if self.curve:
-            found = [-c for c in self.curve]
-            if len(found) > 1:
-                found[1] -= other_weight
-            return one, two, [c * signs[0] * signs[1] ** k for k, c in enumerate(found)]
+            return one, two, self.curve.scaled(signs[1], -signs[0])
         weights = signs[0] * weight, signs[1] * other_weight
         if abs(weights[1]) >= abs(weights[0]):
-            return two, one, [0.0, -weights[0] / weights[1]]
-        return one, two, [0.0, -weights[1] / weights[0]]
+            return two, one, PiecewisePolynomial((0.0,), ((0.0, -weights[0] / weights[1]),))
+        return one, two, PiecewisePolynomial((0.0,), ((0.0, -weights[1] / weights[0]),))
 
 
 @dataclass(frozen=True)

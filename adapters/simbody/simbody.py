@@ -259,12 +259,12 @@ class SimbodyModel(TreeModel):
             super().relate(relation)
             return
         o, coupler = self.o, self.o.CoordinateCouplerConstraint()
-        one, other, (_, factor) = relation.follower(signed=True)
+        one, other, function = relation.follower(signed=True)
         names = o.ArrayStr()
         names.append(coordinate_name(self.coordinates[other][0]))
         coupler.setIndependentCoordinateNames(names)
         coupler.setDependentCoordinateName(coordinate_name(self.coordinates[one][0]))
-        coupler.setFunction(o.LinearFunction(factor, 0.0))
+        coupler.setFunction(o.LinearFunction(function.at(0.0)[1], 0.0))
         self.constrain(coupler, 1, relation)
 
     def constrain(self, constraint: Any, rows: int, keeps: str | Relation) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...core import joints as j
 from ...core.algebra import triple, vec
-from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -256,6 +256,7 @@ def write(
     way: Mapping[str, BodyMotion],
     start: Mapping[str, float],
     zeros: Zeros = NO_ZEROS,
+    ranges: Ranges = NO_RANGES,
 ) -> Mapping[str, str]:
     """Return a .py file; see `Writer`. Initial coordinates are the end of the way.
 
@@ -268,7 +269,7 @@ def write(
         raise KincheckError(
             f"{strange[0]} has no counterpart in Exudyn; export MJCF or URDF instead"
         )
-    note = text.zeros_of(zeros)
+    note = text.zeros_of(zeros) + text.lost_limits(ranges)
     script = _Script(*_spelled_out(mechanism, way)).text(start)
     return {".py": f"#{note}\n{script}" if note else script}
 
@@ -371,8 +372,8 @@ class _Script:
 
     def relate(self, name: str, terms: Terms) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, (_, factor) = Relation(name, terms, ()).follower(signed=False)
-        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
+        one, other, line = Relation(name, terms, ()).follower(signed=False)
+        self.call("relation", name, self.coordinate(*one), self.coordinate(*other), line.at(0.0)[1])
 
     def values(self, joint: Any) -> Mapping[str, tuple[float, ...]]:
         """Return the coordinates of a joint at the start, by freedom."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.algebra import triple
 from ...core.errors import KincheckError
-from ...core.joints import Distance, Fixed, Joint, Revolute, Spherical
+from ...core.joints import Distance, Fixed, Joint, PiecewisePolynomial, Revolute, Spherical
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import TorsionSpringDamper
@@ -58,7 +58,7 @@ class Tie:
     length: float | None = None
 
 
-Following: TypeAlias = tuple[str, str, str, list[float]]
+Following: TypeAlias = tuple[str, str, str, PiecewisePolynomial]
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class Tree:
     Attributes:
         frames: frames of all links at design, parents before children; an auxiliary frame is
             parallel to the global axes.
-        relations, curves: name, coordinate that follows another, the other, and coefficients of
-            the line or polynomial that it follows, the constant first.
+        relations, curves: name, coordinate that follows another, the other, and the line or
+            function that it follows.
         coordinates: names by joint and freedom.
     """
 

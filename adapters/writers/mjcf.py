@@ -16,8 +16,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.case.models.trees.masses import STAND_INS
+from ...core.errors import KincheckError
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import BodyMotion
@@ -48,6 +49,7 @@ def write(
     way: Mapping[str, BodyMotion],
     start: Mapping[str, float],
     zeros: Zeros = NO_ZEROS,
+    ranges: Ranges = NO_RANGES,
 ) -> Mapping[str, str]:
     """Return an .xml file; see `Writer`. The keyframe "start" is the end of the way.
 
@@ -55,14 +57,16 @@ def write(
         KincheckError: a joint has no counterpart in MJCF, or a name cannot be used there.
     """
     require_known(mechanism, "MJCF")
-    return {".xml": _Model(mechanism, way, zeros).text(start)}
+    return {".xml": _Model(mechanism, way, zeros, ranges).text(start)}
 
 
 class _Model:
     """The document during its construction."""
 
-    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion], zeros: Zeros) -> None:
-        self.zeros = zeros
+    def __init__(
+        self, mechanism: Mechanism, way: Mapping[str, BodyMotion], zeros: Zeros, ranges: Ranges
+    ) -> None:
+        self.zeros, self.ranges = zeros, ranges
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("mujoco", model=mechanism.name)
         self.loaded = mechanism.has_loads
@@ -110,6 +114,7 @@ class _Model:
             self.root.insert(2, default)
         masses, left_out = text.facts(mechanism, sprung, self.frames.values(), "MuJoCo")
         masses = f"{masses}{'' if whole else ARMATURE}" if self.loaded else PLAIN
+        left_out += text.lost_limits(ranges, self.coordinates)
         add_note(self.root, NOTE.format(masses, loops(self.ties, KINDS), left_out))
 
     def text(self, start: Mapping[str, float]) -> str:
@@ -194,6 +199,8 @@ class _Model:
             at = {"pos": numbers(local(frame, link.point)), **along}
             if zero := self.zeros.get((joint.name, link.name), 0.0):
                 at["ref"] = numbers(zero)
+            if limits := self.ranges.get((joint.name, link.name)):
+                at["range"] = numbers(limits)
             ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
             self.qpos[name] = value if link.move == "ball" else (value[0] + zero,)
             if link.move == "ball":  # in the axes of the body that it carries
@@ -264,6 +271,11 @@ class _Model:
             ET.SubElement(self.equalities, "tendon", tendon1=name)
             return
         one, other, curve = relation.follower(signed=False)
+        if curve.knots:
+            raise KincheckError(
+                f"joint {relation.name!r} is a spline, which has no counterpart in MJCF, whose"
+                " joints follow polynomials; write URDF or OpenSim instead"
+            )
         names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
-        polynomial = numbers([*curve, 0, 0, 0, 0][:5])
+        polynomial = numbers([*curve.powers[0], 0, 0, 0, 0][:5])
         ET.SubElement(self.equalities, "joint", names, polycoef=polynomial)

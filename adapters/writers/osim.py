@@ -4,21 +4,23 @@ The format has no velocities, and its ball joints lock at a right angle, so the 
 its start pose. Hinges and slides have the coordinates of the case there, as default values; those
 of balls, crosses and free bodies are zero. A body has its frame of the case. Loops are closed
 by Simbody's constraints of a point, a distance or a whole frame; coordinate couplers relate
-coordinates to one another by a factor or a polynomial. Spring-dampers are forces of OpenSim. Names
-in OpenSim are parts of paths: an underscore replaces characters with a meaning in paths.
+coordinates to one another by a factor, a polynomial or a spline. Spring-dampers are forces of
+OpenSim. Names in OpenSim are parts of paths: an underscore replaces characters with a meaning in
+paths.
 """
 
 from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import IDENTITY, Quat, triple, vec
-from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
+from ...core.joints import PiecewisePolynomial
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, Law, SpringDamper, TorsionSpringDamper
@@ -66,6 +68,7 @@ def write(
     way: Mapping[str, BodyMotion],
     start: Mapping[str, float],
     zeros: Zeros = NO_ZEROS,
+    ranges: Ranges = NO_RANGES,
 ) -> Mapping[str, str]:
     """Return an .osim file in the pose at the end of the way; see `Writer`.
 
@@ -76,11 +79,12 @@ def write(
     values = joint_coordinates(mechanism, way)
     values = {key: x + zeros.get(key, 0.0) for key, x in values.items()}
     gravity = mechanism.gravity if mechanism.has_loads else NONE
-    model = _Model(at_start(mechanism, way), gravity, values)
+    model = _Model(at_start(mechanism, way), gravity, values, ranges)
     model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     frames = model.tree.frames.values()
     masses, left_out = text.facts(mechanism, model.sprung, frames, "OpenSim", law=Law.CARDAN)
+    left_out += text.lost_limits(ranges, model.tree.coordinates)
     closed = loops(model.tree.ties, TIES[:3])
     add_note(model.root, NOTE.format(masses, at and f" ({at})", closed, left_out))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
@@ -102,9 +106,15 @@ class _Model:
     """The document during its construction; the mechanism is at its start."""
 
     def __init__(
-        self, mechanism: Mechanism, gravity: Vector, values: Mapping[tuple[str, str], float]
+        self,
+        mechanism: Mechanism,
+        gravity: Vector,
+        values: Mapping[tuple[str, str], float],
+        ranges: Ranges,
     ) -> None:
         self.tree = hung(mechanism)
+        names = self.tree.coordinates
+        self.ranges = {names[key]: limits for key, limits in ranges.items() if key in names}
         # values of coordinates at the start, by name
         self.values = {name: values.get(key, 0.0) for key, name in self.tree.coordinates.items()}
         self.root = ET.Element("OpenSimDocument", Version="40000")
@@ -187,7 +197,10 @@ class _Model:
         for suffix in suffixes:
             coordinate = ET.SubElement(coordinates, "Coordinate", name=_name(joint.name + suffix))
             add_text(coordinate, "default_value", value)
-            add_text(coordinate, "range", "-1e9 1e9")
+            limits = self.ranges.get(joint.name)
+            add_text(coordinate, "range", limits or "-1e9 1e9")
+            if limits:
+                add_text(coordinate, "clamped", "true")
         frames = ET.SubElement(element, "frames")
         turn = _turns(orientation(joint.move, joint.axis))
         if joint.move in ("fixed", "free"):
@@ -251,20 +264,21 @@ class _Model:
         return False
 
     def couple(
-        self, constraints: ET.Element, name: str, one: str, other: str, follows: Sequence[float]
+        self, constraints: ET.Element, name: str, one: str, other: str, follows: PiecewisePolynomial
     ) -> None:
-        """Let one coordinate follow a polynomial of another, both from the start, the constant
-        first.
-        """
+        """Let one coordinate follow a function of another, both from the start."""
         y, x = (self.values.get(each, 0.0) for each in (one, other))
-        curve = Powers(follows)(Powers((-x, 1.0))) + y
-        follows = curve.coef.tolist()
         element = ET.SubElement(constraints, "CoordinateCouplerConstraint", name=_name(name))
-        function = ET.SubElement(
-            ET.SubElement(element, "coupled_coordinates_function"),
-            "LinearFunction" if len(follows) == 2 else "PolynomialFunction",
-        )
-        add_text(function, "coefficients", follows[::-1])
+        around = ET.SubElement(element, "coupled_coordinates_function")
+        if follows.knots:
+            spline = ET.SubElement(around, "SimmSpline")
+            points = [(at + x, value + y) for at, value in follows.knots]
+            for key, values in zip("xy", zip(*points, strict=True), strict=True):
+                add_text(spline, key, values)
+        else:
+            moved: list[float] = (Powers(follows.powers[0])(Powers((-x, 1.0))) + y).coef.tolist()
+            kind = "LinearFunction" if len(moved) == 2 else "PolynomialFunction"
+            add_text(ET.SubElement(around, kind), "coefficients", moved[::-1])
         add_text(element, "independent_coordinate_names", _name(other))
         add_text(element, "dependent_coordinate_name", _name(one))
 

@@ -10,12 +10,13 @@ Drake supports constraints only in discrete plants.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import inf
 
 import numpy as np
 
 from ...core.algebra import IDENTITY, Quat, triple
-from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.case.models.trees.robot_elements import BUSHING, STRUT
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
@@ -38,6 +39,7 @@ TIES = ("a ball constraint", "three ball constraints", "a link on a cross and a 
 KINDS = {"slide": "prismatic", "hinge": "revolute", "ball": "ball", "fixed": "fixed"}
 WORLD = "world"
 MIMIC = "drake:mimic"
+FAR = (-inf, inf)
 
 
 def write(
@@ -45,6 +47,7 @@ def write(
     way: Mapping[str, BodyMotion],
     start: Mapping[str, float],
     zeros: Zeros = NO_ZEROS,
+    ranges: Ranges = NO_RANGES,
 ) -> Mapping[str, str]:
     """Return an .sdf file in the pose at the end of the way; see `Writer`.
 
@@ -56,13 +59,15 @@ def write(
         if coupler.curve:
             raise KincheckError(
                 f"{coupler} has no counterpart in SDF, whose joints mimic others by a factor; write"
-                " MJCF, URDF or OpenSim instead"
+                " URDF or OpenSim instead"
             )
-    model = _Model(at_start(mechanism, way))
+    values = joint_coordinates(mechanism, way)
+    values = {key: x + zeros.get(key, 0.0) for key, x in values.items()}
+    limits = {key: [x - values[key] for x in each] for key, each in ranges.items()}
+    model = _Model(at_start(mechanism, way), limits)
     model.add_bushings(mechanism)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    values = joint_coordinates(mechanism, way)
-    zero = text.zeros_of({key: x + zeros.get(key, 0.0) for key, x in values.items()})
+    zero = text.zeros_of(values) + text.lost_limits(ranges, model.tree.coordinates)
     frames = model.tree.frames.values()
     masses, left_out = text.facts(mechanism, model.sprung, frames, "Drake", gravity=False)
     note = NOTE.format(masses, at and f" ({at})", model.loops, zero + left_out)
@@ -74,8 +79,12 @@ def write(
 class _Model:
     """The document during its construction; the mechanism is at its start."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(
+        self, mechanism: Mechanism, limits: Mapping[tuple[str, str], Sequence[float]]
+    ) -> None:
         self.mechanism, self.tree = mechanism, hung(mechanism)
+        names = self.tree.coordinates
+        self.limits = {names[key]: each for key, each in limits.items() if key in names}
         self.root = ET.Element("sdf", {"version": "1.11", "xmlns:drake": text.DRAKE})
         self.model = ET.SubElement(self.root, "model", name=mechanism.name)
         self.joints: dict[str, ET.Element] = {}
@@ -91,8 +100,8 @@ class _Model:
         for joint in self.tree.joints:
             if joint.move != "free":  # a link without a joint is free
                 self.add_joint(joint)
-        for name, one, other, (_, factor) in self.tree.relations:
-            self.relate(name, one, other, factor)
+        for name, one, other, line in self.tree.relations:
+            self.relate(name, one, other, line.at(0.0)[1])
         for point in mechanism.points:
             frame = {"name": f"point.{point.name}", "attached_to": point.body}
             self.add_pose(ET.SubElement(self.model, "frame", frame), point.position)
@@ -151,8 +160,8 @@ class _Model:
             axis = ET.SubElement(element, "axis")
             add_text(axis, "xyz", joint.axis)
             limit = ET.SubElement(axis, "limit")
-            add_text(limit, "lower", "-inf")
-            add_text(limit, "upper", "inf")
+            for key, x in zip(("lower", "upper"), self.limits.get(joint.name, FAR), strict=True):
+                add_text(limit, key, x)
 
     def joint_name(self, name: str) -> str:
         """Return the name of a joint, which in SDF must differ from the names of links."""

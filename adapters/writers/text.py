@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from ...core.case.io.model_writer import Zeros
+from ...core.case.io.model_writer import Ranges, Zeros
 from ...core.case.models.trees.robot_elements import BUSHING_LAW, STRUT, STRUT_LAW
 from ...core.case.models.trees.tree import BETWEEN, STAND_IN
 from ...core.errors import KincheckError
@@ -228,6 +228,12 @@ def zeros_of(zeros: Zeros) -> str:
         if round(value, 12)
     )
     return f" Where coordinates are zero, those of the case are {told}." if told else ""
+
+
+def lost_limits(ranges: Ranges, kept: Collection[tuple[str, str]] = ()) -> str:
+    """Return a sentence on limits of coordinates, by joint and freedom, that a file lacks."""
+    lost = ", ".join(joint for joint, freedom in ranges if (joint, freedom) not in kept)
+    return f" Left out: limits of {lost}." if lost else ""
 
 
 def left_out(mechanism: Mechanism, names: Collection[str], gravity: bool) -> str:

@@ -22,7 +22,7 @@ from typing import Any, cast
 import numpy as np
 
 from ...core.algebra import vec
-from ...core.case.io.model_writer import NO_ZEROS, Zeros
+from ...core.case.io.model_writer import NO_RANGES, NO_ZEROS, Ranges, Zeros
 from ...core.case.models.trees.robot_elements import BUSHING, STRUT
 from ...core.joints import Joint
 from ...core.mechanism.loads import ForceElement, SpringDamper
@@ -75,6 +75,7 @@ def write(
     way: Mapping[str, BodyMotion],
     start: Mapping[str, float],
     zeros: Zeros = NO_ZEROS,
+    ranges: Ranges = NO_RANGES,
 ) -> Mapping[str, str]:
     """Return a .urdf file and a .constraints.json file, with a consistent start at the end of the
     way; see `Writer`.
@@ -86,7 +87,7 @@ def write(
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
     require_known(mechanism, "URDF")
-    model = _Model(mechanism, way, text.zeros_of(zeros))
+    model = _Model(mechanism, way, zeros, ranges)
     beside = {
         "schema": SCHEMA,
         "mechanism": mechanism.name,
@@ -164,7 +165,10 @@ def _as_data(condition: Condition) -> Iterator[dict[str, Any]]:
 class _Model:
     """The document and the constraints file during their construction."""
 
-    def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion], zero: str) -> None:
+    def __init__(
+        self, mechanism: Mechanism, way: Mapping[str, BodyMotion], zeros: Zeros, ranges: Ranges
+    ) -> None:
+        self.zeros, self.ranges = zeros, ranges
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("robot", name=mechanism.name)
         self.origin: dict[str, Vector] = {}  # origins of links, global at design
@@ -199,9 +203,10 @@ class _Model:
             for frame in frames:
                 self.weigh(frame)
             masses, left_out = text.facts(mechanism, sprung, frames, "Drake", gravity=False)
+        left_out += text.lost_limits(ranges, self.coordinates)
         closed = dict.fromkeys(each["joint"] for each in self.constraints)
         closed = f": {', '.join(closed)}" if closed else ""
-        add_note(self.root, NOTE.format(masses, closed, zero + left_out))
+        add_note(self.root, NOTE.format(masses, closed, text.zeros_of(zeros) + left_out))
 
     def add_link(self, name: str, origin: Vector) -> ET.Element:
         """Add a link with its origin at a position, global at design."""
@@ -272,7 +277,10 @@ class _Model:
         for (name, link, parent, following), value in zip(chain.each(), values, strict=True):
             element = self.attach(following, parent, link.point, name, KINDS[link.move])
             ET.SubElement(element, "axis", xyz=numbers(link.axis))
-            ET.SubElement(element, "limit", FAR)
+            key = joint.name, link.name
+            limits = [numbers(x - self.zeros.get(key, 0.0)) for x in self.ranges.get(key, ())]
+            limit = FAR | dict(zip(("lower", "upper"), limits, strict=False))
+            ET.SubElement(element, "limit", limit)
             self.q[name] = [*value]
             self.coordinates[joint.name, link.name] = name
 
@@ -289,17 +297,15 @@ class _Model:
             )
 
     def relate(self, relation: Relation) -> None:
-        """Keep the weighted sum of coordinates at zero, or a coordinate at a polynomial of
-        another.
-        """
+        """Keep the weighted sum of coordinates at zero, or one at a function of another."""
         if relation.curve:
-            one, other, coefficients = relation.follower(signed=False)
-            table = {
-                "kind": "polynomial",
+            one, other, curve = relation.follower(signed=False)
+            table: dict[str, Any] = {
+                "kind": "spline" if curve.knots else "polynomial",
                 "driven": self.coordinates[one],
                 "driving": self.coordinates[other],
-                "coefficients": coefficients,
             }
+            table |= {"points": curve.knots} if curve.knots else {"coefficients": curve.powers[0]}
         else:
             weights = {self.coordinates[name, one]: w for name, one, w in relation.terms}
             table = {"kind": "linear", "weights": weights}

@@ -297,6 +297,8 @@ class Case:
         unforced: drivers without a force, which only follow a recording.
         free: its free motion; None for the default.
         balance: None unless its samples are equilibria.
+        ranges: of joints of a model with a lower and an upper limit, by joint and freedom, from
+            the model's zero [m or rad].
     """
 
     name: str
@@ -317,6 +319,9 @@ class Case:
     unforced: tuple[str, ...] = ()
     free: Free | None = None
     balance: Balance | None = None
+    ranges: Mapping[tuple[str, str], tuple[float, float]] = field(
+        default_factory=dict[tuple[str, str], tuple[float, float]]
+    )
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

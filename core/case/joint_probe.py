@@ -67,10 +67,17 @@ WHY = (
     " (0.01), x10"
 )
 
-LISTS = ("tuple[float, ...]", tuple[float, ...])
-"""What fields that are lists of numbers are annotated with."""
 CURVE = (0.0, NUMBER, 0.25, -0.125, 0.0625)
-"""Coefficients of a polynomial whose slope vanishes nowhere near the design."""
+LISTS: Mapping[Any, Any] = {
+    "tuple[float, ...]": CURVE,
+    tuple[float, ...]: CURVE,
+    "tuple[tuple[float, float], ...]": tuple(
+        (x, sum(c * x**k for k, c in enumerate(CURVE))) for x in (-1.5, -0.7, -0.2, 0.0, 0.4, 1.1)
+    ),
+}
+"""Values of fields that are lists, by their annotation: coefficients of a polynomial whose slope
+vanishes nowhere near the design, and points on it.
+"""
 
 _Tested = TypeVar("_Tested", bound=Joint | Coupler)
 
@@ -160,7 +167,7 @@ def _made_of_pair(pair: Any) -> Callable[[Field[Any]], Any]:
         Kind.LENGTH: LENGTH,
         None: NUMBER,
     }
-    return lambda each: CURVE if each.type in LISTS else values[each.metadata.get("kind")]
+    return lambda each: LISTS.get(each.type) or values[each.metadata.get("kind")]
 
 
 def _of_joint(joint: Joint) -> Iterator[Case]:

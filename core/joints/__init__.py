@@ -7,7 +7,7 @@ import pkgutil
 
 from .base import Attachment, AxialJoint, Joint, Kind
 from .constant_velocity import ConstantVelocity
-from .coupler import Coupler
+from .coupler import Coupler, Follower, PiecewisePolynomial
 from .cylindrical import Cylindrical
 from .distance import Distance
 from .fixed import Fixed
@@ -25,6 +25,7 @@ from .revolute import Revolute
 from .revolute_spherical import RevoluteSpherical
 from .screw import Screw
 from .spherical import Spherical
+from .spline import Spline
 from .translational import Translational
 from .universal import Universal
 
@@ -39,6 +40,7 @@ __all__ = [
     "Cylindrical",
     "Distance",
     "Fixed",
+    "Follower",
     "Gear",
     "InPlane",
     "Inline",
@@ -48,6 +50,7 @@ __all__ = [
     "OrientationLock",
     "ParallelAxes",
     "PerpendicularAxes",
+    "PiecewisePolynomial",
     "Planar",
     "Polynomial",
     "RackPinion",
@@ -55,6 +58,7 @@ __all__ = [
     "RevoluteSpherical",
     "Screw",
     "Spherical",
+    "Spline",
     "Translational",
     "Universal",
     "linear_relation",

@@ -397,13 +397,13 @@ def test_gears_turn_more_than_once():
     assert record(gears(), simulation("exudyn-static")).outcome is Outcome.PASS
 
 
-COUPLED = "constant_velocity gear linear_coupler polynomial rack_pinion screw"
-EXUDYN = "constant_velocity polynomial revolute_spherical"
+COUPLED = "constant_velocity gear linear_coupler polynomial rack_pinion screw spline"
+EXUDYN = "constant_velocity polynomial revolute_spherical spline"
 REFUSED = {
-    **dict.fromkeys(("mujoco", "mujoco-default", "mujoco-projecting"), ""),
+    **dict.fromkeys(("mujoco", "mujoco-default", "mujoco-projecting"), "spline"),
     **dict.fromkeys(("pinocchio", "dart"), COUPLED),
     **dict.fromkeys(("exudyn", "exudyn-alpha", "exudyn-static", "exudyn-static-modified"), EXUDYN),
-    **dict.fromkeys(("drake", "simbody"), "polynomial"),
+    **dict.fromkeys(("drake", "simbody"), "polynomial spline"),
 }
 """Joint and coupler types that simulators refuse; all others they simulate."""
 

@@ -7,6 +7,8 @@ import sys
 
 import numpy as np
 import pytest
+from kincheck import adapters
+from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.undriven import undriven_file
@@ -26,6 +28,7 @@ from ..support.osim_texts import (
     tagged,
     texts,
 )
+from ..support.splines import through
 
 EXACT = 1e-13
 DRIVE = Supplied(drive=("A:0:0.5:5",))
@@ -156,6 +159,94 @@ def test_axes_of_custom_joint_follow_their_coordinates(write):
     assert any("bend 0.7" in note for note in case.assembly)
 
 
+# The knee of gait2392 of https://github.com/opensim-org/opensim-models (CC BY 3.0):
+# displacements of the shank [m] over the angle [rad].
+FORWARD = (
+    (-2.0944, -1.74533, -1.39626, -1.0472, -0.698132, -0.349066, -0.174533)
+    + (0.197344, 0.337395, 0.490178, 1.52146, 2.0944),
+    (-0.0032, 0.00179, 0.00411, 0.0041, 0.00212, -0.001, -0.0031)
+    + (-0.005227, -0.005435, -0.005574, -0.005435, -0.00525),
+)
+DOWN = (
+    (-2.0944, -1.22173, -0.523599, -0.349066, -0.174533, 0.159149, 2.0944),
+    (-0.4226, -0.4082, -0.399, -0.3976, -0.3966, -0.395264, -0.396),
+)
+
+
+def table(kind, x, y):
+    return tagged(kind, texts(x=x, y=y))
+
+
+def scaled(function, by):
+    return tagged("MultiplierFunction", f"<function>{function}</function><scale>{by}</scale>")
+
+
+def bent(function):
+    """A hinge and a slide that follows."""
+    axes = axis("rotation1", (0, 0, 1), line(1, 0), "q"), axis("translation1", X, function, "q")
+    return model("a", [custom(coordinate("q"), *axes)])
+
+
+X, Y = (1, 0, 0), (0, 1, 0)
+
+
+def test_knee_of_splines_moves_by_its_table(write):
+    """From where it is bent in the file, past the end of its table."""
+    axes = (
+        axis("rotation1", (0, 0, 1), line(1, 0), "q"),
+        axis("translation1", X, table("SimmSpline", *FORWARD), "q"),
+        axis("translation2", Y, scaled(table("SimmSpline", *DOWN), 0.5), "q"),
+    )
+    case = load(
+        write(model("a", [custom(coordinate("q", -0.4), *axes)])),
+        Supplied(drive=("q:-0.3:-2.5:12",)),
+    )
+    found = solution(case).bodies["a"]
+    forward, down = (through(np.transpose(each)) for each in (FORWARD, DOWN))
+    size = np.linalg.norm(C[0])
+    for k, q in enumerate(np.linspace(-0.3, -2.5, 12)):
+        (x, v, a), (y, w, b) = forward(q), down(q)
+        inverse = np.linalg.inv(transform(*C))
+        place = transform(*P) @ transform((x, 0.5 * y, 0), (0, 0, q)) @ inverse
+        assert np.allclose(found.r[k], place[:3, 3], rtol=0, atol=EXACT)
+        # at one radian a second, of a point at rest in the hinge's frame
+        turn = transform(*P)[:3, :3]
+        arm = transform(angles=(0, 0, q))[:3, :3] @ inverse[:3, 3]
+        spin = np.cross((0, 0, 1), arm)
+        speed = turn @ (np.array([v, 0.5 * w, 0]) + spin)
+        bend = turn @ (np.array([a, 0.5 * b, 0]) + np.cross((0, 0, 1), spin))
+        assert np.allclose(found.v[k, :3], speed, rtol=0, atol=1e-12 * size)
+        assert np.allclose(found.a[k, :3], bend, rtol=0, atol=1e-11 * size)
+
+
+def test_coordinate_of_splines_alone_turns_with_its_coupler(write):
+    """As of a patella: it has no axis of its own, and follows the knee's."""
+    axes = (
+        axis("rotation3", (0, 0, 1), table("SimmSpline", *DOWN), "beta"),
+        axis("translation1", X, table("SimmSpline", *FORWARD), "beta"),
+    )
+    knee = joint("PinJoint", "K", "", "b", coordinate("A"))
+    tie = coupler("A", "beta", line(1, 0))
+    case = load(
+        write(model("ab", [knee, custom(coordinate("beta"), *axes)], tie)),
+        Supplied(drive=("A:0:-1.5:4",)),
+    )
+    found = solution(case)
+    forward, down = (through(np.transpose(each)) for each in (FORWARD, DOWN))
+    for k, q in enumerate(np.linspace(0, -1.5, 4)):
+        motion = transform((forward(q)[0], 0, 0), (0, 0, down(q)[0]))
+        place = transform(*P) @ motion @ np.linalg.inv(transform(*C))
+        assert np.allclose(found.bodies["a"].r[k], place[:3, 3], rtol=0, atol=1e-12)
+
+
+def test_tables_on_a_line_are_lines(write):
+    for kind in ("SimmSpline", "PiecewiseLinearFunction"):
+        tree = read_tree(write(bent(table(kind, (-1, 0, 0.5), (-2.5, -0.5, 0.5)))))
+        (tie,) = tree.ties
+        assert tie.is_linear
+        assert tie.weights == {"knee.translation1": 1.0, "q": -2.0}
+
+
 def coupler(leaders, follower, function, scale=""):
     return tagged(
         "CoordinateCouplerConstraint",
@@ -181,9 +272,13 @@ PINS = [
             lambda a: -2 * a - 0.2,
         ),
         (coupler("A", "B", SQUARE), lambda a: 0.3 * a * a + 0.2 * a + 0.1),
+        (
+            coupler("A", "B", table("SimmSpline", *DOWN), "<scale_factor>-1</scale_factor>"),
+            lambda a: -through(np.transpose(DOWN))(a)[0],
+        ),
         (coupler("A C", "B", line(2, 3, 0.1)), lambda a: 2 * a + 0.9 + 0.1),
     ],
-    ids="line scaled curve two".split(),
+    ids="line scaled curve spline two".split(),
 )
 def test_coupled_coordinate_follows(write, tie, law):
     """From where the file has it to where the coupler wants it, at the start and later."""
@@ -260,12 +355,18 @@ REFUSED = {
         "is a PointOnLineConstraint, expected one of PointConstraint",
     ),
     "spline": (
-        model("a", [custom(coordinate("q"), axis("rotation1", (1, 0, 0), "<SimmSpline/>", "q"))]),
-        "is a SimmSpline, a curve for which there is no joint",
+        model("a", [custom(coordinate("q"), axis("rotation1", (1, 0, 0), "<GCVSpline/>", "q"))]),
+        "is a GCVSpline, a curve for which there is no joint",
     ),
-    "no own axis": (
-        model("a", [custom(coordinate("q"), axis("rotation1", (1, 0, 0), line(2, 0), "q"))]),
-        "moves no axis of its joint as much as itself",
+    "points": (bent(table("SimmSpline", (0, 1), (0, 1, 2))), "<y>: found '0 1 2', expected 2"),
+    "order": (bent(table("SimmSpline", (0, 1, 1), (0, 1, 2))), "1.0 follows 1.0; the first"),
+    "corners": (
+        bent(table("PiecewiseLinearFunction", (0, 1, 2), (0, 1, 0))),
+        "has corners, where velocities jump, expected points on one line; give a SimmSpline",
+    ),
+    "no axis": (
+        model("a", [custom(coordinate("q"), axis("rotation1", (1, 0, 0)))]),
+        "moves no axis of its joint, expected one",
     ),
     "frame": (
         model("a", [joint("PinJoint", "j", "b", "a")]),
@@ -344,3 +445,37 @@ def test_older_documents_are_brought_up_to_date(write):
     expected = expected @ transform((0, 0, -2))
     assert np.allclose(placed(tree, "a"), expected, rtol=0, atol=EXACT)
     assert tree.moves["q"].value == 0.3
+
+
+@pytest.mark.parametrize("to", ["osim", "mjcf", "urdf", "sdf"])
+def test_exports_keep_limits(write, tmp_path, to):
+    """From a start at which they count from another zero; a slide too."""
+    clamped = [texts(range=each, clamped="true") for each in ((-0.5, 0.75), (-0.1, 0.3))]
+    joints = [
+        joint("PinJoint", "A", "", "a", coordinate("A", 0.2, clamped[0])),
+        joint("SliderJoint", "B", "a", "b", coordinate("B", 0.05, clamped[1])),
+    ]
+    case = load(write(model("ab", joints)), Supplied(drive=("A:0.2:0.6:3",), hold=("B",)))
+    zeros = {"osim": (0.0, 0.0), "mjcf": (0.0, 0.0), "urdf": (0.2, 0.05), "sdf": (0.4, 0.05)}[to]
+    files = written(case, adapters.writer(to), 0.4)
+    file = write(next(text for end, text in files.items() if end != ".constraints.json"), f"w.{to}")
+    found = undriven_file(file).coordinates
+    for name, limits, zero in zip("AB", ((-0.5, 0.75), (-0.1, 0.3)), zeros, strict=True):
+        limit = found[name].limit
+        assert (limit.lower + zero, limit.upper + zero) == pytest.approx(limits, abs=1e-12)
+
+
+def test_start_or_drive_beyond_limits_is_noted(write):
+    bounded = texts(range=(-0.5, 0.75), clamped="true")
+    joints = [
+        joint("PinJoint", x, "", x.lower(), coordinate(x, v, bounded))
+        for x, v in (("A", 0.0), ("B", 0.9), ("C", 0.75))
+    ]
+    file = write(model("abc", joints))
+    case = load(file, Supplied(drive=("A:0:1:5",), hold=("B", "C")))
+    (note,) = (each for each in case.assembly if "beyond their limits" in each)
+    assert note == (
+        "joints beyond their limits: A at 0 to 1, limits -0.5 to 0.75; B at 0.9, limits -0.5 to"
+        " 0.75"
+    )
+    assert "beyond" not in " ".join(load(write(model("a", joints[:1])), DRIVE).assembly)

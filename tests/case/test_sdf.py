@@ -291,3 +291,15 @@ def test_a_ring_of_included_models_is_refused(tmp_path: Path):
     text = FOUR_BAR.replace("</model>", "<include><uri>model.sdf</uri></include></model>")
     with pytest.raises(CaseError, match="found more than 100 includes, or a ring of them"):
         load(model(tmp_path, text), DRIVE)
+
+
+def test_empty_moments_of_inertia_are_the_defaults(tmp_path: Path):
+    """As of Gazebo's four-bar, split and fixed."""
+    inertia = "<ixx>2</ixx><iyy></iyy><izz>2.5</izz><ixy></ixy>"
+    text = (
+        '<sdf version="1.5"><model name="m"><link name="a"><inertial><mass>3</mass>'
+        f"<inertia>{inertia}</inertia></inertial></link></model></sdf>"
+    )
+    (mass,) = read_tree(model(tmp_path, text)).masses["a"]
+    assert mass.mass == 3.0
+    assert mass.inertia.tolist() == [[2, 0, 0], [0, 1, 0], [0, 0, 2.5]]

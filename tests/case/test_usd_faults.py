@@ -64,6 +64,20 @@ REFUSED = {
         prim("PhysxPhysicsAttachment", "k", lines=["rel actor0 = </r/a>", "rel actor1 = </r/b>"]),
         "may join bodies a, b",
     ),
+    "couples joints": (
+        prim("Scope", "k", lines=["rel one = </r/j>", "rel two = </r/i>"])
+        + "\n"
+        + joint("Revolute", "i", "", "b"),
+        "<" + "/r/k>: of type Scope may couple joints i, j by one, two and is not read",
+    ),
+    "third body": (
+        joint("Revolute", "k", "a", "b", *[(0, 0, 0)] * 2, "rel cable:body2 = </r/a>"),
+        "of type PhysicsRevoluteJoint may join bodies a by cable:body2",
+    ),
+    "leader without schema": (
+        joint("Revolute", "k", "a", "b", *[(0, 0, 0)] * 2, "rel newton:mimicJoint = </r/j>"),
+        "may couple joints j by newton:mimicJoint",
+    ),
     "tendon": (
         joint("Revolute", "k", "a", "b", apis="PhysxTendonAxisRootAPI:t"),
         "PhysxTendonAxisRootAPI:t, which may couple",

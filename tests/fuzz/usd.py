@@ -10,6 +10,7 @@ LONGEST = 6000
 WORDS = (
     *(*IN_BODY, *IN_JOINT, *TYPES, GENERIC, ROD, "true", "false", "inf", "-inf", "nan", "0.5"),
     *("PhysicsRigidBodyAPI", "PhysicsMassAPI", "PhysicsLimitAPI", "PhysxMimicJointAPI", "Cube"),
+    *("MjcEqualityJointAPI", "mjc:target", "mjc:coef2"),
     *("NewtonMimicAPI", "PhysicsCollisionAPI", "rotX", "rotY", "rotZ", "transX", "angular", "low"),
     *("over", "class", "def", "rel", "float", "double3", "quatf", "token", "custom", "None"),
     *("</r/a>", "</r/A>", "</>", "@m.usda@", "timeSamples", "matrix4d", "xformOp:transform"),

@@ -22,6 +22,7 @@ from kincheck.core import (
     Revolute,
 )
 from kincheck.core.case.joint_probe import probes
+from kincheck.core.errors import SolveError
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import constraints, frames
 from kincheck.core.kinematics.one_design import solve
@@ -108,7 +109,16 @@ def test_strut_agrees_with_its_printed_reference():
                     )
 
 
-@pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
+PROVED = [case for case in probes() if case.name != "spline"]
+
+
+def test_splines_have_no_proofs_and_are_refused():
+    (case,) = (case for case in probes() if case.name == "spline")
+    with pytest.raises(SolveError, match="has pieces, and proofs know none"):
+        proved(case.mechanism, case.sweep.driver, case.sweep.change[:1])
+
+
+@pytest.mark.parametrize("case", PROVED, ids=lambda case: case.name)
 def test_every_joint_type_is_proved(case):
     """Velocities and accelerations here come from the residuals alone; the native ones from rows,
     nu and gamma.

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kincheck import adapters
 from kincheck.core import (
-    Polynomial,
     RackPinion,
     Screw,
 )
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.joint_probe import probes
+from kincheck.core.joints import Follower
 
 from ..support.mechanisms import four_bar, mcpherson, placed, slider_crank
 from .test_equivalence import LIMITS, NATIVE, STROKES, TURNS, assert_same, motion, with_all_of_them
@@ -45,7 +45,7 @@ def mirrored(mechanism):
         replace(each, radius=-each.radius)
         if isinstance(each, RackPinion)
         else each.in_units(1.0, -1.0)
-        if isinstance(each, Polynomial)
+        if isinstance(each, Follower)
         else each
         for each in m.couplers
     ]

@@ -36,9 +36,7 @@ from kincheck.core.studies.truth.motion import (
 from kincheck.core.studies.truth.proofs import distance_from_proof
 from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 
-POLYNOMIAL = "polynomial"
-EVERY = {case.name: case for case in probes()}
-PROBES = {name: case for name, case in EVERY.items() if name != POLYNOMIAL}
+PROBES = {case.name: case for case in probes()}
 CRANK, ROD = 0.3, 1.0
 
 
@@ -70,11 +68,6 @@ def test_jacobian_and_curvature_equal_differences(name):
     assert np.abs(rows.beyond(at, rates) - second)[others].max() < 1e-6
 
 
-def test_a_polynomial_coupler_has_no_truth_and_is_refused():
-    with pytest.raises(NotStatedError, match="no polynomial conditions"):
-        followed(EVERY[POLYNOMIAL])
-
-
 @pytest.mark.parametrize("name", PROBES)
 def test_every_joint_type_moves_as_in_the_native_solver(name):
     """That one is held to the paper's equations elsewhere; here it is the other way round: the same
@@ -85,6 +78,16 @@ def test_every_joint_type_moves_as_in_the_native_solver(name):
     truth = followed(case)
     assert (truth.reach == Reach.REACHED).all()
     assert worst(truth, {name: motion.position for name, motion in found.points.items()}) < 1.0
+
+
+@pytest.mark.parametrize("name", ["polynomial", "spline"])
+def test_curves_have_their_rates_and_accelerations(name):
+    """Against the native solver, whose curves other tests hold to closed forms."""
+    case = PROBES[name]
+    found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
+    for point, (_, v, a) in followed(case).points.items():
+        np.testing.assert_allclose(v.astype(float), found.points[point].velocity, atol=1e-12)
+        np.testing.assert_allclose(a.astype(float), found.points[point].acceleration, atol=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -2,17 +2,20 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from kincheck.core.joints import (
     Coupler,
     Cylindrical,
+    Follower,
     Gear,
     Joint,
     Polynomial,
     RackPinion,
     Revolute,
     Screw,
+    Spline,
     Translational,
 )
 from kincheck.core.mechanism.body import Body
@@ -26,6 +29,7 @@ from kincheck.core.mechanism.motions import (
 )
 
 from ..oracles import free_bodies
+from .splines import through
 
 GRAVITY = (0.7, -2.0, -9.3)
 TIMES = np.array([0.0, 0.35, -0.8, 1.7])
@@ -50,16 +54,23 @@ class Swing(Motion):
 
 @dataclass(frozen=True)
 class Following(Motion):
-    """A polynomial of another motion."""
+    """A polynomial of another motion, or the spline through points."""
 
     of: Motion
-    law: tuple[float, ...]
+    law: tuple[Any, ...]
 
     def at(self, t):
         y, v, a = self.of.at(t)
-        law = np.polynomial.Polynomial(self.law)
-        slope, bend = law.deriv(1)(y), law.deriv(2)(y)
-        return law(y), slope * v, slope * a + bend * v * v
+        value, slope, bend = np.vectorize(function(self.law))(y)
+        return value, slope * v, slope * a + bend * v * v
+
+
+def function(law):
+    """Value and derivatives of a polynomial, or of the spline through points."""
+    if not isinstance(law[0], float):
+        return through(law)
+    value = np.polynomial.Polynomial(law)
+    return lambda x: (value(x), value.deriv(1)(x), value.deriv(2)(x))
 
 
 @dataclass(frozen=True)
@@ -76,21 +87,21 @@ class Link:
 @dataclass(frozen=True)
 class Coupling:
     """A coupler type between two coordinates, each the number of a link and a freedom: the driven
-    is law(driving), a polynomial; the driver is at either.
+    is law(driving), a polynomial or a spline; the driver is at either.
     """
 
     kind: type[Coupler]
     driven: tuple[int, str]
     driving: tuple[int, str]
-    law: tuple[float, ...]
+    law: tuple[Any, ...]
     drive_driven: bool = False
 
     @property
     def coupler(self):
         one, other = (f"j{link}" for link, _ in (self.driven, self.driving))
-        if self.kind is Polynomial:
+        if issubclass(self.kind, Follower):
             freedoms = self.driven[1], self.driving[1]
-            return Polynomial("coupler", (one, other), self.law, freedoms=freedoms)
+            return self.kind("coupler", (one, other), self.law, freedoms=freedoms)
         pair = (other, one) if self.kind is RackPinion else (one, other)
         return self.kind("coupler", pair, self.law[1])
 
@@ -113,7 +124,7 @@ class Chain:
                 (f"j{link}", freedom)
                 for link, freedom in (self.coupling.driven, self.coupling.driving)
             )
-            slope = np.polynomial.Polynomial(self.coupling.law).deriv()(moved[other][0])
+            slope = function(self.coupling.law)(moved[other][0])[1]
             loads = [{one: 1.0, other: -slope}]
         return free_bodies.forces(self.mechanism, moved, loads)
 
@@ -231,6 +242,7 @@ def pushed_slide(link):
 
 T, R = "translation", "rotation"
 LAW = (0.0, 0.9, 0.15, -0.05, 0.02)
+POINTS = ((-1.3, -0.9), (-0.6, -0.7), (-0.1, -0.2), (0.0, 0.0), (0.4, 0.7), (0.9, 0.8))
 SLIDE, HINGE, CYLINDER = Link(Translational), Link(Revolute), Link(Cylindrical)
 COUPLINGS = {
     "gear": (HINGE, HINGE, Coupling(Gear, (2, R), (3, R), (0.0, -0.8))),
@@ -252,3 +264,7 @@ for one in (T, R):
         COUPLINGS[f"polynomial, {one} by {other}"] = (of[one], of[other], by)
         COUPLINGS[f"polynomial of cylinders, {one} by {other}"] = (CYLINDER, CYLINDER, by)
         COUPLINGS[f"polynomial of screws, {one} by {other}"] = (*screws, by)
+        by = replace(by, kind=Spline, law=POINTS)
+        COUPLINGS[f"spline, {one} by {other}"] = (of[one], of[other], by)
+turned = Link(Revolute, flipped=True), replace(by, driven=(2, T), driving=(3, R))
+COUPLINGS["spline by a turned hinge"] = (SLIDE, *turned)

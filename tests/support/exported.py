@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ..oracles import naive
+from .splines import through
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,11 @@ def _urdf(texts, mechanism, folder):
                     q[model.idx_qs[model.getJointId(each[name])]] for name in ("driven", "driving")
                 )
                 return [driven - np.polynomial.Polynomial(each["coefficients"])(driving)]
+            case "spline":
+                driven, driving = (
+                    q[model.idx_qs[model.getJointId(each[name])]] for name in ("driven", "driving")
+                )
+                return [driven - through(each["points"])(driving)[0]]
 
     def residuals(q):
         pin.framesForwardKinematics(model, data, q)

@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Meta
 
 from ...errors import CaseError, with_article
-from ...joints import Coupler, Joint, LinearCoupler, Polynomial
+from ...joints import Coupler, Follower, Joint, LinearCoupler
 from ...mechanism.body import ACCELERATION, INERTIA, STIFFNESS, checked_inertia
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper, TorsionSpringDamper
 from ...mechanism.mechanism import Body, Mechanism, Point, coordinates
@@ -183,7 +183,7 @@ def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]
     freedoms = {part.name: part.freedoms for part in parts if isinstance(part, Joint)}
     couplers = list[Coupler]()
     for part in parts:
-        if isinstance(part, Polynomial | LinearCoupler):
+        if isinstance(part, Follower | LinearCoupler):
             if "freedoms" not in sections[part.name].table:
                 own = ((*freedoms.get(name, ()), "rotation")[0] for name in part.joints)
                 part = replace(part, freedoms=(*own,))

@@ -30,6 +30,9 @@ LARGEST_TURN = math.pi / 3.0
 Zeros: TypeAlias = Mapping[tuple[str, str], float]
 """Coordinates by joint and freedom [m or rad]."""
 NO_ZEROS: Zeros = {}
+Ranges: TypeAlias = Mapping[tuple[str, str], tuple[float, float]]
+"""Limits by joint and freedom, from the same zeros [m or rad]."""
+NO_RANGES: Ranges = {}
 
 
 class Writer(Protocol):
@@ -41,6 +44,7 @@ class Writer(Protocol):
         way: Mapping[str, BodyMotion],
         start: Mapping[str, float],
         zeros: Zeros = NO_ZEROS,
+        ranges: Ranges = NO_RANGES,
     ) -> Mapping[str, str]:
         """Return the texts of the files, by their endings.
 
@@ -50,6 +54,7 @@ class Writer(Protocol):
                 half a turn.
             start: values of the drivers at the end of the way, as information [m or rad].
             zeros: coordinates at design where they are not zero.
+            ranges: limits of coordinates, counted from the zeros.
 
         Raises:
             KincheckError: the format cannot express a part; the message names the part.
@@ -82,6 +87,7 @@ def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, 
             for output in case.outputs
             if isinstance(output, JointAngle | JointDisplacement) and output.at_design
         },
+        case.ranges,
     )
 
 

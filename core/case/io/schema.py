@@ -28,6 +28,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          [c0, c1, c2, c3, c4], driven = c0 + c1 driving + c2 driving^2 + ...
                          [units of driven by powers of units of driving]; (freedoms), if a joint
                          has several: ["rotation", "translation"], of driven and driving;
+                         spline: joints = [driven, driving], points = [[driving, driven], ...], the
+                         cubic spline of OpenSim's SimmSpline through them, straight beyond;
                          linear_coupler: joints = [first, second, third, ...], factors = [...], one
                          for each: the sum of factors times coordinates stays zero
                          a joint's rotation and displacement: its second body relative to its
@@ -449,6 +451,9 @@ _SHAPES: Mapping[Any, Any] = {
 }
 _OF_JOINTS: Mapping[Any, Any] = {
     "tuple[float, ...]": Numbers,
+    "tuple[tuple[float, float], ...]": Annotated[
+        tuple[tuple[float, float], ...], Meta(description="a table of pairs of numbers")
+    ],
     "tuple[str, str]": Annotated[
         tuple[Literal["rotation", "translation"], Literal["rotation", "translation"]],
         Meta(description='two of "rotation", "translation", of the first and second joint'),

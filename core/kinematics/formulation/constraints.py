@@ -18,7 +18,7 @@ from typing import Any, Never, TypeVar, cast
 from ... import primitives as p
 from ...algebra import ZERO, Scalar, Vec3, vec
 from ...errors import SolveError
-from ...joints import Attachment, AxialJoint, Joint
+from ...joints import Attachment, AxialJoint, Joint, PiecewisePolynomial
 from ...joints.base import unit
 from ...mechanism.mechanism import GROUND, Mechanism, Vector, extent
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
@@ -227,17 +227,21 @@ def _axial(
 
 
 def _relation(
-    owner: str, weights: Mapping[str, float], frame: Frames, curve: Sequence[float] = ()
+    owner: str,
+    weights: Mapping[str, float],
+    frame: Frames,
+    curve: PiecewisePolynomial | None = None,
 ) -> Relation:
     """Convert weights from metres and radians to units and radians, with the largest at one."""
     units = [frame.unit if name.endswith(".translation") else 1.0 for name in weights]
     scaled = [k * unit for k, unit in zip(weights.values(), units, strict=True)]
+    slopes = [*scaled, curve.at(0.0)[1] * units[-1]] if curve else scaled
     # a traced lead is known only later
-    largest = max(abs(k) for k in scaled if hasattr(k, "__abs__"))
+    largest = max(abs(k) for k in slopes if hasattr(k, "__abs__"))
     return Relation(
         owner,
         {name: k / largest for name, k in zip(weights, scaled, strict=True)},
-        curve=tuple(c * units[-1] ** k / largest for k, c in enumerate(curve)),
+        curve=curve and curve.scaled(units[-1], 1.0 / largest),
     )
 
 
@@ -300,7 +304,7 @@ def renamed(
     """
     if isinstance(c, Relation):
         weights = dict(zip(coordinates, c.weights.values(), strict=True))
-        return Relation(owner, weights, c.drive, tuple(c.curve))
+        return Relation(owner, weights, c.drive, c.curve)
     i, j = (bodies.get(body, GROUND) for body in (c.i, c.j))
     return Constraint(owner, c.primitive, i, j, "".join(coordinates))
 

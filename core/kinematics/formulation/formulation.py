@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
 from ...algebra import ZERO, Quat, Scalar, Vec3, cross, rotation_less_identity, vec
+from ...joints import PiecewisePolynomial
 from ...primitives.base import Drive, Pose, Twist
+from ...program import maximum, where_larger
 
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
 """Named vectors that define the configuration (for Cartesian coordinates: displacement and Euler
@@ -106,43 +108,47 @@ class Relation:
     """A row of coordinates: their weighted sum is the drive's value (zero unless driven).
 
     Attributes:
-        curve: coefficients of a polynomial in the last coordinate, the constant first, that is
-            added to the sum; empty for a linear row.
+        curve: a function of the last coordinate that is added to the sum; None for a linear row.
     """
 
     n: ClassVar[int] = 1
     owner: str
     weights: Mapping[str, Scalar]
     drive: Drive = field(default_factory=Drive)
-    curve: Sequence[Scalar] = ()
+    curve: PiecewisePolynomial | None = None
 
     def value(self, x: Sequence[Scalar]) -> Scalar:
         """Return the residual at values of the coordinates."""
         linear = sum((k * each for k, each in zip(self.weights.values(), x, strict=True)), 0.0)
-        return linear + _polynomial(self.curve, x[-1]) - self.drive.c
+        return linear + (_value(self.curve, x[-1], 0) if self.curve else 0.0) - self.drive.c
 
     def slopes(self, x: Sequence[Scalar]) -> dict[str, Scalar]:
         """Return the derivatives by the coordinates."""
         found = dict(self.weights)
         if self.curve:
             last = [*found][-1]
-            found[last] = found[last] + _polynomial(_derived(self.curve), x[-1])
+            found[last] = found[last] + _value(self.curve, x[-1], 1)
         return found
 
     def gamma(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Scalar:
         """Return the right-hand side of the accelerations at values and rates."""
-        bend = _polynomial(_derived(_derived(self.curve)), x[-1])
-        return self.drive.c_tt - bend * (rates[-1] * rates[-1])
+        if not self.curve:
+            return self.drive.c_tt
+        return self.drive.c_tt - _value(self.curve, x[-1], 2) * (rates[-1] * rates[-1])
 
 
-def _polynomial(coefficients: Sequence[Scalar], x: Scalar) -> Scalar:
-    """Return the value of a polynomial, the constant first."""
+def _value(curve: PiecewisePolynomial, x: Scalar, order: int) -> Scalar:
+    """Return the value of a curve, or one of its first two derivatives; traced, it selects the
+    coefficients of the piece of x.
+    """
+    (start, *starts), (powers, *others) = curve.starts, curve.powers
+    for later, each in zip(starts, others, strict=True):
+        beyond = maximum(x - later, 0.0)
+        start = where_larger(beyond, 0.0, later, start)
+        powers = [where_larger(beyond, 0.0, *pair) for pair in zip(each, powers, strict=True)]
+    for _ in range(order):
+        powers = [float(k) * c for k, c in enumerate(powers)][1:]
     found: Scalar = 0.0
-    for c in reversed(coefficients):
-        found = c + x * found
+    for c in reversed(powers):
+        found = c + (x - start) * found
     return found
-
-
-def _derived(coefficients: Sequence[Scalar]) -> Sequence[Scalar]:
-    """Return the coefficients of the derivative of a polynomial."""
-    return [float(k) * c for k, c in enumerate(coefficients)][1:]

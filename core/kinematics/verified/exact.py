@@ -20,6 +20,7 @@ from typing import Any, cast
 
 from ...algebra import Scalar, Vec3, power, quat
 from ...errors import SolveError
+from ...joints import Spline
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Drive
@@ -158,6 +159,12 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
             raise SolveError(
                 f"{force} has a curve or Cardan angles, and proofs know neither; give a stiffness"
                 " and the law 'euler_parameters'"
+            )
+
+    for coupler in mechanism.couplers:
+        if isinstance(coupler, Spline):
+            raise SolveError(
+                f"{coupler} has pieces, and proofs know none; give a polynomial in its place"
             )
 
     def number(value: Any) -> Any:

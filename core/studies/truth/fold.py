@@ -64,17 +64,17 @@ def first_fold(case: Case, stop: float) -> float | None:
 
 def _spot(system: System, poses: Poses, time: float, angles: Real, before: Array) -> _Spot:
     """Return a spot with its tangent in the direction of the previous one."""
-    way = np.linalg.svd(_slopes(system, poses, time))[2][-1]
+    way = np.linalg.svd(_slopes(system, poses, time, angles))[2][-1]
     return _Spot(poses, time, angles, way * np.sign(way @ before))
 
 
-def _slopes(system: System, poses: Poses, time: float) -> Array:
+def _slopes(system: System, poses: Poses, time: float, near: Real) -> Array:
     """Return the derivative of the rows by unknowns and time, shape (rows, unknowns + 1)."""
     rates = system.drives(np.array([time]))[1, :, 0]
     by_time = np.zeros((len(system.rows.owners), 1))
     for (row, size), rate in zip(system.rows.driven, rates, strict=True):
         by_time[row] = -size * float(rate)
-    return np.hstack([system.rows.jacobian(poses)[0], by_time])
+    return np.hstack([system.rows.jacobian(poses, near)[0], by_time])
 
 
 def _next(system: System, at: _Spot, length: float) -> _Spot | None:
@@ -88,6 +88,6 @@ def _next(system: System, at: _Spot, length: float) -> _Spot | None:
         open_by = system.rows.residual(poses, drives, near)[:, 0].astype(np.float64)
         if np.abs(open_by).max() <= CLOSED:
             return _spot(system, poses, time, near, way)
-        square = np.vstack([_slopes(system, poses, time), way])
+        square = np.vstack([_slopes(system, poses, time, near), way])
         step = np.linalg.lstsq(square, np.append(-open_by, 0.0), rcond=None)[0]
     return None

@@ -188,7 +188,7 @@ class System:
         for k, joint in enumerate(rows.turning):
             if joint in self.driving:
                 near[k] = drives[0, self.driving[joint]]
-        inverse = inverted(rows.jacobian(poses))
+        inverse = inverted(rows.jacobian(poses, near))
         last, largest = np.full(poses.samples, np.inf), np.inf
         for _ in range(MOST_STEPS):
             residual = rows.residual(poses, drives[0], near)
@@ -204,14 +204,14 @@ class System:
             before, largest = largest, float(size[good].max())
             # else the old J still gains at least three digits per step
             if largest > 1e-5 or largest > 1e-3 * before:
-                inverse = inverted(rows.jacobian(poses))
-        jacobian = rows.jacobian(poses)
+                inverse = inverted(rows.jacobian(poses, near))
+        jacobian = rows.jacobian(poses, near)
         inverse = inverted(jacobian)
         forced = np.zeros((2, len(rows.owners), poses.samples), dtype=np.longdouble)
         for k, (row, size) in enumerate(rows.driven):
             forced[:, row] = size * drives[1:, k]
         v = by_body(_times(inverse, forced[0]))
-        a = by_body(_times(inverse, forced[1] - rows.beyond(poses, v)))
+        a = by_body(_times(inverse, forced[1] - rows.beyond(poses, v, near)))
         angles = nearest_turn(rows.angles(poses), near)
         return Solved(times, poses, angles, jacobian, inverse, v, a, last)
 

@@ -2,7 +2,8 @@
 extended precision, without simplification.
 
 They share only the meaning of a joint's fields with the tested primitives, rows and programs. A row
-is a sum of terms minus a constant: its value at design, or zero. A term is a product x . y / L of
+is a sum of terms minus a constant: its value at design, or zero; the row of a curve has a function
+of a sum beside it. A term is a product x . y / L of
 two vectors, or the angle from body i to body j about an axis of i. A vector leads from a point of
 body i to a point of body j (s = 1), or it is a direction of body i, of body j or of the ground
 (s = 0). With the arms r from the centres to the points, of a direction a of body i r_i = -a, and of
@@ -34,6 +35,7 @@ from numpy.typing import NDArray
 from ...errors import KincheckError
 from ...mechanism.mechanism import GROUND, Mechanism
 from ...mechanism.motions import JointDriver, PointCoordinate
+from .curves import Function
 
 Real: TypeAlias = NDArray[Any]
 """Array of longdoubles, which numpy's own type hints lose next to a plain number. On x86 they have
@@ -217,6 +219,7 @@ class Rows:
         self.centres = np.stack([NO_ARM, *map(self.place, centres)])
         self.owners, self.turning = list[str](), list[str]()
         self.driven: list[tuple[int, float]] = []
+        self._curves: list[tuple[int, int, float, Function]] = []
         self._constants: Any = []
         self._products: list[tuple[int, tuple[int, int], float, Any, Vector, Vector]] = []
         self._turns: list[tuple[int, int, int, float, tuple[Real, Real, Real]]] = []
@@ -235,6 +238,7 @@ class Rows:
 
     def _write(self) -> None:
         mechanism = self.mechanism
+        curved = list[tuple[int, Any, list[float]]]()
         for joint in mechanism.joints:
             if joint.type not in JOINTS:
                 raise NotStatedError(
@@ -244,13 +248,12 @@ class Rows:
             for condition in JOINTS[joint.type]:
                 condition(Pair(self, joint, *map(self.index, joint.bodies)))
         for coupler in mechanism.couplers:
-            if coupler.curve:
-                raise NotStatedError(
-                    f"{coupler}: the stress truth has no polynomial conditions. Use a linear"
-                    " coupler."
-                )
             row = self.row(coupler.name)
             units = [self.unit if each == "translation" else 1.0 for each in coupler.freedoms]
+            if coupler.curve:
+                self.coordinate(row, mechanism.joint(coupler.joints[0]), coupler.freedoms[0], 1.0)
+                curved.append((row, coupler, units))
+                continue
             largest = max(abs(k) * each for k, each in zip(coupler.weights, units, strict=True))
             for name, freedom, k, each in zip(
                 coupler.joints, coupler.freedoms, coupler.weights, units, strict=True
@@ -270,6 +273,14 @@ class Rows:
                     f"driver {driver.name!r} ({driver.type}): the stress truth cannot drive it"
                 )
             self.driven.append((row, 1.0 if driver.turns else 1.0 / self.unit))
+        # behind all rows, the coordinates that others follow
+        for row, coupler, units in curved:
+            self._constants.append(extended(0.0))
+            behind = len(self._constants) - 1
+            self.coordinate(
+                behind, mechanism.joint(coupler.joints[1]), coupler.freedoms[1], units[1]
+            )
+            self._curves.append((row, behind, units[0], Function.of(coupler)))
 
     def index(self, body: str) -> int:
         """Return the number of a body in poses; zero for a fixed body."""
@@ -336,18 +347,28 @@ class Rows:
             driven: values of the drivers [m or rad], shape (drivers, n).
             near: angles near those of the turns [rad], shape (turns, n).
         """
-        (x, _), (y, _) = self._vectors(poses)
-        found = self._summed(inner(x, y), nearest_turn(self.angles(poses), near))
-        found -= extended(self._constants)[:, None]
+        found = self._values(poses, near)
+        for row, behind, unit, function in self._curves:
+            found[row] -= function.at(found[behind])[0] / unit
         for (row, size), value in zip(self.driven, driven, strict=True):
             found[row] -= extended(size) * value
-        return found
+        return found[: len(self.owners)]
 
-    def jacobian(self, poses: Poses) -> NDArray[np.float64]:
+    def _values(self, poses: Poses, near: Real | None) -> Real:
+        """Return the terms of all rows, and the coordinates that others follow."""
+        (x, _), (y, _) = self._vectors(poses)
+        angles = self.angles(poses)
+        found = self._summed(inner(x, y), angles if near is None else nearest_turn(angles, near))
+        return found - extended(self._constants)[:, None]
+
+    def jacobian(self, poses: Poses, near: Real | None = None) -> NDArray[np.float64]:
         """Return the derivative of the rows by the unknowns in doubles, shape (n, rows,
         unknowns).
+
+        Args:
+            near: as of `residual`; a function of a turn needs it beyond half a turn.
         """
-        rows, n = len(self.owners), poses.samples
+        rows, n = len(self._constants), poses.samples
         found = np.zeros((rows, len(self.centres), 6, n))
         (x, x_arms), (y, y_arms) = self._vectors(poses)
         x, y = (each[:, None] / self._length[..., None, None] for each in (x, y))
@@ -360,23 +381,36 @@ class Rows:
         turns = (self._turn_weight[..., None] * self._carried(poses, self._i, h)).astype(np.float64)
         np.add.at(found[:, :, 3:], (self.turn_rows, self._i), -turns)
         np.add.at(found[:, :, 3:], (self.turn_rows, self._j), turns)
-        return np.ascontiguousarray(np.moveaxis(found[:, 1:].reshape(rows, -1, n), -1, 0))
+        for row, behind, unit, function in self._curves:
+            slope = function.at(self._values(poses, near)[behind])[1] / unit
+            found[row] -= slope.astype(np.float64) * found[behind]
+        found = found[: len(self.owners), 1:].reshape(len(self.owners), -1, n)
+        return np.ascontiguousarray(np.moveaxis(found, -1, 0))
 
-    def beyond(self, poses: Poses, rates: Real) -> Real:
+    def beyond(self, poses: Poses, rates: Real, near: Real | None = None) -> Real:
         """Return the rows' second time derivative minus J times the accelerations, shape (rows, n).
 
         Args:
             rates: of translations and rotations of all bodies, shape (bodies + 1, 6, n).
+            near: as of `jacobian`.
         """
         v, w = rates[:, :3], rates[:, 3:]
         (x, x_arms), (y, y_arms) = self._vectors(poses)
         both = v[self._bodies], w[self._bodies]
         (x_t, x_tt), (y_t, y_tt) = self._x.rates(*both, x_arms), self._y.rates(*both, y_arms)
         h_t = cross(w[self._i], self._carried(poses, self._i, self._axes[2]))
-        return self._summed(
-            inner(x_tt, y) + 2.0 * inner(x_t, y_t) + inner(x, y_tt),
-            inner(h_t, w[self._j] - w[self._i]),
+        spin = w[self._j] - w[self._i]
+        found = self._summed(
+            inner(x_tt, y) + 2.0 * inner(x_t, y_t) + inner(x, y_tt), inner(h_t, spin)
         )
+        if not self._curves:
+            return found
+        h, values = self._carried(poses, self._i, self._axes[2]), self._values(poses, near)
+        once = self._summed(inner(x_t, y) + inner(x, y_t), inner(h, spin))
+        for row, behind, unit, function in self._curves:
+            _, slope, bend = function.at(values[behind])
+            found[row] -= (slope * found[behind] + bend * once[behind] ** 2) / unit
+        return found[: len(self.owners)]
 
     def _vectors(self, poses: Poses) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
         return self._x.at(poses, self._bodies), self._y.at(poses, self._bodies)
@@ -385,7 +419,7 @@ class Rows:
         return a[..., None] + poses.swing(bodies, a)
 
     def _summed(self, products: Real, turns: Real) -> Real:
-        found = np.zeros((len(self.owners), products.shape[-1]), dtype=np.longdouble)
+        found = np.zeros((len(self._constants), products.shape[-1]), dtype=np.longdouble)
         np.add.at(found, self._row, self._weight * products / self._length)
         np.add.at(found, self.turn_rows, self._turn_weight * turns)
         return found

@@ -398,7 +398,7 @@ def _residual(tie: Tie, pose: Pose) -> Array:
     """Return the residuals of a tie [m or rad]."""
     if isinstance(tie, Coupling):
         driven, driving = (_sum(weights, pose) for weights in (tie.driven, tie.driving))
-        return np.array([driven - float(np.polynomial.Polynomial(tie.coefficients)(driving))])
+        return np.array([driven - tie.function.at(driving)[0]])
     first, second = pose.ends(tie)
     apart = second.at - first.at
     if tie.holds == "distance":
@@ -416,8 +416,7 @@ def _slope(tie: Tie, pose: Pose) -> Array:
         for name, k in tie.driven.items():
             found[0, pose.columns[name][0]] += k
         if tie.driving:
-            curve = np.polynomial.Polynomial(tie.coefficients).deriv()
-            slope = float(curve(_sum(tie.driving, pose)))
+            slope = tie.function.at(_sum(tie.driving, pose))[1]
             for name, k in tie.driving.items():
                 found[0, pose.columns[name][0]] -= slope * k
         return found

@@ -32,12 +32,13 @@ from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_n
 from .element import Element
 from .graph import Freedom, Graph, Joint
 from .place import ORIGIN, Place, unit_quaternion, unit_vector
-from .tree import Closure, Coupling, Kind, Move, Tree
+from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
 CONSTRAINTS = ".constraints.json"
 YAML = (".yaml", ".yml")
 LARGEST_FILE = 4_000_000
 SCHEMA = "kincheck-constraints/1"
+RELATIONS = ("linear", "polynomial", "spline")
 # Rounding of exported numbers, relative to the size of the numbers.
 OPEN = 1e-9
 _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
@@ -62,7 +63,9 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A condition of a joint; the fields depend on its kind."""
 
     joint: str
-    kind: Literal["coincident", "distance", "directions", "offset", "linear", "polynomial"]
+    kind: Literal[
+        "coincident", "distance", "directions", "offset", "linear", "polynomial", "spline"
+    ]
     i: End | None = None
     j: End | None = None
     x: Along | None = None
@@ -72,6 +75,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     driven: str = ""
     driving: str = ""
     coefficients: Annotated[list[float], msgspec.Meta(max_length=HIGHEST + 1)] = []
+    points: tuple[tuple[float, float], ...] = ()
 
 
 class BodyFrame(msgspec.Struct, frozen=True):
@@ -254,22 +258,23 @@ def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
 def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:
     groups: dict[str, list[Condition]] = {}
     for each in found.constraints:
-        if each.kind not in ("linear", "polynomial"):
+        if each.kind not in RELATIONS:
             groups.setdefault(each.joint, []).append(each)
     for name, conditions in groups.items():
         _Group(_element(file, name), name, conditions, graph).add()
     names = {*groups}
     for k, each in enumerate(found.constraints, 1):
-        if each.kind not in ("linear", "polynomial"):
+        if each.kind not in RELATIONS:
             continue
         name = each.joint if each.joint not in names else f"{each.joint}.{k}"
         names.add(name)
         element = _element(file, each.joint)
         if each.kind == "linear":
             coupling = Coupling(name, each.weights, {}, (0.0,), element)
-        elif each.coefficients:
+        elif each.coefficients or each.points:
             pair = {each.driven: 1.0}, {each.driving: 1.0}
-            coupling = Coupling(name, *pair, each.coefficients, element)
+            coupling = Coupling(name, *pair, each.coefficients, element, each.points)
+            require_spline(element, each.points)
         else:
             raise element.fault("found no coefficients, expected some; export the case anew")
         graph.couplings.append(coupling)

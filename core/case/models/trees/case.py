@@ -22,6 +22,7 @@ from ....joints import (
     Polynomial,
     Revolute,
     Spherical,
+    Spline,
     Translational,
     linear_relation,
 )
@@ -168,9 +169,14 @@ class _Parts:
                 f" --start count from the model's zero, and are at the start"
                 f" {shortened(values, MOST_NAMED)}"
             )
-        case = Case(
-            tree.file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=(*notes,)
-        )
+        ranges = {
+            (name, FREEDOMS[move.kind]): (move.limit.lower, move.limit.upper)
+            for name, move in tree.joints.items()
+            if isinstance(self.joints.get(name), Revolute | Translational) and move.limit.is_range
+        }
+        notes += self.driving.beyond_limits(tree, digits)
+        name, truth = tree.file.stem, Truth.CONSENSUS_ONLY
+        case = Case(name, source, truth, mechanism, sweep, (), assembly=(*notes,), ranges=ranges)
         dof = degrees_of_freedom(mechanism)
         if dof != len(drivers) or not model.is_exact:
             with explained(tree.file):
@@ -251,21 +257,24 @@ class _Parts:
             return
         name = self._unused(coupling.name)
         if not coupling.is_linear:
-            self.couplers[name] = self._polynomial(coupling, name)
+            self.couplers[name] = self._follower(coupling, name)
             return
         # the weighted sum of the changes of coordinates is zero
         weights = {x: weight for x, weight in coupling.weights.items() if x in free}
         freedoms = [FREEDOMS[self.tree.joints[x].kind] for x in weights]
         self.couplers[name] = linear_relation(name, weights, freedoms)
 
-    def _polynomial(self, coupling: Coupling, name: str) -> Polynomial:
+    def _follower(self, coupling: Coupling, name: str) -> Polynomial | Spline:
         """Return a curve between two moves, by their changes since the pose of the tree."""
         ((driven, a),), ((driving, b),) = coupling.driven.items(), coupling.driving.items()
+        first, second = (FREEDOMS[self.tree.joints[each].kind] for each in (driven, driving))
+        at = b * self.tree.joints[driving].moved
+        if coupling.points:
+            spline = Spline(name, (driven, driving), coupling.points, freedoms=(first, second))
+            return spline.counted_from(coupling.function.at(at)[0], at)
         curve = np.polynomial.Polynomial(coupling.coefficients)
         # a (x0 + x) = p(b (y0 + y)), which holds at x = y = 0
-        argument = np.polynomial.Polynomial([b * self.tree.joints[driving].moved, b])
-        shifted = (curve(argument) / a).coef.tolist()
-        first, second = (FREEDOMS[self.tree.joints[each].kind] for each in (driven, driving))
+        shifted = (curve(np.polynomial.Polynomial([at, b])) / a).coef.tolist()
         return Polynomial(name, (driven, driving), (0.0, *shifted[1:]), freedoms=(first, second))
 
     def _points(self) -> Iterator[Point]:

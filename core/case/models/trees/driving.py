@@ -149,6 +149,23 @@ class Driving:
         """Driven and held hinges and slides, the swept one first."""
         return (*self.driven, *self.held)
 
+    def beyond_limits(self, tree: Tree, near: Mapping[str, float]) -> list[str]:
+        """Return a note on joints that begin or are driven beyond their limits, if there are some.
+
+        Args:
+            near: distance from a limit that counts as on it, by kind of move [rad or m].
+        """
+        found: list[str] = []
+        for name, move in tree.joints.items():
+            lower, upper = move.limit.lower, move.limit.upper
+            values = self.driven.get(name, np.array([move.value]))
+            low, high = float(values.min()), float(values.max())
+            if move.is_axial and (low < lower - near[move.kind] or high > upper + near[move.kind]):
+                reached = f"{low:.9g} to {high:.9g}" if low < high else f"{low:.9g}"
+                found.append(f"{name} at {reached}, limits {lower:.9g} to {upper:.9g}")
+        told = shortened(found, MOST_NAMED, "; ")
+        return [f"joints beyond their limits: {told}"] if found else []
+
 
 def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     """Read --drive and --hold.

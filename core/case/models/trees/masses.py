@@ -216,10 +216,10 @@ class _Masses:
         if not (mass > 0.0 and has_center and has_moments):
             parts = [self._part(body, each, place) for each in colliders]
             whole = together(parts)
-            if not whole.mass > 0.0:
+            if not (whole.mass > 0.0 or (mass > 0.0 and not colliders)):
                 return None
-            mass = mass if mass > 0.0 else whole.mass
-            center, inertia = whole.center, (mass / whole.mass) * whole.inertia
+            mass, share = (mass, mass / (whole.mass or mass)) if mass > 0.0 else (whole.mass, 1.0)
+            center, inertia = whole.center, share * whole.inertia
         else:
             inertia = np.zeros((3, 3))
         if has_center:

@@ -1,8 +1,8 @@
 """OpenSim: models in its XML since version 4; older ones are brought up to date by its own library.
 
 Coordinates are those of OpenSim, by their names. The pose of the file is that of their default
-values. Custom joints turn and slide by lines of their coordinates; other axes may follow by lines
-and polynomials.
+values. Custom joints turn and slide by lines of their coordinates; other axes may follow by
+polynomials and splines.
 
 Conventions: OpenSim 4.6. Angles of frames and of ball, gimbal and free joints are turns about x, y
 and z of the body, one after the other.
@@ -24,6 +24,7 @@ from numpy.polynomial import Polynomial
 from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
 from ....errors import KincheckError
 from ....extras import library
+from ....joints import PiecewisePolynomial, Spline
 from ...io.case_file import LARGEST_FILE
 from ...io.document import fault, read_text, shown
 from .element import Element, parse_xml, words
@@ -31,7 +32,19 @@ from .graph import FramedFreedom, FramedJoint, Graph, Joint, join
 from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .robot_elements import HALFWAY
-from .tree import NO_LIMIT, BushingLaw, Closure, Coupling, Kind, Limit, Move, Spring, Strut, Tree
+from .tree import (
+    NO_LIMIT,
+    BushingLaw,
+    Closure,
+    Coupling,
+    Kind,
+    Limit,
+    Move,
+    Spring,
+    Strut,
+    Tree,
+    require_spline,
+)
 
 VERSION_4 = 40_000
 """Oldest version of documents that are read as they are."""
@@ -54,7 +67,10 @@ AXES = words("translation1 translation2 translation3 rotation1 rotation2 rotatio
 CONSTRAINTS = words(
     "PointConstraint WeldConstraint ConstantDistanceConstraint CoordinateCouplerConstraint"
 )
-FUNCTIONS = words("Constant LinearFunction PolynomialFunction MultiplierFunction")
+FUNCTIONS = (
+    *words("Constant LinearFunction PolynomialFunction MultiplierFunction"),
+    *words("SimmSpline PiecewiseLinearFunction"),
+)
 IN_JOINT = words(
     "socket_parent_frame socket_child_frame coordinates frames components SpatialTransform reverse"
 )
@@ -73,6 +89,8 @@ _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet
 GRAVITY = (0.0, -9.80665, 0.0)
 """Gravity unless given [m/s^2]."""
 DEEPEST_FRAME = 50
+ON_LINE = 1e-12
+"""Distance of points from a line, over the largest value, that rounding in doubles leaves."""
 
 
 def whole_osim(file: Path, root: Element) -> Element:
@@ -295,15 +313,15 @@ class _Reader:
         return FramedFreedom(name, kind, axis, coordinate, self.values[name], limit=limit)
 
     def _custom(self, element: Element, name: str) -> list[FramedFreedom]:
-        """Return the moves of a custom joint: of each coordinate the first axis that it moves as
-        much as itself; other axes follow.
+        """Return the moves of a custom joint: of each coordinate an axis moved as much as itself;
+        other axes follow. One without such an axis turns a hinge, and another one back.
         """
         coordinates = {each.required("name"): each for each in self._coordinates(element, name, 0)}
         space = element.child(SPACE)
         if space is None:
             raise element.fault(f"<{SPACE}>: missing, expected six axes; add it")
         given = {each.required("name"): each for each in space.only("TransformAxis")}
-        curves: dict[str, tuple[str, Polynomial]] = {}
+        curves: dict[str, tuple[str, PiecewisePolynomial]] = {}
         for each in AXES:
             curves[each] = _curve(given[each], coordinates) if each in given else ("", _ZERO)
         leads = {
@@ -311,43 +329,52 @@ class _Reader:
             for each in (*AXES[:3], *AXES[3:])
             if (coordinate := curves[each][0]) and _is_own(curves[each][1])
         }
+        used = {coordinate for coordinate, _ in curves.values()}
         for coordinate, own in coordinates.items():
-            if coordinate not in leads:
-                raise own.fault(
-                    "moves no axis of its joint as much as itself, expected one axis"
-                    " with a line of slope 1 or -1; correct the joint"
-                )
+            if coordinate not in used:
+                raise own.fault("moves no axis of its joint, expected one; correct the joint")
         freedoms: list[FramedFreedom] = []
+
+        def follow(follower: str, kind: Kind, axis: Vec3, of: str, curve: PiecewisePolynomial):
+            own = given.get(follower.removeprefix(f"{name}."), coordinates[of])
+            self.values[follower] = value = curve.at(self._default(coordinates[of]))[0]
+            freedoms.append(FramedFreedom(follower, kind, axis, own, value))
+            self._follow(f"{follower}.curve", follower, of, curve, own)
+
         for k, each in enumerate(AXES):
+            if k == 3:  # a hinge of the coordinate, and one back
+                for free in [x for x in coordinates if x not in leads]:
+                    freedoms.append(self._freedom(coordinates[free], "hinge", X))
+                    follow(f"{free}.back", "hinge", X, free, _polynomial(0.0, -1.0))
             coordinate, curve = curves[each]
             kind: Kind = "slide" if k < 3 else "hinge"
             axis = (X, Y, Z)[k % 3]
             if each in given and (child := given[each].child("axis")) is not None:
                 axis = child.direction(child.text_numbers(3))
-            constant = float(curve.coef[0])
+            constant = curve.powers[0][0]
             if leads.get(coordinate) == each:
                 if constant:
                     freedoms.append(FramedFreedom("", kind, axis, element, constant, stands=True))
-                slope = float(curve.coef[1])
+                slope = curve.powers[0][1]
                 freedoms.append(self._freedom(coordinates[coordinate], kind, slope * axis))
             elif coordinate:
-                value = float(curve(self._default(coordinates[coordinate])))
-                follower = f"{name}.{each}"
-                freedoms.append(FramedFreedom(follower, kind, axis, given[each], value))
-                self.values[follower] = value
-                self._follow(f"{follower}.curve", follower, coordinate, curve, given[each])
+                follow(f"{name}.{each}", kind, axis, coordinate, curve)
             elif constant:
                 freedoms.append(FramedFreedom("", kind, axis, element, constant, stands=True))
         return freedoms
 
     def _follow(
-        self, name: str, follower: str, leader: str, curve: Polynomial, element: Element
+        self, name: str, follower: str, leader: str, curve: PiecewisePolynomial, element: Element
     ) -> None:
         """Let a coordinate follow a curve of another one; the tie is of their changes."""
-        at = self._default_of(leader)
-        changed = curve(Polynomial([at, 1.0])) - self.values[follower]
-        coefficients = [float(x) for x in changed.coef]
-        self.ties.append(Coupling(name, {follower: 1.0}, {leader: 1.0}, coefficients, element))
+        at, value = self._default_of(leader), self.values[follower]
+        coefficients: list[float] = []
+        if not curve.knots:
+            changed = Polynomial(curve.powers[0])(Polynomial([at, 1.0])) - value
+            coefficients = changed.coef.tolist()
+        points = tuple((x - at, y - value) for x, y in curve.knots)
+        pair = {follower: 1.0}, {leader: 1.0}
+        self.ties.append(Coupling(name, *pair, coefficients, element, points))
 
     def _default_of(self, name: str) -> float:
         coordinate = next((x for x in self._all("Coordinate") if x.required("name") == name), None)
@@ -391,7 +418,7 @@ class _Reader:
         if len(functions) != 1:
             raise element.fault("coupled_coordinates_function: expected one function; correct it")
         if len(leaders) == 1:
-            curve = scale * _function(functions[0])
+            curve = _function(functions[0]).scaled(1.0, scale)
             self._follow(name, follower, leaders[0], curve, element)
             return
         if functions[0].tag != "LinearFunction":
@@ -471,15 +498,22 @@ class _Reader:
         self.graph.struts.append(Strut(name, links, places, law, element, element.tag))
 
 
-_ZERO = Polynomial([0.0])
+def _polynomial(*coefficients: float) -> PiecewisePolynomial:
+    """Return a polynomial, the constant first, without zeros at its end."""
+    trimmed = Polynomial(coefficients).trim()
+    return PiecewisePolynomial((0.0,), (tuple(trimmed.coef.tolist()),))
 
 
-def _is_own(curve: Polynomial) -> bool:
+_ZERO = _polynomial(0.0)
+
+
+def _is_own(curve: PiecewisePolynomial) -> bool:
     """Return whether a curve is a line of slope 1 or -1."""
-    return len(curve.coef) == 2 and abs(curve.coef[1]) == 1.0
+    powers = curve.powers[0]
+    return not curve.knots and len(powers) == 2 and abs(powers[1]) == 1.0
 
 
-def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, Polynomial]:
+def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, PiecewisePolynomial]:
     """Return the coordinate of an axis of a custom joint, empty without one, and its curve."""
     names = axis.child_text("coordinates").split()
     around = axis.child("function")
@@ -494,8 +528,9 @@ def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, Poly
             " correct it"
         )
     curve = _function(functions[0])
-    if len(curve.coef) == 1 or not names:
-        if len(curve.coef) > 1:
+    moves = len(curve.powers[0]) > 1
+    if not (moves and names):
+        if moves:
             raise axis.fault("has no coordinate, expected one for its function; add it")
         return "", curve
     if names[0] not in coordinates:
@@ -503,29 +538,48 @@ def _curve(axis: Element, coordinates: Mapping[str, Element]) -> tuple[str, Poly
     return names[0], curve
 
 
-def _function(element: Element) -> Polynomial:
+def _function(element: Element) -> PiecewisePolynomial:
     """Return a function of one coordinate."""
     match element.tag:
         case "Constant":
-            found = Polynomial(element.value("value", 1, (0.0,)))
+            return _polynomial(*element.value("value", 1, (0.0,)))
         case "LinearFunction":
-            found = Polynomial(element.value("coefficients", 2)[::-1])
+            return _polynomial(*element.value("coefficients", 2)[::-1])
         case "PolynomialFunction":
             count = len(element.child_text("coefficients").split())
-            found = Polynomial(element.value("coefficients", max(count, 1))[::-1])
+            return _polynomial(*element.value("coefficients", max(count, 1))[::-1])
         case "MultiplierFunction":
             (scale,) = element.value("scale", 1, (1.0,))
             around = element.child("function")
             inner = [each for each in (around or element).children if each.tag != "scale"]
             if len(inner) != 1:
                 raise element.fault(f"found {len(inner)} functions, expected one; correct it")
-            found = scale * _function(inner[0])
+            found = _function(inner[0]).scaled(1.0, scale)
+            return found if found.knots else _polynomial(*found.powers[0])
+        case "SimmSpline" | "PiecewiseLinearFunction":
+            return _table(element)
         case _:
             raise element.fault(
                 f"is a {element.tag}, a curve for which there is no joint, expected one of"
-                f" {', '.join(FUNCTIONS)}; fit a polynomial"
+                f" {', '.join(FUNCTIONS)}; fit a SimmSpline"
             )
-    return found.trim()
+
+
+def _table(element: Element) -> PiecewisePolynomial:
+    """Return the function through points, a line where they are on one."""
+    count = max(len(element.child_text("x").split()), 2)
+    x, y = (element.value(key, count) for key in "xy")
+    points = tuple(zip(x, y, strict=True))
+    require_spline(element, points)
+    slope = (y[-1] - y[0]) / (x[-1] - x[0])
+    off = max(abs(b - y[0] - slope * (a - x[0])) for a, b in points)
+    if off <= ON_LINE * max(map(abs, y)):
+        return _polynomial(y[0] - slope * x[0], slope)
+    if element.tag == "PiecewiseLinearFunction":
+        raise element.fault(
+            "has corners, where velocities jump, expected points on one line; give a SimmSpline"
+        )
+    return Spline("spline", ("driven", "driving"), points).function
 
 
 def _turn(angles: Sequence[float]) -> Quat:

@@ -26,7 +26,7 @@ from .place import Place, coordinates, turn_of_axes
 from .tree import BushingLaw, Coupling, Spring, Strut
 
 BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
-BUSHING = "drake:linear_bushing_rpy"
+BUSHING, DRAKE_JOINT = "drake:linear_bushing_rpy", "drake:joint"
 # Of the distance of two points, what lies on the line through both.
 ON_LINE = 1e-6
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")

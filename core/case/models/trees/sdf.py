@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from ....algebra import Vec3, X
+from ....algebra import Vec3, X, Y, Z
 from ....errors import CaseError
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
@@ -24,6 +24,7 @@ from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
     BUSHING,
+    DRAKE_JOINT,
     ENTRIES,
     FRICTION,
     LAW,
@@ -78,7 +79,8 @@ IN_WORLD = (
 IN = {"sdf": IN_ROOT, "world": IN_WORLD, "model": IN_MODEL, "link": IN_LINK}
 """Known elements, by the one around them."""
 IN_LIMIT = words("lower upper effort velocity stiffness dissipation")
-_READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT, BUSHING)
+IN_DRAKE = words("drake:parent drake:child drake:damping")
+_READ = (*words("model world link joint frame pose static"), BALL, STRUT, BUSHING, DRAKE_JOINT)
 _COUNTED = words("visual collision sensor light plugin")
 # Three for each body that other models may have.
 MOST_FRAMES = 6_000
@@ -264,7 +266,9 @@ def _mass(element: Element) -> Mass | None:
             return None  # that of its collision shapes
         matrix = element.child("inertia")
         entries = [
-            default if matrix is None else matrix.value(name, 1, (default,))[0]
+            matrix.value(name, 1, (default,))[0]
+            if matrix is not None and matrix.child_text(name)
+            else default
             for name, default in zip(ENTRIES, UNIT, strict=True)
         ]
         (mass,) = element.value("mass", 1, (1.0,))
@@ -343,7 +347,46 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
             joints.append(joint.read(links))
     for gear, links in gears:
         graph.couplings.append(gear.gearbox(links, [*graph.joints, *joints]))
+    for scope, framed in frames.models.items():
+        for element in framed.element.only(DRAKE_JOINT):
+            joints.append(_planar(graph, frames, scope, element))
     return joints
+
+
+def _planar(graph: Graph, frames: Frames, scope: str, element: Element) -> Joint:
+    """Return Drake's planar joint, in the plane of x and y of a frame of the parent.
+
+    Raises:
+        CaseError: it is of another type, or its frames are apart, which Drake would put together.
+    """
+    element.require_known(("name", "type"), "SDF")
+    element.choice("type", ("planar",), "")
+    element.require_children(IN_DRAKE, closed=True)
+    if any(element.value("drake:damping", 3, (0.0, 0.0, 0.0))):
+        graph.tree.count("dynamics of joints")
+    ends: list[str] = []
+    places: list[Place] = []
+    for tag in IN_DRAKE[:2]:
+        full = within(scope, text_of(element, tag))
+        link = frames.link(element, full)
+        ends.append(frames.short(link) if link else graph.add_world())
+        places.append(frames.place(element, full))
+    element.require_two(*ends)
+    apart = places[1].seen_from(places[0])
+    near = 10.0 ** (1 - graph.tree.digits)
+    if apart.at @ apart.at > near**2 or apart.turn.e @ apart.turn.e > near**2:
+        raise element.fault(
+            "its frames are apart in the poses of the links, and Drake puts them together, expected"
+            " one place; correct the pose of the child"
+        )
+    x, y, z = map(places[0].direction, (X, Y, Z))
+    freedoms: list[Freedom] = [
+        (".slide1", "slide", x),
+        (".slide2", "slide", y),
+        (".rotation", "hinge", z),
+    ]
+    name = frames.short(within(scope, element.required("name")))
+    return Joint.of(name, (ends[0], ends[1]), places[0].at, freedoms, element)
 
 
 class _Joint:

@@ -18,7 +18,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ....algebra import ZERO, Vec3, X, Y, Z
-from ....errors import CaseError
+from ....errors import CaseError, MechanismError
+from ....joints import PiecewisePolynomial, Spline
 from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
 from ...io.document import LARGEST, decimal, fault, shown
@@ -173,10 +174,11 @@ class Closure:
 @dataclass(frozen=True)
 class Coupling:
     """Changes of coordinates since the zero pose [rad, m]: a weighted sum, by move, follows a
-    polynomial of another.
+    polynomial or a spline of another.
 
     Attributes:
-        coefficients: from the constant on.
+        coefficients: of the polynomial, from the constant on.
+        points: of the spline in its place, between two moves; see `Spline`.
     """
 
     name: str
@@ -184,11 +186,19 @@ class Coupling:
     driving: Mapping[str, float]
     coefficients: Sequence[float]
     element: Element
+    points: tuple[tuple[float, float], ...] = ()
+
+    @cached_property
+    def function(self) -> PiecewisePolynomial:
+        """The polynomial or spline."""
+        if not self.points:
+            return PiecewisePolynomial((0.0,), (tuple(self.coefficients),))
+        return Spline(self.name, (*self.driven, *self.driving), self.points).function
 
     @property
     def is_linear(self) -> bool:
         """Whether no power above the first takes part."""
-        return not (self.driving and any(self.coefficients[2:]))
+        return not (self.driving and (self.points or any(self.coefficients[2:])))
 
     @property
     def is_curve(self) -> bool:
@@ -208,6 +218,15 @@ class Coupling:
             slope = self.coefficients[1] if len(self.coefficients) > 1 else 0.0
             found[move] = found.get(move, 0.0) - slope * weight
         return {move: weight for move, weight in found.items() if weight}
+
+
+def require_spline(element: Element, points: tuple[tuple[float, float], ...]) -> None:
+    """Raise CaseError at an element whose points, if any, have no spline."""
+    try:
+        if points:
+            Spline("spline", ("driven", "driving"), points)
+    except MechanismError as error:
+        raise element.fault(str(error)) from None
 
 
 Tie: TypeAlias = Closure | Coupling

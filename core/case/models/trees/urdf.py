@@ -27,6 +27,7 @@ from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
     BUSHING,
+    DRAKE_JOINT,
     ENTRIES,
     FRICTION,
     LAW,
@@ -40,7 +41,7 @@ from .robot_elements import (
 from .sdf import Frames, joints_of
 from .tree import NO_LIMIT, WORLD, Kind, Limit, Mass, Move, Tree, limit_of
 
-GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
+GAZEBO, PITCH = "gazebo", "drake:screw_thread_pitch"
 JOINTS, CONSTRAINTS = ("joint", DRAKE_JOINT), ("constraint", "loop_joint")
 READ = ("link", "frame", *JOINTS, *CONSTRAINTS, BALL, STRUT, BUSHING)
 IN_ROBOT = (

@@ -1,4 +1,5 @@
-"""USD: rigid bodies and joints of UsdPhysics, and the mimic joints of PhysX and Newton.
+"""USD: rigid bodies and joints of UsdPhysics, mimic joints of PhysX and Newton, and equalities of
+MuJoCo.
 
 Joints have a frame in each body, and bodies their own places. The frames decide: along a tree of
 joints each body is placed by its joint, whose coordinates are those nearest to its own place. Other
@@ -24,8 +25,18 @@ from .element import Element, words
 from .graph import FramedFreedom, FramedJoint, Graph, join
 from .masses import COLLIDER, masses_of
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
-from .robot_elements import mimic
-from .tree import INFINITE, NO_LIMIT, UNKNOWNS, Closure, Kind, Limit, Move, Tree, limit_of
+from .tree import (
+    INFINITE,
+    NO_LIMIT,
+    UNKNOWNS,
+    Closure,
+    Coupling,
+    Kind,
+    Limit,
+    Move,
+    Tree,
+    limit_of,
+)
 from .usd_stage import UNITS
 
 AXES = {"X": X, "Y": Y, "Z": Z}
@@ -39,8 +50,10 @@ TYPES: Mapping[str, Kind | None] = {
 GENERIC, ROD = "PhysicsJoint", "PhysicsDistanceJoint"
 BODY, DRIVE = "PhysicsRigidBodyAPI", "PhysicsDriveAPI"
 PHYSX_MIMIC, NEWTON_MIMIC = "PhysxMimicJointAPI", "NewtonMimicAPI"
-EQUALITY = "MjcEquality"
-"""Start of schemas of MuJoCo for joints that close loops."""
+MUJOCO_MIMIC = "MjcEqualityJointAPI"
+FOLLOWS = PHYSX_MIMIC, NEWTON_MIMIC, MUJOCO_MIMIC
+CLOSES = {"MjcEqualityConnectAPI", "MjcEqualityWeldAPI"}
+"""Schemas of MuJoCo for joints that close loops."""
 GAINS = ("stiffness", "damping")
 COUPLING = words("Tendon EqualityJoint MimicJoint Gear Rack")
 """In names of schemas that couple joints."""
@@ -59,6 +72,9 @@ _APART = words(
     "collection material proxyPrim skel isaac physics:filteredPairs physics:filteredGroups"
     " physics:simulationOwner"
 )
+_ENDS = "physics:body0", "physics:body1", ":referenceJoint"
+_TARGETS = "newton:mimicJoint", "mjc:target"
+DEGREE = math.radians(1.0)
 EARTH = 9.81
 """Gravity of a scene unless given [m/s^2]."""
 # Axes of a frame in single precision are square to each other within this; more is a shear.
@@ -160,15 +176,16 @@ class _Reader:
         return Place(self.metre * at, turn_of_axes(x, y, z)), sizes
 
     def _require_apart(self) -> None:
-        """Refuse unread prims and schemas by which bodies may be joined, or joints coupled."""
+        """Refuse unread prims, schemas and relationships by which bodies may be joined, or joints
+        coupled.
+        """
         advice = "a joint of UsdPhysics; write it so, or leave it out by --without"
         for path, element in self.prims.items():
             apis = element.attributes["apis"].split()
             coupling = [
                 api
                 for api in apis
-                if api.partition(":")[0] not in (PHYSX_MIMIC, NEWTON_MIMIC)
-                and any(word in api for word in COUPLING)
+                if api.partition(":")[0] not in FOLLOWS and any(word in api for word in COUPLING)
             ]
             if coupling or any(word in element.tag for word in COUPLING):
                 what = coupling[0] if coupling else element.tag
@@ -176,20 +193,28 @@ class _Reader:
                     f"is {what}, which may couple joints and is not read, expected {advice}"
                     f" {element.attributes['name']}"
                 )
-            if path in self.joint_names:
-                continue
-            joined = {
-                body
+            known = path in self.joint_names
+            schemas = {api.partition(":")[0] for api in apis}
+            read = _ENDS if known else ()
+            read += _TARGETS if not schemas.isdisjoint((*FOLLOWS, *CLOSES)) else ()
+            named = {
+                target: key
                 for key, text in element.attributes.items()
                 if text.startswith("/") and key != "path" and not key.startswith(_APART)
-                for body in map(self._body_of, text.split())
-                if body
+                if not key.endswith(read)
+                for target in text.split()
             }
-            joined |= {self._body_of(path)} - {""} if joined else set()
-            if element.tag.endswith("Joint") or len(joined) > 1:
+            joints = {self.joint_names[each] for each in named if each in self.joint_names}
+            bodies = {self._body_of(each) for each in named if each not in self.joint_names}
+            bodies |= {self._body_of(path)} if bodies - {""} and not known else set()
+            bodies -= {""}
+            odd = element.tag.endswith("Joint") and not known
+            if odd or max(len(joints), len(bodies)) > 1 - known:
+                what = "couple joints" if len(joints) > len(bodies) else "join bodies"
+                names = shortened(sorted(joints | bodies), MOST_NAMED)
+                by = f" by {', '.join(sorted({*named.values()}))}" if named else ""
                 raise element.fault(
-                    f"of type {element.tag} may join bodies"
-                    f"{' ' if joined else ''}{shortened(sorted(joined), MOST_NAMED)} and is not"
+                    f"of type {element.tag} may {what}{' ' if names else ''}{names}{by} and is not"
                     f" read, expected {advice} {element.attributes['name']}"
                 )
 
@@ -236,7 +261,7 @@ class _Reader:
                 " in PhysX no axis comes first, which is another joint for large turns"
             )
         closes = element.flag("physics:excludeFromArticulation", default=False)
-        closes = closes or EQUALITY in apis
+        closes = closes or not CLOSES.isdisjoint(apis.split())
         freedoms = [replace(each, limit=self._limit(element, each)) for each in freedoms]
         self.joints[name] = FramedJoint(name, element, links, (f, g), freedoms, closes)
 
@@ -296,7 +321,7 @@ class _Reader:
 
     def _unit(self, kind: Kind) -> float:
         """Return the unit of a coordinate [rad or m]."""
-        return math.radians(1.0) if kind == "hinge" else self.metre
+        return DEGREE if kind == "hinge" else self.metre
 
     def _limit(self, element: Element, freedom: FramedFreedom) -> Limit:
         if freedom.kind == "ball":
@@ -326,13 +351,12 @@ class _Reader:
         """Add mimic joints, and find the motors."""
         followers = set[str]()
         for joint in self.joints.values():
-            for lead, offset, factor in self._mimics(joint):
-                move = self._one_move(joint.element, joint.name)
-                # of coordinates; the tie is of their changes
-                offset += factor * lead.reference - move.reference
-                tie = mimic(move.name, lead.name, offset, factor, joint.element)
+            for lead, powers in self._mimics(joint):
+                move = self._one_move(joint.element, joint.name).name
+                pair = {move: 1.0}, {lead.name: 1.0}
+                tie = Coupling(f"{move}.mimic", *pair, powers, joint.element)
                 self.graph.couplings.append(tie)
-                followers.add(move.name)
+                followers.add(move)
         for joint, move, axis in self._axes():
             said = joint.element.attributes
             gains = [said.get(f"drive:{axis.key}:physics:{each}") for each in GAINS]
@@ -345,8 +369,10 @@ class _Reader:
             for move, axis in zip(self.moves[joint.name], joint.freedoms, strict=True):
                 yield joint, move, axis
 
-    def _mimics(self, joint: FramedJoint) -> Iterator[tuple[Move, float, float]]:
-        """Yield the leader of a joint, its offset [rad or m] and its factor."""
+    def _mimics(self, joint: FramedJoint) -> Iterator[tuple[Move, Sequence[float]]]:
+        """Yield the leader of a joint, and the coefficients by which it follows the leader's change
+        since the pose of the stage [rad, m].
+        """
         element = joint.element
         said, apis = element.attributes, element.attributes["apis"].split()
         ours = [key for key in said if key.endswith(":referenceJoint")]
@@ -372,21 +398,38 @@ class _Reader:
                         " exactly here"
                     )
                 factor = -element.number(f"{start}gearing", 0.0)
-                yield lead, -element.number(f"{start}offset", 0.0) * unit, factor
-            elif name == NEWTON_MIMIC and element.flag("newton:mimicEnabled", default=True):
+                offset = -element.number(f"{start}offset", 0.0) * unit
+            elif name == MUJOCO_MIMIC:
+                key = "mjc:target" if said.get("mjc:target") else "newton:mimicJoint"
+                lead, unit, other = self._lead(joint, key, angle=1.0)
+                # both coordinates count from the stage's pose
+                yield lead, [c * unit / other**k for k, c in enumerate(_equality(element))]
+                continue
+            elif (
+                name == NEWTON_MIMIC
+                and MUJOCO_MIMIC not in apis
+                and element.flag("newton:mimicEnabled", default=True)
+            ):
                 lead, unit, other = self._lead(joint, "newton:mimicJoint")
                 factor = element.number("newton:mimicCoef1", 1.0) * unit / other
-                yield lead, element.number("newton:mimicCoef0", 0.0) * unit, factor
+                offset = element.number("newton:mimicCoef0", 0.0) * unit
+            else:
+                continue
+            move = self._one_move(element, joint.name)
+            yield lead, (offset + factor * lead.reference - move.reference, factor)
 
-    def _lead(self, joint: FramedJoint, key: str) -> tuple[Move, float, float]:
-        """Return the leader of a joint, and the units of both coordinates."""
+    def _lead(
+        self, joint: FramedJoint, key: str, angle: float = DEGREE
+    ) -> tuple[Move, float, float]:
+        """Return the leader of a joint, and the units of both coordinates, of angles as given."""
         element = joint.element
         found = element.attributes.get(key, "").split()
         name = self.joint_names.get(found[0], "") if len(found) == 1 else ""
         if name not in self.joints:
             raise element.unknown_name(key, " ".join(found), self.joint_names, "a joint")
         lead, move = self._one_move(element, name), self._one_move(element, joint.name)
-        return lead, self._unit(move.kind), self._unit(lead.kind)
+        unit, other = (angle if x.kind == "hinge" else self.metre for x in (move, lead))
+        return lead, unit, other
 
     def _one_move(self, element: Element, name: str) -> Move:
         moves = self.moves[name]
@@ -448,6 +491,17 @@ class _Reader:
 def _is_body(element: Element) -> bool:
     enabled = BODY in element.attributes["apis"].split()
     return enabled and element.flag("physics:rigidBodyEnabled", default=True)
+
+
+def _equality(element: Element) -> list[float]:
+    """Return the coefficients of an equality of MuJoCo; Newton's schema, on which it stands, may
+    give the first two.
+    """
+    found: list[float] = []
+    for k, default in enumerate((0.0, 1.0, 0.0, 0.0, 0.0)):
+        base = element.number(f"newton:mimicCoef{k}", default) if k < 2 else default
+        found.append(element.number(f"mjc:coef{k}", base))
+    return found
 
 
 def _short(paths: Sequence[str]) -> dict[str, str]:
