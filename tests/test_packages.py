@@ -39,10 +39,13 @@ def test_no_line_of_a_page_is_too_wide():
 
 
 def test_no_layer_is_too_large():
+    """Readers of foreign models are a layer of their own beside the case that they fill."""
     sizes = Counter()
     for path in SOURCES:
         if path.parts[0] == "core":
-            sizes[folder_of(path).split("/")[0]] += lines(path)
+            folder = folder_of(path)
+            models = folder.startswith("case/models")
+            sizes["case/models" if models else folder.split("/")[0]] += lines(path)
     whole = sum(sizes.values())
     assert {name: n / whole for name, n in sizes.items() if n > LARGEST_SHARE * whole} == {}
 

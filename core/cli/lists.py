@@ -168,6 +168,13 @@ SCHEMAS = {
 """The type of each file, or the function that returns its schema, as modules of core."""
 
 
+def schema_of(name: str) -> dict[str, Any]:
+    """Return the JSON Schema of a file of `SCHEMAS`."""
+    module, _, attribute = SCHEMAS[name].partition(":")
+    found = getattr(import_module(f"...{module}", __name__), attribute)
+    return msgspec.json.schema(found) if isinstance(found, type) else found()
+
+
 @options
 class PrintSchema(Command):
     """Print the JSON Schema of a file, for editors and validators, made from the types of its
@@ -184,10 +191,7 @@ class PrintSchema(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        module, _, name = SCHEMAS[self.name].partition(":")
-        found = getattr(import_module(f"...{module}", __name__), name)
-        schema = msgspec.json.schema(found) if isinstance(found, type) else found()
-        text = msgspec.json.format(msgspec.json.encode(schema), indent=2)
+        text = msgspec.json.format(msgspec.json.encode(schema_of(self.name)), indent=2)
         to_standard_output(text + b"\n")
         return Status.WITHIN
 

@@ -15,7 +15,7 @@ from kincheck.core.case.io.catalogue import case_schema, catalogue, rows_of
 from kincheck.core.case.io.mechanism_sections import DRIVERS
 from kincheck.core.case.io.schema import keys_of
 from kincheck.core.cli import main
-from kincheck.core.cli.lists import SCHEMAS
+from kincheck.core.cli.lists import SCHEMAS, schema_of
 from kincheck.core.errors import CaseError, MechanismError
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Coupler, Joint, Spherical
@@ -158,7 +158,7 @@ OURS = [*CASES, *sorted((DATA / "case_files").glob("*.toml")), *sorted(DATA.glob
 
 
 def validator(name):
-    schema = SCHEMAS[name]()
+    schema = schema_of(name)
     jsonschema.Draft202012Validator.check_schema(schema)
     return jsonschema.Draft202012Validator(schema)
 
@@ -272,7 +272,7 @@ def test_results_and_regressions_are_valid(tmp_path, capfdbinary):
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_command(name, capfdbinary):
     assert main.main(["schema", name]) == 0
-    assert json.loads(capfdbinary.readouterr().out) == json.loads(json.dumps(SCHEMAS[name]()))
+    assert json.loads(capfdbinary.readouterr().out) == json.loads(json.dumps(schema_of(name)))
 
 
 def test_an_unknown_schema_is_named(capsys):

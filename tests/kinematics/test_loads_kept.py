@@ -9,9 +9,9 @@ from kincheck import cases
 from kincheck.adapters.shared.equivalents import in_own_frame, jointed, own_frame
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
-from kincheck.core.kinematics.formulation.constraints import frames
+from kincheck.core.kinematics.formulation.constraints import frames, structure
 from kincheck.core.kinematics.formulation.parameters import placed, places
-from kincheck.core.kinematics.structure.components import components, section
+from kincheck.core.kinematics.structure.components import components, described
 from kincheck.core.kinematics.verified.exact import exact_mechanism
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper
@@ -70,15 +70,17 @@ def test_components_do_not_depend_on_masses():
     light = loaded()
     heavy = replace(light, bodies=[replace(each, mass=7.0) for each in light.bodies], forces=())
 
-    def signatures(mechanism):
-        frame = frames(mechanism)
-        origins = {body.name: body.origin for body in mechanism.moving}
+    def programs(mechanism):
+        """The structure of each component, with its numbers."""
+        parts = components(mechanism, frames(mechanism))
+        every = [each.name for each in mechanism.points], [each.name for each in mechanism.moving]
+        numbers: list[list[float]] = [[] for _ in parts]
+        found = described(mechanism, parts, *every)
         return [
-            section(each, frame.unit, origins, mechanism.points, mechanism.moving).signature
-            for each in components(mechanism, frame)
+            (structure(each.section, own), own) for each, own in zip(found, numbers, strict=True)
         ]
 
-    assert signatures(heavy) == signatures(light)
+    assert programs(heavy) == programs(light)
 
 
 def test_loads_in_the_unit_of_a_small_mechanism():

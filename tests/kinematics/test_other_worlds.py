@@ -19,7 +19,7 @@ from kincheck.core.case.joint_probe import probes
 from kincheck.core.joints import Follower
 
 from ..support.mechanisms import four_bar, mcpherson, placed, slider_crank
-from .test_equivalence import LIMITS, NATIVE, STROKES, TURNS, assert_same, motion, with_all_of_them
+from .test_equivalence import ALL, LIMITS, NATIVE, STROKES, TURNS, assert_same, composed, motion
 
 # Worlds
 
@@ -148,9 +148,7 @@ def test_samples_do_not_depend_on_their_order_nor_on_others(mechanism, values, e
 @settings(derandomize=True, max_examples=8, deadline=None)
 def test_order_and_names_do_not_matter(data):
     base, values = data.draw(
-        st.sampled_from(
-            [(mcpherson(), STROKES), (four_bar(), TURNS), (with_all_of_them(mcpherson()), STROKES)]
-        )
+        st.sampled_from([(mcpherson(), STROKES), (four_bar(), TURNS), (composed(*ALL), STROKES)])
     )
     words = st.text("abcXYZ .-_\u00e9\u03b1", min_size=1, max_size=8)
     count = len(base.bodies) + len(base.joints) + len(base.points)

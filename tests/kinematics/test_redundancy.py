@@ -89,6 +89,7 @@ def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
         state = dict(formulation.design)
         for name in frame.moving:
             turn, pivot, shift = moved[name]
+            shift = np.broadcast_to(shift, (3, 37))
             q, away = (
                 turn[:, sample].astype(float),
                 np.array([*frame.origins[name]]) - pivot.astype(float) / frame.unit,

@@ -253,7 +253,7 @@ class Followed:
 
     def _beyond(self, end: End) -> list[End] | None:
         """Return the next end of the motion beyond an end; None if the motion does not continue."""
-        if end.failure is not FailureKind.LEFT_OFF and end.sigma > NEAR:
+        if end.failure is not FailureKind.LEFT_OFF and end.is_regular(NEAR):
             return None
         here, number = end.time, self._number(end.route)
         side = 1.0 if end.wanted > here else -1.0

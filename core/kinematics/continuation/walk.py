@@ -255,6 +255,11 @@ class End:
         slots = self.route.model.slots
         return float(self.lane[slots[FROM + SIGMA]] / self.lane[slots[FROM + LARGEST_SIGMA]])
 
+    def is_regular(self, part: float) -> bool:
+        """Return whether `sigma` is above a part, even if all singular values were zero."""
+        slots = self.route.model.slots
+        return bool(self.lane[slots[FROM + SIGMA]] > part * self.lane[slots[FROM + LARGEST_SIGMA]])
+
 
 def time_of(model: Model, lane: Array) -> float:
     """Return the time at which a lane stands [s]."""
@@ -338,12 +343,13 @@ class Marcher:
         """Follow one side, after `at` samples, to its last sample; return its end if it ends
         before.
         """
-        side, anew, stops = self.grid.sides[number], True, {}
-        if self.visit:
+        side, anew = self.grid.sides[number], True
+        stops = {side.count: -1}
+        if self.visit:  # the samples to visit, by the number of samples up to each
             place = np.argsort(self.route.by_time)
             passed = {int((place[k] - side.first) * side.step) + 1: k for k in self.visit}
-            stops = {count: passed[count] for count in passed if 1 <= count <= side.count}
-        for stop, sample in sorted(stops.items()) if self.visit else [(side.count, -1)]:
+            stops = {count: passed[count] for count in sorted(passed) if 1 <= count <= side.count}
+        for stop, sample in stops.items():
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
             walk = SideWalk(self, number)

@@ -1,11 +1,9 @@
 """OpenSim: models in its XML since version 4; older ones are brought up to date by its own library.
 
-Coordinates are those of OpenSim, by their names. The pose of the file is that of their default
-values. Custom joints turn and slide by lines of their coordinates; other axes may follow by
-polynomials and splines.
-
-Conventions: OpenSim 4.6. Angles of frames and of ball, gimbal and free joints are turns about x, y
-and z of the body, one after the other.
+Coordinates keep their names, and the pose is that of their default values. Custom joints turn and
+slide by lines of their coordinates; other axes may follow by polynomials and splines. Angles of
+frames and of ball, gimbal and free joints are turns about x, y and z of the body, one after the
+other (OpenSim 4.6).
 """
 
 from __future__ import annotations
