@@ -1,6 +1,6 @@
 """Caches of results for repeated calls; `clear_caches` empties them.
 
-`keep_last` keeps the last results of a function, for the process or for each thread. `ThreadCache`
+`cache_last` keeps the last results of a function, for the process or for each thread. `ThreadCache`
 keeps the data of one object in each thread, such as lanes solved in place, and ends with the
 object. Both are bounded: a new result replaces the least recently used one. `ByContent` makes a
 large argument cheap to find again.
@@ -25,7 +25,7 @@ _results: WeakSet[Any] = WeakSet()
 _lock = Lock()
 
 
-def keep_last(
+def cache_last(
     count: int, *, per_thread: bool = False
 ) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
     """Return a decorator to keep the last results of a function by its hashable arguments.
@@ -44,7 +44,7 @@ def keep_last(
 
 
 def clear_caches() -> None:
-    """Drop the results kept by `keep_last`, in all threads; the next calls compute them again.
+    """Drop the results kept by `cache_last`, in all threads; the next calls compute them again.
 
     Long-running processes free memory by this. Results in use stay valid.
     """

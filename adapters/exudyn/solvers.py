@@ -149,7 +149,7 @@ def limitation_of(case: Case) -> str | None:
             return f"{coupler}: this adapter gives Exudyn's own solvers relations of two joints"
     if case.balance is None and (reason := uneven(case, "Exudyn")) is not None:
         return reason
-    if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
+    if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).starts_at_design:
         return "turns of coupled joints count from the design, where this motion does not begin"
     return None
 

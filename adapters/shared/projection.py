@@ -23,8 +23,8 @@ from ...core.kinematics import (
     LONGEST_TURN,
     ROUNDING,
     Start,
-    continued,
     continuous,
+    is_continuation,
     regular_between,
     solve_from_start,
     start_of,
@@ -304,7 +304,7 @@ class Walk:
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
         change = self.predicted(at, float(dt)) + new.corrected
         everything = continuous(change, new.v, at.v, dt, self.size)
-        return bool(watched & everything) and continued(change, new.v, at.v, dt)
+        return bool(watched & everything) and is_continuation(change, new.v, at.v, dt)
 
     def regular(self, at: Sample, new: Sample) -> bool:
         """Return whether no singular value of the Jacobian can have been zero between two poses."""

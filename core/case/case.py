@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..caches import keep_last
+from ..caches import cache_last
 from ..errors import CaseError, unknown
 from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
@@ -372,7 +372,7 @@ class Case:
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))
 
 
-@keep_last(8)
+@cache_last(8)
 def size(case: Case) -> float:
     """Return the largest extent along a global axis of joints and compared points at design, or the
     largest displacement of a driver [m].
@@ -398,7 +398,7 @@ def turning(case: Case) -> NDArray[np.bool_]:
     )
 
 
-@keep_last(8)
+@cache_last(8)
 def pace(case: Case) -> float:
     """Return the pace of the mechanism [1/s]: the largest rate of a driver over a radian,
     or over the mechanism's size; see `harness.compare`."""

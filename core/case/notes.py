@@ -171,7 +171,7 @@ def size_notes(case: Case) -> Iterator[str]:
     positions = [
         point.position for point in case.mechanism.points if not point.name.startswith(MARKER)
     ]
-    extent = spanned(
+    extent = largest_extent(
         [*positions, *(each for joint in case.mechanism.joints for each in joint.points_on())]
     )
     if extent and (found := MECHANISMS.improbable(extent, length)):
@@ -193,7 +193,7 @@ def size_notes(case: Case) -> Iterator[str]:
             )
 
 
-def spanned(positions: Sequence[Vector]) -> float:
+def largest_extent(positions: Sequence[Vector]) -> float:
     """Return the largest extent of positions along a global axis [m], zero if all coincide but for
     rounding.
     """

@@ -160,7 +160,7 @@ def _solved(case: Case, engine: Engine) -> Record:
     end the tests.
     """
     from ..harness.engine import may_run_here
-    from ..harness.execution import here
+    from ..harness.execution import solve_in_process
     from ..harness.resource_limits import Limits
     from ..harness.run import run
     from ..harness.standard import STANDARD
@@ -168,7 +168,7 @@ def _solved(case: Case, engine: Engine) -> Record:
     from .shared_options import TOL
 
     native = engine.name == STANDARD
-    solver = here if may_run_here(engine) else in_workers(1, Limits())
+    solver = solve_in_process if may_run_here(engine) else in_workers(1, Limits())
     (record,) = run(
         [case],
         [engine],

@@ -497,7 +497,7 @@ def _keeping(
     code = [*options.joint_type, *(type(each).__module__ for each in engines)]
     about |= {"unread": unread, "resume": options.resume, "sources": sources(code)}
     try:
-        if (mistyped or not cases) and not _known(Path(options.history), settings):
+        if (mistyped or not cases) and not _is_in_history(Path(options.history), settings):
             names = shortened(mistyped or unread, MOST_NAMED)
             why = "no such case" if mistyped else "no case could be read"
             return None, [f"{names}: {why}; the run is not in the history"]
@@ -514,7 +514,7 @@ def _keeping(
     return found, []
 
 
-def _known(path: Path, facts: Facts) -> bool:
+def _is_in_history(path: Path, facts: Facts) -> bool:
     """Return whether a history has a run that was asked for the same."""
     from ..history.queries import same
     from ..history.store import Store

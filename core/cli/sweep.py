@@ -421,7 +421,7 @@ def checking_solver(options: Sweep, engine: Engine) -> Solver:
     worker processes for others.
     """
     from ..harness.engine import may_run_here
-    from ..harness.execution import here
+    from ..harness.execution import solve_in_process
     from ..harness.resource_limits import Limits, default_jobs
     from ..harness.workers.distributed import on_cluster
     from ..harness.workers.pool import in_workers
@@ -429,5 +429,5 @@ def checking_solver(options: Sweep, engine: Engine) -> Solver:
     if options.scheduler is not None:
         return on_cluster(options.scheduler, Limits())
     if may_run_here(engine):
-        return here
+        return solve_in_process
     return in_workers(options.jobs or default_jobs(), Limits())

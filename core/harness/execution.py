@@ -171,7 +171,7 @@ Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
 """Solver of pairs: it yields the index and the result of each pair once, in any order."""
 
 
-def here(pairs: Sequence[Pair]) -> Attempts:
+def solve_in_process(pairs: Sequence[Pair]) -> Attempts:
     """Solve the pairs in this process, one after the other.
 
     If an engine crashes or hangs, the whole run does.

@@ -430,7 +430,7 @@ def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
     )
 
 
-def settled(record: Record) -> Record:
+def update_outcome(record: Record) -> Record:
     """Return a record with today's outcome: older files call an uncompared pair a pass."""
     if record.outcome is Outcome.PASS and not record.compared:
         return msgspec.structs.replace(record, outcome=Outcome.UNJUDGED)
@@ -445,4 +445,6 @@ def from_json(text: bytes) -> Results:
         msgspec.DecodeError: not JSON.
     """
     results = msgspec.json.decode(text, type=Results)
-    return msgspec.structs.replace(results, records=[settled(record) for record in results.records])
+    return msgspec.structs.replace(
+        results, records=[update_outcome(record) for record in results.records]
+    )

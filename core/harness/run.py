@@ -16,7 +16,7 @@ from ..errors import CaseError
 from .compare import as_numbers
 from .engine import Engine, untimed
 from .evidence import Evidence, evidence
-from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, here
+from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, solve_in_process
 from .provenance import results, truth_of
 from .record import Deviations, Outcome, Record, Results, Seconds
 from .standard import STANDARD, Standard, has_everything, standard_of
@@ -56,7 +56,7 @@ def run(
     progress: Progress | None = None,
     baseline: Engine | None = None,
     command: str = "",
-    solver: Solver = here,
+    solver: Solver = solve_in_process,
     made: Sequence[Record] = (),
     facts: Mapping[str, Any] | None = None,
     unread: Sequence[str] = (),
@@ -223,7 +223,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
         acceleration=None,
         reason=f"{result.outcome}: {result.message}",
     )
-    return _made(
+    return _make_record(
         case,
         engine,
         facts,
@@ -262,7 +262,7 @@ def _answered(
             1e6 * seconds.own / samples if solved == samples and seconds.own is not None else None
         ),
     }
-    return _made(
+    return _make_record(
         case,
         engine,
         facts,
@@ -284,7 +284,7 @@ def _answered(
     )
 
 
-def _made(case: Case, engine: Engine, facts: Facts, **result: Any) -> Record:
+def _make_record(case: Case, engine: Engine, facts: Facts, **result: Any) -> Record:
     return Record(
         case=case.name,
         truth=truth_of(case),

@@ -83,7 +83,7 @@ def series(rows: Iterable[RunRow]) -> list[list[RunRow]]:
     return found
 
 
-def standing(rows: Sequence[RunRow], good: Collection[int], within: int) -> RunRow | None:
+def choose_state_run(rows: Sequence[RunRow], good: Collection[int], within: int) -> RunRow | None:
     """Return the run for the state of a history: red until the same thing is green.
 
     It is the latest red run at the end of a series; without one, the latest run. The series with

@@ -21,7 +21,7 @@ from ..harness.record import Facts, Record, Results
 from ..harness.results_file import read_results
 from ..harness.run import planned
 from .findings import RunName
-from .queries import NIGHTS, alike, compared, faultless, most_compared, standing
+from .queries import NIGHTS, alike, choose_state_run, compared, faultless, most_compared
 from .store import HistoryError, Pair, RunRow, Store
 
 LAST_GREEN = "last-green"
@@ -64,7 +64,7 @@ class Subject:
 
 def find(name: str | None, store: Store | None) -> Subject:
     """Return the run of a number or of a results.json; for None, the run of the history's state,
-    see `standing`.
+    see `choose_state_run`.
 
     A killed run counts, too: judging the run before it would hide the fault.
 
@@ -86,7 +86,7 @@ def find(name: str | None, store: Store | None) -> Subject:
             )
         return _stored(store, row)
     rows = [row for row in store.runs() if row.status != "running"]
-    row = standing(rows, faultless(store), NIGHTS)
+    row = choose_state_run(rows, faultless(store), NIGHTS)
     if row is None:
         raise KincheckError(
             f"history {store.path}: no run to report; `kincheck run --history {store.path}`"

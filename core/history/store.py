@@ -28,7 +28,7 @@ from typing import Any, Literal, Self, TypeAlias
 import msgspec
 
 from ..harness.provenance import missing, readable, versions
-from ..harness.record import Record, Results, Seconds, settled
+from ..harness.record import Record, Results, Seconds, update_outcome
 from .database import (
     DamagedRunError,
     HistoryError,
@@ -259,7 +259,8 @@ class Store:
                 "SELECT record FROM records WHERE run_id = ?", (run,)
             ).fetchall()
             records = [
-                settled(msgspec.json.decode(zlib.decompress(blob), type=Record)) for (blob,) in rows
+                update_outcome(msgspec.json.decode(zlib.decompress(blob), type=Record))
+                for (blob,) in rows
             ]
         return sorted(
             records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place))

@@ -32,7 +32,7 @@ Describe:
     Ranks, freeing, conditioning, describe_screws   rank, conditioning and screws at a pose
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
-    continued, continuous, regular_between          tests of a step
+    is_continuation, continuous, regular_between    tests of a step
     motion_defects                                  a motion of bodies against the constraints
 
 The folders:
@@ -87,8 +87,8 @@ if TYPE_CHECKING:
     from .formulation.acceptance_criteria import (
         LONGEST_TURN,
         ROUNDING,
-        continued,
         continuous,
+        is_continuation,
         regular_between,
     )
     from .formulation.cartesian import COLUMNS, Cartesian
@@ -136,7 +136,9 @@ _NAMES = {
         "DOUBTFUL agreement followed_angle followed_attitude follower in_doubt near_design"
     ),
     "forces.reactions": "forces_of motion_defects with_forces",
-    "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
+    "formulation.acceptance_criteria": (
+        "LONGEST_TURN ROUNDING is_continuation continuous regular_between"
+    ),
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",

@@ -29,11 +29,11 @@ from ..trajectory import QUANTITIES, Array, PointMotion, as_variables
 from .compiled.compiled_model import Executor, Model
 from .compiled.request import LARGEST, SIGMA, SMALLEST, accept_by
 from .compiled.routes import SAME_TIME, Route, recent_route
-from .continuation.walk import FINER, ROOM, march
-from .formulation.acceptance_criteria import doubtful
+from .continuation.walk import FINER, ROOM, follow_samples
+from .formulation.acceptance_criteria import is_uncertain
 from .formulation.parameters import every_place, placed, places
 from .motion_solver import ONE_PROGRAM
-from .one_design import asked, driving, prepare, start_notes
+from .one_design import driving, parse_solve_arguments, prepare, start_notes
 from .structure.degrees_of_freedom import require_driven
 
 # Steps of the straight way from the design to a start away from it: a sixteenth of it is a step
@@ -113,8 +113,10 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, alone: bool = T
         if not alone:
             messages[k] = "ends at the first step that fails in equal parts too"
             continue
-        found = march(
-            replace(route, design=model.standing(geometry[:, k : k + 1])[:, 0], given=route.begin),
+        found = follow_samples(
+            replace(
+                route, design=model.design_lanes(geometry[:, k : k + 1])[:, 0], given=route.begin
+            ),
             tol,
         )
         kept[:, :, k], solved[:, k] = found.kept[:, route.by_time], found.solved[route.by_time]
@@ -126,9 +128,9 @@ def solve_variants(route: Route, geometry: Array, tol: float, *, alone: bool = T
         kept[:, :, k], solved[:, k], messages[k] = np.nan, False, message
     # by the worst of each variant: to judge all samples takes a twentieth of the time
     for k in np.union1d(
-        failed, np.flatnonzero(doubtful(worst[SIGMA], worst["closure"], tol))
+        failed, np.flatnonzero(is_uncertain(worst[SIGMA], worst["closure"], tol))
     ).tolist():
-        doubted = solved[:, k] & doubtful(sigma[:, k], closure[:, k], tol)
+        doubted = solved[:, k] & is_uncertain(sigma[:, k], closure[:, k], tol)
         if not doubted.any():
             continue
         # what is known of sigma here is an estimate, which is far too small then
@@ -226,13 +228,15 @@ def _together(
     """
     model, count = route.model, geometry.shape[1]
     executor = model.executor(count)
-    closes = model.stand(executor, geometry)
+    closes = model.solve_at_design(executor, geometry)
     accepted_by = accept_by(tol)
     executor.put(
         [model.slots[name] for name in accepted_by], np.array([*accepted_by.values()])[:, None]
     )
-    arrived = np.ones(count, dtype=np.bool_) if route.stands else _lead(executor, route, count)
-    model.depart(executor, route.origin)
+    arrived = (
+        np.ones(count, dtype=np.bool_) if route.starts_at_design else _lead(executor, route, count)
+    )
+    model.set_prediction_start(executor, route.origin)
     # what lanes are predicted from, with what stands between: one stretch is copied in half the
     # time of single slots
     ahead = executor.window(range(min(model.ahead), max(model.ahead) + 1))
@@ -242,7 +246,9 @@ def _together(
     for k, (side, samples) in enumerate(zip(route.sides, route.for_motions(parts), strict=True)):
         if k:
             ahead[:] = start
-        executor.fan(samples, whole, worst, parts * route.below - (side.step < 0), side.step)
+        executor.run_motions(
+            samples, whole, worst, parts * route.count_before_start - (side.step < 0), side.step
+        )
     kept = whole[:, route.ends(parts) if parts > 1 else slice(None), :count]
     if not (arrived & closes).all():
         kept[:, :, ~(arrived & closes)] = worst[:, :count][:, ~(arrived & closes)] = np.nan
@@ -262,11 +268,11 @@ def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
     """Take lanes straight from the design to the start; return which of them arrived."""
     model, last = route.model, route.path.lead_in(route.start)
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
-    model.depart(executor, way.origin)
+    model.set_prediction_start(executor, way.origin)
     found = executor.table(LEAD)
     (side,) = way.sides
     worst = np.repeat(model.plan.best, executor.room, axis=1)
-    executor.fan(way.for_motions()[0], found, worst, side.first, side.step)
+    executor.run_motions(way.for_motions()[0], found, worst, side.first, side.step)
     return ~np.isnan(worst[0, :count])
 
 
@@ -348,7 +354,7 @@ def solve_designs(
         SolveError: there is no such place, a shape is wrong, a number is not finite, or the nominal
             mechanism cannot be solved.
     """
-    path, request = asked(
+    path, request = parse_solve_arguments(
         "solve_designs",
         mechanism,
         driver,

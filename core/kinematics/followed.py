@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import ZERO, Quat, quat, vec
-from ..caches import keep_last
+from ..caches import cache_last
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
@@ -107,13 +107,13 @@ def _is_near(mechanism: Mechanism, path: Path) -> bool:
         return True
     start = start_of(mechanism, path)
     # turns are read from samples as if the design were at time zero
-    if not start.stands or start.time != 0.0:
+    if not start.starts_at_design or start.time != 0.0:
         return False
     return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
 
 
 # asked for each angle and attitude of a motion
-_recent_near = keep_last(8)(_is_near)
+_recent_near = cache_last(8)(_is_near)
 
 
 def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
@@ -138,7 +138,7 @@ def _finer(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     return found
 
 
-_recent = keep_last(32)(_finer)
+_recent = cache_last(32)(_finer)
 
 
 def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> tuple[Array, bool]:
@@ -170,7 +170,7 @@ def _lead(mechanism: Mechanism, path: Path, to: float, part: float) -> Path:
 
 
 # the same for all that is followed along a path
-_recent_fine, _recent_lead = keep_last(4)(_fine), keep_last(4)(_lead)
+_recent_fine, _recent_lead = cache_last(4)(_fine), cache_last(4)(_lead)
 
 
 def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
@@ -185,7 +185,7 @@ def _solved(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajec
     return prepare_motion(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
 
 
-_recent_motion = keep_last(2)(_solved)
+_recent_motion = cache_last(2)(_solved)
 
 
 def _sorted(path: Path, start: float) -> Array:

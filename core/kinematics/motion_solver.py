@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ..caches import keep_last
+from ..caches import cache_last
 from ..errors import SolveError
 from ..failures import FailureKind
 from ..mechanism.mechanism import Mechanism
@@ -89,7 +89,7 @@ def by_blocks(
     def along(path: Path) -> Solver:
         return BlockSweep(lanes, path).solve
 
-    again = keep_last(1)(along)
+    again = cache_last(1)(along)
     return lambda path: (again if path.is_builtin else along)(path)
 
 
@@ -115,4 +115,4 @@ def _lanes(
 
 
 # One only, and of its paths the last: they fill much of the memory. A thread solves it in place.
-_recent_blocks = keep_last(1, per_thread=True)(by_blocks)
+_recent_blocks = cache_last(1, per_thread=True)(by_blocks)

@@ -105,7 +105,7 @@ def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) 
     decides it.
     """
     start = start_of(mechanism, path)
-    if start.stands and not start.ambiguous:
+    if start.starts_at_design and not start.ambiguous:
         return []
     return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
 
@@ -160,7 +160,7 @@ def solve(
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the
             design position, or an argument makes no sense.
     """
-    path, request = asked(
+    path, request = parse_solve_arguments(
         "solve",
         mechanism,
         driver,
@@ -192,7 +192,7 @@ def driving(mechanism: Mechanism, path: Path, driver: str, values: Array) -> Dri
     return Driving(path.times, found, units)
 
 
-def asked(
+def parse_solve_arguments(
     who: str,
     mechanism: Mechanism,
     driver: str,

@@ -94,7 +94,9 @@ class LiveModel(LiveFile):
             KincheckError: there is no such driver.
         """
         begin, mechanism = perf_counter(), self.case.mechanism
-        changes = {name: value - self._known(name).design for name, value in asked.drivers.items()}
+        changes = {
+            name: value - self._driver_named(name).design for name, value in asked.drivers.items()
+        }
         # forces are those at rest
         way = self._way(changes, np.linspace(0.0, 1.0, WAY), SLOW if asked.measured else 1.0)
         sweep = replace(self.case.sweep, values=way.times, rate=0.0 if asked.measured else 1.0)
@@ -149,7 +151,7 @@ class LiveModel(LiveFile):
         Raises:
             KincheckError: there is no such driver.
         """
-        driver = self._known(asked.driver)
+        driver = self._driver_named(asked.driver)
         ends, messages = list[float](), list[str]()
         for end in (driver.low, driver.high):
             way = self._way({driver.name: end - driver.design}, np.linspace(0.0, 1.0, REACH))
@@ -180,7 +182,7 @@ class LiveModel(LiveFile):
         poses = conditioning(self.case.mechanism, way, way.times, (), {}, 2, TOL).poses
         return poses[-1].smallest / poses[0].smallest
 
-    def _known(self, name: str) -> LiveDriver:
+    def _driver_named(self, name: str) -> LiveDriver:
         if name not in self.drivers:
             raise KincheckError(unknown("driver", name, self.drivers))
         return self.drivers[name]

@@ -132,7 +132,9 @@ def ready() -> bool:
     return here is not None and _usable(here)
 
 
-def kept(content: bytes, make: Callable[[], bytes], read: Callable[[bytes], Found]) -> Found:
+def load_or_make(
+    content: bytes, make: Callable[[], bytes], read: Callable[[bytes], Found]
+) -> Found:
     """Return what `read` makes of the cached bytes of a content; make and store them if there are
     none, or none that it can read.
     """

@@ -203,10 +203,10 @@ class NumpyExecutor:
         return self.lanes
 
     def table(self, columns: int) -> Array:
-        """Return an empty output array of `fan`, shape (kept, columns, room)."""
+        """Return an empty output array of `run_motions`, shape (kept, columns, room)."""
         return np.empty((len(self.plan.kept), columns, self.room))
 
-    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
+    def run_motions(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
         """Follow one motion per lane through the same samples, each lane alone.
 
         Args:

@@ -49,8 +49,8 @@ class Plan:
         sampled: slots with a new value at every sample. Those of `extrapolate` are valid for groups
             that begin at a multiple of their lanes.
         behind: number of groups `extrapolate` uses.
-        remembered: slots that `fan` stores at the last `NODES` samples, for `extend`; `follow`
-            stores them of all groups for `extrapolate` but the last.
+        remembered: slots that `run_motions` stores at the last `NODES` samples, for `extend`;
+            `follow` stores them of all groups for `extrapolate` but the last.
         past: first slot of the store: sample k is at position k modulo `NODES`, groups are in
             order.
         carried: slots of a solved lane, and the slots of the next prediction that take their

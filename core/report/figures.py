@@ -132,7 +132,7 @@ def output_figure(
     unit, scale = DISPLAY.get(curves[0][1].unit, (curves[0][1].unit, 1.0))
     drawn = OverDriver(axis)
     if band is not None and not band_is_thin(*band):
-        standard, tolerance = taken(band[0].position, axis.kept, scale), scale * band[1]
+        standard, tolerance = drawn_values(band[0].position, axis.kept, scale), scale * band[1]
         low, high = (
             [None if v is None else v + off for v in standard] for off in (-tolerance, tolerance)
         )
@@ -140,9 +140,9 @@ def output_figure(
     if truth is not None:
         line: Figure = {"width": 6, "color": "rgba(128,128,128,0.45)"}
         named = {"name": REFERENCE, "uid": REFERENCE, "meta": REFERENCE}
-        drawn.add(taken(truth.position, axis.kept, scale), line=line, **named)
+        drawn.add(drawn_values(truth.position, axis.kept, scale), line=line, **named)
     for index, (style, series) in enumerate(curves):
-        values = taken(series.position, axis.kept, scale)
+        values = drawn_values(series.position, axis.kept, scale)
         line = {"width": 2, "color": style.colour, "dash": style.dash}
         drawn.add(values, line=line, name=style.name, uid=style.key, meta=style.name)
         stride = max(len(curves), len(values) // MARKERS)
@@ -181,15 +181,15 @@ def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
     return not known or 2 * tolerance < THIN * (max(known) - min(known))
 
 
-def taken(
+def drawn_values(
     values: Values, kept: Sequence[int], scale: float, digits: int = DIGITS
 ) -> list[float | None]:
     """Return the kept values for drawing, scaled and rounded."""
     # JSON has neither NaN nor infinity; null stands for a value that cannot be drawn.
-    taken = (values[k] if k < len(values) else None for k in kept)
+    chosen = (values[k] if k < len(values) else None for k in kept)
     return [
         float(f"{scale * v:.{digits}g}") if v is not None and math.isfinite(v) else None
-        for v in taken
+        for v in chosen
     ]
 
 
@@ -227,7 +227,7 @@ def error_figure(
             None if a is None or b is None else abs(a - b)
             for a, b in zip(values, standard, strict=True)
         ]
-        errors = taken(off, axis.kept, 1.0)
+        errors = drawn_values(off, axis.kept, 1.0)
         # three digits suffice for an error, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
         curve = style.curve("driver", rounded, width=1.2, size=5)

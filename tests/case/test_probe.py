@@ -16,7 +16,7 @@ from kincheck.core.kinematics.compiled.dense_equations import system_of
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_poses import solve_closely
-from kincheck.core.kinematics.continuation.walk import march
+from kincheck.core.kinematics.continuation.walk import follow_samples
 
 from ..oracles import naive
 
@@ -36,7 +36,7 @@ def smallest_singular_value(case):
     """Of the rows at all samples; an engine's record holds an estimate."""
     route = Route(compile_model(case.mechanism, Request((case.sweep.driver,), ())), case.sweep.path)
     every = range(len(route.path.times))
-    found, system = march(route, 1e-12, visit=every), system_of(route.model)
+    found, system = follow_samples(route, 1e-12, visit=every), system_of(route.model)
     lanes = np.array([found.visited[k] for k in every]).T
     return solve_closely(system, system.state(lanes), route.sampled(route.path.times)).sigma.min()
 

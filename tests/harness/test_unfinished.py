@@ -14,7 +14,7 @@ import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError, KincheckError
-from kincheck.core.harness.execution import here
+from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.findings import Kind
@@ -133,7 +133,7 @@ def test_file_of_interrupted_run_is_reported(path, tmp_path):
 
 def test_interrupted_run_lists_missing_pairs(tmp_path, monkeypatch):
     def stopped(pairs):
-        yield from islice(here(pairs), 1)
+        yield from islice(solve_in_process(pairs), 1)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("kincheck.core.cli.shared_options.solver", lambda *_: (stopped, {}))

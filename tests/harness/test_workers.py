@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from kincheck.core.extras import THREADS
-from kincheck.core.harness.execution import here
+from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
@@ -142,7 +142,7 @@ def test_records_are_the_same_however_many_jobs():
     engines = [Fake(), Fake("missing", installed=None), Slow("native", seconds=0.05)]
     three, one, none = (
         run(cases, engines, tol=TOL, solver=solver).records
-        for solver in (in_workers(3, PATIENT), in_workers(1, PATIENT), here)
+        for solver in (in_workers(3, PATIENT), in_workers(1, PATIENT), solve_in_process)
     )
     assert timeless(three) == timeless(one) == timeless(none)
     assert [each.errors["x"].position.against for each in three if each.engine == "fake"] == [

@@ -9,7 +9,7 @@ from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_samples import scrutinise
-from kincheck.core.kinematics.continuation.walk import march
+from kincheck.core.kinematics.continuation.walk import follow_samples
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.size import ring, tip
 
@@ -159,8 +159,8 @@ def test_scrutiny_of_other_poses_is_not_taken():
     mechanism, _ = torus(2, 2)
     path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
     route = Route(recent_model(mechanism, Request(("turn",), ("tip",))), path)
-    findings = [scrutinise(route, march(route, 1e-12), 1e-12) for _ in range(2)]
+    findings = [scrutinise(route, follow_samples(route, 1e-12), 1e-12) for _ in range(2)]
     assert findings[0] is findings[1]
-    other = march(route, 1e-12)
+    other = follow_samples(route, 1e-12)
     other.kept[route.model.rows["position tip"].start, 3] += 1e-6
     assert scrutinise(route, other, 1e-12) is not findings[0]

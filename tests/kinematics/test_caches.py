@@ -5,7 +5,7 @@ from threading import Thread
 from weakref import WeakSet
 
 import pytest
-from kincheck.core.caches import KEYS, ThreadCache, clear_caches, keep_last
+from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
 
 
 def test_what_was_made_for_a_thread_goes_with_it():
@@ -46,7 +46,7 @@ def test_a_thread_keeps_what_it_used_last():
 def test_a_function_keeps_its_last_results(per_thread):
     made = list[int]()
 
-    @keep_last(2, per_thread=per_thread)
+    @cache_last(2, per_thread=per_thread)
     def ask(key):
         made.append(key)
         return [key]
@@ -67,7 +67,7 @@ def test_clearing_reaches_every_thread(per_thread):
 
     made = WeakSet()
 
-    @keep_last(2, per_thread=per_thread)
+    @cache_last(2, per_thread=per_thread)
     def ask(key):
         found = Large()
         made.add(found)

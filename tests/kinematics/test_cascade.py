@@ -51,7 +51,7 @@ def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
         chain(3),
         Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5)),
     )
-    assert not start_of(chain(3), path).stands
+    assert not start_of(chain(3), path).starts_at_design
     compared(mechanism, path, ("end",))
 
 
@@ -201,8 +201,8 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
     for count in (LANES, 5):  # all that there are, or the last ones are as the last
         going, carrying = (ComponentLanes(chain(3), request) for _ in range(2))
         for lanes in (going, carrying):
-            lanes.stand_at(lanes.design, 1e-12)
-            lanes.depart(0.0, path)
+            lanes.solve_near(lanes.design, 1e-12)
+            lanes.set_prediction_start(0.0, path)
             for first in (0.0, 0.1, 0.2):  # there and back again
                 assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
                 if lanes is going:
@@ -229,8 +229,8 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
         Request(("turn",), ("end",), compiled=compiled),
     )
     lanes, times = ComponentLanes(chain(3), request), np.linspace(0.005, 0.1, LANES)
-    lanes.stand_at(lanes.design, 1e-12)
-    lanes.depart(0.0, path)
+    lanes.solve_near(lanes.design, 1e-12)
+    lanes.set_prediction_start(0.0, path)
     assert len(lanes.parts) == 4
     assert (lanes.attempt(times, path) > 0.0).all()
     np.testing.assert_array_equal(

@@ -204,7 +204,7 @@ def test_motions_of_a_users_own_are_followed_anew(bound):
     request = samples.Request(("stroke",), ("wheel",))
     for number in (1, 2):
         path = Path({"stroke": Mine()}, STROKES)
-        walk.march(samples.recent_route(mcpherson(), request, path), 1e-12)
+        walk.follow_samples(samples.recent_route(mcpherson(), request, path), 1e-12)
         assert len(bound) == number
 
 

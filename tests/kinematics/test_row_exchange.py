@@ -11,7 +11,7 @@ from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation import segments, singular_samples, sweep
 from kincheck.core.kinematics.continuation.segments import Followed, chosen, with_better_rows
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.continuation.walk import SideWalk, march
+from kincheck.core.kinematics.continuation.walk import SideWalk, follow_samples
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp
 
@@ -45,13 +45,13 @@ def test_few_samples_are_tried_in_vain(monkeypatch):
     assert found == [3]
 
 
-def test_a_sample_in_question_only_that_is_not_reached_again_stays(monkeypatch):
+def test_sample_is_kept_if_not_reached_again(monkeypatch):
     monkeypatch.setattr(Followed, "visit", lambda self, samples: {})
-    turn, question = np.append(0.0, DEAD - np.geomspace(1.0, 1e-2, 12)), segments.in_question
+    turn, question = np.append(0.0, DEAD - np.geomspace(1.0, 1e-2, 12)), segments.needs_check
     found = list[int]()
     monkeypatch.setattr(
         segments,
-        "in_question",
+        "needs_check",
         lambda *a, **k: found.append(question(*a, **k).sum()) or question(*a, **k),
     )
     assert solve(locomotive(np.pi / 2.0), "turn", turn).solved.all()
@@ -94,11 +94,11 @@ def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
     """What rows chosen anew make of a pose is near it, or it is another."""
     model = recent_model(loop(), Request(("turn",), ("tracer",)))
     route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.0, 1.5])))
-    lane = march(route, 1e-12, visit={1}).visited[1]
+    lane = follow_samples(route, 1e-12, visit={1}).visited[1]
     standing = with_better_rows(route, lane, route.path, [model])
     assert standing is None  # none are better there
     beside = replace(route, path=Path({"turn": Ramp(1.0)}, np.array([0.0, ALONG - 1e-3])))
-    lane = march(beside, 1e-12, visit={1}).visited[1]
+    lane = follow_samples(beside, 1e-12, visit={1}).visited[1]
     standing = with_better_rows(beside, lane, beside.path, [model])
     assert standing is not None
     before = {name: lane[model.vectors[f"from {name}"]] for name in model.state}
@@ -128,10 +128,10 @@ def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
 def test_a_sample_is_taken_again_only_where_it_is_much_farther_from_singular(part, monkeypatch):
     model = recent_model(loop(), Request(("turn",), ("tracer",)))
     route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.1, 0.2, 0.3])))
-    found = march(route, 1e-12)
+    found = follow_samples(route, 1e-12)
     sigma, other = model.rows[SIGMA].start, np.full_like(found.kept, 7.0)
     other[sigma] = part * found.kept[sigma]
-    monkeypatch.setattr(segments, "march", lambda *_, **__: found._replace(kept=other))
+    monkeypatch.setattr(segments, "follow_samples", lambda *_, **__: found._replace(kept=other))
     whole = Followed(route, found._replace(kept=found.kept.copy()), 1e-12)
     whole._follow(route, np.arange(3))
     assert (whole.found.kept[0] == 7.0).tolist() == [part > 3.0] * 3

@@ -18,8 +18,8 @@ from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.continuation.walk import longest, march
-from kincheck.core.kinematics.formulation.acceptance_criteria import doubtful
+from kincheck.core.kinematics.continuation.walk import follow_samples, longest
+from kincheck.core.kinematics.formulation.acceptance_criteria import is_uncertain
 from kincheck.core.kinematics.one_design import solve
 from mpmath import mp, mpf
 
@@ -53,8 +53,8 @@ def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, mo
         case.mechanism, Request((case.sweep.driver,), case.points, compiled=compiled)
     )
     route, tol = Route(model, case.sweep.path), 2e-13
-    estimates = march(route, tol).kept[model.rows[SIGMA].start]
-    doubted = doubtful(estimates, 0.0, tol)
+    estimates = follow_samples(route, tol).kept[model.rows[SIGMA].start]
+    doubted = is_uncertain(estimates, 0.0, tol)
     assert 0 < doubted.sum() < len(doubted)
     for _ in range(2):
         found = follow(route, tol)

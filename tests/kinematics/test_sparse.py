@@ -105,8 +105,8 @@ def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another()
         [-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14
     )
     lanes = SparseLanes(CRANK, Request(("turn",), ()))
-    lanes.stand_at(lanes.design, 1e-12)
-    lanes.depart(0.0, path)
+    lanes.solve_near(lanes.design, 1e-12)
+    lanes.set_prediction_start(0.0, path)
     here = lanes.anchor(0.0)
     lanes.restore(
         replace(

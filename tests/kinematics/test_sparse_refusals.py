@@ -26,8 +26,8 @@ from .test_sparse import CRANK, X, turning
 
 def test_a_wrong_branch_is_no_solution():
     lanes = SparseLanes(CRANK, Request(("turn",), ()))
-    lanes.stand_at(lanes.design, 1e-12)
-    lanes.depart(0.0, turning(0.0))
+    lanes.solve_near(lanes.design, 1e-12)
+    lanes.set_prediction_start(0.0, turning(0.0))
     # half a turn about x: the axes are parallel, but opposite
     over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
     here = lanes.anchor(0.0)

@@ -210,7 +210,7 @@ def test_a_design_value_that_is_rounding_itself_is_zero_to_a_driver_held_there()
     start = start_of(
         mechanism, Path({**motions, "y": Absolute(Ramp(0.0), mechanism.design_value("y"))}, TIMES)
     )
-    assert (start.time, start.lead, start.stands) == (0.0, None, True)
+    assert (start.time, start.lead, start.starts_at_design) == (0.0, None, True)
 
 
 def test_what_is_exact_is_where_it_was():

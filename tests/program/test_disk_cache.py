@@ -23,7 +23,7 @@ def fail():
 
 
 def kept(make=lambda: b"made"):
-    return disk_cache.kept(b"asked", make, bytes)
+    return disk_cache.load_or_make(b"asked", make, bytes)
 
 
 def found():
@@ -160,7 +160,7 @@ def test_an_entry_that_cannot_be_read_is_made_again(here):
     kept()
     (entry,) = here.iterdir()
     entry.write_bytes(sha256(entry.name.encode() + b"forged").digest() + b"forged")
-    assert disk_cache.kept(b"asked", lambda: b"7", int) == 7
+    assert disk_cache.load_or_make(b"asked", lambda: b"7", int) == 7
     assert found() == b"7"
 
 

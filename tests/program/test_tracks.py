@@ -14,7 +14,7 @@ from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.continuation.walk import march, marcher
+from kincheck.core.kinematics.continuation.walk import follow_samples, marcher
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NumpyExecutor
 from kincheck.core.program.llvm.compiler import available
@@ -55,7 +55,7 @@ def test_the_worst_is_that_of_the_samples_that_are_kept(compiled, sweep, order):
     make, driver, values = SWEEPS[sweep]
     route = route_of(make(), driver, values, compiled=compiled, order=order)
     for _ in range(2):
-        found = march(route, TOL)
+        found = follow_samples(route, TOL)
         assert found.solved.all() == (sweep != "an end on one side")
         closure, leftover, sigma = (
             found.kept[route.model.rows[name].start, found.solved]
@@ -67,7 +67,7 @@ def test_the_worst_is_that_of_the_samples_that_are_kept(compiled, sweep, order):
 @pytest.mark.parametrize("compiled", COMPILED)
 def test_the_worst_of_a_march_before_is_forgotten(compiled):
     route = route_of(mcpherson(), "stroke", np.linspace(0.0, 0.2, 41), compiled=compiled)
-    whole, half = march(route, TOL), march(route, TOL, visit={20})
+    whole, half = follow_samples(route, TOL), follow_samples(route, TOL, visit={20})
     sigma = half.kept[route.model.rows[SIGMA].start, :21]
     assert half.worst[-1] == sigma.min() > whole.worst[-1]
 
@@ -82,7 +82,7 @@ def test_sweeps_of_one_model_leave_each_other_alone(compiled):
     first = follow(route, TOL).points["wheel"]
     was = first.position.copy(), first.acceleration.copy()
     follow(other, TOL)
-    assert not march(route, 1e-19).solved.all()
+    assert not follow_samples(route, 1e-19).solved.all()
     again = follow(route, TOL).points["wheel"]
     assert not np.shares_memory(first.position, again.position)
     for now in (first, again):
@@ -110,12 +110,12 @@ def test_a_route_may_be_swept_by_several_threads(compiled):
 
 def test_interrupted_march_is_made_again(monkeypatch):
     route = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False)
-    first = march(route, TOL)
+    first = follow_samples(route, TOL)
     monkeypatch.setattr(NumpyExecutor, "run", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
-        march(route, TOL)
+        follow_samples(route, TOL)
     monkeypatch.undo()
-    np.testing.assert_array_equal(march(route, TOL).kept, first.kept)
+    np.testing.assert_array_equal(follow_samples(route, TOL).kept, first.kept)
 
 
 @pytest.mark.parametrize("order", [0, 2])
@@ -125,13 +125,13 @@ def test_at_its_end_a_side_stands_where_it_was_followed_to(compiled, order):
     route = route_of(
         mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled, order=order
     )
-    whole = march(route, TOL)
-    visited = march(route, TOL, visit={0, 81, 103, 160}).visited
+    whole = follow_samples(route, TOL)
+    visited = follow_samples(route, TOL, visit={0, 81, 103, 160}).visited
     time = route.model.slots[FROM + TIME]
     assert {k: float(lane[time]) for k, lane in visited.items()} == {
         k: float(route.path.times[k]) for k in (0, 81, 103, 160)
     }
-    again = march(route, TOL)
+    again = follow_samples(route, TOL)
     np.testing.assert_array_equal(again.kept, whole.kept)
 
 

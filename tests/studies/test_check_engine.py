@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.cli import class_loading, main
-from kincheck.core.harness.execution import here
+from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw
 from kincheck.core.studies.checks import check_engine as checking
@@ -43,7 +43,7 @@ def failures(report):
 
 def test_a_sound_engine_passes(few, monkeypatch):
     """Without worker processes: the checks that a faulty engine passes have them."""
-    monkeypatch.setattr(checking, "in_workers", lambda *_: here)
+    monkeypatch.setattr(checking, "in_workers", lambda *_: solve_in_process)
     report = kincheck.check_engine(Sound())
     assert failures(report) == set()
     assert [each.check for each in report.findings] == [

@@ -3,7 +3,7 @@
 import kincheck
 import pytest
 from kincheck.core.case.joint_probe import probe
-from kincheck.core.harness.execution import here
+from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.joints import Screw, Universal
 from kincheck.core.studies.checks import check_engine as checking
 from kincheck.core.studies.checks import engine_cases as force_cases
@@ -15,7 +15,7 @@ from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
 @pytest.fixture(autouse=True)
 def here_alone(monkeypatch):
     """Solved in this process, by two joint types at most."""
-    monkeypatch.setattr(checking, "in_workers", lambda *_: here)
+    monkeypatch.setattr(checking, "in_workers", lambda *_: solve_in_process)
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Universal)])
     monkeypatch.setattr(force_cases, "probes", lambda: [probe(Universal)])
     monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})

@@ -10,7 +10,7 @@ from kincheck import adapters
 from kincheck.cases import load
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
-from kincheck.core.harness.execution import Pair, here
+from kincheck.core.harness.execution import Pair, solve_in_process
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.tolerance.cross_check import Check, chosen, judged
 from kincheck.core.studies.tolerance.study import Study
@@ -47,7 +47,11 @@ def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
     assert chosen(600, 1e-9, 4) == {some}
     at = sorted(picked)[7]
     found = sweep_designs(
-        case, variation, samples=600, seed=4, check=Check(deviating(at), 0.05, here, 1e-12)
+        case,
+        variation,
+        samples=600,
+        seed=4,
+        check=Check(deviating(at), 0.05, solve_in_process, 1e-12),
     )
     assert [each.variant for each in found.checked] == sorted(picked)
     (bad,) = found.deviating
@@ -65,7 +69,9 @@ def test_impossible_check_is_refused_first(tmp_path):
         (Fake("poor", refusal="has no hinge"), "--check poor: unsupported: has no hinge"),
     ):
         with pytest.raises(KincheckError, match=message):
-            sweep_designs(case, variation, samples=10, check=Check(engine, 1.0, here, 1e-12))
+            sweep_designs(
+                case, variation, samples=10, check=Check(engine, 1.0, solve_in_process, 1e-12)
+            )
 
 
 def test_a_check_with_a_simulator_agrees(tmp_path):
@@ -78,7 +84,7 @@ def test_a_check_with_a_simulator_agrees(tmp_path):
         vary(tmp_path, case, **STRUT),
         samples=200,
         seed=6,
-        check=Check(mujoco, 0.02, here, 1e-12),
+        check=Check(mujoco, 0.02, solve_in_process, 1e-12),
     )
     assert len(found.checked) == 4
     assert found.deviating == []
@@ -131,7 +137,9 @@ def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
         monkeypatch.setattr(
             adapters, "engine", lambda name, *mode: liar if name == "mujoco" else known(name, *mode)
         )
-        monkeypatch.setattr("kincheck.core.cli.sweep.checking_solver", lambda options, engine: here)
+        monkeypatch.setattr(
+            "kincheck.core.cli.sweep.checking_solver", lambda options, engine: solve_in_process
+        )
         assert main(command) == 1
         return capsys.readouterr().out
 
@@ -172,7 +180,7 @@ def test_variant_solved_alone_is_no_contradiction(tmp_path):
     end = {"at": case.mechanism.points[0].name, "values": [1.0]}
     # the first is the nominal design
     study = Study(case, vary(tmp_path, case, "one_at_a_time", end=end), 2, 0, 2, 1e-12)
-    (_, found), *_ = here(
+    (_, found), *_ = solve_in_process(
         [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
     )
     assert found.result.solved == 4
@@ -199,7 +207,7 @@ def test_check_names_rows_without_values(tmp_path):
         2,
         1e-12,
     )
-    (_, found), *_ = here(
+    (_, found), *_ = solve_in_process(
         [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
     )
     values = [

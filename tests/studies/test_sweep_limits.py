@@ -19,7 +19,7 @@ from kincheck.core.case.io.case_file import case_text
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.compare import output_series
-from kincheck.core.harness.execution import here
+from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
 from kincheck.core.kinematics import NativeSolver
@@ -520,7 +520,7 @@ def test_force_study_is_linear_in_mass(tmp_path):
         vary(tmp_path, case, **mass),
         samples=20,
         seed=1,
-        check=Check(adapters.engine("native"), 0.05, here, 1e-12),
+        check=Check(adapters.engine("native"), 0.05, solve_in_process, 1e-12),
     )
     assert [each.outcome.value for each in found.checked] == ["pass"]
     torque = found.outputs["crank_torque"]

@@ -18,7 +18,17 @@ from typing import IO, BinaryIO, cast
 
 from ...extras import THREADS
 from ..engine import Engine, may_run_here
-from ..execution import Attempt, Attempts, Facts, Failure, Pair, Solver, bounded, error_text, here
+from ..execution import (
+    Attempt,
+    Attempts,
+    Facts,
+    Failure,
+    Pair,
+    Solver,
+    bounded,
+    error_text,
+    solve_in_process,
+)
 from ..provenance import readable
 from ..record import Outcome
 from ..resource_limits import STARTUP, Limits, default_jobs
@@ -231,7 +241,7 @@ def solver_for(
     """
     if jobs is None:
         jobs = 0 if limits is None and all(map(may_run_here, engines)) else default_jobs()
-    return (in_workers(jobs, limits or Limits()), jobs) if jobs else (here, 0)
+    return (in_workers(jobs, limits or Limits()), jobs) if jobs else (solve_in_process, 0)
 
 
 def in_workers(jobs: int, limits: Limits) -> Solver:

@@ -36,7 +36,7 @@ from ..compiled.request import (
 )
 from ..compiled.solution import Columns
 from ..continuation.singular_poses import SOUND, Anchor, Numbers
-from ..formulation.acceptance_criteria import doubtful
+from ..formulation.acceptance_criteria import is_uncertain
 from ..formulation.constraints import frames, structure
 from ..formulation.state_vectors import samples
 from ..structure.components import Alike, components, described
@@ -204,7 +204,7 @@ class ComponentLanes(Lanes):
             state=True,
         )
         model = compile_model(self.mechanism, request, Alike(first, varied.tolist()))
-        lanes = model.standing(numbers[:, varied].T)
+        lanes = model.design_lanes(numbers[:, varied].T)
         if np.isnan(lanes).any():
             worst = self.parts[members[int(np.isnan(lanes).any(axis=0).argmax())]]
             raise SolveError(
@@ -264,7 +264,7 @@ class ComponentLanes(Lanes):
         for kind, fixed in zip(self.kinds, self._fixed, strict=True):
             fixed[:, [kind.column[name] for name in limits]] = [*limits.values()]
 
-    def depart(self, time: float, path: Path) -> PoseFailure | None:
+    def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`. The rates of the path where the mechanism stands are those of a sample."""
         for kind, fixed in zip(self.kinds, self._fixed, strict=True):
             fixed[:, [kind.column[FROM + TIME], kind.column[EARLIER + TIME]]] = time
@@ -313,9 +313,9 @@ class ComponentLanes(Lanes):
         equations of the whole mechanism do.
         """
         closure, sigma = (self.worst[row, :count] for row in (CLOSURES, SIGMAS))
-        if not doubtful(float(sigma.min()), float(closure.max()), self._tol):
+        if not is_uncertain(float(sigma.min()), float(closure.max()), self._tol):
             return {}
-        at = np.flatnonzero(doubtful(sigma, closure, self._tol))
+        at = np.flatnonzero(is_uncertain(sigma, closure, self._tol))
         state = np.stack([self._state(k) for k in at.tolist()], axis=1)
         sample = self._whole.sampled(self._times[at], path)[0]
         errors = self._whole.error_bounds(state, sample)

@@ -35,7 +35,7 @@ from ..formulation.acceptance_criteria import (
     Block,
     Candidate,
     Limits,
-    doubtful,
+    is_uncertain,
     known_slope,
     least_slope,
     margins,
@@ -287,7 +287,7 @@ class SparseLanes(Lanes):
         """See `Lanes`."""
         self._limits = Limits(*(limits[name] for name in ACCEPT))
 
-    def depart(self, time: float, path: Path) -> PoseFailure | None:
+    def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`."""
         try:
             self._stand(self.sampled(np.array([time]), path)[0])
@@ -508,7 +508,7 @@ class SparseLanes(Lanes):
         """See `Lanes`."""
         found, tol = self._found, self._limits.tol
         closure, sigma = self.worst[CLOSURES, :count], self.worst[SIGMAS, :count]
-        at = np.flatnonzero(doubtful(sigma, closure, tol))
+        at = np.flatnonzero(is_uncertain(sigma, closure, tol))
         errors = self.error_bounds(found.state[:, at], found.sample[:, at])
         return self.refused(at, errors, tol)
 

@@ -27,7 +27,7 @@ from ..continuation.singular_poses import (
     CONTINUED,
     NEARLY,
     Anchor,
-    Passage,
+    PassedSingularity,
     interpolated,
     listed,
     pass_over,
@@ -71,7 +71,7 @@ class Lanes(ABC):
         """
         return self.attempt_at(self.sampled(times, path))
 
-    def stand_at(self, anchor: Anchor, tol: float, *, crossing: bool = False) -> None:
+    def solve_near(self, anchor: Anchor, tol: float, *, crossing: bool = False) -> None:
         """Set the pose before the lanes, the tolerance, and whether a singular pose may be
         crossed.
         """
@@ -87,7 +87,7 @@ class Lanes(ABC):
         """Set the numbers of `ACCEPT`."""
 
     @abstractmethod
-    def depart(self, time: float, path: Path) -> PoseFailure | None:
+    def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """Stand at a time of a path with the rates there, with no step behind."""
 
     @abstractmethod
@@ -297,7 +297,7 @@ class _Run:
         """
         lanes, path, times = self.lanes, side.path, side.times
         left, refused = np.arange(len(times)), list[int]()
-        lanes.stand_at(start, self.tol)
+        lanes.solve_near(start, self.tol)
         came: tuple[Anchor, Anchor | None] | None = None
         while len(left):
             ahead = BlockWalk(lanes, side, left, keep, start, self.tol, watch=watch)
@@ -319,13 +319,13 @@ class _Run:
             start = passed.poses[-1]
             beside = left[np.abs(times[left] - ahead.time) <= abs(start.time - ahead.time)]
             left = left[len(beside) :]
-            lanes.stand_at(start, self.tol)
+            lanes.solve_near(start, self.tol)
             back = BlockWalk(lanes, side, beside[::-1], keep, start, self.tol, watch=watch)
             reached, _ = back.run()
             for each in beside[: len(beside) - reached].tolist()[:BRIDGED]:
                 if not self.interpolate(side, each, ahead.sound, None):
                     refused.append(each)
-            lanes.stand_at(start, self.tol)
+            lanes.solve_near(start, self.tol)
             came = start, None
         if refused:
             places = listed([path.where(float(times[k])) for k in refused])
@@ -345,12 +345,12 @@ class _Run:
         way: float,
         *,
         rates: bool = True,
-    ) -> Passage | None:
+    ) -> PassedSingularity | None:
         """Pass a time on a path, see `continuation.singular_poses.pass_over`."""
         lanes, tol = self.lanes, self.tol
 
         def reach(at: Anchor, time: float, crossing: bool) -> Anchor | None:
-            lanes.stand_at(at, tol, crossing=crossing)
+            lanes.solve_near(at, tol, crossing=crossing)
             here = at.time
             # parts of a step over a singular pose at which the motion turns back end at the pose
             for _ in range(FEW if crossing else MOST):
@@ -485,16 +485,16 @@ class BlockSweep:
         way.
         """
         lanes, path, begin, run = self._lanes, self.path, self.start, _Run(self._lanes, CLOSED)
-        lanes.stand_at(lanes.design, CLOSED)
+        lanes.solve_near(lanes.design, CLOSED)
         if way := begin.lead:
             times = np.array([0.0, 1.0])
-            lanes.depart(0.0, way)
+            lanes.set_prediction_start(0.0, way)
             side = _Side(way, np.arange(2), times, lanes.sampled(times, way))
             run.follow(side, lanes.anchor(0.0), _nothing)
             if run.messages:
                 run.messages[:] = [f"on the way to {begin.name}: {run.messages[0]}"]
                 return None, run
-        failure = lanes.depart(begin.time, path)
+        failure = lanes.set_prediction_start(begin.time, path)
         if failure is not None:
             run.end(f"the motion cannot start at {path.where(begin.time)}: {failure}", failure.kind)
             return None, run

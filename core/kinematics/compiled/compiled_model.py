@@ -20,13 +20,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...caches import ThreadCache, keep_last
+from ...caches import ThreadCache, cache_last
 from ...errors import SolveError
 from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import ITERATIONS, NODES, Plan, groups_behind
-from ...program.disk_cache import kept
+from ...program.disk_cache import load_or_make
 from ...program.llvm import compiler
 from ...program.llvm.compiler import available
 from ...program.llvm.executor import Executor, bind
@@ -109,7 +109,7 @@ def traced(mechanism: Mechanism, request: Request, alike: Alike | None = None) -
     def read(whole: bytes) -> Tracing:
         return msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
 
-    return kept(content, made, read)
+    return load_or_make(content, made, read)
 
 
 def _plain(value: slice | np.generic) -> Any:
@@ -228,7 +228,7 @@ def compile_model(mechanism: Mechanism, request: Request, alike: Alike | None = 
     return Model(mechanism, request, traced(mechanism, request, alike))
 
 
-@keep_last(RECENT)
+@cache_last(RECENT)
 def _recent(mechanism: Mechanism, request: Request) -> Model:
     return compile_model(mechanism, request)
 
@@ -261,7 +261,7 @@ class Model(Tracing):
         self.geometry, self.kept = slots_of(self.vectors, self.varied), len(self.plan.kept)
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self.plan) if compiled else None
-        self.bound = ThreadCache()
+        self.thread_cache = ThreadCache()
         self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
     @cached_property
@@ -306,20 +306,20 @@ class Model(Tracing):
         Every caller with the same number of lanes gets the same memory, and sets every slot it
         reads.
         """
-        return self.bound(lanes, lambda: bind(self.plan, lanes, self._code))
+        return self.thread_cache(lanes, lambda: bind(self.plan, lanes, self._code))
 
     def samples(self, path: Path, times: Array) -> Array:
         """Return the values of the slots `sampled` at times of a path, shape (sampled, n)."""
         return samples(self.mechanism, self.request.drivers, self.frame.unit, path, times)
 
-    def departing(self, lane: Array, sample: Array) -> Array:
+    def prediction_start(self, lane: Array, sample: Array) -> Array:
         """Return a lane ready for predictions from a solved lane, with rates by a sample of the
         drives.
         """
         executor = self.executor(1)
         every = range(len(self.slots))
         executor.put(every, lane[:, None])
-        self.depart(executor, sample)
+        self.set_prediction_start(executor, sample)
         return executor.get(every)[:, 0]
 
     @cached_property
@@ -327,7 +327,7 @@ class Model(Tracing):
         """Slots of the start of a prediction."""
         return [target for _, target in self.plan.carried]
 
-    def depart(self, executor: Executor, sample: Array) -> None:
+    def set_prediction_start(self, executor: Executor, sample: Array) -> None:
         """Make solved lanes ready for predictions, with rates by a sample of the drives."""
         executor.put(self.sampled, sample[:, None])
         executor.run(*self.plan.onward)
@@ -335,7 +335,7 @@ class Model(Tracing):
         # there is no step behind it
         executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))
 
-    def standing(self, geometry: Array) -> Array:
+    def design_lanes(self, geometry: Array) -> Array:
         """Return all slots of lanes at the design position of variants, shape (slots, variants).
 
         All drivers have their design value. Lanes that do not close there, or are on a wrong
@@ -345,21 +345,21 @@ class Model(Tracing):
             geometry: numbers of all varied places, shape (numbers, variants).
         """
         executor = self.executor(geometry.shape[1])
-        closes = self.stand(executor, geometry)
+        closes = self.solve_at_design(executor, geometry)
         return np.where(closes, executor.get(range(len(self.slots))), np.nan)
 
-    def stand(self, executor: Executor, geometry: Array) -> NDArray[np.bool_]:
-        """Put the lanes of an executor at the design position, see `standing`; return which of them
-        close.
+    def solve_at_design(self, executor: Executor, geometry: Array) -> NDArray[np.bool_]:
+        """Put the lanes of an executor at the design position; return which of them close. See
+        `design_lanes`.
         """
-        return self.stand_at(
+        return self.solve_near(
             executor,
             self.state,
             self.samples(STILL, STILL.times),
             geometry,
         )
 
-    def stand_at(
+    def solve_near(
         self,
         executor: Executor,
         state: Mapping[str, Sequence[float] | Array],
@@ -387,7 +387,7 @@ class Model(Tracing):
 
     def _solve_design(self) -> Array:
         geometry = np.array([number for value in self.varied.values() for number in value])
-        found = self.standing(geometry[:, None])[:, 0]
+        found = self.design_lanes(geometry[:, None])[:, 0]
         if np.isnan(found).any():
             closure = float(self.executor(1).get([self.slots["closure"]])[0, 0])
             raise SolveError(

@@ -66,7 +66,7 @@ class Equations:
 
 def system_of(model: Model) -> System:
     """Return the equations of a model; kept with it, because tracing takes longer than the use."""
-    return model.bound(
+    return model.thread_cache(
         "system",
         lambda: System(
             Tracer(

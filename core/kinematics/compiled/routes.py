@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...caches import ThreadCache, keep_last
+from ...caches import ThreadCache, cache_last
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import NODES, Side, groups_behind, place_of
@@ -52,7 +52,7 @@ class Start:
     time: float = 0.0
     name: str = "time zero"
     lead: Path | None = None
-    stands: bool = True
+    starts_at_design: bool = True
     other: Start | None = None
     ambiguous: bool = False
 
@@ -180,7 +180,7 @@ def notes_on_start(start: Start, path: Path) -> list[str]:
     """Return notes on the assumed way from the design position to the path; none if it is on the
     path.
     """
-    if start.stands:
+    if start.starts_at_design:
         return []
     way = (
         f"all drivers go straight from it to {start.name} ({path.where(start.time)}), and are"
@@ -287,7 +287,7 @@ class Route:
         return self.given or start_of(self.model.mechanism, self.path)
 
     @cached_property
-    def stands(self) -> bool:
+    def starts_at_design(self) -> bool:
         """Whether the lane it starts from stands on the path: at the design position, or on the
         way.
         """
@@ -296,7 +296,7 @@ class Route:
     @cached_property
     def single(self) -> bool:
         """Whether the design position is its start, and nothing else can be."""
-        return self.stands and self.begin.other is None
+        return self.starts_at_design and self.begin.other is None
 
     @cached_property
     def details(self) -> Mapping[str, Any]:
@@ -311,7 +311,9 @@ class Route:
     def by(self, start: Start) -> Route:
         """Return the route from another start; kept with this one."""
         return (
-            self if start is self.begin else self.bound(start, lambda: replace(self, given=start))
+            self
+            if start is self.begin
+            else self.thread_cache(start, lambda: replace(self, given=start))
         )
 
     @cached_property
@@ -336,12 +338,12 @@ class Route:
     @cached_property
     def departure(self) -> Array:
         """All slots of a lane at the design position, with the rates of the start."""
-        return self.model.departing(
+        return self.model.prediction_start(
             self.model.design if self.design is None else self.design, self.origin
         )
 
     @cached_property
-    def below(self) -> int:
+    def count_before_start(self) -> int:
         """How many samples are before the start."""
         return int(np.searchsorted(self.path.times[self.by_time], self.start, side="left"))
 
@@ -355,7 +357,7 @@ class Route:
         `ends`.
         """
         times = self.path.times[self.by_time]
-        n, below, executor = len(times), self.below, self.model.executor(self.lanes)
+        n, below, executor = len(times), self.count_before_start, self.model.executor(self.lanes)
         found: list[Side] = []
         for columns, step in ((np.arange(below, n), 1), (np.arange(below - 1, -1, -1), -1)):
             if len(columns):
@@ -372,7 +374,7 @@ class Route:
     def ends(self, parts: int) -> NDArray[np.intp]:
         """Return the samples by time, as positions among the equal parts of all steps."""
         n = len(self.path.times)
-        return parts * np.arange(n) + np.where(np.arange(n) < self.below, 0, parts - 1)
+        return parts * np.arange(n) + np.where(np.arange(n) < self.count_before_start, 0, parts - 1)
 
     def for_motions(self, parts: int = 1) -> tuple[Array, ...]:
         """Return the samples of each side, for lanes with motions of their own."""
@@ -381,7 +383,7 @@ class Route:
             given = [side.samples[: len(self.origin), : side.count] for side in self.divided(parts)]
             return tuple(np.concatenate([each, weights_of_samples(each[0])]) for each in given)
 
-        return self.bound(parts, made)
+        return self.thread_cache(parts, made)
 
     @cached_property
     def lanes(self) -> int:
@@ -389,7 +391,7 @@ class Route:
         return min(LANES, max(1, len(self.path.times)))
 
     @cached_property
-    def bound(self) -> ThreadCache:
+    def thread_cache(self) -> ThreadCache:
         """Cache for each thread."""
         return ThreadCache()
 
@@ -418,6 +420,6 @@ def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
     )
 
 
-@keep_last(RECENT)
+@cache_last(RECENT)
 def _recent(mechanism: Mechanism, request: Request, path: Path) -> Route:
     return Route(recent_model(mechanism, request), path)

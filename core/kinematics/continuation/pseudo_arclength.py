@@ -53,7 +53,7 @@ MEETS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Spot:
+class CurvePoint:
     """A pose on the curve.
 
     Attributes:
@@ -75,12 +75,12 @@ class Spot:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class NearbyPoint:
     """A singular pose on the curve: its length and time, and the nearest spot reached by
     corrections.
     """
 
-    spot: Spot
+    spot: CurvePoint
     arc: float
     time: float
 
@@ -95,7 +95,7 @@ class ArclengthWalk:
         """Return a sample of the drivers, shape (sampled, 1)."""
         return self.system.samples(self.path, np.array([time]))
 
-    def begin(self, state: Array, time: float, direction: float) -> Spot:
+    def begin(self, state: Array, time: float, direction: float) -> CurvePoint:
         """A pose as the first of a walk, with time growing or falling from there.
 
         Raises:
@@ -105,7 +105,7 @@ class ArclengthWalk:
         dq = direction * _solution(found.jacobian[0], found.nu[0])
         return _spot(found, state, time, dq / np.linalg.norm(dq), 0.0)
 
-    def advance(self, spot: Spot, h: float) -> Spot | None:
+    def advance(self, spot: CurvePoint, h: float) -> CurvePoint | None:
         """Return the pose at about the length h from a spot; None if corrections do not converge
         nearby, or not to a solution.
 
@@ -134,7 +134,7 @@ class ArclengthWalk:
             return None
         return after if self._solved(after) else None
 
-    def _solved(self, spot: Spot) -> bool:
+    def _solved(self, spot: CurvePoint) -> bool:
         zero, sample = np.zeros((self.system.unknowns, 1)), self.sample(spot.time)
         tests = self.system.equations(spot.state, sample)
         (branch,) = self.system.outputs(spot.state, sample, zero, zero)["branch"]
@@ -144,8 +144,8 @@ class ArclengthWalk:
         )
 
     def along(
-        self, spot: Spot, length: float, longest: float, attempts: int | None = None
-    ) -> Iterator[Spot]:
+        self, spot: CurvePoint, length: float, longest: float, attempts: int | None = None
+    ) -> Iterator[CurvePoint]:
         """Yield spots after one, up to a length from the beginning of the walk; stop early if steps
         get too short or too many.
         """
@@ -168,11 +168,11 @@ class ArclengthWalk:
             spot = after
             yield spot
 
-    def _bend(self, before: Spot, after: Spot) -> list[Spot]:
+    def _bend(self, before: CurvePoint, after: CurvePoint) -> list[CurvePoint]:
         """Return spots round the bend that a step with a change of sign cut off; empty if there is
         none, and the branches meet within the tolerance.
         """
-        spots, spot, h = list[Spot](), before, 0.5 * (after.arc - before.arc)
+        spots, spot, h = list[CurvePoint](), before, 0.5 * (after.arc - before.arc)
         while h >= np.sqrt(self.tol):  # of branches nearer to each other, each solves the equations
             ahead = self.advance(spot, h)
             if ahead is None or ahead.sign != spot.sign or ahead.dq @ spot.dq < COSINE:
@@ -184,7 +184,7 @@ class ArclengthWalk:
                 return spots
         return []
 
-    def limit(self, before: Spot, after: Spot) -> Beside:
+    def limit(self, before: CurvePoint, after: CurvePoint) -> NearbyPoint:
         """Return the turning point of the driver between two spots: the zero of dt, by false
         position (Illinois), to round-off.
 
@@ -213,10 +213,10 @@ class ArclengthWalk:
             offsets, spots = nodes
             root = _root(offsets, np.array([spot.dt for spot in spots]))
             if np.isfinite(root):
-                return Beside(best, best.arc + root, _between(offsets, spots, root))
-        return Beside(best, best.arc, best.time)
+                return NearbyPoint(best, best.arc + root, _between(offsets, spots, root))
+        return NearbyPoint(best, best.arc, best.time)
 
-    def branching(self, before: Spot, after: Spot) -> Beside | None:
+    def branching(self, before: CurvePoint, after: CurvePoint) -> NearbyPoint | None:
         """Return the branch point between two spots, or None.
 
         Corrections do not converge there, but sigma falls to zero linearly on both sides: with its
@@ -234,9 +234,11 @@ class ArclengthWalk:
         )
         if not abs(from_left - from_right) <= MEETS:
             return None
-        return Beside(spots[3], before.arc + centre + root, _between(offsets, spots, root))
+        return NearbyPoint(spots[3], before.arc + centre + root, _between(offsets, spots, root))
 
-    def _nodes(self, before: Spot, after: Spot, centre: float) -> tuple[Array, list[Spot]] | None:
+    def _nodes(
+        self, before: CurvePoint, after: CurvePoint, centre: float
+    ) -> tuple[Array, list[CurvePoint]] | None:
         """Return spots on both sides of a length from the first, and their lengths; None if any is
         not reached.
         """
@@ -245,7 +247,7 @@ class ArclengthWalk:
         spots = [spot for spot in found if spot is not None]
         return (offsets, spots) if len(spots) == len(found) else None
 
-    def _least(self, before: Spot, length: float) -> float:
+    def _least(self, before: CurvePoint, length: float) -> float:
         """Return the length to the least sigma, by golden section; 0 stands for unreached poses."""
         part = 0.5 * (np.sqrt(5.0) - 1.0)
         a, b = 0.0, length
@@ -257,7 +259,7 @@ class ArclengthWalk:
         return 0.5 * (a + b)
 
 
-def _spot(found: Equations, state: Array, time: float, along: Array, arc: float) -> Spot:
+def _spot(found: Equations, state: Array, time: float, along: Array, arc: float) -> CurvePoint:
     """Return a pose with its tangent.
 
     Args:
@@ -272,7 +274,7 @@ def _spot(found: Equations, state: Array, time: float, along: Array, arc: float)
     tangent /= np.linalg.norm(tangent[:-1])
     sigma = float(np.linalg.svd(bordered[:-1], compute_uv=False)[-1])
     sign = float(np.linalg.slogdet(_bordered(found.jacobian[0], found.nu[0], tangent[:-1]))[0])
-    return Spot(state, time, tangent[:-1], float(tangent[-1]), arc, sigma, sign)
+    return CurvePoint(state, time, tangent[:-1], float(tangent[-1]), arc, sigma, sign)
 
 
 def _bordered(jacobian: Array, nu: Array, dq: Array) -> Array:
@@ -286,7 +288,7 @@ def _solution(matrix: Array, b: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix, b), dtype=np.float64)
 
 
-def _between(offsets: Array, spots: Sequence[Spot], at: float) -> float:
+def _between(offsets: Array, spots: Sequence[CurvePoint], at: float) -> float:
     """The time at an offset among spots, interpolated."""
     times = [spot.time for spot in spots]
     return float(np.polynomial.Polynomial.fit(offsets, times, len(times) - 1)(at))

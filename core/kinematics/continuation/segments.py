@@ -23,14 +23,14 @@ from ..compiled.compiled_model import Model, recent_model
 from ..compiled.dense_equations import system_of
 from ..compiled.request import CONSISTENT, FROM, LARGEST_SIGMA, SIGMA
 from ..compiled.routes import Route
-from ..formulation.acceptance_criteria import LOW, doubtful, in_question
+from ..formulation.acceptance_criteria import LOW, is_uncertain, needs_check
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
 from ..formulation.formulation import Condition
 from ..formulation.state_vectors import jacobian, standing_drives
 from ..structure.redundancy import independent_rows
 from .singular_poses import bridge, onward
-from .walk import End, March, arrived, led, march, time_of
+from .walk import End, March, follow_samples, lane_at_start, route_from_start, time_of
 
 # A motion that ends with a smallest singular value above this part of the largest that it has had
 # does not end at a singular pose.
@@ -134,7 +134,7 @@ def _standing(model: Model, state: dict[str, Array], sample: Array, nearby: floa
     The distance to another solution is the smallest singular value or more.
     """
     executor = model.executor(1)
-    (closes,) = model.stand_at(executor, state, sample)
+    (closes,) = model.solve_near(executor, state, sample)
     lane = executor.get(range(len(model.slots)))[:, 0]
     moved = max(
         float(np.abs(lane[model.vectors[name]] - value).max()) for name, value in state.items()
@@ -160,7 +160,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Stuck:
+class UnreachedSample:
     """A sample too near to a passage to be reached from either side.
 
     Attributes:
@@ -190,24 +190,24 @@ class Followed:
     def __init__(self, route: Route, found: March, tol: float) -> None:
         self.route, self.found, self.tol, self.times = route, found, tol, route.path.times
         self.models = [route.model]
-        stands = led(route, tol)
+        stands = route_from_start(route, tol)
         self.parts = [
             Part(stands if isinstance(stands, Route) else route, np.arange(len(self.times)))
         ]
         self.part_of = np.zeros(len(self.times), dtype=np.intp)
         self.ends: list[End] = []
         self.passages: list[End] = []
-        self.stuck: list[Stuck] = []
+        self.stuck: list[UnreachedSample] = []
         self.renewed = 0
         self._stood: dict[int, Array] = {}
 
     @property
-    def doubtful(self) -> NDArray[np.bool_]:
+    def is_uncertain(self) -> NDArray[np.bool_]:
         """Return whether each reached sample may be wrong, shape (n,)."""
-        return self.found.solved & doubtful(*self._tests, self.tol)
+        return self.found.solved & is_uncertain(*self._tests, self.tol)
 
     @property
-    def in_question(self) -> NDArray[np.bool_]:
+    def needs_check(self) -> NDArray[np.bool_]:
         """Return whether each sample is doubtful or may be better with other rows, shape (n,)."""
         model = self.route.model
         largest = (
@@ -215,7 +215,7 @@ class Followed:
             if model.selection.dropped
             else None
         )
-        return self.found.solved & in_question(*self._tests, self.tol, largest)
+        return self.found.solved & needs_check(*self._tests, self.tol, largest)
 
     @property
     def _tests(self) -> tuple[Array, Array]:
@@ -249,7 +249,7 @@ class Followed:
             else:
                 self._follow(route, samples)
                 self.renewed += 1
-                left = [k for k in left[1:] if self.in_question[k]]
+                left = [k for k in left[1:] if self.needs_check[k]]
 
     def _beyond(self, end: End) -> list[End] | None:
         """Return the next end of the motion beyond an end; None if the motion does not continue."""
@@ -294,7 +294,7 @@ class Followed:
         while back and back[0].failure is FailureKind.LEFT_OFF:
             back = self._further(back[0], len(self.parts) - 1, -side)
         self.stuck += [
-            Stuck(k, end.route, lane, end.lane)
+            UnreachedSample(k, end.route, lane, end.lane)
             for k in missing.tolist()
             if not self.found.solved[k] and side * (self.times[k] - beyond) < 0.0
         ]
@@ -303,7 +303,7 @@ class Followed:
     def _further(self, end: End, number: int, side: float) -> list[End]:
         """Run a route again, and continue it beyond its earlier end."""
         samples = self.parts[number].samples
-        found = march(end.route, self.tol, low=LOW * end.sigma)
+        found = follow_samples(end.route, self.tol, low=LOW * end.sigma)
         self._take(found, samples, found.solved & ~self.found.solved[samples], number)
         return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
 
@@ -315,17 +315,17 @@ class Followed:
     def _arrive(self, way: Route) -> list[End]:
         """Go on to the start of the samples, and from there."""
         last = len(way.path.times) - 1
-        found = march(way, self.tol, {last})
+        found = follow_samples(way, self.tol, {last})
         if not found.solved.all():
             return list(found.ends)
-        lane = arrived(way.model, found.visited[last])
+        lane = lane_at_start(way.model, found.visited[last])
         return self._follow(
             Route(way.model, self.route.path, lane, self.route.start), np.arange(len(self.times))
         )
 
     def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:
         """Store the samples reached by a route if they were missing, or much nearer to singular."""
-        found, sigma = march(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
+        found, sigma = follow_samples(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
         nearer = BETTER * self.found.kept[sigma, samples] < found.kept[sigma]
         reached = found.solved & (nearer | ~self.found.solved[samples])
         self._take(found, samples, reached, len(self.parts))
@@ -352,7 +352,9 @@ class Followed:
             if wanted:
                 found |= {
                     int(part.samples[at]): lane
-                    for at, lane in march(part.route, self.tol, visit=wanted).visited.items()
+                    for at, lane in follow_samples(
+                        part.route, self.tol, visit=wanted
+                    ).visited.items()
                 }
         return found
 
@@ -362,10 +364,10 @@ class Followed:
         """
         route = self.parts[number].route
         away = side * (self.times - route.start)
-        mine = (self.part_of == number) & self.found.solved & ~self.doubtful
+        mine = (self.part_of == number) & self.found.solved & ~self.is_uncertain
         good = np.flatnonzero(mine & (away >= 0.0) & (away < side * (time - route.start)))
         if not len(good):
-            return route.departure if route.stands else None
+            return route.departure if route.starts_at_design else None
         nearest = int(good[away[good].argmax()])
         if nearest not in self._stood:
             self._stood |= self.visit({nearest})

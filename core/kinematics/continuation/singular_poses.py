@@ -35,7 +35,7 @@ from ..compiled.request import FROM, RATE, SIGMA, TESTS, TIME, slots_of
 from ..compiled.routes import Route
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
 from .pseudo_arclength import PLACES
-from .walk import arrived, march, time_of
+from .walk import follow_samples, lane_at_start, time_of
 
 # Of what is largest, in a combination of rows or a motion: smaller shares are not named.
 SHARE = 0.1
@@ -332,7 +332,7 @@ class Anchor:
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class PassedSingularity:
     """A singular pose on a motion.
 
     Attributes:
@@ -358,7 +358,7 @@ def pass_over(
     reach: Reach,
     measure: Callable[[Array, float], float],
     limit: float,
-) -> Passage | None:
+) -> PassedSingularity | None:
     """Return the passage over a singular pose, or None if the motion is not known to go on, or not
     well enough.
 
@@ -392,7 +392,7 @@ def pass_over(
             known = COVERED * np.abs(state @ (EIGHT - SIX)) + near[1]
             on_curve = (np.abs(middle - near[0]) <= known).all()
         if smooth and error <= limit and on_curve:
-            return Passage(poses, whole @ EIGHT, error)
+            return PassedSingularity(poses, whole @ EIGHT, error)
     return None
 
 
@@ -408,12 +408,12 @@ def _eight(sound: Anchor, times: Array, reach: Reach) -> Sequence[Anchor] | None
 
 def onward(model: Model, lane: Array, path: Path) -> Route:
     """Return the route from a lane on a path along it."""
-    return Route(model, path, arrived(model, lane), time_of(model, lane))
+    return Route(model, path, lane_at_start(model, lane), time_of(model, lane))
 
 
 def bridge(
     route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True
-) -> Passage | None:
+) -> PassedSingularity | None:
     """Pass a time on a route, from a lane; see `pass_over`. Its motions are the kept rows
     (`Model.rows`).
 
@@ -430,7 +430,7 @@ def bridge(
 
     def reach(at: Anchor, time: float, crossing: bool) -> Anchor | None:
         there = replace(route.path, times=np.array([time]))
-        found = march(onward(model, at.pose, there), tol, {0}, crossing=crossing)
+        found = follow_samples(onward(model, at.pose, there), tol, {0}, crossing=crossing)
         if not found.visited:
             return None
         closure, sigma = (found.kept[model.rows[name].start, 0] for name in ("closure", SIGMA))

@@ -135,7 +135,7 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
     if len(found.solved) > LONGEST_KEPT:
         return _Scrutiny(Followed(route, found, tol)).run()
     poses, before = (found.kept, found.solved), (found.kept.copy(), found.solved.copy())
-    known = route.bound(("scrutinised", tol), list[tuple[_Poses, _Poses, Findings]])
+    known = route.thread_cache(("scrutinised", tol), list[tuple[_Poses, _Poses, Findings]])
     for same, after, findings in known:
         if all(np.array_equal(*pair, equal_nan=True) for pair in zip(same, before, strict=True)):
             for array, values in zip(poses, after, strict=True):
@@ -158,7 +158,7 @@ class _Scrutiny:
         """Return the findings; samples are solved again in place."""
         findings, unknowns = self.findings, len(self.route.model.selection.chosen)
         if unknowns > LARGEST:
-            if count := int(self.followed.doubtful.sum()):
+            if count := int(self.followed.is_uncertain.sum()):
                 findings.notes.append(
                     f"{count} samples seem to be nearly singular, and were not examined:"
                     f" {unknowns} unknowns are more than {LARGEST}"
@@ -182,7 +182,7 @@ class _Scrutiny:
         """Follow samples with better rows, solve doubtful ones closely, and interpolate or refuse
         the rest.
         """
-        indices, doubtful = np.flatnonzero(self.followed.in_question), self.followed.doubtful
+        indices, doubtful = np.flatnonzero(self.followed.needs_check), self.followed.is_uncertain
         visited = self.followed.visit(indices.tolist()) if len(indices) else {}
         self._lost([k for k in indices.tolist() if k not in visited and doubtful[k]])
         better: dict[int, Array] = {}
@@ -198,7 +198,7 @@ class _Scrutiny:
             judged = wanted | doubtful[samples]
             self.found.kept[self.rows[SIGMA].start, samples[judged]] = sigma[judged]
         self.followed.renew(better)
-        doubtful = self.followed.doubtful
+        doubtful = self.followed.is_uncertain
         for model, samples in self._by_model(k for k in visited if doubtful[k]):
             self._closely(system_of(model), samples, self._lanes(visited, samples))
 

@@ -18,8 +18,8 @@ from ..compiled.compiled_model import Model
 from ..compiled.request import SIGMA
 from ..compiled.routes import Route, solve_from_start
 from ..compiled.solution import solution
-from ..formulation.acceptance_criteria import LOW, in_question
-from .walk import march
+from ..formulation.acceptance_criteria import LOW, needs_check
+from .walk import follow_samples
 
 
 def sweep(model: Model, path: Path, tol: float) -> Trajectory:
@@ -42,14 +42,19 @@ def follow(route: Route, tol: float) -> Trajectory:
 
 
 def _follow(route: Route, tol: float) -> Trajectory:
-    model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
+    model, rows, found, message = (
+        route.model,
+        route.model.rows,
+        follow_samples(route, tol, low=LOW),
+        "",
+    )
     failures: Sequence[FailureKind] = found.failures if found.ends else ()
     closure, leftover, sigma = found.worst
     largest = math.inf if model.selection.dropped else None
     findings: Mapping[str, Any] = {}
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or in_question(sigma, closure, tol, largest):
+    elif found.ends or needs_check(sigma, closure, tol, largest):
         from .singular_samples import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)

@@ -23,7 +23,7 @@ from ..compiled.dense_equations import System, system_of
 from ..compiled.request import Request
 from ..formulation.constraints import Style
 from ..structure.degrees_of_freedom import require_driven
-from .pseudo_arclength import NODE, ArclengthWalk, Beside, Spot
+from .pseudo_arclength import NODE, ArclengthWalk, CurvePoint, NearbyPoint
 from .singular_poses import Singularity, examine
 
 
@@ -223,7 +223,7 @@ class _Trail:
         length: of a closed curve; infinite until it is known to be one.
     """
 
-    def __init__(self, walk: ArclengthWalk, first: Spot, longest: float) -> None:
+    def __init__(self, walk: ArclengthWalk, first: CurvePoint, longest: float) -> None:
         self.walk, self.first, self.longest = walk, first, longest
         self.spots, self.events, self.length = [first], list[Event](), np.inf
         # the plane across the curve at its beginning
@@ -251,7 +251,7 @@ class _Trail:
         self._note_branches()
         self.events.sort(key=lambda event: event.arc)
 
-    def _passed(self, before: Spot, after: Spot) -> Spot | None:
+    def _passed(self, before: CurvePoint, after: CurvePoint) -> CurvePoint | None:
         """Return the beginning as a spot at its length on the curve if the step between two spots
         passes it, else None.
         """
@@ -263,7 +263,7 @@ class _Trail:
             return None
         share = ahead / (ahead + beyond)
         apart = np.abs((1.0 - share) * change + share * change_after).max()
-        spot: Spot | None = None
+        spot: CurvePoint | None = None
         h = share * (after.arc - before.arc)
         for _ in range(ROUNDS):
             spot = self.walk.advance(before, h)
@@ -280,7 +280,7 @@ class _Trail:
         turned = before.time + share * (after.time - before.time) if spot is None else spot.time
         return replace(self.first, arc=before.arc + h, time=turned)
 
-    def _change(self, spot: Spot) -> Array:
+    def _change(self, spot: CurvePoint) -> Array:
         """Return the change from the pose of a spot to the beginning; Euler parameters p and -p are
         the same.
         """
@@ -313,7 +313,7 @@ class _Trail:
             if not event.singularity.regular:
                 self.events.append(event)
 
-    def _with_neighbours(self) -> list[Spot]:
+    def _with_neighbours(self) -> list[CurvePoint]:
         """Return the spots, and one before the first and after the last: a branch point is seen by
         the spots on both sides of it.
         """
@@ -327,25 +327,25 @@ class _Trail:
         return [*filter(None, (before, *self.spots, after))]
 
 
-def _turns_back(before: Spot, after: Spot) -> bool:
+def _turns_back(before: CurvePoint, after: CurvePoint) -> bool:
     """Return whether the driver's value is stationary between two spots; a spot counts once."""
     return (before.dt < 0.0) != (after.dt < 0.0)
 
 
-def _event(walk: ArclengthWalk, found: Beside) -> Event:
+def _event(walk: ArclengthWalk, found: NearbyPoint) -> Event:
     spot = found.spot
     singularity = examine(walk.system, spot.state, walk.sample(spot.time))
     points = {name: places[0] for name, places in _points(walk, [spot]).items()}
     return Event(found.arc, found.time, singularity, points)
 
 
-def _stacked(walk: ArclengthWalk, spots: Sequence[Spot]) -> tuple[Array, Array]:
+def _stacked(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> tuple[Array, Array]:
     """Return states and samples of spots, shapes (numbers, spots) and (sampled, spots)."""
     state = np.concatenate([spot.state for spot in spots], axis=1)
     return state, np.concatenate([walk.sample(spot.time) for spot in spots], axis=1)
 
 
-def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
+def _points(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> dict[str, Array]:
     zero = np.zeros((walk.system.unknowns, len(spots)))
     found = walk.system.outputs(*_stacked(walk, spots), zero, zero)
     return {name: found[f"position {name}"].T for name in walk.system.tracer.request.points}

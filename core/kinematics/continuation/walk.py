@@ -235,7 +235,7 @@ class End:
         route: the given one, or the straight way to its start.
         lane: all slots of the last pose.
         wanted: time of the sample out of reach [s].
-        failure: the reason; `LEFT_OFF` if no part of the step was tried, see `march`.
+        failure: the reason; `LEFT_OFF` if no part of the step was tried, see `follow_samples`.
     """
 
     message: str
@@ -319,7 +319,7 @@ class Marcher:
             yield self._finer[k]
 
     def run(self, visit: Collection[int] = (), low: float = 0.0) -> March:
-        """See `march`."""
+        """See `follow_samples`."""
         if self.model.geometry:  # the lanes know their variant
             self.route.model.executor(self.route.lanes).put(
                 range(len(self.departure)), self.departure[:, None]
@@ -430,7 +430,7 @@ class SideWalk(Walk):
         return None
 
     def _leaves_off(self) -> bool:
-        """Return whether no part of the step is tried; see `march`."""
+        """Return whether no part of the step is tried; see `follow_samples`."""
         sigma, largest = self.track.anchors[self.number, self.marcher.sigmas]
         return self.marcher.crossing or bool(sigma < self.marcher.low * largest)
 
@@ -471,10 +471,10 @@ class SideWalk(Walk):
         if part is None:
             refused = np.flatnonzero(~(lanes[margin] > 0.0))[-1]
             return pose_failure(self.model, lanes[:, refused])
-        return self.model.departing(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
+        return self.model.prediction_start(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
 
 
-def march(
+def follow_samples(
     route: Route,
     tol: float,
     visit: Collection[int] = (),
@@ -492,7 +492,7 @@ def march(
         low: with redundant rows, leave off at a failed step if the smallest singular value is below
             this fraction of its largest value so far: other rows may be better.
     """
-    stands = route if route.stands else led(route, tol)
+    stands = route if route.starts_at_design else route_from_start(route, tol)
     if isinstance(stands, Route):
         return marcher(stands, tol, crossing=crossing).run(visit, low)
     n = len(route.path.times)
@@ -500,32 +500,36 @@ def march(
     return March(kept, route.model.plan.best[:, 0].tolist(), np.zeros(n, np.bool_), (stands,))
 
 
-def led(route: Route, tol: float) -> Route | End:
+def route_from_start(route: Route, tol: float) -> Route | End:
     """Return the route from a lane on its path, or the end of the straight way to there; kept with
     the route.
     """
-    return route if route.stands else route.bound(("led", tol), lambda: _led(route, tol))
+    return (
+        route
+        if route.starts_at_design
+        else route.thread_cache(("led", tol), lambda: _route_from_start(route, tol))
+    )
 
 
-def _led(route: Route, tol: float) -> Route | End:
+def _route_from_start(route: Route, tol: float) -> Route | End:
     model, begin = route.model, route.begin
     way = Route(model, begin.lead or route.path.lead_in(begin.time), route.design)
     found = marcher(way, tol, crossing=False).run({0})
     if found.ends:
         return replace(found.ends[0], message=f"on the way to {begin.name}: {found.messages[0]}")
-    return Route(model, route.path, arrived(model, found.visited[0]), begin.time)
+    return Route(model, route.path, lane_at_start(model, found.visited[0]), begin.time)
 
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
     """Return the marcher of a route from its departure; kept with it, because binding takes as long
     as a run.
     """
-    return route.bound(
+    return route.thread_cache(
         (tol, crossing), lambda: Marcher(route, route.departure, accept_by(tol, crossing=crossing))
     )
 
 
-def arrived(model: Model, lane: Array) -> Array:
+def lane_at_start(model: Model, lane: Array) -> Array:
     """Return a lane at the start of the given lane's prediction."""
     found = lane.copy()
     for name in model.state:

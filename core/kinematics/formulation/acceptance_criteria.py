@@ -83,7 +83,7 @@ ROUNDING = 64.0 * EPSILON
 FOLLOWED, TURNED = 1e-2, 1e-3
 
 
-def doubtful(
+def is_uncertain(
     sigma: float | Array, closure: float | Array, tol: float, order: int = 1
 ) -> bool | NDArray[np.bool_]:
     """Return whether residuals and estimates of sigma allow too large an error at each sample.
@@ -99,7 +99,7 @@ def doubtful(
     return (WORSE * closure > limit) | (limit < WORSE * EPSILON)
 
 
-def in_question(
+def needs_check(
     sigma: float | Array, closure: float | Array, tol: float, largest: float | None
 ) -> bool | NDArray[np.bool_]:
     """Return whether each sample is doubtful, or may be more accurate with other rows.
@@ -110,10 +110,10 @@ def in_question(
     Args:
         largest: largest estimate of sigma along the motion; None without redundant rows.
     """
-    found = doubtful(sigma, closure, tol)
+    found = is_uncertain(sigma, closure, tol)
     if largest is None:
         return found
-    return found | (doubtful(sigma, closure, SHARPER * tol, order=2) & (sigma < LOW * largest))
+    return found | (is_uncertain(sigma, closure, SHARPER * tol, order=2) & (sigma < LOW * largest))
 
 
 def continuous(
@@ -137,7 +137,9 @@ def continuous(
     return deviation <= LARGEST_DEVIATION * 0.5 * step * speed + NEGLIGIBLE * size
 
 
-def continued(change: Array, velocity: Array, velocity_before: Array, dt: float | Array) -> bool:
+def is_continuation(
+    change: Array, velocity: Array, velocity_before: Array, dt: float | Array
+) -> bool:
     """Return whether a step of all coordinates is short and agrees with their velocities.
 
     Near a fold the rates are so large that they allow any deviation, so the deviation is compared

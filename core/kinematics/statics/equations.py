@@ -241,13 +241,13 @@ class StaticEquations:
         executor = NumpyExecutor(Plan(both, dict(self._layout.slots)), 1)
         executor.clear()
         self.multipliers = np.zeros(len(self.chosen))
-        self.stand(executor)
+        self.set_to_design(executor)
         executor.run("unbalanced")
         out = self.vectors["unbalanced"]
         # joints carry what they can, which changes the stiffness; the rest is out of balance
         found = np.linalg.lstsq(self._matrix.T, executor.get(out)[:, 0], rcond=None)[0]
         self.multipliers = np.asarray(found, dtype=np.float64)
-        self.stand(executor)
+        self.set_to_design(executor)
         for name in both:
             executor.run(name)
         self.rest = executor.get(out)[:, 0]
@@ -260,7 +260,7 @@ class StaticEquations:
         stiffness /= scale
         return scale, float(np.linalg.slogdet(matrix)[1]) / np.log(2.0)
 
-    def stand(self, executor: Executor) -> None:
+    def set_to_design(self, executor: Executor) -> None:
         """Set all lanes to the design position without loads."""
         for name, values in self.design.items():
             executor.put(self.vectors[name], np.array(values)[:, None])

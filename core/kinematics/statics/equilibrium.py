@@ -194,7 +194,7 @@ class StaticModel:
         for name in (REST, *(f"{LOAD}{each.name}" for each in self.equations.loads)):
             slots = self.equations.vectors[name]
             made.put(slots, np.zeros((len(slots), 1)))
-        self.equations.stand(made)
+        self.equations.set_to_design(made)
         return made
 
     @cached_property

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ...caches import keep_last
+from ...caches import cache_last
 from ...program.llvm.compiler import available
 from ...program.llvm.fixed_order import LANES, FixedOrder
 from ...trajectory import Array
@@ -241,7 +241,7 @@ class Blocks:
         return np.sqrt(np.divide(*squares)), factors.signs(m)
 
 
-@keep_last(64)
+@cache_last(64)
 def _exchanges(content: bytes) -> int:
     """Return the number of exchanges that a permutation takes: its length less its cycles.
 

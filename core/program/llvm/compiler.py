@@ -20,7 +20,7 @@ from platform import machine
 from struct import Struct, pack_into, unpack_from
 from typing import Any, NamedTuple
 
-from ..disk_cache import kept
+from ..disk_cache import load_or_make
 
 TRAITS = b"vendor_id", b"cpu family", b"model", b"stepping", b"flags"
 """Fields of /proc/cpuinfo that LLVM depends on."""
@@ -71,7 +71,7 @@ def processor() -> Processor:
     An emulator that hides instructions of the processor (valgrind) needs a separate cache.
     """
     known = _described()
-    return _read(_ask_llvm()) if known is None else kept(known, _ask_llvm, _read)
+    return _read(_ask_llvm()) if known is None else load_or_make(known, _ask_llvm, _read)
 
 
 def _read(description: bytes) -> Processor:

@@ -93,7 +93,7 @@ class LlvmExecutor:
         shape = len(self._code.plan.kept), columns, self.room
         return aligned(math.prod(shape)).reshape(shape)
 
-    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
+    def run_motions(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
         """See `NumpyExecutor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted

@@ -16,12 +16,12 @@ from typing import Any
 
 import msgspec
 
-from ...caches import keep_last
+from ...caches import cache_last
 from .. import disk_cache, plan, straight_line, tape
 from ..plan import Plan
 from ..straight_line import Bytecode, bytecode, packed, unpacked
 from . import compiler
-from .loops import fan, follow, parts, run, settle
+from .loops import follow, parts, run, run_motions, settle
 from .plan import PlanInMemory, rows
 from .programs import declarations, function, interpret
 
@@ -61,7 +61,7 @@ def load(
     content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None
 ) -> Code:
     """Return the cached code of a content; compile the text if there is none."""
-    return disk_cache.kept(
+    return disk_cache.load_or_make(
         cache_key(content), lambda: _emitted(text()), lambda code: Code(code, signatures or {})
     )
 
@@ -90,7 +90,7 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
         [*_NEEDED, run, follow],
         {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3},
     ),
-    "fan": ([*_NEEDED, fan], {"fan": 12}),
+    "fan": ([*_NEEDED, run_motions], {"fan": 12}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
 """Modules of loops: their writers, and their functions with the number of arguments."""
@@ -192,7 +192,7 @@ class LlvmCode:
             }
             return packed(tables)
 
-        return disk_cache.kept(self._of_tables, made, unpacked)
+        return disk_cache.load_or_make(self._of_tables, made, unpacked)
 
     @property
     def _of_tables(self) -> bytes:
@@ -224,14 +224,14 @@ def make_loops_ready() -> None:
 
 def _loop(name: str, width: int) -> Code:
     with _LOCK:
-        return _made(name, width)
+        return _load_loops(name, width)
 
 
 _LOCK = Lock()
 
 
-@keep_last(2 * len(LOOPS))
-def _made(name: str, width: int) -> Code:
+@cache_last(2 * len(LOOPS))
+def _load_loops(name: str, width: int) -> Code:
     """Return functions that run any plan."""
     writers, signatures = LOOPS[name]
     text = partial("\n".join, [*(write(width) for write in writers), declarations(width)])

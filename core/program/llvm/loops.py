@@ -391,9 +391,9 @@ def _worst(width: int) -> str:
     }{each_slot("end_worst", ", ptr %here, ptr %found", end, 3)}"""
 
 
-def fan(width: int) -> str:
-    """Return the LLVM functions of `fan` of an executor: a group of W motions passes all samples
-    while its slots are in the L1 cache.
+def run_motions(width: int) -> str:
+    """Return the LLVM functions `fan`, of `run_motions` of an executor: a group of W motions passes
+    all samples while its slots are in the L1 cache.
 
     After `NODES` samples a group is predicted by `extend`. If this fails for a live motion, the
     group goes back and is predicted by its rates.

@@ -19,7 +19,15 @@ from ...case.case import TIME, Case
 from ...case.joint_probe import probe, probes
 from ...errors import shortened
 from ...harness.engine import Engine, may_run_here, versions
-from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, error_text, here
+from ...harness.execution import (
+    Answer,
+    Attempt,
+    Attempts,
+    Pair,
+    Solver,
+    error_text,
+    solve_in_process,
+)
 from ...harness.record import Outcome, Record
 from ...harness.resource_limits import Limits
 from ...harness.run import Progress, run
@@ -196,7 +204,7 @@ def check_engine(
     again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
     found.append(_same("determinism", again, mine, in_workers(1, Limits())))
     if may_run_here(engine):
-        found.append(_same("isolation: in this process", again, mine, here))
+        found.append(_same("isolation: in this process", again, mine, solve_in_process))
     return Report(engine.name, (), None, tuple(found))
 
 

@@ -269,13 +269,13 @@ def verdict_on_roundoff(errors: Iterable[RoundOff]) -> list[str]:
         ),
         (
             "(22) as printed, positions summed one by one, loses digits with the distance:"
-            f" {_told(last)} m. With r_j - r_i first: {_told(first)} m, unsimplified. The order of"
-            " the sum keeps the digits, not the simplification."
+            f" {_by_distance(last)} m. With r_j - r_i first: {_by_distance(first)} m, unsimplified."
+            " The order of the sum keeps the digits, not the simplification."
         ),
     ]
 
 
-def _told(values: Sequence[float]) -> str:
+def _by_distance(values: Sequence[float]) -> str:
     return ", ".join(
         f"{value:.0e} at {distance:.0e}" for value, distance in zip(values, DISTANCES, strict=True)
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from ...harness.labels import notes, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import Axis, driver_axis
-from ...report.figures import Figure, OverDriver, taken
+from ...report.figures import Figure, OverDriver, drawn_values
 from ...report.sections import environment, figure_parts
 from ...unit_text import with_unit
 from .conformance import Capability, Histogram
@@ -150,7 +150,7 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
         if about_nominal:
             pairs = zip(values, envelope.nominal, strict=True)
             values = [None if None in (v, at) else v - at for v, at in pairs]  # pyright: ignore
-        return taken(values, axis.kept, view.scale, DIGITS)
+        return drawn_values(values, axis.kept, view.scale, DIGITS)
 
     def add(name: str, values: Numbers, uid: str, width: float, colour: str, **dash: str) -> None:
         line = {"width": width, "color": colour, **dash}

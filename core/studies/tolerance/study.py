@@ -444,7 +444,7 @@ def gradients(ready: Ready) -> Gradients:
     study, path = ready.study, ready.study.case.sweep.path
     n, count = len(path.times), len(study.variation.coordinates)
     start = ready.designs.start
-    from_design = start.stands
+    from_design = start.starts_at_design
     if from_design:  # one sample more, at the design position
         ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))
     steps = np.array([STEP * _size(study, k) for k in range(count)])

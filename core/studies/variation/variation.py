@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...caches import keep_last
+from ...caches import cache_last
 from ...errors import KincheckError
 from ...trajectory import Array
 from .study_choices import Mode, Sampling
@@ -250,7 +250,7 @@ class _Sobol:
         return np.ascontiguousarray(self._engine.random(DRAWN).T)
 
 
-@keep_last(2, per_thread=True)
+@cache_last(2, per_thread=True)
 def _sobol(seed: int, coordinates: int) -> _Sobol:
     return _Sobol(seed, coordinates)
 

@@ -123,7 +123,7 @@ def limit_of(
     Raises:
         ValueError: there is no such output, or the limits make no sense.
     """
-    output, derivative = _found(case, name)
+    output, derivative = _find_output(case, name)
     unit = output.unit + PER_TIME[derivative]
     shown_unit, size = in_units(unit, LENGTHS[units.length], ANGLES[units.angle])
     if stated:
@@ -148,7 +148,7 @@ def limit_of(
     )
 
 
-def _found(case: Case, name: str) -> tuple[Quantity, int]:
+def _find_output(case: Case, name: str) -> tuple[Quantity, int]:
     """Return the output and the order of the time derivative of a name."""
     known = {output.name: output for output in case.outputs}
     base, _, quantity = name.rpartition(".")
@@ -400,7 +400,7 @@ class _Reader:
     def _block(self, name: str, table: object) -> _Block:
         key = join("hardpoints", name)
         keys = typed(self.file, key, table, HardpointKeys)
-        moved = self._found(join(key, "at"), keys.at, self.geometry.variable)
+        moved = self._find(join(key, "at"), keys.at, self.geometry.variable)
         if keys.only is not None:
             moved = self._only(join(key, "only"), moved, keys.only)
         dimension = self.geometry.dimensions.get(moved.name)
@@ -414,7 +414,7 @@ class _Reader:
         return _Block(moved, coordinates)
 
     def _only(self, key: str, moved: Variable, names: Sequence[str]) -> Variable:
-        chosen = [self._found(key, each, self.geometry.find) for each in names]
+        chosen = [self._find(key, each, self.geometry.find) for each in names]
         there = [place for place in self.geometry.named if place in moved.moves]
         for each in chosen:
             if each not in there:
@@ -434,7 +434,7 @@ class _Reader:
                     problem = f"moves {place}, as does hardpoints.{owner}, expected one of them to"
                     raise fault(self.file, join("hardpoints", name), f"{problem}. Give one `only`.")
 
-    def _found(self, key: str, name: str, find: Callable[[str], _Named]) -> _Named:
+    def _find(self, key: str, name: str, find: Callable[[str], _Named]) -> _Named:
         try:
             return find(name)
         except PlaceError as error:
@@ -444,8 +444,8 @@ class _Reader:
         """Let a direction follow the two positions on its line; unvaried ends are fixed."""
         keys = typed(self.file, key, table, LineKeys)
         find = self.geometry.find
-        axis = self._found(join(key, "axis"), keys.axis, find)
-        ends = [self._found(join(key, "through"), each, find) for each in keys.through]
+        axis = self._find(join(key, "axis"), keys.axis, find)
+        ends = [self._find(join(key, "through"), each, find) for each in keys.through]
         for each, wanted, place in (
             ("axis", Kind.DIRECTION, axis),
             *(("through", Kind.POSITION, end) for end in ends),
