@@ -14,7 +14,7 @@ DRIVES = {
         Supplied(),
         [
             "3 degrees of freedom",
-            "nothing said of what drives it",
+            "nothing says what drives it",
             "--drive JOINT:START:STOP",
             "2 more",
         ],

@@ -156,7 +156,7 @@ def test_the_rest_is_held_and_the_list_is_complete(tmp_path):
     message = str(caught.value)
     assert "11 degrees of freedom, and 1 driven or held" in message
     assert "--hold JOINT for 10 more" in message
-    assert "first: two; ball joints: ball; free bodies: base" in message
+    assert "first: two. Ball joints: ball. Free bodies: base" in message
     case = load(file, Supplied(drive=("one:0:1:5",), hold_rest=True))
     assert [driver.name for driver in case.mechanism.drivers] == ["one", "two"]
     assert case.mechanism.body("base").fixed

@@ -126,7 +126,7 @@ def _freedoms(file: Path, drive: str) -> tuple[int, str]:
         return len(case.mechanism.drivers), drive or case.sweep.driver
     except KincheckError as error:
         freedom = re.search(r"has (\d+) degree", str(error))
-        joints = re.search(r"joints, actuated ones first: ([^;]*)", str(error))
+        joints = re.search(r"Joints, actuated ones first: (.*?)\.( |$)", str(error))
         if freedom and (drive or joints):
             return int(freedom[1]), drive or joints[1].split(", ")[0]
         raise

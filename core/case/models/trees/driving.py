@@ -389,12 +389,12 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
     if dof == 0:
         return tree.fault(
             "",
-            "the model has no freedom in its start, expected one that moves; give another model or"
-            " another start by --start",
+            "the model cannot move from its start: no freedom is left there. Give another model, or"
+            " another start by --start.",
         )
     what = f"{count} driven or held"
     if not count:
-        what = f"nothing said of what drives it ({_motors(tree, dof)})"
+        what = f"nothing says what drives it: {_motors(tree, dof)}"
     advice: list[str] = []
     if not driving.driven:
         advice.append("--drive JOINT:START:STOP for the one that moves")
@@ -412,8 +412,8 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
         )
     return tree.fault(
         "",
-        f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}, expected as many of"
-        f" either; say {' and '.join(advice)}{_to_hold(_candidates(tree, driving), freedom)}",
+        f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}. Say"
+        f" {' and '.join(advice)}.{_to_hold(_candidates(tree, driving), freedom)}",
     )
 
 
@@ -436,17 +436,17 @@ def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:
     counts = [(move, freedom.count(move.name)) for move in candidates]
     loose = [move for move, count in counts if count == UNKNOWNS[move.kind]]
     kinds = {
-        "joints, actuated ones first": [move.name for move in loose if move.is_axial],
-        "ball joints": [move.name for move in loose if move.kind == "ball"],
-        "free bodies": [move.inner for move in loose if move.kind == "free"],
+        "Joints, actuated ones first": [move.name for move in loose if move.is_axial],
+        "Ball joints": [move.name for move in loose if move.kind == "ball"],
+        "Free bodies": [move.inner for move in loose if move.kind == "free"],
     }
     if loose:
         return "".join(
-            f"; {what}: {shortened(names, MOST_NAMED)}" for what, names in kinds.items() if names
+            f" {what}: {shortened(names, MOST_NAMED)}." for what, names in kinds.items() if names
         )
     partly = shortened([move.name for move, count in counts if count], MOST_NAMED)
     return (
-        f"; only in part free, so that they cannot be held: {partly}"
+        f" These are free in part only, and cannot be held: {partly}."
         if partly
-        else ("; none can be held")
+        else " None can be held."
     )
