@@ -8,7 +8,7 @@ import pytest
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.harness.execution import Pair
-from kincheck.core.kinematics import continued, continuous, regular_between
+from kincheck.core.kinematics import continuous, is_continuation, regular_between
 from kincheck.core.studies.stress.families import FAMILIES
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, polar, slider_crank
@@ -113,10 +113,10 @@ def test_a_step_is_compared_with_itself_and_not_with_its_rates():
     """Beside a fold the rates are very large: half their sum over the step may be any change."""
     dt, before, now = 0.02, np.array([60.0]), np.array([2.0])
     assert continuous(np.array([0.49]), now, before, dt, 1.0)
-    assert not continued(np.array([0.49]), now, before, dt)
-    assert continued(np.array([0.49]), np.array([24.0]), np.array([25.5]), dt)
-    assert not continued(np.array([0.51]), np.array([25.5]), np.array([25.5]), dt)  # too long
-    assert continued(np.zeros(1), np.zeros(1), np.zeros(1), dt)
+    assert not is_continuation(np.array([0.49]), now, before, dt)
+    assert is_continuation(np.array([0.49]), np.array([24.0]), np.array([25.5]), dt)
+    assert not is_continuation(np.array([0.51]), np.array([25.5]), np.array([25.5]), dt)  # too long
+    assert is_continuation(np.zeros(1), np.zeros(1), np.zeros(1), dt)
 
 
 @pytest.mark.parametrize(("seed", "number", "passed"), [(101, 364, 0), (109, 192, 2)])

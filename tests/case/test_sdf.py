@@ -125,7 +125,7 @@ def test_links_without_a_joint_above_are_free(tmp_path: Path):
     text = text.replace("<visual", '<visual name="w"/><visual', 1).replace(
         '<link name="a">', '<link name="base"/><link name="a">', 1
     )
-    with pytest.raises(CaseError, match="free bodies: base"):
+    with pytest.raises(CaseError, match="Free bodies: base"):
         load(model(tmp_path, text), DRIVE)
     assert solution(
         load(model(tmp_path, text), Supplied(DRIVE.template, drive=DRIVE.drive, hold=("base",)))

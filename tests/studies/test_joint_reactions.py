@@ -56,7 +56,7 @@ def failing(joint_type):
 def traced_anew(monkeypatch):
     """Programs are traced with the mistake of the test, not taken from the cache on disk."""
     monkeypatch.setattr(
-        "kincheck.core.kinematics.compiled.compiled_model.kept",
+        "kincheck.core.kinematics.compiled.compiled_model.load_or_make",
         lambda content, make, read: read(make()),
     )
 
