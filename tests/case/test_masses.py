@@ -215,3 +215,11 @@ def test_inertia_is_in_global_axes_at_design(tmp_path):
     assert np.allclose(body.center_of_mass, [0, 1, 0], rtol=0, atol=EXACT)
     assert np.allclose(inertia_matrix(body.inertia), np.diag([1, 0.1, 1]), rtol=0, atol=EXACT)
     assert case.mechanism.gravity == (0.0, 1.0, 0.0)
+
+
+def test_total_mass_of_a_setting_leaves_masses_unread(tmp_path):
+    """It scales all of them, below a kilogram too; zero or less is MuJoCo's word for none."""
+    for total, unread in (("0.5", True), ("-1", False)):
+        file = tmp_path / "model.xml"
+        file.write_text(WEIGHED.replace("<compiler ", f'<compiler settotalmass="{total}" ', 1))
+        assert bool(read_tree(file).unweighed) is unread
