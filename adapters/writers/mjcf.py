@@ -273,8 +273,8 @@ class _Model:
         one, other, curve = relation.follower(signed=False)
         if curve.knots:
             raise KincheckError(
-                f"joint {relation.name!r} is a spline, which has no counterpart in MJCF, whose"
-                " joints follow polynomials; write URDF or OpenSim instead"
+                f"joint {relation.name!r} (spline) has no counterpart in MJCF."
+                " Write URDF or OpenSim instead."
             )
         names = {"joint1": self.coordinates[one], "joint2": self.coordinates[other]}
         polynomial = numbers([*curve.powers[0], 0, 0, 0, 0][:5])

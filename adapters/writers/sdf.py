@@ -58,8 +58,8 @@ def write(
     for coupler in mechanism.couplers:
         if coupler.curve:
             raise KincheckError(
-                f"{coupler} has no counterpart in SDF, whose joints mimic others by a factor; write"
-                " URDF or OpenSim instead"
+                f"{coupler} has no counterpart in SDF: its joints mimic others by a factor. Write"
+                " URDF or OpenSim instead."
             )
     values = joint_coordinates(mechanism, way)
     values = {key: x + zeros.get(key, 0.0) for key, x in values.items()}
