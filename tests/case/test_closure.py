@@ -77,7 +77,7 @@ def turned(angles=(0.3, 1.1, -0.7)):
 
 @pytest.mark.parametrize("last", ["revolute", "spherical", "cylindrical", "universal"])
 @pytest.mark.parametrize("turn", [np.eye(3), turned()], ids=["level", "turned"])
-def test_a_tilted_loop_moves_like_the_ideal_one(tmp_path, last, turn):
+def test_closure_tolerance_moves_like_ideal_loop(tmp_path, last, turn):
     file = four_bar(tmp_path, f"[closure]\ntolerance = {TILT}\n", turn, g=last)
     case = load_case(file)
     assert degrees_of_freedom(case.mechanism) == 1
@@ -91,25 +91,25 @@ def test_a_tilted_loop_moves_like_the_ideal_one(tmp_path, last, turn):
     assert 1e-8 < float(note.rsplit(" m", 1)[0].split()[-1]) < 10.0 * TILT
 
 
-def test_without_a_tolerance_it_is_refused(tmp_path, capsys):
+def test_tilted_loop_without_tolerance_is_refused(tmp_path, capsys):
     file = four_bar(tmp_path)
     assert load_case(file).assembly == ()
     assert main(["run", str(file), "--engine", "native"]) == 2
     assert "0 degrees of freedom" in capsys.readouterr().err
 
 
-def test_the_option_stands_above_the_file(tmp_path):
+def test_closure_option_overrides_file(tmp_path):
     file = four_bar(tmp_path, "[closure]\ntolerance = 1e-9\n")
     assert load(file).assembly == ()
     assert "--closure" in load(file, Supplied(closure=TILT)).assembly[0]
 
 
-def test_all_engines_solve_it_alike(tmp_path, capsys):
+def test_closure_tolerance_in_all_engines(tmp_path, capsys):
     file = four_bar(tmp_path, "[closure]\ntolerance = 1e-6\n")
     assert main(["run", str(file), "--jobs", "0"]) == 0, capsys.readouterr()
 
 
-def test_the_tolerance_is_in_the_unit_of_the_file(tmp_path):
+def test_closure_tolerance_in_unit_of_file(tmp_path):
     file = four_bar(tmp_path, '[closure]\ntolerance = 1e-3\n[units]\nlength = "mm"\n')
     assert load_case(file).assembly
     file.write_text(file.read_text().replace("tolerance = 1e-3", "tolerance = 1e-8"))
@@ -117,12 +117,12 @@ def test_the_tolerance_is_in_the_unit_of_the_file(tmp_path):
 
 
 @pytest.mark.parametrize("value", ["0", "-1e-6", '"small"', "nan"])
-def test_no_tolerance(tmp_path, value):
+def test_closure_tolerance_out_of_range(tmp_path, value):
     with pytest.raises(CaseError, match="tolerance"):
         load_case(four_bar(tmp_path, f"[closure]\ntolerance = {value}\n"))
 
 
-def test_freedom_is_the_same_whatever_is_driven(tmp_path):
+def test_closure_tolerance_with_any_driven_joint(tmp_path):
     file = four_bar(tmp_path, "[closure]\ntolerance = 1e-6\n")
     text = file.read_text()
     for joint in PLACES:
@@ -132,7 +132,7 @@ def test_freedom_is_the_same_whatever_is_driven(tmp_path):
         assert degrees_of_freedom(case.mechanism) == 1, joint
 
 
-def test_rows_that_do_not_hold_along_the_motion_are_no_digits(tmp_path):
+def test_closure_rows_violated_along_motion(tmp_path):
     """A hinge that is tilted by a hundredth opens by as much as it turns."""
     file = four_bar(tmp_path, "[closure]\ntolerance = 2e-3\n")
     file.write_text(file.read_text().replace("[1e-06, 0.0, 1.0]", "[0.01, 0.0, 1.0]"))

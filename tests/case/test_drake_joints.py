@@ -12,7 +12,7 @@ from kincheck.core.errors import CaseError
 from scipy.spatial.transform import Rotation
 
 from ..support.model_poses import solution
-from .test_lost_loops import EXACT, GATE, read
+from .test_joining_elements import EXACT, GATE, read
 
 JOINTS_OF_DRAKE = {
     "ball": ("", 3),
@@ -25,7 +25,7 @@ JOINTS_OF_DRAKE = {
 @pytest.mark.parametrize(
     ("kind", "inside", "freedoms"), [(kind, *each) for kind, each in JOINTS_OF_DRAKE.items()]
 )
-def test_a_joint_of_drake_moves_as_drake_moves_it(kind, inside, freedoms, tmp_path: Path):
+def test_drake_joint_in_urdf_matches_drake(kind, inside, freedoms, tmp_path: Path):
     """Its freedoms, and the place of the tip when the last one moves."""
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
     parsing = pytest.importorskip("pydrake.multibody.parsing")
@@ -69,7 +69,7 @@ MOVES = {"q.slide1": (0.5, 0, 0), "q.slide2": (0, 0.5, 0), "q.rotation": (0, 0, 
 
 
 @pytest.mark.parametrize("moved", MOVES)
-def test_a_planar_joint_of_drake_in_sdf_is_that_of_drake(moved: str, tmp_path: Path):
+def test_planar_joint_in_sdf_matches_drake(moved: str, tmp_path: Path):
     """Along x and y of the parent's frame, and about its z; where Drake is, by Drake too."""
     (tmp_path / "m.sdf").write_text(PLANAR)
     held = tuple(each for each in MOVES if each != moved)
@@ -104,7 +104,7 @@ def test_a_planar_joint_of_drake_in_sdf_is_that_of_drake(moved: str, tmp_path: P
         ("<drake:child>b<", "<drake:child>c<", "found the frame 'm::c'"),
     ],
 )
-def test_other_joints_of_drake_in_sdf_are_refused(old: str, new: str, said: str, tmp_path: Path):
+def test_faulty_drake_joint_in_sdf(old: str, new: str, said: str, tmp_path: Path):
     (tmp_path / "m.sdf").write_text(PLANAR.replace(old, new))
     with pytest.raises(CaseError, match=re.escape(said)):
         read_tree(tmp_path / "m.sdf")

@@ -45,7 +45,7 @@ SETTINGS = {
 
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
-def test_masses_are_those_of_mujoco(tmp_path, settings):
+def test_mjcf_masses_match_mujoco(tmp_path, settings):
     file = tmp_path / "model.xml"
     file.write_text(WEIGHED.replace("<default>", settings + "<default>", 1))
     model = mujoco.MjModel.from_xml_path(str(file))
@@ -93,7 +93,7 @@ def case_of(tmp_path, text, supplied=DRIVEN):
     return load(file, supplied)
 
 
-def test_all_formats_have_the_same_masses(tmp_path):
+def test_masses_agree_across_formats(tmp_path):
     cases = [case_of(tmp_path, text) for text in (MJCF, URDF, SDF)]
     bodies = [case.mechanism.body("arm") for case in cases]
     for case, body in zip(cases, bodies, strict=True):
@@ -112,7 +112,7 @@ def test_fixed_link_with_mass_is_output(tmp_path, text):
     assert case.outputs[3].point == "tip"
 
 
-def test_the_effort_of_a_robot_is_that_of_mujoco(tmp_path):
+def test_driver_effort_matches_mujoco(tmp_path):
     case = case_of(tmp_path, MJCF)
     found = NativeSolver(compiled=False).prepare(case.mechanism, case.sweep.path, forces=["J"])(
         1e-12
@@ -131,7 +131,7 @@ ROD = """<mujoco><worldbody><body name="a"><joint name="J" axis="0 1 0"/><inerti
 <equality><connect body1="rod" body2="c" anchor="4 0 0"/></equality></mujoco>"""  # noqa: E501
 
 
-def test_a_rod_has_its_mass_at_its_ends(tmp_path):
+def test_rod_mass_is_at_its_ends(tmp_path):
     """Two kilograms, a quarter of the length from its first end."""
     case = case_of(tmp_path, ROD)
     assert "moments of inertia of rods, whose masses are at their ends: rod" in case.source
@@ -152,13 +152,13 @@ UNREADABLE = {
 
 
 @pytest.mark.parametrize(("text", "old", "new", "body"), UNREADABLE.values(), ids=UNREADABLE)
-def test_a_mass_that_cannot_be_read_never_stops_a_motion(tmp_path, text, old, new, body):
+def test_unreadable_mass_is_noted(tmp_path, text, old, new, body):
     assert old in text
     case = case_of(tmp_path, text.replace(old, new))
     assert f"masses that cannot be read, of {body}" in case.source
 
 
-def test_a_mesh_has_an_unknown_mass(tmp_path):
+def test_mesh_has_unknown_mass(tmp_path):
     text = (
         '<mujoco><worldbody><body name="arm"><joint name="J"/><geom type="mesh" mesh="m"/></body>'
         "</worldbody></mujoco>"
@@ -168,7 +168,7 @@ def test_a_mesh_has_an_unknown_mass(tmp_path):
     assert case.mechanism.gravity == (0.0, 0.0, 0.0)  # as long as nothing has a mass
 
 
-def test_moments_without_a_mass_are_told(tmp_path):
+def test_moments_without_mass_are_noted(tmp_path):
     text = MJCF.replace(
         "<compiler angle", '<compiler inertiafromgeom="false" boundinertia="1" angle'
     )
@@ -178,13 +178,13 @@ def test_moments_without_a_mass_are_told(tmp_path):
     assert case.mechanism.body("arm").mass == 0.0
 
 
-def test_settings_of_masses_are_checked(tmp_path):
+def test_mistyped_mass_setting_is_refused(tmp_path):
     with pytest.raises(CaseError, match="inertiafromgeom: found 'yes'"):
         case_of(tmp_path, MJCF.replace("<compiler", '<compiler inertiafromgeom="yes"'))
 
 
 @pytest.mark.parametrize("writer", [mjcf, sdf], ids=["mjcf", "sdf"])
-def test_stand_ins_are_no_masses(tmp_path, writer):
+def test_exported_stand_ins_are_no_masses(tmp_path, writer):
     """What kincheck writes for a mechanism without masses is read as one without masses."""
     texts = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)
     file = tmp_path / ("model" + next(iter(texts)))
@@ -195,7 +195,7 @@ def test_stand_ins_are_no_masses(tmp_path, writer):
 
 
 @pytest.mark.parametrize(("key", "mass"), [("mass", 2e-6), ("ixx", 1e-6)])
-def test_small_masses_unlike_a_stand_in_count(tmp_path, key, mass):
+def test_small_mass_unlike_stand_in_counts(tmp_path, key, mass):
     text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), sdf.write)[".sdf"]
     file = tmp_path / "model.sdf"
     file.write_text(text.replace(f"<{key}>1e-06", f"<{key}>2e-06", 1))
@@ -203,7 +203,7 @@ def test_small_masses_unlike_a_stand_in_count(tmp_path, key, mass):
     assert [body.mass for body in case.mechanism.bodies if body.mass] == [mass]
 
 
-def test_inertia_is_in_global_axes_at_design(tmp_path):
+def test_inertia_in_global_axes(tmp_path):
     """A bar along x in a body turned by 90 degrees about z lies along y."""
     text = (
         '<mujoco><option gravity="0 1 0"/><worldbody><body name="arm" euler="0 0 90">'
@@ -217,7 +217,7 @@ def test_inertia_is_in_global_axes_at_design(tmp_path):
     assert case.mechanism.gravity == (0.0, 1.0, 0.0)
 
 
-def test_total_mass_of_a_setting_leaves_masses_unread(tmp_path):
+def test_settotalmass_leaves_masses_unread(tmp_path):
     """It scales all of them, below a kilogram too; zero or less is MuJoCo's word for none."""
     for total, unread in (("0.5", True), ("-1", False)):
         file = tmp_path / "model.xml"

@@ -99,17 +99,17 @@ DRIVES = {
         ),
     ],
 )
-def test_a_joint_that_the_file_locks_is_not_driven(tmp_path, supplied, found):
+def test_locked_joint_is_not_driven(tmp_path, supplied, found):
     complains(edited(tmp_path, (COUPLING, '<joint joint1="right_driver_joint"')), supplied, found)
 
 
 @pytest.mark.parametrize("kind", DRIVES)
-def test_driving(kind):
+def test_drive_and_hold_faults(kind):
     supplied, fragments = DRIVES[kind]
     complains(GRIPPER, supplied, *fragments)
 
 
 @pytest.mark.parametrize("drive", ["0:20deg:5", "0:0.3490658503988659rad:5"])
-def test_drive_takes_a_unit(drive):
+def test_drive_takes_angle_unit(drive):
     case = load(GRIPPER, replace(DRIVEN, drive=(f"right_driver_joint:{drive}",)))
     assert case.sweep.values[-1] - case.sweep.values[0] == pytest.approx(math.radians(20.0))

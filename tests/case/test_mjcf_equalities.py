@@ -63,7 +63,7 @@ EQUALITIES = {
 
 
 @pytest.mark.parametrize("kind", EQUALITIES)
-def test_equalities(tmp_path, kind):
+def test_equality_closes_as_in_mujoco(tmp_path, kind):
     """Each closes what it says: driven joints and residuals in MuJoCo."""
     equality, closed = EQUALITIES[kind]
     file = model(tmp_path, linkage(equality))
@@ -81,7 +81,7 @@ BLOCK = """<body name="block" pos="0.4 0 0.4" quat="1 0 1 0"><joint name="x" typ
 
 
 @pytest.mark.parametrize("kind", ["connect", "weld"])
-def test_sites(tmp_path, kind):
+def test_equality_between_sites(tmp_path, kind):
     """Sites that coincide at qpos0: the block follows the crank's pin, or it locks it."""
     text = linkage(f'<{kind} site1="pin" site2="hub"/>').replace('<body name="lever"', BLOCK)
     if kind == "weld":
@@ -100,7 +100,7 @@ def test_sites(tmp_path, kind):
     assert distance < EXACT
 
 
-def test_bodies_made_of_several_joints_are_no_others(tmp_path):
+def test_name_of_body_between_two_joints(tmp_path):
     """The body between two joints of one body has a name that none of the file has."""
     text = """
     <mujoco><worldbody>
@@ -114,7 +114,7 @@ def test_bodies_made_of_several_joints_are_no_others(tmp_path):
         load(model(tmp_path, text), Supplied(drive=("y:0:1",), hold=("x",)))
 
 
-def test_inactive_equalities_are_left_out(tmp_path):
+def test_inactive_equality_is_left_out(tmp_path):
     gear = '<joint joint1="lever" joint2="crank" active="false"/>'
     for text in (
         linkage(gear),
@@ -135,7 +135,7 @@ ROD = """
     </worldbody><equality><connect body1="rod" body2="slider" anchor="0.8 0.1 -0.4"/></equality></mujoco>"""  # noqa: E501
 
 
-def test_a_rod_on_a_ball_and_a_connect_does_not_spin(tmp_path):
+def test_rod_spin_is_left_out(tmp_path):
     """Its turn about itself, which nothing can drive, is left out; a free body can be held."""
     file = model(tmp_path, ROD)
     case = load(file, Supplied(drive=("crank:0.2:0.9:6",), hold=("frame",)))

@@ -211,7 +211,7 @@ ALSO = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_models(tmp_path, kind):
+def test_mjcf_fault_is_one_message(tmp_path, kind):
     edit, fragments = FAULTS[kind]
     complains(edited(tmp_path, edit, *([ALSO[kind]] if kind in ALSO else [])), DRIVEN, *fragments)
 
@@ -227,7 +227,7 @@ def test_models(tmp_path, kind):
         ('<!DOCTYPE a SYSTEM "file:///etc/hostname">', ["line 1", "<!DOCTYPE>"]),
     ],
 )
-def test_no_document_types(tmp_path, head, fragments):
+def test_document_type_is_refused(tmp_path, head, fragments):
     file = tmp_path / "model.xml"
     file.write_text(head + GRIPPER.read_text())
     complains(file, DRIVEN, *fragments)
@@ -246,13 +246,13 @@ def test_no_document_types(tmp_path, head, fragments):
         ("<mujoco><worldbody><body name='&#133;'/></worldbody></mujoco>", ["control characters"]),
     ],
 )
-def test_other_texts(tmp_path, text, fragments):
+def test_text_without_mjcf_model_is_refused(tmp_path, text, fragments):
     file = tmp_path / "model.xml"
     file.write_text(text)
     complains(file, DRIVEN, *fragments)
 
 
-def test_too_large(tmp_path):
+def test_too_large_file_is_refused(tmp_path):
     file = tmp_path / "model.xml"
     file.write_text(" " * 4_000_001)
     complains(file, DRIVEN, "larger than 4000000 bytes")

@@ -22,7 +22,7 @@ CLOSING = Supplied(
 )
 
 
-def test_the_gripper_moves_as_mujoco_allows():
+def test_gripper_closes_in_mujoco():
     """A published model: two five-bars, closed by connects and geared, over the stroke that its
     file gives.
     """
@@ -38,14 +38,14 @@ def test_the_gripper_moves_as_mujoco_allows():
     assert distance < EXACT
 
 
-def test_the_gripper_moves_at_all_and_alike_on_both_sides():
+def test_gripper_sides_move_symmetrically():
     found = solution(load(GRIPPER, CLOSING)).points
     right, left = found["right_pad"].position, found["left_pad"].position
     assert np.abs(right[-1] - right[0]).max() > 0.02
     assert np.abs(right * [-1, -1, 1] - left).max() < EXACT
 
 
-def test_what_is_lost_is_listed():
+def test_left_out_elements_are_listed():
     listed = load(GRIPPER, CLOSING).source.split(LEFT_OUT)[1].split(", ")
     assert {
         "ranges of joints (8)",
@@ -72,7 +72,7 @@ ORIENTATIONS = {
 @pytest.mark.parametrize("angle", ["degree", "radian"])
 @pytest.mark.parametrize("sequence", ["xyz", "zyx", "XYZ", "zXy"])
 @pytest.mark.parametrize("orientation", ORIENTATIONS.values(), ids=ORIENTATIONS)
-def test_orientations(tmp_path, orientation, sequence, angle):
+def test_orientations_match_mujoco(tmp_path, orientation, sequence, angle):
     text = f"""
     <mujoco><compiler angle="{angle}" eulerseq="{sequence}"/><worldbody>
       <body name="a" pos="0.1 0.2 0.3" {orientation}><joint name="j" axis="1 2 2" pos="0.3 0 0.1" ref="0.4"/>
@@ -85,7 +85,7 @@ def test_orientations(tmp_path, orientation, sequence, angle):
     agree(model(tmp_path, text))
 
 
-def test_classes_of_joints_and_bodies_without_joints(tmp_path):
+def test_default_classes_match_mujoco(tmp_path):
     """A joint takes what it lacks from its class, from the class of the body around it, or from the
     outermost class.
     """
@@ -124,7 +124,7 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
     assert tree.massless == {"own.own"}
 
 
-def test_what_was_exported_is_read(tmp_path):
+def test_exported_mjcf_is_read(tmp_path):
     """The strut: its tie rod is a tendon between two sites there, and a distance again here."""
     file = tmp_path / "strut.xml"
     assert main(["export", "mcpherson_strut", "--to", "mjcf", "--out", str(file)]) == 0
@@ -135,14 +135,14 @@ def test_what_was_exported_is_read(tmp_path):
     assert distance < EXACT
 
 
-def test_a_name_that_is_a_path_is_no_place_to_write_to(tmp_path, monkeypatch):
+def test_model_name_with_path_in_export(tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     keep_texts({".xml": "<mujoco/>"}, "../../out of/here", None)
     assert [file.name for file in (tmp_path / "here").iterdir()] == [".._.._out of_here.xml"]
 
 
-def test_every_engine_reads_the_gripper_from_the_command_line(capsys):
+def test_run_command_with_gripper(capsys):
     options = [
         "--drive",
         "right_driver_joint:0:0.8:5",

@@ -45,7 +45,7 @@ ALL_KINDS = """<mujoco><compiler angle="degree" eulerseq="zyx"/><worldbody>
 
 
 @pytest.mark.parametrize("said", [("keyframe:bent",), ("keyframe:bent", "push=-0.1", "lone=0.7")])
-def test_a_start_is_mujocos_pose(tmp_path, said):
+def test_start_pose_matches_mujoco(tmp_path, said):
     file = written(tmp_path, ALL_KINDS)
     tree = read_tree(file)
     there = read_start(tree, said).pose.as_tree()
@@ -79,7 +79,7 @@ def test_a_start_is_mujocos_pose(tmp_path, said):
         (("push=1", "push=2"), ["twice"]),
     ],
 )
-def test_a_start_that_is_none(tmp_path, said, fragments):
+def test_start_faults(tmp_path, said, fragments):
     file = written(tmp_path, ALL_KINDS)
     tree = read_tree(file)
     with pytest.raises(CaseError) as caught:
@@ -97,7 +97,7 @@ def parallelogram(gap, digits="0.5123456"):
     </worldbody><equality><connect site1="b" site2="c"/></equality></mujoco>"""  # noqa: E501
 
 
-def test_an_open_start_is_assembled_and_said(tmp_path):
+def test_open_start_is_assembled(tmp_path):
     file = written(tmp_path, parallelogram(0.01))
     case = load(file, Supplied(drive=("crank:0:0.2:5",)))
     note, zeros = case.assembly
@@ -113,7 +113,7 @@ def test_an_open_start_is_assembled_and_said(tmp_path):
     assert np.allclose(found.bodies["b"].r[-1], 0.5123456 * np.array([np.sin(0.2), 0, np.cos(0.2)]))
 
 
-def test_a_start_that_is_far_open_is_refused(tmp_path):
+def test_far_open_start_is_refused(tmp_path):
     file = written(tmp_path, parallelogram(0.3))
     with pytest.raises(CaseError, match=r"open in the start .* by 0\.3 m, expected 0\.13"):
         load(file, Supplied(drive=("crank:0:0.2:5",)))
@@ -121,7 +121,7 @@ def test_a_start_that_is_far_open_is_refused(tmp_path):
     assert load(file, Supplied(drive=("crank:0:0.2:5",), start=("crank=0",))).assembly
 
 
-def test_offsets_are_followed_from_the_assembled_start(tmp_path):
+def test_joint_polynomial_offset_from_assembled_start(tmp_path):
     text = """<mujoco><compiler angle="radian"/><worldbody>
       <body name="a"><joint name="x" axis="0 0 1"/><geom/></body>
       <body name="b" pos="1 0 0"><joint name="y" axis="0 0 1"/><geom/><site name="tip" pos="0.5 0 0"/></body>
@@ -149,7 +149,7 @@ CHAIN = """<mujoco><compiler angle="radian"/><worldbody>
   </body></worldbody><actuator><motor joint="two"/></actuator></mujoco>"""  # noqa: E501
 
 
-def test_the_rest_is_held_and_the_list_is_complete(tmp_path):
+def test_hold_rest_covers_all_freedoms(tmp_path):
     file = written(tmp_path, CHAIN)
     with pytest.raises(CaseError) as caught:
         load(file, Supplied(drive=("one:0:1",)))
@@ -163,7 +163,7 @@ def test_the_rest_is_held_and_the_list_is_complete(tmp_path):
     assert case.mechanism.joint("ball").type == "fixed"
 
 
-def test_joints_are_driven_together(tmp_path):
+def test_two_joints_driven_together(tmp_path):
     case = load(
         written(tmp_path, CHAIN),
         Supplied(drive=("one:0:1:5", "two:0.5:-0.3"), hold=("base", "ball")),
@@ -193,7 +193,7 @@ RODS = {
 
 
 @pytest.mark.parametrize("kind", RODS)
-def test_rods_do_not_spin(tmp_path, kind):
+def test_rod_between_balls_does_not_spin(tmp_path, kind):
     inside, equality = RODS[kind]
     free = '<body name="free" pos="0.2 0 0.3"><freejoint/><geom/></body>' * (kind == "free body")
     text = f"""<mujoco><worldbody>
@@ -208,7 +208,7 @@ def test_rods_do_not_spin(tmp_path, kind):
     assert np.allclose(solved(case).points["slider"].position[:, 0], slid, rtol=0, atol=EXACT)
 
 
-def test_two_rods_end_to_end_keep_their_bodies(tmp_path):
+def test_rods_in_series_count_freedoms(tmp_path):
     """The one that cannot be a distance is kept from turning about itself by a row."""
     text = """<mujoco><worldbody>
       <body name="crank"><joint name="crank" axis="0 0 1"/><geom/>
@@ -224,7 +224,7 @@ def test_two_rods_end_to_end_keep_their_bodies(tmp_path):
     assert "the model has 5 degrees of freedom" in str(caught.value)
 
 
-def test_includes_and_replicates_are_as_in_mujoco(tmp_path):
+def test_include_and_replicate_match_mujoco(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "leg.xml").write_text(
         '<mujocoinclude><body name="leg" pos="0 0 1"><joint name="hip"/><geom/>'
@@ -253,7 +253,7 @@ def test_includes_and_replicates_are_as_in_mujoco(tmp_path):
         assert np.allclose([*joint.axis], data.joint(name).xaxis, rtol=0, atol=EXACT)
 
 
-def test_an_include_may_be_in_a_folder_beside_the_model(tmp_path):
+def test_include_from_folder_beside_model(tmp_path):
     (tmp_path / "leg").mkdir()
     (tmp_path / "scene").mkdir()
     part = f'<mujocoinclude><body name="b"><joint name="j"/>{BODY}</body></mujocoinclude>'
@@ -275,7 +275,7 @@ def test_an_include_may_be_in_a_folder_beside_the_model(tmp_path):
         ("link.xml", ["in the folder of the model"]),
     ],
 )
-def test_includes_stay_beside_the_model(tmp_path, include, fragments):
+def test_include_from_elsewhere_is_refused(tmp_path, include, fragments):
     folder = tmp_path / "robots" / "inside"
     folder.mkdir(parents=True)
     (tmp_path / "outside.xml").write_text("<mujoco/>")

@@ -32,7 +32,7 @@ def test_motors_move_through_their_limits(tmp_path):
     assert any("shoulder, elbow move through their limits" in note for note in case.assembly)
 
 
-def test_one_motor_is_said_in_the_singular(tmp_path):
+def test_note_of_one_motor(tmp_path):
     note = "elbow moves through its limits"
     file = tmp_path / "arm.urdf"
     text = arm(tmp_path, "shoulder", "elbow").read_text()
@@ -40,7 +40,7 @@ def test_one_motor_is_said_in_the_singular(tmp_path):
     assert any(note in each for each in load(file).assembly)
 
 
-def test_joints_commanded_by_ros2_control_have_motors(tmp_path):
+def test_ros2_control_commands_are_motors(tmp_path):
     file = arm(tmp_path, "elbow")
     commanded = '<joint name="shoulder"><command_interface name="position"/></joint>'
     file.write_text(
@@ -77,7 +77,7 @@ def test_motor_of_tendon_moves_its_joints(tmp_path):
         (("elbow", "shoulder"), "-1", "its motors, of shoulder, elbow, have no limits at shoulder"),
     ],
 )
-def test_unused_motors_say_why(motors, upper, why, tmp_path):
+def test_unused_motors_give_reason(motors, upper, why, tmp_path):
     with pytest.raises(CaseError, match=rf"nothing says what drives it: {why}. Say"):
         load(arm(tmp_path, *motors, upper=upper))
 
@@ -99,7 +99,7 @@ def test_motor_in_parent_drives_its_joint(tmp_path):
     assert load(file).sweep.driver == "motor"
 
 
-def test_what_drives_a_model_is_not_left_out(tmp_path):
+def test_used_motors_are_not_left_out(tmp_path):
     (file := tmp_path / "wiper.xml").write_text(WIPER)
     case = load(file, Supplied(start=("keyframe:up",)))
     assert case.source.split(LEFT_OUT)[1] == "actuator: position (1), keyframe: key (1)"
@@ -111,7 +111,7 @@ def test_what_drives_a_model_is_not_left_out(tmp_path):
     }
 
 
-def test_locked_joint_with_a_link_s_name_is_refused(tmp_path):
+def test_locked_joint_named_like_link(tmp_path):
     (file := tmp_path / "arm.xml").write_text(
         '<mujoco><worldbody><body name="upper"><joint name="arm"/><body name="arm" pos="1 0 0">'
         '<joint name="elbow" axis="0 1 0"/></body></body></worldbody>'

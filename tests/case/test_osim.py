@@ -79,7 +79,7 @@ def placed(tree, name):
 
 @pytest.mark.parametrize("locked", ["", "<locked>true</locked>"])
 @pytest.mark.parametrize("kind", MOTIONS)
-def test_joint_places_its_child_by_its_coordinates(write, kind, locked):
+def test_joint_places_child_by_coordinates(write, kind, locked):
     """On a link that turns, and of one that a second joint carries."""
     count, motion = MOTIONS[kind]
     names = [coordinate(f"q{k}", Q[k], locked * (k == 0)) for k in range(count)]
@@ -106,7 +106,7 @@ def test_joint_places_its_child_by_its_coordinates(write, kind, locked):
 
 
 @pytest.mark.parametrize("text", [FOUR_BAR, FOUR_BAR.replace('<Ground name="ground"/>', "")])
-def test_point_constraint_closes_the_loop(write, text):
+def test_point_constraint_closes_loop(write, text):
     case = load(write(text), DRIVE)
     found = solution(case)
     for k, angle in enumerate(case.sweep.values):
@@ -131,7 +131,7 @@ SQUARE = tagged("PolynomialFunction", texts(coefficients=(0.3, 0.2, 0.1)))
 HALF = tagged("MultiplierFunction", f"<function>{line(1, 2)}</function><scale>0.5</scale>")
 
 
-def test_axes_of_custom_joint_follow_their_coordinates(write):
+def test_custom_joint_axes_follow_coordinates(write):
     """A hinge against its axis and off zero, a slide by a line, one by a curve, one that stands."""
     axes = (
         axis("rotation1", (0, 0, 2), line(-1, 0.4), "bend"),
@@ -190,7 +190,7 @@ def bent(function):
 X, Y = (1, 0, 0), (0, 1, 0)
 
 
-def test_knee_of_splines_moves_by_its_table(write):
+def test_knee_of_splines_follows_table(write):
     """From where it is bent in the file, past the end of its table."""
     axes = (
         axis("rotation1", (0, 0, 1), line(1, 0), "q"),
@@ -219,7 +219,7 @@ def test_knee_of_splines_moves_by_its_table(write):
         assert np.allclose(found.a[k, :3], bend, rtol=0, atol=1e-11 * size)
 
 
-def test_coordinate_of_splines_alone_turns_with_its_coupler(write):
+def test_coordinate_of_splines_alone_is_coupled(write):
     """As of a patella: it has no axis of its own, and follows the knee's."""
     axes = (
         axis("rotation3", (0, 0, 1), table("SimmSpline", *DOWN), "beta"),
@@ -239,7 +239,7 @@ def test_coordinate_of_splines_alone_turns_with_its_coupler(write):
         assert np.allclose(found.bodies["a"].r[k], place[:3, 3], rtol=0, atol=1e-12)
 
 
-def test_tables_on_a_line_are_lines(write):
+def test_tables_on_a_line_are_linear(write):
     for kind in ("SimmSpline", "PiecewiseLinearFunction"):
         tree = read_tree(write(bent(table(kind, (-1, 0, 0.5), (-2.5, -0.5, 0.5)))))
         (tie,) = tree.ties
@@ -280,7 +280,7 @@ PINS = [
     ],
     ids="line scaled curve spline two".split(),
 )
-def test_coupled_coordinate_follows(write, tie, law):
+def test_coupled_coordinate_follows_leader(write, tie, law):
     """From where the file has it to where the coupler wants it, at the start and later."""
     case = load(write(model("abc", PINS, tie)), Supplied(drive=("A:0:0.5:5",), hold=("C",)))
     found = solution(case)
@@ -314,7 +314,7 @@ def test_welds_and_rods_tie_frames(write):
     assert tree.left_out["constraints that are not enforced"] == 1
 
 
-def test_facts_beside_motion_are_read(write):
+def test_masses_springs_limits_and_markers(write):
     heavy = (
         '<Body name="a">'
         + texts(mass=(2.0,), mass_center=(0.1, 0.2, 0.3), inertia=(1.0, 2.0, 2.5, 0.1, 0.2, 0.3))
@@ -411,13 +411,13 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("fault", REFUSED)
-def test_what_is_not_read_is_refused(write, fault):
+def test_osim_fault_is_one_message(write, fault):
     text, message = REFUSED[fault]
     with pytest.raises(CaseError, match=re.escape(message)):
         load(write(text), DRIVE)
 
 
-def test_constraint_is_left_out_by_name(write):
+def test_constraint_left_out_by_name(write):
     text = model("abc", PINS, tagged("PointOnLineConstraint", "", "tie"))
     tree = read_tree(write(text), ["tie"])
     assert any("PointOnLineConstraint" in note for note in tree.notes)
@@ -432,14 +432,14 @@ OLD = """<OpenSimDocument Version="30000"><Model name="old"><BodySet><objects>
 """
 
 
-def test_older_documents_need_the_library(write, monkeypatch):
+def test_older_document_needs_opensim(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "opensim", None)
     with pytest.raises(CaseError, match=r"found 30000, expected 40000 or more; .* pip install"):
         read_tree(write(OLD))
 
 
 @pytest.mark.skipif(importlib.util.find_spec("opensim") is None, reason="no OpenSim")
-def test_older_documents_are_brought_up_to_date(write):
+def test_older_document_is_updated_by_opensim(write):
     tree = read_tree(write(OLD))
     expected = transform((0, 1, 0), (0, 0.5, 0)) @ transform(angles=(0, 0, 0.3))
     expected = expected @ transform((0, 0, -2))
@@ -448,7 +448,7 @@ def test_older_documents_are_brought_up_to_date(write):
 
 
 @pytest.mark.parametrize("to", ["osim", "mjcf", "urdf", "sdf"])
-def test_exports_keep_limits(write, tmp_path, to):
+def test_exports_keep_joint_limits(write, tmp_path, to):
     """From a start at which they count from another zero; a slide too."""
     clamped = [texts(range=each, clamped="true") for each in ((-0.5, 0.75), (-0.1, 0.3))]
     joints = [
@@ -465,7 +465,7 @@ def test_exports_keep_limits(write, tmp_path, to):
         assert (limit.lower + zero, limit.upper + zero) == pytest.approx(limits, abs=1e-12)
 
 
-def test_start_or_drive_beyond_limits_is_noted(write):
+def test_start_or_drive_beyond_limits(write):
     bounded = texts(range=(-0.5, 0.75), clamped="true")
     joints = [
         joint("PinJoint", x, "", x.lower(), coordinate(x, v, bounded))

@@ -69,7 +69,7 @@ def random_case(kind, seed, folder):
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_a_random_model_is_imported_whole(kind, tmp_path):
+def test_random_model_round_trip(kind, tmp_path):
     found = [random_case(kind, seed, tmp_path) for seed in range(1, MODELS + 1)]
     moving = [case for case in found if case is not None]
     assert len(moving) >= 0.9 * MODELS
@@ -111,7 +111,7 @@ def chrono(rng, seed):
 
 
 @pytest.mark.parametrize("table", [plain, adams, chrono])
-def test_a_random_table_is_imported_whole(table, tmp_path):
+def test_random_table_round_trip(table, tmp_path):
     for seed in range(MODELS):
         name, content, options = table(np.random.default_rng(seed), seed)
         file = tmp_path / name

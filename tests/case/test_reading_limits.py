@@ -66,14 +66,14 @@ TOO_MUCH = {
 
 
 @pytest.mark.parametrize(("part", "content", "said"), TOO_MUCH.values(), ids=TOO_MUCH)
-def test_a_workbook_of_too_much_is_not_opened(part, content, said, tmp_path, monkeypatch):
+def test_oversized_workbook_is_not_opened(part, content, said, tmp_path, monkeypatch):
     file = book(tmp_path, part, content)
     assert file.stat().st_size < 1_000_000
     monkeypatch.setattr(openpyxl, "load_workbook", lambda *_: pytest.fail("it is opened"))
     assert said in refused(file)
 
 
-def test_an_archive_of_many_parts_is_not_opened(tmp_path, monkeypatch):
+def test_archive_of_many_parts_is_refused(tmp_path, monkeypatch):
     file = book(tmp_path, "", b"", MOST_MEMBERS)
     monkeypatch.setattr(zipfile, "ZipFile", lambda *_: pytest.fail("it is opened"))
     assert f"parts, expected {MOST_MEMBERS} at most" in refused(file)
@@ -106,13 +106,13 @@ def test_blank_rows_and_cells_are_counted(rows, said, tmp_path, monkeypatch):
     assert read["cells"] <= table.MOST_CELLS + 16_384
 
 
-def test_a_gap_of_a_sheet_is_read(tmp_path):
+def test_sheet_with_gap_is_read(tmp_path):
     last = f'<row r="{table.MOST_ROWS}"><c r="A1"><v>2</v></c></row>'.encode()
     (sheet,) = table.read_sheets(book(tmp_path, SHEET, HEAD + ONE + last + END), None, 10)
     assert [row for _, row in sheet.sheet] == [[1.0], [2.0]]
 
 
-def test_a_table_of_many_columns_is_refused(tmp_path):
+def test_table_of_many_columns_is_refused(tmp_path):
     file = tmp_path / "table.csv"
     file.write_text("a,b\n1" + "," * table.MOST_COLUMNS_OF_TEXT)
     said = f"line 2: found more than {table.MOST_COLUMNS_OF_TEXT} columns"
@@ -121,14 +121,14 @@ def test_a_table_of_many_columns_is_refused(tmp_path):
         load(file, Supplied(template="mcpherson"))
 
 
-def test_a_table_of_many_lines_is_no_suspension(tmp_path):
+def test_table_of_many_lines_is_refused(tmp_path):
     file = tmp_path / "table.dat"
     file.write_text("a 1 2 3\n" * (MOST_LINES + 1))
     with pytest.raises(CaseError, match=f"found {MOST_LINES + 1} lines"):
         load(file)
 
 
-def test_elements_are_read_up_to_a_number(tmp_path):
+def test_xml_elements_up_to_limit(tmp_path):
     """The first one beyond it is named; there is one on each line."""
     text = "<a>\n" + "<b/>\n" * MOST_ELEMENTS + "</a>"
     with pytest.raises(CaseError, match=f"line {MOST_ELEMENTS + 1}: <b>: found more than"):
@@ -153,14 +153,14 @@ TIE = {
 
 
 @pytest.mark.parametrize("name", TIES)
-def test_closures_are_read_up_to_a_number(name, tmp_path):
+def test_closures_up_to_limit(name, tmp_path):
     file = tmp_path / name
     file.write_text(TIES[name].format(TIE[name] * (MOST_TIES + 1)))
     with pytest.raises(CaseError, match=rf"line {MOST_TIES + 3}: .*found more than"):
         load(file, Supplied(drive=("j:0:1",)))
 
 
-def test_long_chain_of_fixed_links_is_read(tmp_path):
+def test_long_chain_of_fixed_links(tmp_path):
     base = LINKS.replace('"b"', '"l-1"')
     chain = "".join(
         f'<link name="l{k}"/><joint name="f{k}" type="fixed"><parent link="l{k - 1}"/>'
@@ -173,7 +173,7 @@ def test_long_chain_of_fixed_links_is_read(tmp_path):
     assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
 
 
-def test_bodies_in_bodies_are_read_however_deep(tmp_path):
+def test_deeply_nested_mjcf_bodies(tmp_path):
     """Deeper than Python recurses."""
     deep = '<body pos="1 0 0"><frame><joint axis="0 0 1"/>'
     file = tmp_path / "deep.xml"
@@ -187,7 +187,7 @@ def test_bodies_in_bodies_are_read_however_deep(tmp_path):
     assert tree.sites["tip"][1].at == Vec3(1200.0, 0.0, 0.0)
 
 
-def test_many_linkages_of_few_digits_are_read(tmp_path):
+def test_many_linkages_of_few_digits(tmp_path):
     """Rows that are redundant but for digits are those of each linkage alone."""
     bars = "".join(
         f'<body name="c{k}" pos="{k} 0 0"><joint name="j{k}" axis="0 1 0"/><body name="r{k}"'
@@ -206,7 +206,7 @@ def test_many_linkages_of_few_digits_are_read(tmp_path):
     assert len(case.mechanism.reduced) == 52
 
 
-def test_springs_without_a_length_are_left_out(tmp_path):
+def test_spring_tendon_without_length_left_out(tmp_path):
     """A tendon between sites in one place has no direction."""
     text = BODIES.replace("<joint/>", '<joint/><site name="t"/>').replace(
         '<joint name="j"/>', '<joint name="j"/><site name="s"/>'

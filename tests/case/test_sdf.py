@@ -23,7 +23,7 @@ def model(folder: Path, text: str) -> Path:
     return file
 
 
-def test_a_link_that_two_joints_hold_closes_a_loop(tmp_path: Path):
+def test_link_under_two_joints_closes_loop(tmp_path: Path):
     """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
     case = load(model(tmp_path, FOUR_BAR), DRIVE)
     found = solution(case)
@@ -41,7 +41,7 @@ def test_a_link_that_two_joints_hold_closes_a_loop(tmp_path: Path):
     assert case.source.split(LEFT_OUT)[1] == "visual (1)"
 
 
-def test_the_joint_of_the_loop_can_be_driven(tmp_path: Path):
+def test_loop_joint_is_driven(tmp_path: Path):
     """It is a joint like any other."""
     by_crank = solution(load(model(tmp_path, FOUR_BAR), DRIVE)).bodies["b"].r
     by_loop = (
@@ -50,7 +50,7 @@ def test_the_joint_of_the_loop_can_be_driven(tmp_path: Path):
     assert np.abs(by_crank - by_loop).max() < EXACT
 
 
-def test_all_types_of_joints_in_several_models(tmp_path: Path):
+def test_all_sdf_joint_types(tmp_path: Path):
     supplied = Supplied(
         drive=("m::s:0:0.1:3",), hold=("m::u.1", "m::u.2", "m::ball", "m::w.rotation")
     )
@@ -75,7 +75,7 @@ def test_all_types_of_joints_in_several_models(tmp_path: Path):
     assert turned == pytest.approx(0.2, abs=EXACT)
 
 
-def test_a_screw_advances_by_its_pitch_in_a_turn(tmp_path: Path):
+def test_screw_advances_by_pitch(tmp_path: Path):
     text = """<sdf version="1.10"><model name="m"><link name="nut"/><joint name="w" type="screw">
     <parent>world</parent><child>nut</child><axis/><screw_thread_pitch>0.01</screw_thread_pitch>
     </joint></model></sdf>"""
@@ -110,7 +110,7 @@ AXES = {
 
 
 @pytest.mark.parametrize(("root", "more", "xyz", "expected"), AXES.values(), ids=AXES)
-def test_an_axis_is_in_the_frame_it_says(root, more, xyz, expected, tmp_path: Path):
+def test_axis_frame_by_version_and_attribute(root, more, xyz, expected, tmp_path: Path):
     half = np.pi / 2
     text = f"""{root}<model name="m"><link name="a"><pose>0 0 0 0 {half} 0</pose></link>
     <link name="b"><pose>1 0 0 0 0 {half}</pose></link><joint name="j" type="revolute">
@@ -120,7 +120,7 @@ def test_an_axis_is_in_the_frame_it_says(root, more, xyz, expected, tmp_path: Pa
     assert [*hinge.point] == pytest.approx((1, 0, 0), abs=EXACT)
 
 
-def test_links_without_a_joint_above_are_free(tmp_path: Path):
+def test_links_without_joint_are_free(tmp_path: Path):
     text = FOUR_BAR.replace("<parent>world</parent>", "<parent>base</parent>")
     text = text.replace("<visual", '<visual name="w"/><visual', 1).replace(
         '<link name="a">', '<link name="base"/><link name="a">', 1
@@ -177,7 +177,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize(("old", "new", "said"), FAULTS.values(), ids=FAULTS)
-def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
+def test_sdf_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
     assert old in FOUR_BAR
     file = model(tmp_path, FOUR_BAR.replace(old, new, 1))
     with pytest.raises(CaseError, match=said) as caught:
@@ -186,7 +186,7 @@ def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
 
 
 @pytest.mark.parametrize("text", ['<sdf version="1.7"/>', '<sdf><model name="m"/></sdf>'])
-def test_a_document_without_a_mechanism_is_told(text: str, tmp_path: Path):
+def test_sdf_without_mechanism_is_refused(text: str, tmp_path: Path):
     with pytest.raises(CaseError, match=r"has no (model|link), expected"):
         load(model(tmp_path, text), DRIVE)
 
@@ -206,7 +206,7 @@ GEARS = """<sdf version="1.9"><model name="gears"><link name="frame"/>
 
 @pytest.mark.parametrize(("axis", "turns"), [("0 0 1", -3.0), ("0 0 -1", 3.0)])
 @pytest.mark.parametrize("sign", ["1", "-1"])
-def test_a_gearbox_couples_turns_about_its_reference(axis, turns, sign, tmp_path: Path):
+def test_gearbox_couples_turns_about_reference(axis, turns, sign, tmp_path: Path):
     """SDF: the child turns by minus the ratio times the turn of the parent, each about its axis."""
     text = GEARS.replace("SIGN", sign).replace("AXIS", axis)
     found = solution(load(model(tmp_path, text), Supplied(drive=("s:0:0.5:3",))))
@@ -214,13 +214,13 @@ def test_a_gearbox_couples_turns_about_its_reference(axis, turns, sign, tmp_path
     assert np.allclose(found.bodies["wheel"].p[:, 3] / found.bodies["wheel"].p[:, 0], np.tan(half))
 
 
-def test_a_gearbox_without_hinges_is_refused(tmp_path: Path):
+def test_gearbox_without_hinges_is_refused(tmp_path: Path):
     text = GEARS.replace("SIGN", "1").replace("AXIS", "1 0 0")
     with pytest.raises(CaseError, match="<axis2>: there is no hinge between 'wheel' and 'frame'"):
         read_tree(model(tmp_path, text))
 
 
-def test_a_model_is_placed_by_its_frame(tmp_path: Path):
+def test_model_placement_frame_matches_drake(tmp_path: Path):
     """As Drake 1.51 places the links, to its printed digits."""
     text = (
         '<sdf version="1.9"><model name="m" placement_frame="v"><pose>0 0 1 0 0 0.3</pose>'
@@ -254,7 +254,7 @@ def including(folder: Path, uri: str, more: str = "", version: str = "1.9") -> P
 
 
 @pytest.mark.parametrize("uri", INCLUDED.values(), ids=INCLUDED)
-def test_an_included_model_stands_where_it_is_put(uri: str, tmp_path: Path):
+def test_included_model_is_placed(uri: str, tmp_path: Path):
     case = load(including(tmp_path, uri), DRIVE)
     found = solution(case)
     # the pose of the include takes the place of the model's own, 1 m up and turned by 30 degrees
@@ -277,23 +277,23 @@ NOT_INCLUDED = {
 
 
 @pytest.mark.parametrize(("uri", "more", "said"), NOT_INCLUDED.values(), ids=NOT_INCLUDED)
-def test_a_model_that_cannot_be_included_is_refused(uri: str, more: str, said: str, tmp_path: Path):
+def test_unreadable_include_is_refused(uri: str, more: str, said: str, tmp_path: Path):
     with pytest.raises(CaseError, match=said):
         load(including(tmp_path, uri, more), DRIVE)
 
 
-def test_an_included_model_of_another_age_is_refused(tmp_path: Path):
+def test_include_of_other_version_is_refused(tmp_path: Path):
     with pytest.raises(CaseError, match=r"is of SDF 1\.9, whose axes have another meaning"):
         load(including(tmp_path, "model://bars", version="1.4"), DRIVE)
 
 
-def test_a_ring_of_included_models_is_refused(tmp_path: Path):
+def test_ring_of_includes_is_refused(tmp_path: Path):
     text = FOUR_BAR.replace("</model>", "<include><uri>model.sdf</uri></include></model>")
     with pytest.raises(CaseError, match="found more than 100 includes, or a ring of them"):
         load(model(tmp_path, text), DRIVE)
 
 
-def test_empty_moments_of_inertia_are_the_defaults(tmp_path: Path):
+def test_empty_moments_of_inertia_are_defaults(tmp_path: Path):
     """As of Gazebo's four-bar, split and fixed."""
     inertia = "<ixx>2</ixx><iyy></iyy><izz>2.5</izz><ixy></ixy>"
     text = (

@@ -43,7 +43,7 @@ def random_tree(seed: int) -> str:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_links_of_any_tree_stand_where_pinocchio_has_them(seed: int, tmp_path: Path):
+def test_random_tree_places_match_pinocchio(seed: int, tmp_path: Path):
     pin = pytest.importorskip("pinocchio")
     text = random_tree(seed)
     found = read_tree(robot(tmp_path, text)).places
@@ -58,7 +58,7 @@ def test_links_of_any_tree_stand_where_pinocchio_has_them(seed: int, tmp_path: P
         assert np.allclose(np.transpose(turned), frame.rotation, rtol=0, atol=EXACT)
 
 
-def test_a_closed_robot_moves_as_pinocchio_moves_its_joints(tmp_path: Path):
+def test_closed_urdf_moves_as_in_pinocchio(tmp_path: Path):
     """All links, at every sample; the frames of the loop coincide there."""
     pin = pytest.importorskip("pinocchio")
     case = load(robot(tmp_path, FOUR_BAR), DRIVE)
@@ -112,7 +112,7 @@ CLOSED = {
 
 
 @pytest.mark.parametrize("closing", CLOSED.values(), ids=CLOSED)
-def test_a_loop_can_be_closed_in_many_ways(closing: str, tmp_path: Path):
+def test_urdf_constraint_types_close_loop(closing: str, tmp_path: Path):
     same = solution(load(robot(tmp_path, FOUR_BAR), DRIVE)).bodies
     case = load(robot(tmp_path, TREE.replace("</robot>", closing + "</robot>")), DRIVE)
     found = solution(case)
@@ -121,7 +121,7 @@ def test_a_loop_can_be_closed_in_many_ways(closing: str, tmp_path: Path):
         assert np.abs(found.bodies[name].r - same[name].r).max() < EXACT
 
 
-def test_what_is_lost_is_listed(tmp_path: Path):
+def test_left_out_elements_are_listed(tmp_path: Path):
     text = FOUR_BAR.replace(
         '<link name="c"/>', '<link name="c"><visual><mesh filename="no.stl"/></visual></link>'
     )
@@ -129,7 +129,7 @@ def test_what_is_lost_is_listed(tmp_path: Path):
     assert case.source.split(LEFT_OUT)[1] == "gazebo (1), visual (2), limit of joints (1)"
 
 
-def test_a_file_of_pairs_closes_the_loop_beside_it(tmp_path: Path):
+def test_pairs_file_closes_loop(tmp_path: Path):
     """Of example-parallel-robots: frames are links or joints, and joints get other types."""
     pytest.importorskip("yaml")
     text = seeds.PAIRED.decode().replace("yaml=", "said=")
@@ -147,7 +147,7 @@ def test_a_file_of_pairs_closes_the_loop_beside_it(tmp_path: Path):
     assert solution(case).solved.all()
 
 
-def test_paired_frames_need_not_meet_in_the_zero_pose(tmp_path: Path):
+def test_pairs_file_with_open_zero_pose(tmp_path: Path):
     """The file has no other start; another model so far open is refused."""
     pytest.importorskip("yaml")
     text = seeds.PAIRED.decode().replace("yaml=", "said=")
@@ -162,7 +162,7 @@ def test_paired_frames_need_not_meet_in_the_zero_pose(tmp_path: Path):
     assert solution(case).solved.all()
 
 
-def test_a_polynomial_coupling_is_read_back(tmp_path: Path):
+def test_exported_polynomial_coupling_is_read(tmp_path: Path):
     pins = [
         Revolute("A", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         Revolute("B", "ground", "b", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
@@ -182,7 +182,7 @@ AXES = ["3 4 0", "0.33 0 0.9439809320108114", "0 -0.6 0.8", "1e100 0 0", "2 3 6"
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_an_axis_is_divided_by_its_length_once_or_kept(axis: str, tmp_path: Path):
+def test_axis_is_normalized_once(axis: str, tmp_path: Path):
     numbers = [float(each) for each in axis.split()]
     length = math.hypot(*numbers)
     unit = abs(length - 1.0) < 1e-15

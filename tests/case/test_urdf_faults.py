@@ -53,7 +53,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize(("old", "new", "said"), FAULTS.values(), ids=FAULTS)
-def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
+def test_urdf_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
     file = edited(tmp_path, old, new)
     with pytest.raises(CaseError, match=said) as caught:
         load(file, DRIVE)
@@ -76,7 +76,7 @@ BESIDE_FAULTS = {
 }
 
 
-def test_a_file_of_conditions_closes_the_loop_beside_it(tmp_path: Path):
+def test_constraints_file_closes_loop(tmp_path: Path):
     (other := tmp_path / "other").mkdir()
     found = solution(load(beside(tmp_path), DRIVE)).bodies["c"].r
     same = solution(load(robot(other, FOUR_BAR), DRIVE)).bodies["c"].r
@@ -84,7 +84,7 @@ def test_a_file_of_conditions_closes_the_loop_beside_it(tmp_path: Path):
 
 
 @pytest.mark.parametrize(("changes", "said"), BESIDE_FAULTS.values(), ids=BESIDE_FAULTS)
-def test_a_fault_of_a_file_of_conditions_names_it(changes: dict, said: str, tmp_path: Path):
+def test_constraints_file_fault_names_file(changes: dict, said: str, tmp_path: Path):
     file = beside(tmp_path, **changes)
     with pytest.raises(CaseError, match=said) as caught:
         load(file, DRIVE)
@@ -108,7 +108,7 @@ PAIRS = {
 
 
 @pytest.mark.parametrize(("text", "said"), PAIRS.values(), ids=PAIRS)
-def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Path):
+def test_pairs_file_fault_names_file(text: str, said: str, tmp_path: Path):
     pytest.importorskip("yaml")
     file = robot(tmp_path, TREE, yaml=text)
     with pytest.raises(CaseError, match=said) as caught:
@@ -117,7 +117,7 @@ def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", ["robot.xacro", "robot.mo", "part.STL", "r.constraints.json"])
-def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
+def test_file_beside_model_is_refused(name: str, tmp_path: Path):
     (tmp_path / name).write_bytes(b"\x00\xff")
     with pytest.raises(CaseError, match=r"found a \.[\w.]+ file, which .*; "):
         load(tmp_path / name)
@@ -131,14 +131,14 @@ def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
         (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
     ],
 )
-def test_other_documents_are_told(text: str, advice: str, tmp_path: Path):
+def test_other_document_gets_advice(text: str, advice: str, tmp_path: Path):
     file = tmp_path / "model.xml"
     file.write_text(text)
     with pytest.raises(CaseError, match=advice):
         load(file)
 
 
-def test_entities_are_refused(tmp_path: Path):
+def test_document_type_is_refused(tmp_path: Path):
     file = robot(tmp_path, '<!DOCTYPE r [<!ENTITY a "b">]>' + FOUR_BAR)
     with pytest.raises(CaseError, match="found <!DOCTYPE>, expected none"):
         load(file, DRIVE)
@@ -153,7 +153,7 @@ LIMIT = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 @pytest.mark.parametrize("name", ["ground", "world"])
-def test_moving_link_named_as_the_world_is_refused(name: str, kind: str, tmp_path: Path):
+def test_moving_link_named_world_is_refused(name: str, kind: str, tmp_path: Path):
     """It is not taken for the world, which would fix it in silence."""
     file = robot(tmp_path, MOVING.format(name=name, kind=kind, limit=LIMIT))
     with pytest.raises(CaseError, match=f"found '{name}'.*rename"):

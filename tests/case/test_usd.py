@@ -30,7 +30,7 @@ def tree_of(file):
     return read_tree(file)
 
 
-def test_excluded_joint_closes_the_loop(write):
+def test_excluded_joint_closes_loop(write):
     """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
     case = load(write(*FOUR_BAR), DRIVE)
     found = solution(case)
@@ -41,7 +41,7 @@ def test_excluded_joint_closes_the_loop(write):
     assert np.allclose(found.points["b"].position, 2 * pin.T, rtol=0, atol=EXACT)
 
 
-def test_equality_of_mujoco_closes_a_loop(write):
+def test_mujoco_equality_closes_loop(write):
     prims = [*FOUR_BAR]
     prims[5] = (
         prims[5]
@@ -107,7 +107,7 @@ NESTED = (
     ],
     ids="fallback centimetres scaled apart nested plain".split(),
 )
-def test_units_scales_and_places_leave_the_mechanism(write, prims, units):
+def test_units_scales_and_places_keep_mechanism(write, prims, units):
     mechanism = undriven_file(write(*FOUR_BAR, name="truth.usda"))
     other = undriven_file(write(*prims, **({} if units is None else {"units": units})))
     found = compare(mechanism, other, {})
@@ -115,7 +115,7 @@ def test_units_scales_and_places_leave_the_mechanism(write, prims, units):
     assert found.largest < 1e-12
 
 
-def test_gravity_goes_down_the_up_axis(write):
+def test_gravity_and_masses_in_stage_units(write):
     heavy = "float physics:mass = 1\n"
     prims = [*CENTIMETRES]
     prims[1] = body(
@@ -150,7 +150,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("lock", KINDS)
-def test_generic_joint_leaves_what_it_does_not_lock(write, lock):
+def test_generic_joint_frees_unlocked_axes(write, lock):
     carrier = joint("Revolute", "base", "", "a")
     file = write(
         body("a"), body("b"), carrier, joint("", "j", "a", "b", (0, 0, 0), (0, 0, 0), *locked(lock))
@@ -169,7 +169,7 @@ def test_generic_joint_leaves_what_it_does_not_lock(write, lock):
 
 
 @pytest.mark.parametrize("name", ["k", "PhysxPhysicsGearJoint", "PhysxPhysicsGearJoint/k"])
-def test_left_out_by_name_is_told(write, name):
+def test_prim_left_out_by_name(write, name):
     file = write(*ARM, prim("PhysxPhysicsGearJoint", "k"))
     tree = read_tree(file, [name])
     assert any("</r/k>" in note for note in tree.notes)
@@ -215,7 +215,7 @@ MIMICS = {
 
 
 @pytest.mark.parametrize("dialect", MIMICS)
-def test_mimic_joint_follows_its_leader(write, dialect):
+def test_mimic_joint_follows_leader(write, dialect):
     api, lines, law = MIMICS[dialect]
     follower = joint("Revolute", "B", "a", "b", (0, 0, 1), (0, 0, 0), *lines, apis=api)
     file = write(body("a"), body("b", (0, 0, 1)), joint("Revolute", "A", "", "a"), follower)
@@ -228,7 +228,7 @@ def test_mimic_joint_follows_its_leader(write, dialect):
     assert not zero or any(f"B {zero:.9g}" in note for note in case.assembly)
 
 
-def test_equality_of_mujoco_counts_radians_and_units(write):
+def test_mujoco_equality_in_stage_units(write):
     """In centimetres: x = 3 + 2 q, and a turn of 0.1 x^2 of that."""
     lines = "rel mjc:target = </r/A>", "double mjc:coef0 = 3", "double mjc:coef1 = 2"
     turn = "rel mjc:target = </r/x>", "double mjc:coef1 = 0", "double mjc:coef2 = 0.1"
@@ -246,7 +246,7 @@ def test_equality_of_mujoco_counts_radians_and_units(write):
     assert hinge == pytest.approx([0, 0, 1000.0, 0, 0])
 
 
-def test_mass_without_shape_or_inertia_is_a_mass(write):
+def test_mass_without_shape_has_no_moments(write):
     """At its own centre, and without moments; one of a mesh stays unknown."""
     center = "point3f physics:centerOfMass = (1, 0, 0)"
     file = write(
@@ -261,7 +261,7 @@ def test_mass_without_shape_or_inertia_is_a_mass(write):
     assert tree.unweighed == {"c"}
 
 
-def test_newton_mimic_of_a_slide_counts_degrees(write):
+def test_newton_mimic_of_slide_counts_degrees(write):
     """A thread of 0.36 m in a turn: a thousandth of the stage's unit in a degree."""
     nut = joint(
         "Prismatic",
@@ -278,7 +278,7 @@ def test_newton_mimic_of_a_slide_counts_degrees(write):
     assert shift == pytest.approx(0.36 / math.tau * case.sweep.values, abs=EXACT)
 
 
-def test_motors_limits_and_starts_of_drives(write):
+def test_drive_motors_limits_and_starts(write):
     """In degrees and units of the stage; a drive without gains is no motor."""
     drive = [
         "float drive:angular:physics:stiffness = 10",
@@ -312,7 +312,7 @@ def test_motors_limits_and_starts_of_drives(write):
     assert any("keyframe:target" in each for each in (case.source, *case.assembly))
 
 
-def test_rods_and_switched_off_joints(write):
+def test_rods_and_disabled_joints(write):
     rod = joint(
         "Distance",
         "rod",
@@ -339,7 +339,7 @@ MASS = "float physics:mass = 6"
 SHAPE = '{kind} "{name}"'
 
 
-def test_masses_of_bodies_and_of_their_colliders(write):
+def test_masses_of_bodies_and_colliders(write):
     """Of a box of 1, 2, 3 m, a ball, and own numbers in turned axes."""
     box = prim(
         "Cube",
@@ -434,7 +434,7 @@ def test_references_instances_and_variants(write, tmp_path):
     assert [*copies.values()] == [[0, 0, 5]] * 3
 
 
-def test_random_chain_is_that_of_mjcf(write, tmp_path):
+def test_random_chain_matches_mjcf(write, tmp_path):
     """Turned frames in single precision, with a loop by a ball."""
     rng = np.random.default_rng(0)
 
@@ -504,7 +504,7 @@ def turned_by(degrees):
     return TURN.format(math.cos(half), math.sin(half))
 
 
-def test_coordinates_at_the_start_are_those_of_transforms(write):
+def test_start_coordinates_follow_transforms(write):
     """In centimetres; the second joint counts the world on its body, and the third follows."""
     follow = ["rel newton:mimicJoint = </r/A>", "float newton:mimicCoef1 = 3"]
     file = write(
@@ -526,7 +526,7 @@ def test_coordinates_at_the_start_are_those_of_transforms(write):
     assert any("c by 0.07 m and" in note and "a by" not in note for note in tree.notes)
 
 
-def test_rod_is_measured_where_joints_place_its_bodies(write):
+def test_rod_length_after_joints_place_bodies(write):
     rod = joint("Distance", "rod", "a", "b", (0, 0, 1), None, axis=None)
     lengths = "float physics:minDistance = 1\nfloat physics:maxDistance = 1\n}"
     file = write(
@@ -545,7 +545,7 @@ def placed(tree, start, name):
     return [*place.at, *e, e0]
 
 
-def test_chain_and_universal_joint_are_as_in_newton(write):
+def test_chain_and_universal_joint_match_newton(write):
     """Poses of Newton 1.8 by its own reader, at equal coordinates, in single precision."""
     turn = "quatf physics:localRot{} = (0.9238795, {})"
     ends = turn.format(0, "0.3826834, 0, 0"), turn.format(1, "0, 0, 0.3826834")

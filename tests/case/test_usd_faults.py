@@ -146,7 +146,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("fault", REFUSED)
-def test_what_is_not_read_is_refused(write, fault):
+def test_usd_fault_is_one_message(write, fault):
     prims, message = REFUSED[fault]
     with pytest.raises(CaseError, match=re.escape(message)):
         tree_of(write(*ARM, prims))
@@ -163,7 +163,7 @@ def test_what_is_not_read_is_refused(write, fault):
         ("broken.usda", "line 3: not valid USD: Expected }"),
     ],
 )
-def test_files_from_elsewhere_are_refused(write, tmp_path, asset, problem):
+def test_reference_from_elsewhere_is_refused(write, tmp_path, asset, problem):
     folder = tmp_path / "in" / "here"
     folder.mkdir(parents=True)
     (tmp_path / "far.usda").write_text(stage())
@@ -180,14 +180,14 @@ OTHER = [b"", b"hello", b"PXR-USDC", b"PK\x03\x04", bytes(99), INVALID]
 
 @pytest.mark.parametrize("data", OTHER, ids=range(len(OTHER)))
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usdz", ".usd"])
-def test_other_data_is_no_stage(tmp_path, suffix, data):
+def test_data_without_stage_is_refused(tmp_path, suffix, data):
     file = tmp_path / f"m{suffix}"
     file.write_bytes(data)
     with pytest.raises(CaseError, match=r"not valid USD|has no|no body"):
         tree_of(file)
 
 
-def test_missing_library_says_what_to_install(write, monkeypatch):
+def test_missing_library_names_package(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr.Usd", None)
     with pytest.raises(KincheckError, match=r"reading m.usda needs pxr.*pip install .*usd-core"):
         tree_of(write(*ARM))
@@ -201,6 +201,6 @@ def test_missing_library_says_what_to_install(write, monkeypatch):
         ("metersPerUnit = 0", "expected positive numbers"),
     ],
 )
-def test_units_that_make_no_sense_are_refused(write, units, message):
+def test_nonsense_stage_units_are_refused(write, units, message):
     with pytest.raises(CaseError, match=message):
         tree_of(write(*ARM, units=units))

@@ -93,7 +93,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
-def test_a_loop_of_gazebo_or_drake_is_closed(loop: str, tmp_path: Path):
+def test_gazebo_or_drake_loop_closes(loop: str, tmp_path: Path):
     case = read(tmp_path, GATE.format(loop))
     found = solution(case)
     assert found.solved.all()
@@ -187,7 +187,7 @@ JOINING = {
 
 
 @pytest.mark.parametrize(("text", "said"), JOINING.values(), ids=JOINING)
-def test_what_joins_links_is_refused(text: str, said: str, tmp_path: Path):
+def test_element_joining_links_is_refused(text: str, said: str, tmp_path: Path):
     with pytest.raises(CaseError) as caught:
         read(tmp_path, GATE.format(text))
     assert said in str(caught.value)
@@ -201,7 +201,7 @@ JOINING_IN_LINKS = {
 
 
 @pytest.mark.parametrize("link", JOINING_IN_LINKS.values(), ids=JOINING_IN_LINKS)
-def test_a_link_that_names_another_is_refused(link: str, tmp_path: Path):
+def test_link_naming_another_is_refused(link: str, tmp_path: Path):
     with pytest.raises(CaseError, match=TWO):
         read(tmp_path, GATE.format("").replace('<link name="strut"/>', link))
 
@@ -229,19 +229,19 @@ APART = {
 
 
 @pytest.mark.parametrize("text", APART.values(), ids=APART)
-def test_what_joins_nothing_is_left_out(text: str, tmp_path: Path):
+def test_element_joining_nothing_is_left_out(text: str, tmp_path: Path):
     case = read(tmp_path, GATE.format(text))
     assert case.source.split(LEFT_OUT)[1] not in ("", "nothing")
 
 
-def test_numbers_name_links_only_where_links_are_named(tmp_path: Path):
+def test_links_named_by_numbers(tmp_path: Path):
     numbered = GATE.replace('"strut"', '"1"').replace('"follower"', '"2"')
     read(tmp_path, numbered.format('<gazebo reference="1"><mu1>2</mu1></gazebo>'))
     with pytest.raises(CaseError, match="names the links '1' and '2'"):
         read(tmp_path, numbered.format("<tie><link>1</link><link>2</link></tie>"))
 
 
-def test_a_screw_of_drake_advances_by_its_pitch_in_a_turn(tmp_path: Path):
+def test_drake_screw_advances_by_pitch(tmp_path: Path):
     screw = (
         '<link name="tip"/><drake:joint name="q" type="screw"><parent link="base"/>'
         '<child link="tip"/><axis xyz="0 1 0"/><drake:screw_thread_pitch value="0.5"/>'
@@ -252,7 +252,7 @@ def test_a_screw_of_drake_advances_by_its_pitch_in_a_turn(tmp_path: Path):
     assert found.r[-1] == pytest.approx((0.0, 0.25, 0.0), abs=EXACT)
 
 
-def test_a_plugin_that_repeats_a_mimic_is_left_out(tmp_path: Path):
+def test_plugin_repeating_mimic_is_left_out(tmp_path: Path):
     text = GATE.format(JOINING["mimic plugin"][0] + JOINING["mimic of ros2_control"][0])
     case = read(
         tmp_path, text.replace('<origin xyz="0.4', '<mimic joint="drive"/><origin xyz="0.4')
@@ -289,7 +289,7 @@ def rubber(folder: Path, form: str, turned: str = QUARTER):
 
 
 @pytest.mark.parametrize("form", ["urdf", "sdf"])
-def test_a_bushing_of_drake_is_read(form: str, tmp_path: Path):
+def test_drake_bushing_is_read(form: str, tmp_path: Path):
     case = rubber(tmp_path, form)
     (bushing,) = case.mechanism.forces
     # frames turned by a quarter about z: their x is global y; C is 0.01 along it from A
@@ -301,7 +301,7 @@ def test_a_bushing_of_drake_is_read(form: str, tmp_path: Path):
     assert any("halfway between both frames" in note for note in case.assembly)
 
 
-def test_a_twisted_bushing_of_drake_is_refused(tmp_path: Path):
+def test_twisted_drake_bushing_is_refused(tmp_path: Path):
     with pytest.raises(CaseError, match=r"turned against each other by 0\.4"):
         rubber(tmp_path, "urdf", f"{np.pi / 2 + 0.4!r}")
 
@@ -313,7 +313,7 @@ BY_DRAKE = {
 }
 
 
-def test_a_bushing_of_drake_has_its_forces(tmp_path: Path):
+def test_drake_bushing_forces_match_drake(tmp_path: Path):
     slide = (
         '<link name="{1}"><inertial><mass value="1"/></inertial></link><joint name="{0}"'
         ' type="prismatic"><parent link="base"/><child link="{1}"/><origin xyz="{2}"/>'
@@ -351,7 +351,7 @@ IN_SDF_JOINING = {
 
 
 @pytest.mark.parametrize("text", IN_SDF_JOINING.values(), ids=IN_SDF_JOINING)
-def test_an_element_of_sdf_that_joins_links_is_refused(text: str, tmp_path: Path):
+def test_sdf_element_joining_links_is_refused(text: str, tmp_path: Path):
     with pytest.raises(CaseError, match=TWO):
         read(tmp_path, IN_SDF.format(text), "gate.sdf")
 
@@ -419,7 +419,7 @@ MISTYPED_IN_MJCF = {
 }
 
 
-def test_exclusions_and_sensors_join_nothing(tmp_path: Path):
+def test_mjcf_exclusions_and_sensors_join_nothing(tmp_path: Path):
     case = read(tmp_path, IN_MJCF.format(""), "model.xml")
     assert "contact: exclude (1), sensor: framepos (1)" in case.source
     assert case.mechanism.gravity == (0.0, 0.0, -1.0)
@@ -435,7 +435,7 @@ MISTYPED_IN = {
 @pytest.mark.parametrize(
     ("file", "what"), [(file, what) for file, (_, table) in MISTYPED_IN.items() for what in table]
 )
-def test_mistyped_names_are_refused(file: str, what: str, tmp_path: Path):
+def test_mistyped_name_is_refused(file: str, what: str, tmp_path: Path):
     text, table = MISTYPED_IN[file]
     old, new, said = table[what]
     assert old in text
@@ -447,7 +447,7 @@ def test_mistyped_names_are_refused(file: str, what: str, tmp_path: Path):
     assert said in str(caught.value)
 
 
-def test_attributes_of_other_releases_are_left_out_where_they_move_nothing(tmp_path: Path):
+def test_mjcf_attribute_of_other_release(tmp_path: Path):
     read(tmp_path, IN_MJCF.format("").replace('name="g"', 'name="g" mystery="1"'), "model.xml")
     with pytest.raises(CaseError, match="the attribute 'mystery', which MJCF does not have here"):
         read(tmp_path, IN_MJCF.format("").replace('"drive"', '"drive" mystery="1"'), "model.xml")
@@ -484,20 +484,20 @@ def test_all_attributes_of_mujoco_are_accepted(tmp_path: Path):
     assert len(found["mujoco/body/geom"]) > 30
 
 
-def test_a_plugin_of_mjcf_between_bodies_is_refused(tmp_path: Path):
+def test_mjcf_plugin_between_bodies_is_refused(tmp_path: Path):
     plugin = '<plugin plugin="p"><config key="i" value="a"/><config key="j" value="b"/></plugin>'
     with pytest.raises(CaseError, match="names the links 'a' and 'b', which it may join"):
         read(tmp_path, IN_MJCF.format(f"<extension>{plugin}</extension>"), "model.xml")
 
 
 @pytest.mark.parametrize("kind", ["flex", "flexvert", "flexstrain", "distance"])
-def test_other_equalities_are_refused(kind: str, tmp_path: Path):
+def test_unknown_mjcf_equality_is_refused(kind: str, tmp_path: Path):
     text = IN_MJCF.format(f"<equality><{kind}/></equality>")
     with pytest.raises(CaseError, match="cannot be read: there is no joint for it"):
         read(tmp_path, text, "model.xml")
 
 
-def test_a_soft_body_between_bodies_is_refused(tmp_path: Path):
+def test_mjcf_flex_between_bodies_is_refused(tmp_path: Path):
     text = IN_MJCF.format('<deformable><flex name="f" body="a b"/></deformable>')
     with pytest.raises(CaseError, match="holds the bodies a, b together as a soft one"):
         read(tmp_path, text, "model.xml")
@@ -512,7 +512,7 @@ WITHOUT = {
 
 
 @pytest.mark.parametrize(("text", "name", "said"), WITHOUT.values(), ids=WITHOUT)
-def test_without_leaves_an_element_out_and_says_so(text: str, name: str, said: str, tmp_path: Path):
+def test_without_option_notes_element(text: str, name: str, said: str, tmp_path: Path):
     supplied = replace(DRIVE, without=(name,))
     case = read(tmp_path, GATE.format(text), supplied=supplied)
     assert [joint.name for joint in case.mechanism.joints] == ["drive", "pin", "pivot"]
@@ -520,12 +520,12 @@ def test_without_leaves_an_element_out_and_says_so(text: str, name: str, said: s
     assert said in case.assembly[0]
 
 
-def test_without_refuses_what_the_file_does_not_have(tmp_path: Path):
+def test_without_option_refuses_unknown_name(tmp_path: Path):
     with pytest.raises(CaseError, match="did you mean 'mujoco'"):
         read(tmp_path, GATE.format("<mujoco/>"), supplied=replace(DRIVE, without=("mujcoo",)))
 
 
-def test_without_leaves_out_an_equality_of_mjcf(tmp_path: Path):
+def test_without_option_drops_mjcf_equality(tmp_path: Path):
     tied = IN_MJCF.format('<equality><joint name="t" joint1="drive" joint2="pin"/></equality>')
     assert read(tmp_path, tied, "model.xml").mechanism.couplers
     case = read(tmp_path, tied, "model.xml", replace(DRIVE, without=("t",)))
@@ -535,7 +535,7 @@ def test_without_leaves_out_an_equality_of_mjcf(tmp_path: Path):
 @pytest.mark.parametrize(
     "motor", ["", '<transmission name="t{0}"><joint name="j{0}"/></transmission>']
 )
-def test_many_held_joints_without_motors_are_a_question(motor: str, tmp_path: Path):
+def test_hold_rest_asks_about_passive_joints(motor: str, tmp_path: Path):
     links = '<link name="l0"/>' + "".join(
         f'<link name="l{k}"/>' + HINGE.format(f"j{k}", f"l{k - 1}", f"l{k}", "") + motor.format(k)
         for k in range(1, 41)
