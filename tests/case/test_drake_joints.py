@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.errors import CaseError
 from scipy.spatial.transform import Rotation
 
+from ..support.model_files import driven
 from ..support.model_poses import solution
 from .test_joining_elements import EXACT, GATE, read
 
@@ -45,7 +45,7 @@ def test_drake_joint_in_urdf_matches_drake(kind, inside, freedoms, tmp_path: Pat
         assert between["q"].type == "fixed"  # held
         return
     moving = {"universal": "q.2", "planar": "q.rotation", "screw": "q.rotation"}[kind]
-    supplied = Supplied(drive=(f"{moving}:0:0.3:2",), hold_rest=True)
+    supplied = driven(f"{moving}:0:0.3:2", hold_rest=True)
     found = solution(load(tmp_path / "gate.urdf", supplied)).bodies["tip"]
     context = plant.CreateDefaultContext()
     positions = plant.GetPositions(context)
@@ -73,7 +73,7 @@ def test_planar_joint_in_sdf_matches_drake(moved: str, tmp_path: Path):
     """Along x and y of the parent's frame, and about its z; where Drake is, by Drake too."""
     (tmp_path / "m.sdf").write_text(PLANAR)
     held = tuple(each for each in MOVES if each != moved)
-    supplied = Supplied(drive=(f"{moved}:0:0.5:2",), hold=("A", *held))
+    supplied = driven(f"{moved}:0:0.5:2", hold=("A", *held))
     found = solution(load(tmp_path / "m.sdf", supplied)).bodies["b"]
     x, y, angle = MOVES[moved]
     frame = Rotation.from_euler("xyz", (0.3, 0, 0.4))

@@ -16,10 +16,11 @@ from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import output_series
 
+from ..support.model_files import driven
 from ..support.model_poses import coordinate, solution
 
 EXACT = 1e-13
-DRIVE = Supplied(drive=("drive:-0.2:0.2:5",), hold_rest=True)
+DRIVE = driven("drive:-0.2:0.2:5", hold_rest=True)
 HINGE = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>{}</joint>'
 GATE = (
     '<robot name="gate" xmlns:drake="http://drake.mit.edu"><link name="base"/><link name="swing"/>'
@@ -95,9 +96,7 @@ LOOPS = {
 @pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
 def test_gazebo_or_drake_loop_closes(loop: str, tmp_path: Path):
     case = read(tmp_path, GATE.format(loop))
-    found = solution(case)
-    assert found.solved.all()
-    turned = [coordinate(case.mechanism, found, case.mechanism.joint("pivot"), k) for k in range(5)]
+    turned = coordinate(case, solution(case), "pivot")
     expected = follower_angles()
     assert turned == pytest.approx(expected, abs=EXACT)
     assert expected[[0, -1]] == pytest.approx([-0.10101, 0.090703], abs=5e-6)
@@ -247,7 +246,7 @@ def test_drake_screw_advances_by_pitch(tmp_path: Path):
         '<child link="tip"/><axis xyz="0 1 0"/><drake:screw_thread_pitch value="0.5"/>'
         "</drake:joint>"
     )
-    supplied = Supplied(drive=(f"q.rotation:0:{np.pi}:2",), hold_rest=True)
+    supplied = driven(f"q.rotation:0:{np.pi}:2", hold_rest=True)
     found = solution(read(tmp_path, GATE.format(screw), supplied=supplied)).bodies["tip"]
     assert found.r[-1] == pytest.approx((0.0, 0.25, 0.0), abs=EXACT)
 
@@ -327,7 +326,7 @@ def test_drake_bushing_forces_match_drake(tmp_path: Path):
         + BUSHING.format(*OF_URDF)
         + "</robot>"
     )
-    drive = Supplied(drive=("drive:0.05:0.2:3",), hold=("held",))
+    drive = driven("drive:0.05:0.2:3", hold=("held",))
     case = read(tmp_path, text, supplied=drive)
     mechanism = replace(case.mechanism, gravity=(0.0, 0.0, 0.0))
     native = adapters.engine("native")
@@ -542,7 +541,7 @@ def test_hold_rest_asks_about_passive_joints(motor: str, tmp_path: Path):
     )
     text, supplied = (
         f'<robot name="r">{links}</robot>',
-        Supplied(drive=("j1:0:1:2",), hold_rest=True),
+        driven("j1:0:1:2", hold_rest=True),
     )
     if motor:
         assert len(read(tmp_path, text, supplied=supplied).mechanism.drivers) == 40

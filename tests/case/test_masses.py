@@ -6,12 +6,13 @@ import pytest
 from kincheck.adapters.writers import mjcf, sdf
 from kincheck.core.algebra import vec
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.trees.tree import Mass, together
 from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
+
+from ..support.model_files import driven
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -83,7 +84,7 @@ SDF = """<sdf version="1.11"><world name="w"><gravity>0 0 -9.81</gravity><model 
 <inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial></link>
 <joint name="J" type="revolute"><parent>world</parent><child>arm</child><axis><xyz>0 1 0</xyz></axis></joint>
 <joint name="t" type="fixed"><parent>arm</parent><child>tip</child></joint></model></world></sdf>"""  # noqa: E501
-DRIVEN = Supplied(drive=("J:-0.4:0.4:5",))
+DRIVEN = driven("J:-0.4:0.4:5")
 
 
 def case_of(tmp_path, text, supplied=DRIVEN):
@@ -189,7 +190,7 @@ def test_exported_stand_ins_are_no_masses(tmp_path, writer):
     texts = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)
     file = tmp_path / ("model" + next(iter(texts)))
     file.write_text(next(iter(texts.values())))
-    case = load(file, Supplied(drive=("left_pivot:0:0.1:3",), hold_rest=True))
+    case = load(file, driven("left_pivot:0:0.1:3", hold_rest=True))
     assert not any(body.mass for body in case.mechanism.bodies)
     assert "with the masses" not in case.source
 
@@ -199,7 +200,7 @@ def test_small_mass_unlike_stand_in_counts(tmp_path, key, mass):
     text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), sdf.write)[".sdf"]
     file = tmp_path / "model.sdf"
     file.write_text(text.replace(f"<{key}>1e-06", f"<{key}>2e-06", 1))
-    case = load(file, Supplied(drive=("left_pivot:0:0.1:3",), hold_rest=True))
+    case = load(file, driven("left_pivot:0:0.1:3", hold_rest=True))
     assert [body.mass for body in case.mechanism.bodies if body.mass] == [mass]
 
 

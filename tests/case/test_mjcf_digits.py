@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+
+from ..support.model_files import driven
 
 # Hinges are parallel to the file's six digits: across the plane, their slopes are as small as the
 # gap itself.
@@ -23,7 +24,7 @@ FIVE_BAR = """<mujoco><compiler angle="radian"/><worldbody>
 def test_gap_within_digits_moves_no_body(tmp_path: Path, tilt: str, gap: str):
     file = tmp_path / "model.xml"
     file.write_text(FIVE_BAR.format(tilt=tilt, gap=gap))
-    case = load(file, Supplied(drive=("crank:0:0.1:3",), hold_rest=True))
+    case = load(file, driven("crank:0:0.1:3", hold_rest=True))
     rod = case.mechanism.body("rod")
     assert np.allclose(rod.origin, (0.03, 0.0, 0.04), rtol=0, atol=1e-6)
     assert np.allclose(rod.euler_parameters, (1, 0, 0, 0), rtol=0, atol=1e-6)
@@ -34,5 +35,5 @@ def test_joint_moved_by_digits_stays_free(tmp_path: Path):
     file = tmp_path / "model.xml"
     across = '<joint name="across" axis="1 0 0"/><joint name="pin"'
     file.write_text(FIVE_BAR.format(tilt="0.00001", gap="0").replace('<joint name="pin"', across))
-    case = load(file, Supplied(drive=("crank:0:0.1:3",), hold_rest=True))
+    case = load(file, driven("crank:0:0.1:3", hold_rest=True))
     assert [driver.name for driver in case.mechanism.drivers] == ["crank", "pin"]

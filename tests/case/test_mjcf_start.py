@@ -10,6 +10,8 @@ from kincheck.core.case.models.trees.driving import read_start
 from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 
+from ..support.model_files import driven
+
 mujoco = pytest.importorskip("mujoco")
 
 # Composed frames of metre-sized models, some operations deep.
@@ -99,7 +101,7 @@ def parallelogram(gap, digits="0.5123456"):
 
 def test_open_start_is_assembled(tmp_path):
     file = written(tmp_path, parallelogram(0.01))
-    case = load(file, Supplied(drive=("crank:0:0.2:5",)))
+    case = load(file, driven("crank:0:0.2:5"))
     note, zeros = case.assembly
     assert "are at the start knee 9.66" in zeros
     assert "open by 0.01 m" in note
@@ -116,9 +118,9 @@ def test_open_start_is_assembled(tmp_path):
 def test_far_open_start_is_refused(tmp_path):
     file = written(tmp_path, parallelogram(0.3))
     with pytest.raises(CaseError, match=r"open in the start .* by 0\.3 m, expected 0\.13"):
-        load(file, Supplied(drive=("crank:0:0.2:5",)))
+        load(file, driven("crank:0:0.2:5"))
     # who says where a joint is lets the others find their places
-    assert load(file, Supplied(drive=("crank:0:0.2:5",), start=("crank=0",))).assembly
+    assert load(file, driven("crank:0:0.2:5", start=("crank=0",))).assembly
 
 
 def test_joint_polynomial_offset_from_assembled_start(tmp_path):
@@ -127,7 +129,7 @@ def test_joint_polynomial_offset_from_assembled_start(tmp_path):
       <body name="b" pos="1 0 0"><joint name="y" axis="0 0 1"/><geom/><site name="tip" pos="0.5 0 0"/></body>
       </worldbody><equality><joint joint1="y" joint2="x" polycoef="0.1 0.9 0.4 -0.3 0.2"/></equality>
       </mujoco>"""  # noqa: E501
-    case = load(written(tmp_path, text), Supplied(drive=("x:-0.4:0.6:6",), start=("x=0.2",)))
+    case = load(written(tmp_path, text), driven("x:-0.4:0.6:6", start=("x=0.2",)))
     assert case.sweep.design == 0.2
     x = case.sweep.values
     y = 0.1 + x * (0.9 + x * (0.4 + x * (-0.3 + x * 0.2)))
@@ -152,12 +154,12 @@ CHAIN = """<mujoco><compiler angle="radian"/><worldbody>
 def test_hold_rest_covers_all_freedoms(tmp_path):
     file = written(tmp_path, CHAIN)
     with pytest.raises(CaseError) as caught:
-        load(file, Supplied(drive=("one:0:1",)))
+        load(file, driven("one:0:1"))
     message = str(caught.value)
     assert "11 degrees of freedom, and 1 driven or held" in message
     assert "--hold JOINT for 10 more" in message
     assert "first: two. Ball joints: ball. Free bodies: base" in message
-    case = load(file, Supplied(drive=("one:0:1:5",), hold_rest=True))
+    case = load(file, driven("one:0:1:5", hold_rest=True))
     assert [driver.name for driver in case.mechanism.drivers] == ["one", "two"]
     assert case.mechanism.body("base").fixed
     assert case.mechanism.joint("ball").type == "fixed"
@@ -166,7 +168,7 @@ def test_hold_rest_covers_all_freedoms(tmp_path):
 def test_two_joints_driven_together(tmp_path):
     case = load(
         written(tmp_path, CHAIN),
-        Supplied(drive=("one:0:1:5", "two:0.5:-0.3"), hold=("base", "ball")),
+        driven("one:0:1:5", "two:0.5:-0.3", hold=("base", "ball")),
     )
     one, two = np.linspace(0.0, 1.0, 5), np.linspace(0.5, -0.3, 5)
     assert np.allclose(case.sweep.moved["two"], two, rtol=0, atol=1e-15)
@@ -175,7 +177,7 @@ def test_two_joints_driven_together(tmp_path):
     expected = np.stack([reach * np.cos(one), reach * np.sin(one), -np.sin(two)], axis=1)
     assert np.allclose(found, expected, rtol=0, atol=EXACT)
     with pytest.raises(CaseError, match="5 of 'one', 7 of 'two' samples"):
-        load(tmp_path / "model.xml", Supplied(drive=("one:0:1:5", "two:0:1:7"), hold_rest=True))
+        load(tmp_path / "model.xml", driven("one:0:1:5", "two:0:1:7", hold_rest=True))
 
 
 RODS = {
@@ -200,7 +202,7 @@ def test_rod_between_balls_does_not_spin(tmp_path, kind):
       <body name="crank" pos="0.2 0 0.3"><joint name="crank" axis="0 0 1" pos="-0.2 0 0"/><geom/>{inside}</body>
       <body name="slider" pos="1 0 0"><joint name="slider" type="slide" axis="1 0 0"/><geom/></body>{free}
       </worldbody><equality>{equality}</equality></mujoco>"""  # noqa: E501
-    case = load(written(tmp_path, text), Supplied(drive=("crank:0:0.5:4",)))
+    case = load(written(tmp_path, text), driven("crank:0:0.5:4"))
     assert "turn about itself" in case.source
     turned = np.linspace(0.0, 0.5, 4)
     x, y, z = 0.2 * np.cos(turned), 0.2 * np.sin(turned), 0.3
@@ -219,7 +221,7 @@ def test_rods_in_series_count_freedoms(tmp_path):
       </worldbody><equality><connect body1="second" body2="end" anchor="0.1 0 0.5"/></equality></mujoco>"""  # noqa: E501
     file = written(tmp_path, text)
     with pytest.raises(CaseError) as caught:
-        load(file, Supplied(drive=("crank:0:0.1:3",)))
+        load(file, driven("crank:0:0.1:3"))
     # crank and three slides; the middle ball of the rods moves on a circle: one more
     assert "the model has 5 degrees of freedom" in str(caught.value)
 

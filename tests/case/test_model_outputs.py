@@ -8,7 +8,6 @@ import numpy as np
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import with_all_coordinates, with_all_motions
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.notes import notes
 from kincheck.core.harness.record import Outcome
@@ -18,6 +17,7 @@ from kincheck.core.mechanism.mechanism import Body
 
 from ..support.case_texts import write
 from ..support.measure_cases import AXIS, arm
+from ..support.model_files import driven
 
 FOUR_BAR = """
 <mujoco model="four bar"><compiler angle="radian"/><worldbody>
@@ -30,7 +30,7 @@ FOUR_BAR = """
 
 def test_model_outputs_in_every_engine(tmp_path: Path):
     file = write(tmp_path, FOUR_BAR, "four_bar.xml")
-    case = load(file, Supplied(drive=("crank:-0.3:6.6:24",)))
+    case = load(file, driven("crank:-0.3:6.6:24"))
     names = [output.name for output in case.outputs]
     for each in ("crank", "rod", "rocker"):
         assert f"{each}.angle" in names
@@ -48,7 +48,7 @@ def test_model_outputs_in_every_engine(tmp_path: Path):
 
 
 def test_outputs_without_closure_are_noted(tmp_path: Path):
-    case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), Supplied(drive=("crank:-0.3:0.3:7",)))
+    case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), driven("crank:-0.3:0.3:7"))
     vacuous = tuple(each for each in case.outputs if each.name.startswith("crank"))
     (note,) = notes(replace(case, outputs=vacuous))
     assert "no output depends on a closure" in note

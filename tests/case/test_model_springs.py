@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.mechanism.loads import SpringDamper, TorsionSpringDamper
 
 from ..support.loads import solved
+from ..support.model_files import driven
 
 # All terms of the efforts are below 100 N or N m; the spring of the slide acts from 250 m behind
 # it, whose last digit is 6e-14 m at 90 N/m.
@@ -25,7 +26,7 @@ TREE = """<mujoco><compiler angle="{angle}"/><option gravity="1 2 -9"/><worldbod
 <tendon><spatial name="cord" {cord}><site site="here"/><site site="there"/></spatial></tendon>
 </mujoco>"""
 DEGREES = {"angle": "degree", "turn": "20 30 40", "ref": "30", "rest": "-50"}
-DRIVE = Supplied(drive=("hinge:0.2:1:4", "slide:-0.3:0.5:4"))
+DRIVE = driven("hinge:0.2:1:4", "slide:-0.3:0.5:4")
 
 
 @pytest.mark.parametrize(
@@ -54,7 +55,7 @@ def test_spring_efforts_match_mujoco(tmp_path: Path, cord: str):
 def read(tmp_path: Path, text: str, name: str = "model.xml"):
     file = tmp_path / name
     file.write_text(text)
-    case = load(file, Supplied(drive=("hinge:0:0.1:2",), hold_rest=True))
+    case = load(file, driven("hinge:0:0.1:2", hold_rest=True))
     return case.mechanism.forces, case.source.split(LEFT_OUT)[1]
 
 

@@ -8,6 +8,8 @@ from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
+from ..support.model_files import driven
+
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
 <origin xyz="1 0 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="{3}" effort="1" velocity="1"/>
 </joint>"""
@@ -105,9 +107,9 @@ def test_used_motors_are_not_left_out(tmp_path):
     assert case.source.split(LEFT_OUT)[1] == "actuator: position (1), keyframe: key (1)"
     assert any("joint motor moves through its limits" in note for note in case.assembly)
     assert load(arm(tmp_path, "shoulder", "elbow")).source.endswith(f"{LEFT_OUT}nothing")
-    driven = load(file, Supplied(drive=("motor:0:1",))).source
+    source = load(file, driven("motor:0:1")).source
     assert {"ranges of joints (1)", "actuator: motor (1)"} < {
-        *driven.split(LEFT_OUT)[1].split(", ")
+        *source.split(LEFT_OUT)[1].split(", ")
     }
 
 
@@ -118,4 +120,4 @@ def test_locked_joint_named_like_link(tmp_path):
         '<equality><joint joint1="arm" polycoef="0 0"/></equality></mujoco>'
     )
     with pytest.raises(CaseError, match="found 'arm', which an equality of the file locks"):
-        load(file, Supplied(drive=("arm:0:1",), hold=("elbow",)))
+        load(file, driven("arm:0:1", hold=("elbow",)))

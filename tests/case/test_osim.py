@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.undriven import undriven_file
 from kincheck.core.errors import CaseError
 from scipy.spatial.transform import Rotation
 
+from ..support.model_files import driven
 from ..support.model_poses import coordinate as since_design
 from ..support.model_poses import solution
 from ..support.osim_texts import (
@@ -31,7 +32,7 @@ from ..support.osim_texts import (
 from ..support.splines import through
 
 EXACT = 1e-13
-DRIVE = Supplied(drive=("A:0:0.5:5",))
+DRIVE = driven("A:0:0.5:5")
 P = (0.1, 0.2, 0.3), (0.3, -0.2, 0.5)
 C = (0.1, -0.3, 0.2), (0.2, 0.4, -0.1)
 Q = (0.2, -0.4, 0.7, 0.1, 0.5, -0.3)
@@ -108,10 +109,9 @@ def test_joint_places_child_by_coordinates(write, kind, locked):
 @pytest.mark.parametrize("text", [FOUR_BAR, FOUR_BAR.replace('<Ground name="ground"/>', "")])
 def test_point_constraint_closes_loop(write, text):
     case = load(write(text), DRIVE)
-    found = solution(case)
-    for k, angle in enumerate(case.sweep.values):
-        turned = [since_design(case.mechanism, found, case.mechanism.joint(x), k) for x in "ABD"]
-        assert turned == pytest.approx([angle, -angle, angle], abs=EXACT)
+    turned = [since_design(case, solution(case), x) for x in "ABD"]
+    expected = np.outer([1, -1, 1], case.sweep.values)
+    assert np.array(turned) == pytest.approx(expected, abs=EXACT)
     assert case.source.split(LEFT_OUT)[1] == "nothing"
 
 
@@ -152,7 +152,7 @@ def test_custom_joint_axes_follow_coordinates(write):
         return transform(*P) @ motion @ np.linalg.inv(transform(*C))
 
     assert np.allclose(placed(read_tree(file), "a"), expected(0.7, -0.2), rtol=0, atol=EXACT)
-    case = load(file, Supplied(drive=("bend:0.7:1.2:5",), hold=("lift",)))
+    case = load(file, driven("bend:0.7:1.2:5", hold=("lift",)))
     found = solution(case)
     for bend, at in zip(np.linspace(0.7, 1.2, 5), found.bodies["a"].r, strict=True):
         assert np.allclose(at, expected(bend, -0.2)[:3, 3], rtol=0, atol=EXACT)
@@ -199,7 +199,7 @@ def test_knee_of_splines_follows_table(write):
     )
     case = load(
         write(model("a", [custom(coordinate("q", -0.4), *axes)])),
-        Supplied(drive=("q:-0.3:-2.5:12",)),
+        driven("q:-0.3:-2.5:12"),
     )
     found = solution(case).bodies["a"]
     forward, down = (through(np.transpose(each)) for each in (FORWARD, DOWN))
@@ -229,7 +229,7 @@ def test_coordinate_of_splines_alone_is_coupled(write):
     tie = coupler("A", "beta", line(1, 0))
     case = load(
         write(model("ab", [knee, custom(coordinate("beta"), *axes)], tie)),
-        Supplied(drive=("A:0:-1.5:4",)),
+        driven("A:0:-1.5:4"),
     )
     found = solution(case)
     forward, down = (through(np.transpose(each)) for each in (FORWARD, DOWN))
@@ -282,13 +282,11 @@ PINS = [
 )
 def test_coupled_coordinate_follows_leader(write, tie, law):
     """From where the file has it to where the coupler wants it, at the start and later."""
-    case = load(write(model("abc", PINS, tie)), Supplied(drive=("A:0:0.5:5",), hold=("C",)))
-    found = solution(case)
+    case = load(write(model("abc", PINS, tie)), driven("A:0:0.5:5", hold=("C",)))
     (start,) = re.findall(r"B (-?[\d.]+)", next(x for x in case.assembly if "model's zero" in x))
     zero = law(0.1)
     assert float(start) == pytest.approx(zero, rel=1e-8)
-    joint = case.mechanism.joint("B")
-    turned = [since_design(case.mechanism, found, joint, k) + zero for k in range(5)]
+    turned = since_design(case, solution(case), "B") + zero
     assert turned == pytest.approx([law(a) for a in np.linspace(0, 0.5, 5)], abs=1e-9)
 
 
@@ -455,7 +453,7 @@ def test_exports_keep_joint_limits(write, tmp_path, to):
         joint("PinJoint", "A", "", "a", coordinate("A", 0.2, clamped[0])),
         joint("SliderJoint", "B", "a", "b", coordinate("B", 0.05, clamped[1])),
     ]
-    case = load(write(model("ab", joints)), Supplied(drive=("A:0.2:0.6:3",), hold=("B",)))
+    case = load(write(model("ab", joints)), driven("A:0.2:0.6:3", hold=("B",)))
     zeros = {"osim": (0.0, 0.0), "mjcf": (0.0, 0.0), "urdf": (0.2, 0.05), "sdf": (0.4, 0.05)}[to]
     files = written(case, adapters.writer(to), 0.4)
     file = write(next(text for end, text in files.items() if end != ".constraints.json"), f"w.{to}")
@@ -472,7 +470,7 @@ def test_start_or_drive_beyond_limits(write):
         for x, v in (("A", 0.0), ("B", 0.9), ("C", 0.75))
     ]
     file = write(model("abc", joints))
-    case = load(file, Supplied(drive=("A:0:1:5",), hold=("B", "C")))
+    case = load(file, driven("A:0:1:5", hold=("B", "C")))
     (note,) = (each for each in case.assembly if "beyond their limits" in each)
     assert note == (
         "joints beyond their limits: A at 0 to 1, limits -0.5 to 0.75; B at 0.9, limits -0.5 to"

@@ -16,6 +16,8 @@ from kincheck.core.case.models.trees.element import DEEPEST, MOST_ELEMENTS, pars
 from kincheck.core.case.models.trees.tree import MOST_TIES
 from kincheck.core.errors import CaseError
 
+from ..support.model_files import driven
+
 openpyxl = pytest.importorskip("openpyxl")
 HEAD = b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
 END = b"</sheetData></worksheet>"
@@ -157,7 +159,7 @@ def test_closures_up_to_limit(name, tmp_path):
     file = tmp_path / name
     file.write_text(TIES[name].format(TIE[name] * (MOST_TIES + 1)))
     with pytest.raises(CaseError, match=rf"line {MOST_TIES + 3}: .*found more than"):
-        load(file, Supplied(drive=("j:0:1",)))
+        load(file, driven("j:0:1"))
 
 
 def test_long_chain_of_fixed_links(tmp_path):
@@ -169,7 +171,7 @@ def test_long_chain_of_fixed_links(tmp_path):
     )
     file = tmp_path / "chain.urdf"
     file.write_text(f"{base}{chain}</robot>")
-    case = load(file, Supplied(drive=("j:0:1",)))
+    case = load(file, driven("j:0:1"))
     assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
 
 
@@ -201,7 +203,7 @@ def test_many_linkages_of_few_digits(tmp_path):
     file = tmp_path / "scene.xml"
     file.write_text(f"<mujoco><worldbody>{bars}</worldbody><equality>{ties}</equality></mujoco>")
     hold = tuple(f"j{k}" for k in range(1, 52))
-    case = load(file, Supplied(drive=("j0:0:0.1:2",), hold=hold))
+    case = load(file, driven("j0:0:0.1:2", hold=hold))
     assert len(case.mechanism.drivers) == 52
     assert len(case.mechanism.reduced) == 52
 
@@ -214,5 +216,5 @@ def test_spring_tendon_without_length_left_out(tmp_path):
     spring = '<tendon><spatial stiffness="1"><site site="s"/><site site="t"/></spatial></tendon>'
     file = tmp_path / "model.xml"
     file.write_text(f"{text}{spring}</mujoco>")
-    case = load(file, Supplied(drive=("j:0:1",), hold_rest=True))
+    case = load(file, driven("j:0:1", hold_rest=True))
     assert "tendon: spatial (1)" in case.source

@@ -9,7 +9,7 @@ from kincheck import adapters
 from kincheck.core.algebra import X, Y, Z
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.joints import Polynomial, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism
@@ -17,6 +17,7 @@ from kincheck.core.mechanism.motions import JointAngle
 
 from ..fuzz import urdf as seeds
 from ..support.exported_again import same_motion
+from ..support.model_files import driven
 from ..support.model_poses import coordinate, solution
 from ..support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
 
@@ -63,17 +64,13 @@ def test_closed_urdf_moves_as_in_pinocchio(tmp_path: Path):
     pin = pytest.importorskip("pinocchio")
     case = load(robot(tmp_path, FOUR_BAR), DRIVE)
     found = solution(case)
-    assert found.solved.all()
     model = pin.buildModelFromXML(FOUR_BAR)
     data, names = model.createData(), [*model.names][1:]
-    for k, swept in enumerate(case.sweep.values):
-        angles = {
-            name: coordinate(case.mechanism, found, case.mechanism.joint(name), k) for name in names
-        }
-        assert angles["A"] == pytest.approx(swept, abs=EXACT)
+    angles = np.transpose([coordinate(case, found, name) for name in names])
+    assert angles[:, names.index("A")] == pytest.approx(case.sweep.values, abs=EXACT)
+    for k, values in enumerate(angles):
         q = pin.neutral(model)
-        for name, angle in angles.items():
-            joint = model.joints[model.getJointId(name)]
+        for joint, angle in zip([*model.joints][1:], values, strict=True):
             two = joint.nq == 2  # continuous: cosine and sine
             q[joint.idx_q : joint.idx_q + joint.nq] = (
                 (np.cos(angle), np.sin(angle)) if two else angle
@@ -116,7 +113,6 @@ def test_urdf_constraint_types_close_loop(closing: str, tmp_path: Path):
     same = solution(load(robot(tmp_path, FOUR_BAR), DRIVE)).bodies
     case = load(robot(tmp_path, TREE.replace("</robot>", closing + "</robot>")), DRIVE)
     found = solution(case)
-    assert found.solved.all()
     for name in ("a", "b", "c"):
         assert np.abs(found.bodies[name].r - same[name].r).max() < EXACT
 
@@ -144,7 +140,7 @@ def test_pairs_file_closes_loop(tmp_path: Path):
         "D": "revolute",
         "X = y": "spherical",
     }
-    assert solution(case).solved.all()
+    solution(case)
 
 
 def test_pairs_file_with_open_zero_pose(tmp_path: Path):
@@ -159,7 +155,7 @@ def test_pairs_file_with_open_zero_pose(tmp_path: Path):
         "the start (its zero pose) is assembled: closed_loop: X = y was open by 1.5 m"
         in (case.assembly[0])
     )
-    assert solution(case).solved.all()
+    solution(case)
 
 
 def test_exported_polynomial_coupling_is_read(tmp_path: Path):
@@ -173,7 +169,7 @@ def test_exported_polynomial_coupling_is_read(tmp_path: Path):
     case = Case("m", "made up for this test", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     texts = written(case, adapters.writer("urdf"))
     file = robot(tmp_path, texts[".urdf"], constraints_json=texts[".constraints.json"])
-    again = load(file, Supplied(drive=("A:0:1:3",)))
+    again = load(file, driven("A:0:1:3"))
     assert [each.type for each in again.mechanism.couplers] == ["polynomial"]
     assert same_motion(case, again) < EXACT
 
@@ -191,12 +187,12 @@ def test_axis_is_normalized_once(axis: str, tmp_path: Path):
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
         f'<parent link="a"/><child link="b"/><axis xyz="{axis}"/></joint></robot>'
     )
-    case = load(robot(tmp_path, text), Supplied(drive=("j:0:1",)))
+    case = load(robot(tmp_path, text), driven("j:0:1"))
     assert case.mechanism.joint("j").axis == expected
     file = tmp_path / "model.xml"
     file.write_text(
         '<mujoco><worldbody><body name="b"><geom size="0.1"/>'
         f'<joint name="j" axis="{axis}"/></body></worldbody></mujoco>'
     )
-    case = load(file, Supplied(drive=("j:0:1",)))
+    case = load(file, driven("j:0:1"))
     assert case.mechanism.joint("j").axis == expected

@@ -6,19 +6,19 @@ from functools import partial
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.trees.driving import read_start
 from kincheck.core.case.models.undriven import undriven_file
 from kincheck.core.studies.same import compare
 
+from ..support.model_files import driven
 from ..support.model_poses import coordinate, solution
 from ..support.usd_texts import ARM, EXCLUDED, FOUR_BAR, body, joint, locked, prim, stage, written
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("pxr") is None, reason="no usd-core")
 EXACT = 1e-13
 SINGLE = 3e-7
-DRIVE = Supplied(drive=("A:0:0.5:5",))
+DRIVE = driven("A:0:0.5:5")
 
 
 @pytest.fixture
@@ -34,9 +34,8 @@ def test_excluded_joint_closes_loop(write):
     """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
     case = load(write(*FOUR_BAR), DRIVE)
     found = solution(case)
-    for k, angle in enumerate(case.sweep.values):
-        turned = [coordinate(case.mechanism, found, case.mechanism.joint(x), k) for x in "ABDC"]
-        assert turned == pytest.approx([angle, -angle, angle, angle], abs=EXACT)
+    turned = np.array([coordinate(case, found, x) for x in "ABDC"])
+    assert turned == pytest.approx(np.outer([1, -1, 1, 1], case.sweep.values), abs=EXACT)
     pin = np.stack([np.sin(case.sweep.values), 0 * case.sweep.values, np.cos(case.sweep.values)])
     assert np.allclose(found.points["b"].position, 2 * pin.T, rtol=0, atol=EXACT)
 
@@ -221,10 +220,8 @@ def test_mimic_joint_follows_leader(write, dialect):
     file = write(body("a"), body("b", (0, 0, 1)), joint("Revolute", "A", "", "a"), follower)
     found = solution(case := load(file, DRIVE))
     zero = law(0.0)
-    turned = [coordinate(case.mechanism, found, case.mechanism.joint("B"), k) for k in range(5)]
-    assert [q + zero for q in turned] == pytest.approx(
-        [law(q) for q in case.sweep.values], abs=EXACT
-    )
+    turned = coordinate(case, found, "B") + zero
+    assert turned == pytest.approx(law(case.sweep.values), abs=EXACT)
     assert not zero or any(f"B {zero:.9g}" in note for note in case.assembly)
 
 
@@ -308,7 +305,7 @@ def test_drive_motors_limits_and_starts(write):
     assert turn.limit.effort == pytest.approx(5e-4)
     tree = tree_of(file)
     assert tree.starts == {"target": [f"A={math.radians(45)!r}"], "state": ["B=0.1"]}
-    case = load(file, Supplied(drive=("A:0:1:3",), hold=("B",), start=("keyframe:target",)))
+    case = load(file, driven("A:0:1:3", hold=("B",), start=("keyframe:target",)))
     assert any("keyframe:target" in each for each in (case.source, *case.assembly))
 
 

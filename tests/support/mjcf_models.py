@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from kincheck.core.algebra import Quat, X, Y, Z, vec
-from kincheck.core.case.models.files import read_tree
+from kincheck.core.case.models.files import load, read_tree
 
 mujoco = pytest.importorskip("mujoco")
+differences = pytest.importorskip("tests.oracles.public_robots").differences
 
 
 # MuJoCo's residuals at kincheck's poses: rounding of metre-sized coordinates, some operations deep.
@@ -25,6 +26,13 @@ def model(tmp_path, text, name="model.xml"):
         )
     )
     return file
+
+
+def closes_in_mujoco(file, supplied):
+    """All samples are solved, and stand where Newton's method on MuJoCo's equalities puts them."""
+    solved, reached, worst = differences(file, supplied)
+    assert reached == solved == len(load(file, supplied).sweep.values)
+    assert worst.max() < EXACT
 
 
 def agree(file):
