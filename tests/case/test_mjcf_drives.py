@@ -7,7 +7,8 @@ import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 
-from ..support.model_files import COUPLING, DRIVEN, GRIPPER, SPRINGS, complains, driven, edited
+from ..support.case_texts import complains
+from ..support.model_files import COUPLING, DRIVEN, GRIPPER, SPRINGS, driven, edited
 
 DRIVES = {
     "nothing said": (
@@ -90,17 +91,18 @@ DRIVES = {
         ),
     ],
 )
-def test_locked_joint_is_not_driven(tmp_path, supplied, found):
+def test_locked_joint_is_not_driven(tmp_path, found, supplied):
     complains(
         edited(tmp_path, GRIPPER.read_text(), (COUPLING, '<joint joint1="right_driver_joint"')),
-        supplied,
         found,
+        supplied,
     )
 
 
 @pytest.mark.parametrize("kind", DRIVES)
 def test_drive_and_hold_faults(kind):
-    complains(GRIPPER, *DRIVES[kind])
+    supplied, said = DRIVES[kind]
+    complains(GRIPPER, said, supplied)
 
 
 @pytest.mark.parametrize("drive", ["0:20deg:5", "0:0.3490658503988659rad:5"])

@@ -4,7 +4,8 @@ file, line, found and remedy.
 
 import pytest
 
-from ..support.model_files import COUPLING, DRIVEN, GRIPPER, complains, edited, written
+from ..support.case_texts import complains, write
+from ..support.model_files import COUPLING, DRIVEN, GRIPPER, edited
 
 FIRST = '<connect anchor="0 0 0" body1="right_follower"'
 BASE = '<body name="base_mount" pos="0 0 0.007" quat="1 0 0 1"'
@@ -250,7 +251,7 @@ ALSO = {
 def test_mjcf_fault_is_one_message(tmp_path, kind):
     *edit, said = FAULTS[kind]
     edits = [edit, ALSO[kind]] if kind in ALSO else [edit]
-    complains(edited(tmp_path, GRIPPER.read_text(), *edits), DRIVEN, said)
+    complains(edited(tmp_path, GRIPPER.read_text(), *edits), said, DRIVEN)
 
 
 WHOLE = GRIPPER.read_text()
@@ -282,4 +283,4 @@ TEXTS = {
 @pytest.mark.parametrize("kind", TEXTS)
 def test_text_without_mjcf_model_is_refused(tmp_path, kind):
     text, said = TEXTS[kind]
-    complains(written(tmp_path, text), DRIVEN, said)
+    complains(write(tmp_path, text, "model.xml"), said, DRIVEN)

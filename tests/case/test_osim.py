@@ -15,7 +15,8 @@ from kincheck.core.case.models.undriven import undriven_file
 from kincheck.core.errors import CaseError
 from scipy.spatial.transform import Rotation
 
-from ..support.model_files import complains, driven, written
+from ..support import case_texts
+from ..support.model_files import driven
 from ..support.model_poses import coordinate as since_design
 from ..support.model_poses import solution
 from ..support.osim_texts import (
@@ -41,7 +42,7 @@ NONE = (0.0, 0.0, 0.0)
 
 @pytest.fixture
 def write(tmp_path):
-    return lambda text, name="m.osim": written(tmp_path, text, name)
+    return lambda text, name="m.osim": case_texts.write(tmp_path, text, name)
 
 
 def transform(at=NONE, angles=NONE):
@@ -402,7 +403,7 @@ FAULTS = {
 def test_osim_fault_is_one_message(write, fault):
     old, new, said = FAULTS[fault]
     assert old in WHOLE
-    complains(write(WHOLE.replace(old, new)), driven("B:0:0.5:5"), said)
+    case_texts.complains(write(WHOLE.replace(old, new)), said, driven("B:0:0.5:5"))
 
 
 def test_constraint_left_out_by_name(write):

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from .model_files import written
+from .case_texts import write
 
 
 def stage(*prims, units='metersPerUnit = 1\n    upAxis = "Z"'):
@@ -69,4 +69,4 @@ def locked(axes):
 
 def write_stage(folder, *prims, name="m.usda", **units):
     """Write a stage into a folder, and return its file."""
-    return written(folder, stage(*prims, **units), name)
+    return write(folder, stage(*prims, **units), name)
