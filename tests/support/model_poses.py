@@ -1,14 +1,15 @@
 """The native solution of a case, and coordinates of its joints by the poses of their bodies."""
 
 import numpy as np
-from kincheck.core.kinematics import solve
+from kincheck.core.kinematics import NativeSolver
 from scipy.spatial.transform import Rotation
 
 
 def solution(case):
     """The native solution of a case, with all bodies that move; all samples are solved."""
     names = [body.name for body in case.mechanism.moving]
-    found = solve(case.mechanism, case.sweep.driver, case.sweep.change, bodies=names)
+    solver = NativeSolver(compiled=False)
+    found = solver.prepare(case.mechanism, case.sweep.path, bodies=names, points=case.points)(1e-12)
     assert found.solved.all(), found.message
     return found
 
