@@ -8,11 +8,11 @@ from kincheck.core.algebra import vec
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.trees.tree import Mass, together
-from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
 
-from ..support.model_files import driven
+from ..support.case_texts import complains, write
+from ..support.model_files import driven, edited
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -47,8 +47,7 @@ SETTINGS = {
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
 def test_mjcf_masses_match_mujoco(tmp_path, settings):
-    file = tmp_path / "model.xml"
-    file.write_text(WEIGHED.replace("<default>", settings + "<default>", 1))
+    file = edited(tmp_path, WEIGHED, ("<default>", settings + "<default>"))
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -89,9 +88,7 @@ DRIVEN = driven("J:-0.4:0.4:5")
 
 def case_of(tmp_path, text, supplied=DRIVEN):
     ending = {"<m": "xml", "<r": "urdf", "<s": "sdf"}[text[:2]]
-    file = tmp_path / f"robot.{ending}"
-    file.write_text(text)
-    return load(file, supplied)
+    return load(write(tmp_path, text, f"robot.{ending}"), supplied)
 
 
 def test_masses_agree_across_formats(tmp_path):
@@ -101,8 +98,8 @@ def test_masses_agree_across_formats(tmp_path):
         assert case.mechanism.gravity == (0.0, 0.0, -9.81)
         assert "with the masses of its bodies" in case.source
         assert body.mass == 3.0
-        assert np.allclose(body.center_of_mass, bodies[0].center_of_mass, rtol=0, atol=EXACT)
-        assert np.allclose(body.inertia, bodies[0].inertia, rtol=0, atol=EXACT)
+        first, other = ((*x.center_of_mass, *x.inertia) for x in (bodies[0], body))
+        assert np.allclose(first, other, rtol=0, atol=EXACT)
 
 
 @pytest.mark.parametrize("text", [URDF, SDF], ids=["urdf", "sdf"])
@@ -136,27 +133,35 @@ def test_rod_mass_is_at_its_ends(tmp_path):
     """Two kilograms, a quarter of the length from its first end."""
     case = case_of(tmp_path, ROD)
     assert "moments of inertia of rods, whose masses are at their ends: rod" in case.source
-    masses = {body.name: body for body in case.mechanism.bodies}
-    assert masses.keys() == {"a", "c"}
-    assert masses["a"].mass == 2.5
-    assert masses["c"].mass == 1.5
+    assert {body.name: body.mass for body in case.mechanism.bodies} == {"a": 2.5, "c": 1.5}
     # the rod's weight at its centre, 1 m beside the crank's pin, is lifted by both
-    assert masses["a"].center_of_mass == pytest.approx((0.0, 0.0, (1.0 + 1.5 * 2.0) / 2.5))
+    center = case.mechanism.body("a").center_of_mass
+    assert center == pytest.approx((0.0, 0.0, (1.0 + 1.5 * 2.0) / 2.5))
 
 
+START, END = MJCF.index('<inertial pos="0.5'), MJCF.index('<body name="tip"')
+BOUNDED = (MJCF[:START] + MJCF[END:]).replace(
+    "<compiler angle", '<compiler inertiafromgeom="false" boundinertia="1" angle'
+)
 UNREADABLE = {
-    "a negative mass": (MJCF, 'mass="2"', 'mass="-2"', "arm"),
-    "no number": (URDF, 'value="2"', 'value="heavy"', "arm"),
-    "no rigid body": (URDF, 'ixx="0.4"', 'ixx="-4"', "arm"),
-    "of collisions": (SDF, "<inertial><pose>0.5", '<inertial auto="true"><pose>0.5', "arm"),
+    "a negative mass": (MJCF, 'mass="2"', 'mass="-2"'),
+    "no number": (URDF, 'value="2"', 'value="heavy"'),
+    "no rigid body": (URDF, 'ixx="0.4"', 'ixx="-4"'),
+    "of collisions": (SDF, "<inertial><pose>0.5", '<inertial auto="true"><pose>0.5'),
+    "moments without mass": (
+        BOUNDED,
+        'mass="1"',
+        'mass="0"',
+    ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "old", "new", "body"), UNREADABLE.values(), ids=UNREADABLE)
-def test_unreadable_mass_is_noted(tmp_path, text, old, new, body):
+@pytest.mark.parametrize("kind", UNREADABLE)
+def test_unreadable_mass_is_noted(tmp_path, kind):
+    text, old, new = UNREADABLE[kind]
     assert old in text
     case = case_of(tmp_path, text.replace(old, new))
-    assert f"masses that cannot be read, of {body}" in case.source
+    assert "masses that cannot be read, of arm" in case.source
 
 
 def test_mesh_has_unknown_mass(tmp_path):
@@ -169,39 +174,31 @@ def test_mesh_has_unknown_mass(tmp_path):
     assert case.mechanism.gravity == (0.0, 0.0, 0.0)  # as long as nothing has a mass
 
 
-def test_moments_without_mass_are_noted(tmp_path):
-    text = MJCF.replace(
-        "<compiler angle", '<compiler inertiafromgeom="false" boundinertia="1" angle'
-    )
-    start, end = text.index('<inertial pos="0.5'), text.index('<body name="tip"')
-    case = case_of(tmp_path, text[:start] + text[end:].replace('mass="1"', 'mass="0"'))
-    assert "masses that cannot be read, of arm" in case.source
-    assert case.mechanism.body("arm").mass == 0.0
-
-
 def test_mistyped_mass_setting_is_refused(tmp_path):
-    with pytest.raises(CaseError, match="inertiafromgeom: found 'yes'"):
-        case_of(tmp_path, MJCF.replace("<compiler", '<compiler inertiafromgeom="yes"'))
+    file = edited(tmp_path, MJCF, ("<compiler", '<compiler inertiafromgeom="yes"'))
+    complains(file, "inertiafromgeom: found 'yes'", DRIVEN)
 
 
-@pytest.mark.parametrize("writer", [mjcf, sdf], ids=["mjcf", "sdf"])
-def test_exported_stand_ins_are_no_masses(tmp_path, writer):
-    """What kincheck writes for a mechanism without masses is read as one without masses."""
-    texts = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)
-    file = tmp_path / ("model" + next(iter(texts)))
-    file.write_text(next(iter(texts.values())))
+STAND_INS = {"mjcf": (mjcf, ".xml"), "sdf": (sdf, ".sdf")}
+
+
+@pytest.mark.parametrize(
+    ("form", "edit", "masses"),
+    [
+        ("mjcf", ("", ""), []),
+        ("sdf", ("", ""), []),
+        ("sdf", ("<mass>1e-06", "<mass>2e-06"), [2e-6]),
+        ("sdf", ("<ixx>1e-06", "<ixx>2e-06"), [1e-6]),
+    ],
+)
+def test_exported_stand_ins_are_no_masses(tmp_path, form, edit, masses):
+    """What kincheck writes for a mechanism without masses is read so; numbers unlike it count."""
+    writer, ending = STAND_INS[form]
+    text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)[ending]
+    file = edited(tmp_path, text, edit, name="model" + ending)
     case = load(file, driven("left_pivot:0:0.1:3", hold_rest=True))
-    assert not any(body.mass for body in case.mechanism.bodies)
-    assert "with the masses" not in case.source
-
-
-@pytest.mark.parametrize(("key", "mass"), [("mass", 2e-6), ("ixx", 1e-6)])
-def test_small_mass_unlike_stand_in_counts(tmp_path, key, mass):
-    text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), sdf.write)[".sdf"]
-    file = tmp_path / "model.sdf"
-    file.write_text(text.replace(f"<{key}>1e-06", f"<{key}>2e-06", 1))
-    case = load(file, driven("left_pivot:0:0.1:3", hold_rest=True))
-    assert [body.mass for body in case.mechanism.bodies if body.mass] == [mass]
+    assert [body.mass for body in case.mechanism.bodies if body.mass] == masses
+    assert ("with the masses" in case.source) is bool(masses)
 
 
 def test_inertia_in_global_axes(tmp_path):
@@ -221,6 +218,5 @@ def test_inertia_in_global_axes(tmp_path):
 def test_settotalmass_leaves_masses_unread(tmp_path):
     """It scales all of them, below a kilogram too; zero or less is MuJoCo's word for none."""
     for total, unread in (("0.5", True), ("-1", False)):
-        file = tmp_path / "model.xml"
-        file.write_text(WEIGHED.replace("<compiler ", f'<compiler settotalmass="{total}" ', 1))
+        file = edited(tmp_path, WEIGHED, ("<compiler ", f'<compiler settotalmass="{total}" '))
         assert bool(read_tree(file).unweighed) is unread
