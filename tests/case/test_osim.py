@@ -23,7 +23,6 @@ from ..support.osim_texts import (
     FOUR_BAR,
     axis,
     coordinate,
-    frame,
     joint,
     line,
     model,
@@ -281,18 +280,13 @@ def test_coupled_coordinate_follows_leader(write, tie, law):
 
 
 def test_welds_and_rods_tie_frames(write):
-    weld = tagged(
-        "WeldConstraint",
-        texts(socket_frame1="one", socket_frame2="/bodyset/b")
-        + tagged("frames", frame("one", "a", (1, 0, 0), (0.1, 0, 0))),
-        "weld",
-    )
-    rod = tagged(
-        "ConstantDistanceConstraint",
-        texts(socket_body_1="/bodyset/a", socket_body_2="/ground", constant_distance=(2.0,))
-        + texts(location_body_2=(2, 0, 0)),
-        "rod",
-    )
+    weld = """<WeldConstraint name="weld"><socket_frame1>one</socket_frame1>
+        <socket_frame2>/bodyset/b</socket_frame2><frames><PhysicalOffsetFrame name="one">
+        <socket_parent>/bodyset/a</socket_parent><translation>1 0 0</translation>
+        <orientation>0.1 0 0</orientation></PhysicalOffsetFrame></frames></WeldConstraint>"""
+    rod = """<ConstantDistanceConstraint name="rod"><socket_body_1>/bodyset/a</socket_body_1>
+        <socket_body_2>/ground</socket_body_2><constant_distance>2</constant_distance>
+        <location_body_2>2 0 0</location_body_2></ConstantDistanceConstraint>"""
     off = coupler("A", "A", line(1, 0), "<isEnforced>false</isEnforced>")
     tree = read_tree(write(model("abc", PINS, weld + rod + off)))
     ties = {each.name: each for each in tree.ties}
@@ -303,23 +297,20 @@ def test_welds_and_rods_tie_frames(write):
 
 
 def test_masses_springs_limits_and_markers(write):
-    heavy = (
-        '<Body name="a">'
-        + texts(mass=(2.0,), mass_center=(0.1, 0.2, 0.3), inertia=(1.0, 2.0, 2.5, 0.1, 0.2, 0.3))
-        + "</Body>"
-    )
-    bounded = texts(range=(-0.5, 0.75), clamped="true")
+    heavy = """<Body name="a"><mass>2</mass><mass_center>0.1 0.2 0.3</mass_center>
+        <inertia>1 2 2.5 0.1 0.2 0.3</inertia></Body>"""
+    bounded = "<range>-0.5 0.75</range><clamped>true</clamped>"
     pin = joint("PinJoint", "A", "", "a", coordinate("A", 0.0, bounded))
-    law = texts(coordinate="A", stiffness=(5.0,), rest_length=(0.1,), viscosity=(0.5,))
-    ends = texts(socket_body1="/ground", socket_body2="/bodyset/a", point1=(0, 1, 0))
-    forces = (
-        tagged("SpringGeneralizedForce", law, "s")
-        + tagged("CoordinateActuator", texts(coordinate="A"), "motor")
-        + tagged("Millard2012EquilibriumMuscle", "", "muscle")
-        + tagged("PointToPointSpring", ends + texts(stiffness=(7.0,), rest_length=(0.5,)), "p")
-    )
-    marker = tagged("Marker", texts(socket_parent_frame="/bodyset/a", location=(0, 1, 0)), "tip")
-    more = tagged("MarkerSet", tagged("objects", marker), "markerset") + texts(gravity=(0, 0, -3))
+    forces = """<SpringGeneralizedForce name="s"><coordinate>A</coordinate><stiffness>5</stiffness>
+        <rest_length>0.1</rest_length><viscosity>0.5</viscosity></SpringGeneralizedForce>
+        <CoordinateActuator name="motor"><coordinate>A</coordinate></CoordinateActuator>
+        <Millard2012EquilibriumMuscle name="muscle"/>
+        <PointToPointSpring name="p"><socket_body1>/ground</socket_body1>
+        <socket_body2>/bodyset/a</socket_body2><point1>0 1 0</point1><stiffness>7</stiffness>
+        <rest_length>0.5</rest_length></PointToPointSpring>"""
+    more = """<MarkerSet name="markerset"><objects><Marker name="tip">
+        <socket_parent_frame>/bodyset/a</socket_parent_frame><location>0 1 0</location></Marker>
+        </objects></MarkerSet><gravity>0 0 -3</gravity>"""
     file = write(model([heavy], [pin], forces=forces, more=more))
     tree = read_tree(file)
     (mass,) = tree.masses["a"]
@@ -439,10 +430,10 @@ def test_older_document_is_updated_by_opensim(write):
 @pytest.mark.parametrize("to", ["osim", "mjcf", "urdf", "sdf"])
 def test_exports_keep_joint_limits(write, tmp_path, to):
     """From a start at which they count from another zero; a slide too."""
-    clamped = [texts(range=each, clamped="true") for each in ((-0.5, 0.75), (-0.1, 0.3))]
+    limits = "<range>{} {}</range><clamped>true</clamped>".format
     joints = [
-        joint("PinJoint", "A", "", "a", coordinate("A", 0.2, clamped[0])),
-        joint("SliderJoint", "B", "a", "b", coordinate("B", 0.05, clamped[1])),
+        joint("PinJoint", "A", "", "a", coordinate("A", 0.2, limits(-0.5, 0.75))),
+        joint("SliderJoint", "B", "a", "b", coordinate("B", 0.05, limits(-0.1, 0.3))),
     ]
     case = load(write(model("ab", joints)), driven("A:0.2:0.6:3", hold=("B",)))
     zeros = {"osim": (0.0, 0.0), "mjcf": (0.0, 0.0), "urdf": (0.2, 0.05), "sdf": (0.4, 0.05)}[to]
@@ -455,7 +446,7 @@ def test_exports_keep_joint_limits(write, tmp_path, to):
 
 
 def test_start_or_drive_beyond_limits(write):
-    bounded = texts(range=(-0.5, 0.75), clamped="true")
+    bounded = "<range>-0.5 0.75</range><clamped>true</clamped>"
     joints = [
         joint("PinJoint", x, "", x.lower(), coordinate(x, v, bounded))
         for x, v in (("A", 0.0), ("B", 0.9), ("C", 0.75))

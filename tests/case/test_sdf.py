@@ -88,7 +88,8 @@ AXES = {
 def test_axis_frame_by_version_and_attribute(version, axis, expected, tmp_path: Path):
     half = np.pi / 2
     text = f"""<sdf version="{version}"><model name="m">
-    <link name="a"><pose>0 0 0 0 {half} 0</pose></link><link name="b"><pose>1 0 0 0 0 {half}</pose></link>
+    <link name="a"><pose>0 0 0 0 {half} 0</pose></link>
+    <link name="b"><pose>1 0 0 0 0 {half}</pose></link>
     <joint name="j" type="revolute">
     <parent>a</parent><child>b</child><axis>{axis}</axis></joint></model></sdf>"""
     hinge = read_tree(model(tmp_path, text)).moves["j"]

@@ -16,8 +16,9 @@ from kincheck.core.mechanism.mechanism import Body, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
 
 from ..fuzz import urdf as seeds
+from ..support.case_texts import write
 from ..support.exported_again import same_motion
-from ..support.model_files import driven
+from ..support.model_files import driven, edited
 from ..support.model_poses import coordinate, solution
 from ..support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
 
@@ -68,22 +69,14 @@ def test_closed_urdf_moves_as_in_pinocchio(tmp_path: Path):
     data, names = model.createData(), [*model.names][1:]
     angles = np.transpose([coordinate(case, found, name) for name in names])
     assert angles[:, names.index("A")] == pytest.approx(case.sweep.values, abs=EXACT)
+    x, y, z = map(float, THERE.split('"')[1].split())
     for k, values in enumerate(angles):
-        q = pin.neutral(model)
-        for joint, angle in zip([*model.joints][1:], values, strict=True):
-            two = joint.nq == 2  # continuous: cosine and sine
-            q[joint.idx_q : joint.idx_q + joint.nq] = (
-                (np.cos(angle), np.sin(angle)) if two else angle
-            )
-        pin.framesForwardKinematics(model, data, q)
-        for name in ("a", "b", "c"):
-            frame = data.oMf[model.getFrameId(name)]
+        pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), values))
+        frames = {name: data.oMf[model.getFrameId(name)] for name in "abc"}
+        for name, frame in frames.items():
             assert np.allclose(found.bodies[name].r[k], frame.translation, rtol=0, atol=EXACT)
-        there, here = (data.oMf[model.getFrameId(name)] for name in ("b", "c"))
-        gap = there.act(np.array([4.0, 0, 0])) - here.act(
-            np.array([*map(float, THERE.split('"')[1].split())])
-        )
-        assert np.abs(gap).max() < EXACT
+        there, here = frames["b"].act(np.array([4.0, 0, 0])), frames["c"].act(np.array([x, y, z]))
+        assert np.abs(there - here).max() < EXACT
     tip = case.mechanism.point("tip")
     assert tip.body == "b"
     assert tip.position == pytest.approx((2.0, 0.0, 3.0))
@@ -125,36 +118,28 @@ def test_left_out_elements_are_listed(tmp_path: Path):
     assert case.source.split(LEFT_OUT)[1] == "gazebo (1), visual (2), limit of joints (1)"
 
 
+PAIRED = seeds.PAIRED.decode().replace("yaml=", "said=")
+PAIRS = PAIRED.split('said="')[1].split('"')[0]
+
+
 def test_pairs_file_closes_loop(tmp_path: Path):
     """Of example-parallel-robots: frames are links or joints, and joints get other types."""
     pytest.importorskip("yaml")
-    text = seeds.PAIRED.decode().replace("yaml=", "said=")
-    pairs = text.split('said="')[1].split('"')[0]
-    file = robot(tmp_path, text, yaml=pairs)
-    case = load(file, DRIVE)
+    case = load(robot(tmp_path, PAIRED, yaml=PAIRS), DRIVE)
     assert "with robot.yaml" in case.source
-    assert {joint.name: joint.type for joint in case.mechanism.joints} == {
-        "A": "revolute",
-        "B_Y": "revolute",
-        "B_X": "revolute",
-        "D": "revolute",
-        "X = y": "spherical",
-    }
+    hinges = dict.fromkeys(("A", "B_Y", "B_X", "D"), "revolute")
+    types = {joint.name: joint.type for joint in case.mechanism.joints}
+    assert types == {**hinges, "X = y": "spherical"}
     solution(case)
 
 
 def test_pairs_file_with_open_zero_pose(tmp_path: Path):
     """The file has no other start; another model so far open is refused."""
     pytest.importorskip("yaml")
-    text = seeds.PAIRED.decode().replace("yaml=", "said=")
-    pairs = text.split('said="')[1].split('"')[0]
-    far = text.replace('<origin xyz="0 0 3"/>', '<origin xyz="0 0 1.5"/>')
-    assert far != text
-    case = load(robot(tmp_path, far, yaml=pairs), DRIVE)
-    assert (
-        "the start (its zero pose) is assembled: closed_loop: X = y was open by 1.5 m"
-        in (case.assembly[0])
-    )
+    file = edited(tmp_path, PAIRED, ('xyz="0 0 3"', 'xyz="0 0 1.5"'), name="robot.urdf")
+    case = load(robot(tmp_path, file.read_text(), yaml=PAIRS), DRIVE)
+    said = "the start (its zero pose) is assembled: closed_loop: X = y was open by 1.5 m"
+    assert said in case.assembly[0]
     solution(case)
 
 
@@ -189,10 +174,9 @@ def test_axis_is_normalized_once(axis: str, tmp_path: Path):
     )
     case = load(robot(tmp_path, text), driven("j:0:1"))
     assert case.mechanism.joint("j").axis == expected
-    file = tmp_path / "model.xml"
-    file.write_text(
+    text = (
         '<mujoco><worldbody><body name="b"><geom size="0.1"/>'
         f'<joint name="j" axis="{axis}"/></body></worldbody></mujoco>'
     )
-    case = load(file, driven("j:0:1"))
+    case = load(write(tmp_path, text, "model.xml"), driven("j:0:1"))
     assert case.mechanism.joint("j").axis == expected
