@@ -145,6 +145,12 @@ FAULTS = {
         '<equality><weld body1="right_driver" body2="left_driver" relpose="0 0 0.1 1 0 0 0"/>',
         "<weld> ... is open in the start ... --start",
     ),
+    "weld turned apart": (
+        "<equality>",
+        '<equality><weld body1="right_driver" body2="right_coupler"'
+        ' relpose="0 0.0315 -0.0041 0 0 1 0"/>',
+        "<weld> ... is open in the start ... --start",
+    ),
     "weld turned": (
         "<equality>",
         '<equality><weld site1="right_pad" site2="turned"/>',

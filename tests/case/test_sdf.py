@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.studies.same import compare
 
 from ..fuzz import sdf as seeds
 from ..support.case_texts import complains, refused, write
@@ -55,6 +57,8 @@ def test_all_sdf_joint_types(tmp_path: Path):
     revolute = dict.fromkeys(("m::u.1", "m::u.2", "m::w.rotation", "m::m"), "revolute")
     slides = dict.fromkeys(("m::s", "m::w.translation"), "translational")
     assert types == {**revolute, **slides, "m::ball": "fixed"}  # the ball is held
+    turned = read_tree(tmp_path / "model.sdf").places["m::c"]
+    assert [*turned.turn] == pytest.approx([0.8, 0, 0, 0.6])
     (thread,) = (each for each in case.mechanism.couplers if each.name == "m::w.thread")
     assert thread.radius == pytest.approx(0.01 / (2 * np.pi))  # metres for a radian
     found = solution(case)
@@ -67,6 +71,20 @@ def test_screw_advances_by_pitch(tmp_path: Path):
     </joint></model></sdf>"""
     case = load(model(tmp_path, text), driven("w.rotation:0:6.283185307179586:3"))
     assert solution(case).bodies["nut"].r[:, 2] == pytest.approx([0, 0.005, 0.01], abs=EXACT)
+
+
+CARDAN = """<sdf version="1.9"><model name="m"><link name="a"/><link name="b"/>
+<joint name="A" type="revolute"><parent>world</parent><child>a</child><axis/></joint>
+<joint name="U" type="universal"><parent>{}</parent><child>{}</child><axis><xyz>{}</xyz></axis>
+<axis2><xyz>{}</xyz></axis2></joint></model></sdf>"""
+
+
+def test_universal_joint_with_links_exchanged(tmp_path: Path):
+    """The cross stays, with its second axis first."""
+    ways = ("a", "b", "1 0 0", "0 1 0"), ("b", "a", "0 1 0", "1 0 0")
+    cases = [undriven_file(model(tmp_path, CARDAN.format(*way))) for way in ways]
+    found = compare(*cases, {})
+    assert found.verdict == "same", found.reason
 
 
 AXES = {

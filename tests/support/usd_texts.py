@@ -62,9 +62,9 @@ ARM = (body("a"), body("b"), hinge("j", "", "a"))
 
 
 def locked(axes):
-    """Lines that lock axes of a generic joint."""
-    ends = ("low = 1", "high = -1")
-    return [f"float limit:{axis}:physics:{end}" for axis in axes.split() for end in ends]
+    """Lines that lock axes of a generic joint: low above high, or zero for both."""
+    ends = {"trans": ("low = 1", "high = -1"), "rot": ("low = 0", "high = 0")}
+    return [f"float limit:{x}:physics:{end}" for x in axes.split() for end in ends[x[:-1]]]
 
 
 def write_stage(folder, *prims, name="m.usda", **units):
