@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from ..support.case_texts import complains, write
 from ..support.model_files import driven
-from ..support.model_poses import solution
-from .test_joining_elements import EXACT, GATE
+from ..support.model_poses import EXACT, solution
+from .test_joining_elements import GATE
 
 JOINTS_OF_DRAKE = {
     "ball": ("", "", 0),

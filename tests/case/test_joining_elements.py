@@ -17,9 +17,8 @@ from kincheck.core.harness.compare import output_series
 
 from ..support.case_texts import complains, refused, write
 from ..support.model_files import driven, edited
-from ..support.model_poses import coordinate, solution
+from ..support.model_poses import EXACT, coordinate, solution
 
-EXACT = 1e-13
 DRIVE = driven("drive:-0.2:0.2:5", hold_rest=True)
 HINGE = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>{}</joint>'
 GATE = (

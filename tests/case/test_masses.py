@@ -1,5 +1,7 @@
 """Masses of models: those of MuJoCo itself, of URDF and SDF alike, and what is not read of them."""
 
+from functools import partial
+
 import kincheck.cases
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ mujoco = pytest.importorskip("mujoco")
 
 # Sums of some ten masses in metre-sized frames.
 EXACT = 1e-12
+near = partial(np.allclose, rtol=0, atol=EXACT)
 
 WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceinertia="true" inertiagrouprange="0 2"/>
 <default><geom density="500"/><default class="c"><geom type="capsule" size="0.1 0.2"/></default></default>
@@ -62,7 +65,7 @@ def test_mjcf_masses_match_mujoco(tmp_path, settings):
         theirs = together(parts)
         ours = together(tree.masses[joint.inner]).seen_in(tree.moving[joint.inner])
         assert ours.mass == pytest.approx(theirs.mass, rel=EXACT)
-        assert np.allclose([*ours.center], [*theirs.center], rtol=0, atol=EXACT)
+        assert near([*ours.center], [*theirs.center])
         size = np.abs(theirs.inertia).max()
         assert np.allclose(ours.inertia, theirs.inertia, rtol=0, atol=EXACT * size)
 
@@ -99,7 +102,7 @@ def test_masses_agree_across_formats(tmp_path):
         assert "with the masses of its bodies" in case.source
         assert body.mass == 3.0
         first, other = ((*x.center_of_mass, *x.inertia) for x in (bodies[0], body))
-        assert np.allclose(first, other, rtol=0, atol=EXACT)
+        assert near(first, other)
 
 
 @pytest.mark.parametrize("text", [URDF, SDF], ids=["urdf", "sdf"])
@@ -210,8 +213,8 @@ def test_inertia_in_global_axes(tmp_path):
     )
     case = case_of(tmp_path, text)
     body = case.mechanism.body("arm")
-    assert np.allclose(body.center_of_mass, [0, 1, 0], rtol=0, atol=EXACT)
-    assert np.allclose(inertia_matrix(body.inertia), np.diag([1, 0.1, 1]), rtol=0, atol=EXACT)
+    assert near(body.center_of_mass, [0, 1, 0])
+    assert near(inertia_matrix(body.inertia), np.diag([1, 0.1, 1]))
     assert case.mechanism.gravity == (0.0, 1.0, 0.0)
 
 

@@ -10,9 +10,9 @@ from kincheck.core.case.models.files import load
 from kincheck.core.cli.files import keep_texts
 from kincheck.core.cli.main import main
 
-from ..support.mjcf_models import EXACT, agree, closes_in_mujoco, model
+from ..support.mjcf_models import agree, closes_in_mujoco, model
 from ..support.model_files import DRIVEN, GRIPPER, SPRINGS, driven
-from ..support.model_poses import solution
+from ..support.model_poses import EXACT, solution
 
 
 def test_gripper_closes_in_mujoco():

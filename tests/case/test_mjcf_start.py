@@ -8,9 +8,9 @@ from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.trees.driving import read_start
 
 from ..support.case_texts import complains, refused
-from ..support.mjcf_models import EXACT, agree, model, mujoco
+from ..support.mjcf_models import agree, model, mujoco
 from ..support.model_files import driven
-from ..support.model_poses import solution
+from ..support.model_poses import EXACT, near, solution
 
 ALL_KINDS = """<mujoco><compiler angle="degree" eulerseq="zyx"/><worldbody>
   <body name="base" pos="1 2 3" euler="10 20 30"><freejoint name="root"/>
@@ -38,10 +38,10 @@ def test_start_pose_matches_mujoco(tmp_path, said):
     places = {name: there.moving[name] for name in tree.places if name in there.moving}
     assert len(places) == 4
     for name, place in places.items():
-        assert np.allclose([*place.at], data.body(name).xpos, rtol=0, atol=EXACT)
+        assert near([*place.at], data.body(name).xpos)
         turned = np.abs([*place.turn] @ data.body(name).xquat)
         assert turned == pytest.approx(1.0, abs=EXACT)
-    assert np.allclose([*there.sites["tip"][1].at], data.site("tip").xpos, rtol=0, atol=EXACT)
+    assert near([*there.sites["tip"][1].at], data.site("tip").xpos)
     for name in ("turn", "push", "lone"):
         assert there.joints[name].value == pytest.approx(data.joint(name).qpos[0], abs=EXACT)
 
@@ -111,8 +111,8 @@ def test_joint_polynomial_offset_from_assembled_start(tmp_path):
     bend = 0.8 + x * (-1.8 + x * 2.4)
     along, across = np.array([np.cos(y), np.sin(y)]), np.array([-np.sin(y), np.cos(y)])
     tip = solution(case).points["tip"]
-    assert np.allclose(tip.position[:, :2].T, [[1.0], [0.0]] + 0.5 * along, rtol=0, atol=EXACT)
-    assert np.allclose(tip.velocity[:, :2].T, 0.5 * slope * across, rtol=0, atol=EXACT)
+    assert near(tip.position[:, :2].T, [[1.0], [0.0]] + 0.5 * along)
+    assert near(tip.velocity[:, :2].T, 0.5 * slope * across)
     expected = 0.5 * (bend * across - slope**2 * along)
     assert np.allclose(tip.acceleration[:, :2].T, expected, rtol=0, atol=1e-12)
 
@@ -146,7 +146,7 @@ def test_two_joints_driven_together(tmp_path):
     found = solution(case).points["s"].position
     reach = 1.0 + np.cos(two)
     expected = np.stack([reach * np.cos(one), reach * np.sin(one), -np.sin(two)], axis=1)
-    assert np.allclose(found, expected, rtol=0, atol=EXACT)
+    assert near(found, expected)
     said = "5 of 'one', 7 of 'two' samples"
     complains(tmp_path / "model.xml", said, driven("one:0:1:5", "two:0:1:7", hold_rest=True))
 
@@ -178,7 +178,7 @@ def test_rod_between_balls_does_not_spin(tmp_path, kind):
     turned = np.linspace(0.0, 0.5, 4)
     x, y, z = 0.2 * np.cos(turned), 0.2 * np.sin(turned), 0.3
     slid = x + np.sqrt(0.8**2 + 0.3**2 - y**2 - z**2)
-    assert np.allclose(solution(case).points["slider"].position[:, 0], slid, rtol=0, atol=EXACT)
+    assert near(solution(case).points["slider"].position[:, 0], slid)
 
 
 def test_rods_in_series_count_freedoms(tmp_path):

@@ -2,6 +2,7 @@
 
 import csv
 import xml.etree.ElementTree as ET
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from kincheck.core.cli.main import main
 
 # Euler's and the native equations agree to round-off; numbers of files are decimal.
 EXACT = 1e-12
+near = partial(np.allclose, rtol=0, atol=EXACT)
 LOOP = """<mujoco model="loop"><compiler angle="degree"/><worldbody>
 <body name="crank"><joint name="crank" axis="0 0 1" ref="40"/><geom size=".01"/>
  <body name="rod" pos=".1 0 0"><joint name="pin" axis="0 0 1" ref="-15"/><geom size=".01"/></body></body>
@@ -53,7 +55,7 @@ def test_qpos_outputs_close_loop_in_mujoco(model):
         data.qpos[:] = qpos
         mujoco.mj_forward(there, data)
         assert np.abs(data.efc_pos[:3]).max() < EXACT
-    assert np.allclose(numbers(found["crank.qpos"]), [0.6, 0.7, 0.8], rtol=0, atol=EXACT)
+    assert near(numbers(found["crank.qpos"]), [0.6, 0.7, 0.8])
     assert (numbers(found["rocker.qpos"]) > 2 * np.pi).all()
 
 
@@ -72,7 +74,7 @@ def test_imported_case_keeps_zeros_of_model(model, tmp_path, capsys):
     assert main(["import", str(model), *DRIVE, "--out", str(case)]) == 0
     _, after = curves(case)
     for name in ("crank.qpos", "rocker.qpos", "pin.angle"):
-        assert np.allclose(numbers(after[name]), numbers(before[name]), rtol=0, atol=EXACT)
+        assert near(numbers(after[name]), numbers(before[name]))
     capsys.readouterr()
 
 

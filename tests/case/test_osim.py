@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from ..support import case_texts
 from ..support.model_files import driven
+from ..support.model_poses import EXACT, near, solution
 from ..support.model_poses import coordinate as since_design
-from ..support.model_poses import solution
 from ..support.osim_texts import (
     FOUR_BAR,
     axis,
@@ -31,7 +31,6 @@ from ..support.osim_texts import (
 )
 from ..support.splines import through
 
-EXACT = 1e-13
 DRIVE = driven("A:0:0.5:5")
 P = (0.1, 0.2, 0.3), (0.3, -0.2, 0.5)
 C = (0.1, -0.3, 0.2), (0.2, 0.4, -0.1)
@@ -97,7 +96,7 @@ def test_joint_places_child_by_coordinates(write, kind, locked):
     six[SLOTS[kind]] = Q[:count]
     expected = joined(transform(angles=(0, 0, 0.3))) @ joined(transform(six[3:], six[:3]))
     for name in "bc":
-        assert np.allclose(placed(tree, name), expected, rtol=0, atol=EXACT)
+        assert near(placed(tree, name), expected)
     values = {name: move.value for name, move in tree.moves.items() if move.is_axial}
     assert values["turn"] == 0.3
     assert "last_coord_0" in values
@@ -151,11 +150,11 @@ def test_custom_joint_axes_follow_coordinates(write):
         turn = Rotation.from_euler("ZX", (0.4 - bend, 0.25)).as_euler("XYZ")
         return joined(transform(at, turn))
 
-    assert np.allclose(placed(read_tree(file), "a"), expected(0.7, -0.2), rtol=0, atol=EXACT)
+    assert near(placed(read_tree(file), "a"), expected(0.7, -0.2))
     case = load(file, driven("bend:0.7:1.2:5", hold=("lift",)))
     found = solution(case)
     for bend, at in zip(np.linspace(0.7, 1.2, 5), found.bodies["a"].r, strict=True):
-        assert np.allclose(at, expected(bend, -0.2)[:3, 3], rtol=0, atol=EXACT)
+        assert near(at, expected(bend, -0.2)[:3, 3])
     assert any("bend 0.7" in note for note in case.assembly)
 
 
@@ -199,7 +198,7 @@ def test_knee_of_splines_follows_table(write):
     for k, q in enumerate(np.linspace(-0.3, -2.5, 12)):
         (x, v, a), (y, w, b) = forward(q), down(q)
         place = joined(transform((x, 0.5 * y, 0), (0, 0, q)))
-        assert np.allclose(found.r[k], place[:3, 3], rtol=0, atol=EXACT)
+        assert near(found.r[k], place[:3, 3])
         # at one radian a second, of a point at rest in the hinge's frame
         turn = transform(*P)[:3, :3]
         arm = transform(angles=(0, 0, q))[:3, :3] @ BACK[:3, 3]
@@ -423,7 +422,7 @@ def test_older_document_is_updated_by_opensim(write):
     tree = read_tree(write(OLD))
     expected = transform((0, 1, 0), (0, 0.5, 0)) @ transform(angles=(0, 0, 0.3))
     expected = expected @ transform((0, 0, -2))
-    assert np.allclose(placed(tree, "a"), expected, rtol=0, atol=EXACT)
+    assert near(placed(tree, "a"), expected)
     assert tree.moves["q"].value == 0.3
 
 

@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 
 from ..fuzz import mjcf
+from ..support.model_poses import EXACT
 
 pytest.importorskip("mujoco")
 public_robots = pytest.importorskip("tests.oracles.public_robots")
 FOUR_BAR = mjcf.FOUR_BAR.decode()
 
-# Newton on both sides: round-off of metre-sized coordinates, some operations deep.
-EXACT = 1e-13
 PAIRED = """<robot name="r"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
 <link name="x"/><link name="y"/>
 <joint name="A" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>

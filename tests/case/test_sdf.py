@@ -14,9 +14,8 @@ from kincheck.core.studies.same import compare
 from ..fuzz import sdf as seeds
 from ..support.case_texts import complains, refused, write
 from ..support.model_files import driven, edited
-from ..support.model_poses import coordinate, solution
+from ..support.model_poses import EXACT, coordinate, near, solution
 
-EXACT = 1e-13
 DRIVE = driven("A:0:0.5:5")
 FOUR_BAR = seeds.FOUR_BAR.decode()
 TYPED = seeds.TYPED.decode()
@@ -36,7 +35,7 @@ def test_link_under_two_joints_closes_loop(tmp_path: Path):
     pin = 2.0 * np.sin(case.sweep.values)
     expected = [np.cos(np.pi / 6) * pin, np.sin(np.pi / 6) * pin, 1 + 2 * np.cos(case.sweep.values)]
     there = found.points["B"].position
-    assert np.allclose(there, np.transpose(expected), rtol=0, atol=EXACT)
+    assert near(there, np.transpose(expected))
     assert {joint.name for joint in case.mechanism.joints} >= {"A", "B3", "C", "D"}
     assert case.source.split(LEFT_OUT)[1] == "visual (1)"
 
@@ -249,7 +248,7 @@ def test_included_model_is_placed(uri: str, tmp_path: Path):
     # the pose of the include takes the place of the model's own, 1 m up and turned by 30 degrees
     pin = 2.0 * np.sin(case.sweep.values)
     expected = [np.full(5, 2.0), pin, 2.0 * np.cos(case.sweep.values)]
-    assert np.allclose(found.points["B"].position, np.transpose(expected), rtol=0, atol=EXACT)
+    assert near(found.points["B"].position, np.transpose(expected))
 
 
 NOT_INCLUDED = {

@@ -19,11 +19,9 @@ from ..fuzz import urdf as seeds
 from ..support.case_texts import write
 from ..support.exported_again import same_motion
 from ..support.model_files import driven, edited
-from ..support.model_poses import coordinate, solution
+from ..support.model_poses import EXACT, coordinate, near, solution
 from ..support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
 
-# Rounding of metre-sized coordinates, some operations deep.
-EXACT = 1e-13
 ENDS = '<parent link="b"/><parent_origin xyz="4 0 0"/><child link="c"/>'
 THERE = 'xyz="-0.958851077208406 0 1.7551651237807455"'
 
@@ -55,9 +53,9 @@ def test_random_tree_places_match_pinocchio(seed: int, tmp_path: Path):
     for name in (f"l{k}" for k in range(9)):
         place = found[name]
         frame = data.oMf[model.getFrameId(name)]
-        assert np.allclose([*place.at], frame.translation, rtol=0, atol=EXACT)
+        assert near([*place.at], frame.translation)
         turned = [[*place.direction(axis)] for axis in (X, Y, Z)]
-        assert np.allclose(np.transpose(turned), frame.rotation, rtol=0, atol=EXACT)
+        assert near(np.transpose(turned), frame.rotation)
 
 
 def test_closed_urdf_moves_as_in_pinocchio(tmp_path: Path):
@@ -74,7 +72,7 @@ def test_closed_urdf_moves_as_in_pinocchio(tmp_path: Path):
         pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), values))
         frames = {name: data.oMf[model.getFrameId(name)] for name in "abc"}
         for name, frame in frames.items():
-            assert np.allclose(found.bodies[name].r[k], frame.translation, rtol=0, atol=EXACT)
+            assert near(found.bodies[name].r[k], frame.translation)
         there, here = frames["b"].act(np.array([4.0, 0, 0])), frames["c"].act(np.array([x, y, z]))
         assert np.abs(there - here).max() < EXACT
     tip = case.mechanism.point("tip")

@@ -12,7 +12,7 @@ from kincheck.core.case.models.undriven import undriven_file
 from kincheck.core.studies.same import compare
 
 from ..support.model_files import driven
-from ..support.model_poses import coordinate, solution
+from ..support.model_poses import EXACT, coordinate, near, solution
 from ..support.usd_texts import (
     ARM,
     EXCLUDED,
@@ -28,7 +28,6 @@ from ..support.usd_texts import (
 )
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("pxr") is None, reason="no usd-core")
-EXACT = 1e-13
 CENTI = 'metersPerUnit = 0.01\n    upAxis = "Z"'
 DRIVE = driven("A:0:0.5:5")
 
@@ -45,7 +44,7 @@ def test_excluded_joint_closes_loop(write):
     turned = np.array([coordinate(case, found, x) for x in "ABDC"])
     assert turned == pytest.approx(np.outer([1, -1, 1, 1], case.sweep.values), abs=EXACT)
     pin = np.stack([np.sin(case.sweep.values), 0 * case.sweep.values, np.cos(case.sweep.values)])
-    assert np.allclose(found.points["b"].position, 2 * pin.T, rtol=0, atol=EXACT)
+    assert near(found.points["b"].position, 2 * pin.T)
 
 
 def test_mujoco_equality_closes_loop(write):

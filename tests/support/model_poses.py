@@ -1,8 +1,14 @@
 """The native solution of a case, and coordinates of its joints by the poses of their bodies."""
 
+from functools import partial
+
 import numpy as np
 from kincheck.core.kinematics import NativeSolver
 from scipy.spatial.transform import Rotation
+
+EXACT = 1e-13
+"""Rounding of metre-sized coordinates, some operations deep."""
+near = partial(np.allclose, rtol=0.0, atol=EXACT)
 
 
 def solution(case):
