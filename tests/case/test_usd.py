@@ -22,6 +22,7 @@ from ..support.usd_texts import (
     hinge,
     joint,
     locked,
+    parallelogram,
     prim,
     stage,
     write_stage,
@@ -58,16 +59,7 @@ def test_mujoco_equality_closes_loop(write):
     assert [tie.name for tie in read_tree(write(*prims)).ties] == ["C.closure"]
 
 
-CENTIMETRES = (
-    prim("PhysicsScene", "scene"),
-    body("a"),
-    body("b", at=(0, 200, 0)),
-    body("c", at=(400, 0, 0)),
-    hinge("A", "", "a", axis="Z"),
-    hinge("B", "a", "b", p=(0, 200, 0), axis="Z"),
-    hinge("C", "b", "c", EXCLUDED, p=(400, 0, 0), q=(0, 200, 0), axis="Z"),
-    hinge("D", "", "c", p=(400, 0, 0), axis="Z"),
-)
+CENTIMETRES = (prim("PhysicsScene", "scene"), *parallelogram((400, 0, 0), (0, 200, 0), "Z"))
 """The same with y up, in the units that USD has unless a stage says others."""
 SCALED = (
     body("a", ops="double3 xformOp:scale = (0.5, 2, 4)"),
@@ -176,37 +168,33 @@ def test_prim_left_out_by_name(write, name):
 MIMICS = {
     "physx": (
         "PhysxMimicJointAPI:rotY",
-        [
-            "rel physxMimicJoint:rotY:referenceJoint = </r/A>",
-            "float physxMimicJoint:rotY:gearing = -2",
-            "float physxMimicJoint:rotY:offset = 30",
-        ],
+        """rel physxMimicJoint:rotY:referenceJoint = </r/A>
+        float physxMimicJoint:rotY:gearing = -2
+        float physxMimicJoint:rotY:offset = 30""",
         lambda q: 2 * q - math.radians(30),
     ),
     "newton": (
         "NewtonMimicAPI",
-        [
-            "rel newton:mimicJoint = </r/A>",
-            "float newton:mimicCoef0 = 30",
-            "float newton:mimicCoef1 = -0.5",
-        ],
+        """rel newton:mimicJoint = </r/A>
+        float newton:mimicCoef0 = 30
+        float newton:mimicCoef1 = -0.5""",
         lambda q: math.radians(30) - 0.5 * q,
     ),
     "mujoco": (
         "NewtonMimicAPI MjcEqualityJointAPI",
-        [
-            "rel newton:mimicJoint = </r/A>",
-            "rel mjc:target = </r/A>",
-            "float newton:mimicCoef0 = 7",
-            "double mjc:coef0 = 0.1",
-            "double mjc:coef1 = -0.5",
-            "double mjc:coef3 = 0.25",
-        ],
+        """rel newton:mimicJoint = </r/A>
+        rel mjc:target = </r/A>
+        float newton:mimicCoef0 = 7
+        double mjc:coef0 = 0.1
+        double mjc:coef1 = -0.5
+        double mjc:coef3 = 0.25""",
         lambda q: 0.1 - 0.5 * q + 0.25 * q**3,
     ),
     "mujoco on newton": (
         "MjcEqualityJointAPI",
-        ["rel newton:mimicJoint = </r/A>", "float newton:mimicCoef1 = 2", "double mjc:coef2 = 1"],
+        """rel newton:mimicJoint = </r/A>
+        float newton:mimicCoef1 = 2
+        double mjc:coef2 = 1""",
         lambda q: 2 * q + q**2,
     ),
 }
@@ -215,7 +203,7 @@ MIMICS = {
 @pytest.mark.parametrize("dialect", MIMICS)
 def test_mimic_joint_follows_leader(write, dialect):
     api, lines, law = MIMICS[dialect]
-    follower = hinge("B", "a", "b", *lines, p=(0, 0, 1), apis=api)
+    follower = hinge("B", "a", "b", lines, p=(0, 0, 1), apis=api)
     case = load(write(*ARM[:2], hinge("A", "", "a"), follower), DRIVE)
     zero = law(0.0)
     turned = coordinate(case, solution(case), "B") + zero

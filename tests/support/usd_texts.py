@@ -47,16 +47,22 @@ def joint(kind, name, first, second, *lines, p=ZERO, q=ZERO, axis="Y", apis=""):
 
 hinge = partial(joint, "Revolute")
 EXCLUDED = "bool physics:excludeFromArticulation = true"
-FOUR_BAR = (
-    body("a"),
-    body("b", at=(0, 0, 2)),
-    body("c", at=(4, 0, 0)),
-    hinge("A", "", "a"),
-    hinge("B", "a", "b", p=(0, 0, 2)),
-    hinge("C", "b", "c", EXCLUDED, p=(4, 0, 0), q=(0, 0, 2)),
-    hinge("D", "", "c", p=(4, 0, 0)),
-)
-"""A parallelogram of 2 and 4, whose last joint closes the loop."""
+
+
+def parallelogram(width, height, axis):
+    """Links and hinges, the third of which closes the loop."""
+    return (
+        body("a"),
+        body("b", at=height),
+        body("c", at=width),
+        hinge("A", "", "a", axis=axis),
+        hinge("B", "a", "b", p=height, axis=axis),
+        hinge("C", "b", "c", EXCLUDED, p=width, q=height, axis=axis),
+        hinge("D", "", "c", p=width, axis=axis),
+    )
+
+
+FOUR_BAR = parallelogram((4, 0, 0), (0, 0, 2), "Y")
 ARM = (body("a"), body("b"), hinge("j", "", "a"))
 """A body on a hinge, and a free one."""
 
