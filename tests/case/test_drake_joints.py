@@ -1,7 +1,6 @@
 """Joints of Drake in URDF and SDF: they move as Drake moves them."""
 
 import importlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +40,7 @@ def assert_stands_as_in_drake(file, link, values, motion, base="world"):
 
 
 @pytest.mark.parametrize("kind", JOINTS_OF_DRAKE)
-def test_drake_joint_in_urdf_matches_drake(kind, tmp_path: Path):
+def test_drake_joint_in_urdf_matches_drake(kind, tmp_path):
     """Its freedoms, and the place of the tip when the last one moves; a ball is held."""
     inside, moving, freedoms = JOINTS_OF_DRAKE[kind]
     joint = (
@@ -71,7 +70,7 @@ MOVES = {"q.slide1": (0.5, 0, 0), "q.slide2": (0, 0.5, 0), "q.rotation": (0, 0, 
 
 
 @pytest.mark.parametrize("moved", MOVES)
-def test_planar_joint_in_sdf_matches_drake(moved: str, tmp_path: Path):
+def test_planar_joint_in_sdf_matches_drake(moved, tmp_path):
     """Along x and y of the parent's frame, and about its z; where Drake is, by Drake too."""
     file = write(tmp_path, PLANAR, "m.sdf")
     held = tuple(each for each in MOVES if each != moved)
@@ -93,5 +92,5 @@ def test_planar_joint_in_sdf_matches_drake(moved: str, tmp_path: Path):
         ("<drake:child>b<", "<drake:child>c<", "found the frame 'm::c'"),
     ],
 )
-def test_faulty_drake_joint_in_sdf(old: str, new: str, said: str, tmp_path: Path):
+def test_faulty_drake_joint_in_sdf(old, new, said, tmp_path):
     complains(write(tmp_path, PLANAR.replace(old, new), "m.sdf"), said, driven())

@@ -100,7 +100,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
-def test_gazebo_or_drake_loop_closes(loop: str, tmp_path: Path):
+def test_gazebo_or_drake_loop_closes(loop, tmp_path):
     case = read_inside(tmp_path, loop)
     turned = coordinate(case, solution(case), "pivot")
     expected = follower_angles()
@@ -223,7 +223,7 @@ JOINING_IN = {
 @pytest.mark.parametrize(
     ("name", "kind"), [(name, kind) for name, table in JOINING_IN.items() for kind in table]
 )
-def test_element_joining_links_is_refused(name: str, kind: str, tmp_path: Path):
+def test_element_joining_links_is_refused(name, kind, tmp_path):
     text, said = JOINING_IN[name][kind]
     refused(
         lambda: read_inside(tmp_path, text, name), f"{tmp_path / name}: line  ... : < ... {said}"
@@ -238,7 +238,7 @@ def test_element_joining_links_is_refused(name: str, kind: str, tmp_path: Path):
     ],
     ids=["element", "attribute"],
 )
-def test_link_naming_another_is_refused(link: str, tmp_path: Path):
+def test_link_naming_another_is_refused(link, tmp_path):
     text = GATE.format("").replace('<link name="strut"/>', link)
     refused(lambda: read(tmp_path, text), TWO)
 
@@ -266,19 +266,19 @@ APART = {
 
 
 @pytest.mark.parametrize("text", APART.values(), ids=APART)
-def test_element_joining_nothing_is_left_out(text: str, tmp_path: Path):
+def test_element_joining_nothing_is_left_out(text, tmp_path):
     case = read_inside(tmp_path, text)
     assert case.source.split(LEFT_OUT)[1] not in ("", "nothing")
 
 
-def test_links_named_by_numbers(tmp_path: Path):
+def test_links_named_by_numbers(tmp_path):
     numbered = GATE.replace('"strut"', '"1"').replace('"follower"', '"2"')
     read(tmp_path, numbered.format('<gazebo reference="1"><mu1>2</mu1></gazebo>'))
     tied = numbered.format("<tie><link>1</link><link>2</link></tie>")
     refused(lambda: read(tmp_path, tied), "names the links '1' and '2'")
 
 
-def test_drake_screw_advances_by_pitch(tmp_path: Path):
+def test_drake_screw_advances_by_pitch(tmp_path):
     screw = (
         '<link name="tip"/><drake:joint name="q" type="screw"><parent link="base"/>'
         '<child link="tip"/><axis xyz="0 1 0"/><drake:screw_thread_pitch value="0.5"/>'
@@ -289,7 +289,7 @@ def test_drake_screw_advances_by_pitch(tmp_path: Path):
     assert found.r[-1] == pytest.approx((0.0, 0.25, 0.0), abs=EXACT)
 
 
-def test_plugin_repeating_mimic_is_left_out(tmp_path: Path):
+def test_plugin_repeating_mimic_is_left_out(tmp_path):
     text = GATE.format(JOINING["mimic plugin"][0] + JOINING["mimic of ros2_control"][0])
     case = read(
         tmp_path, text.replace('<origin xyz="0.4', '<mimic joint="drive"/><origin xyz="0.4')
@@ -325,7 +325,7 @@ def rubber(folder: Path, form: str, turned: str = QUARTER):
 
 
 @pytest.mark.parametrize("form", ["urdf", "sdf"])
-def test_drake_bushing_is_read(form: str, tmp_path: Path):
+def test_drake_bushing_is_read(form, tmp_path):
     case = rubber(tmp_path, form)
     (bushing,) = case.mechanism.forces
     # frames turned by a quarter about z: their x is global y; C is 0.01 along it from A
@@ -337,7 +337,7 @@ def test_drake_bushing_is_read(form: str, tmp_path: Path):
     assert any("halfway between both frames" in note for note in case.assembly)
 
 
-def test_twisted_drake_bushing_is_refused(tmp_path: Path):
+def test_twisted_drake_bushing_is_refused(tmp_path):
     twisted = f"{np.pi / 2 + 0.4!r}"
     refused(lambda: rubber(tmp_path, "urdf", twisted), "turned against each other by 0.4")
 
@@ -349,7 +349,7 @@ BY_DRAKE = {
 }
 
 
-def test_drake_bushing_forces_match_drake(tmp_path: Path):
+def test_drake_bushing_forces_match_drake(tmp_path):
     slide = (
         '<link name="{1}"><inertial><mass value="1"/></inertial></link><joint name="{0}"'
         ' type="prismatic"><parent link="base"/><child link="{1}"/><origin xyz="{2}"/>'
@@ -432,7 +432,7 @@ MISTYPED_IN_MJCF = {
 }
 
 
-def test_mjcf_exclusions_and_sensors_join_nothing(tmp_path: Path):
+def test_mjcf_exclusions_and_sensors_join_nothing(tmp_path):
     case = read_inside(tmp_path, "", "model.xml")
     assert "contact: exclude (1), sensor: framepos (1)" in case.source
     assert case.mechanism.gravity == (0.0, 0.0, -1.0)
@@ -448,19 +448,19 @@ MISTYPED_IN = {
 @pytest.mark.parametrize(
     ("name", "kind"), [(name, kind) for name, table in MISTYPED_IN.items() for kind in table]
 )
-def test_mistyped_name_is_refused(name: str, kind: str, tmp_path: Path):
+def test_mistyped_name_is_refused(name, kind, tmp_path):
     *edit, said = MISTYPED_IN[name][kind]
     file = edited(tmp_path, BASES[name].format(""), edit, name=name)
     complains(file, f"{file}: line  ... : ... {said}", DRIVE)
 
 
-def test_mjcf_attribute_of_other_release(tmp_path: Path):
+def test_mjcf_attribute_of_other_release(tmp_path):
     read(tmp_path, IN_MJCF.format("").replace('name="g"', 'name="g" mystery="1"'), "model.xml")
     file = edited(tmp_path, IN_MJCF.format(""), ('"drive"', '"drive" mystery="1"'))
     complains(file, "the attribute 'mystery', which MJCF does not have here", DRIVE)
 
 
-def test_all_attributes_of_mujoco_are_accepted(tmp_path: Path):
+def test_all_attributes_of_mujoco_are_accepted(tmp_path):
     """Of its own schema: no attribute that is not read is taken for a mistyped one."""
     mujoco = pytest.importorskip("mujoco")
     path: list[str] = []
@@ -500,19 +500,19 @@ WITHOUT = {
 
 
 @pytest.mark.parametrize(("text", "name", "said"), WITHOUT.values(), ids=WITHOUT)
-def test_without_option_notes_element(text: str, name: str, said: str, tmp_path: Path):
+def test_without_option_notes_element(text, name, said, tmp_path):
     case = read_inside(tmp_path, text, supplied=replace(DRIVE, without=(name,)))
     assert [joint.name for joint in case.mechanism.joints] == ["drive", "pin", "pivot"]
     assert case.assembly[0].startswith("left out by --without: ")
     assert said in case.assembly[0]
 
 
-def test_without_option_refuses_unknown_name(tmp_path: Path):
+def test_without_option_refuses_unknown_name(tmp_path):
     file = write(tmp_path, GATE.format("<mujoco/>"), "gate.urdf")
     complains(file, "did you mean 'mujoco'", replace(DRIVE, without=("mujcoo",)))
 
 
-def test_without_option_drops_mjcf_equality(tmp_path: Path):
+def test_without_option_drops_mjcf_equality(tmp_path):
     tied = '<equality><joint name="t" joint1="drive" joint2="pin"/></equality>'
     for without in ((), ("t",)):
         case = read_inside(tmp_path, tied, "model.xml", replace(DRIVE, without=without))
@@ -522,7 +522,7 @@ def test_without_option_drops_mjcf_equality(tmp_path: Path):
 @pytest.mark.parametrize(
     "motor", ["", '<transmission name="t{0}"><joint name="j{0}"/></transmission>']
 )
-def test_hold_rest_asks_about_passive_joints(motor: str, tmp_path: Path):
+def test_hold_rest_asks_about_passive_joints(motor, tmp_path):
     links = '<link name="l0"/>' + "".join(
         f'<link name="l{k}"/>' + HINGE.format(f"j{k}", f"l{k - 1}", f"l{k}", "") + motor.format(k)
         for k in range(1, 41)

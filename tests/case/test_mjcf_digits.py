@@ -1,7 +1,5 @@
 """Models with few digits: their digits do not move them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from kincheck.core.case.models.files import load
@@ -21,7 +19,7 @@ FIVE_BAR = """<mujoco><compiler angle="radian"/><worldbody>
 
 @pytest.mark.parametrize("tilt", ["0.000001", "0.000004"])
 @pytest.mark.parametrize("gap", ["0.0000004", "0.000001"])
-def test_gap_within_digits_moves_no_body(tmp_path: Path, tilt: str, gap: str):
+def test_gap_within_digits_moves_no_body(tmp_path, tilt, gap):
     file = tmp_path / "model.xml"
     file.write_text(FIVE_BAR.format(tilt=tilt, gap=gap))
     case = load(file, driven("crank:0:0.1:3", hold_rest=True))
@@ -30,7 +28,7 @@ def test_gap_within_digits_moves_no_body(tmp_path: Path, tilt: str, gap: str):
     assert np.allclose(rod.euler_parameters, (1, 0, 0, 0), rtol=0, atol=1e-6)
 
 
-def test_joint_moved_by_digits_stays_free(tmp_path: Path):
+def test_joint_moved_by_digits_stays_free(tmp_path):
     """The joint across the plane moves by a ten thousandth of what the others move by."""
     file = tmp_path / "model.xml"
     across = '<joint name="across" axis="1 0 0"/><joint name="pin"'

@@ -1,7 +1,6 @@
 """Outputs of every joint and body of a model, and whether closures enter them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import kincheck.cases
 import numpy as np
@@ -28,7 +27,7 @@ FOUR_BAR = """
 """
 
 
-def test_model_outputs_in_every_engine(tmp_path: Path):
+def test_model_outputs_in_every_engine(tmp_path):
     file = write(tmp_path, FOUR_BAR, "four_bar.xml")
     case = load(file, driven("crank:-0.3:6.6:24"))
     names = [output.name for output in case.outputs]
@@ -47,7 +46,7 @@ def test_model_outputs_in_every_engine(tmp_path: Path):
         np.testing.assert_allclose(2.0 * np.arctan2(e3, e0), rocker, atol=1e-9)
 
 
-def test_outputs_without_closure_are_noted(tmp_path: Path):
+def test_outputs_without_closure_are_noted(tmp_path):
     case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), driven("crank:-0.3:0.3:7"))
     vacuous = tuple(each for each in case.outputs if each.name.startswith("crank"))
     (note,) = notes(replace(case, outputs=vacuous))

@@ -1,7 +1,5 @@
 """The comparison of public robots, on small models of our own."""
 
-from pathlib import Path
-
 import pytest
 
 from ..fuzz import mjcf
@@ -29,7 +27,7 @@ joint_type: [UJOINT_YX]
 """
 
 
-def test_public_mjcf_loop_agrees_with_mujoco(tmp_path: Path):
+def test_public_mjcf_loop_agrees_with_mujoco(tmp_path):
     (tmp_path / "bars.xml").write_text(FOUR_BAR)
     (tmp_path / "open.xml").write_text(
         mjcf.FOUR_BAR.decode().replace('pos="4 0 0"><joint', "><joint")
@@ -46,7 +44,7 @@ def test_public_mjcf_loop_agrees_with_mujoco(tmp_path: Path):
     assert refused.cells[1].startswith("refused: ")
 
 
-def test_loop_in_included_file_counts_once(tmp_path: Path):
+def test_loop_in_included_file_counts_once(tmp_path):
     whole = FOUR_BAR.replace("</mujoco>", '<include file="parts/loop.xml"/></mujoco>')
     start, end = whole.index("<equality>"), whole.index("</equality>") + len("</equality>")
     (tmp_path / "parts").mkdir()
@@ -57,7 +55,7 @@ def test_loop_in_included_file_counts_once(tmp_path: Path):
     assert (row.cells[0], row.cells[3]) == ("bars.xml", "1")
 
 
-def test_urdf_with_pairs_agrees_with_pinocchio(tmp_path: Path):
+def test_urdf_with_pairs_agrees_with_pinocchio(tmp_path):
     pytest.importorskip("pinocchio")
     pytest.importorskip("yaml")
     (tmp_path / "robot.urdf").write_text(PAIRED)
@@ -67,7 +65,7 @@ def test_urdf_with_pairs_agrees_with_pinocchio(tmp_path: Path):
     assert all(0.0 < float(each) < EXACT for each in row.cells[6:])
 
 
-def test_difference_from_mujoco_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_difference_from_mujoco_is_seen(tmp_path, monkeypatch):
     oracle = public_robots.MujocoNewton
     own = oracle.body
     monkeypatch.setattr(oracle, "body", lambda self, name: shifted(own(self, name)))

@@ -24,7 +24,7 @@ TYPED = seeds.TYPED.decode()
 model = partial(write, name="model.sdf")
 
 
-def test_link_under_two_joints_closes_loop(tmp_path: Path):
+def test_link_under_two_joints_closes_loop(tmp_path):
     """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
     case = load(model(tmp_path, FOUR_BAR), DRIVE)
     found = solution(case)
@@ -40,14 +40,14 @@ def test_link_under_two_joints_closes_loop(tmp_path: Path):
     assert case.source.split(LEFT_OUT)[1] == "visual (1)"
 
 
-def test_loop_joint_is_driven(tmp_path: Path):
+def test_loop_joint_is_driven(tmp_path):
     """It is a joint like any other."""
     file = model(tmp_path, FOUR_BAR)
     crank, loop = (solution(load(file, each)) for each in (DRIVE, driven("C:0:-0.5:5")))
     assert np.abs(crank.bodies["b"].r - loop.bodies["b"].r).max() < EXACT
 
 
-def test_all_sdf_joint_types(tmp_path: Path):
+def test_all_sdf_joint_types(tmp_path):
     supplied = driven("m::s:0:0.1:3", hold=("m::u.1", "m::u.2", "m::ball", "m::w.rotation"))
     case = load(
         model(tmp_path, TYPED.replace('<model name="n"><link name="base"/></model>', "")), supplied
@@ -64,7 +64,7 @@ def test_all_sdf_joint_types(tmp_path: Path):
     assert coordinate(case, found, "m::m")[2] == pytest.approx(0.2, abs=EXACT)
 
 
-def test_screw_advances_by_pitch(tmp_path: Path):
+def test_screw_advances_by_pitch(tmp_path):
     text = """<sdf version="1.10"><model name="m"><link name="nut"/><joint name="w" type="screw">
     <parent>world</parent><child>nut</child><axis/><screw_thread_pitch>0.01</screw_thread_pitch>
     </joint></model></sdf>"""
@@ -78,7 +78,7 @@ CARDAN = """<sdf version="1.9"><model name="m"><link name="a"/><link name="b"/>
 <axis2><xyz>{}</xyz></axis2></joint></model></sdf>"""
 
 
-def test_universal_joint_with_links_exchanged(tmp_path: Path):
+def test_universal_joint_with_links_exchanged(tmp_path):
     """The cross stays, with its second axis first."""
     ways = ("a", "b", "1 0 0", "0 1 0"), ("b", "a", "0 1 0", "1 0 0")
     cases = [undriven_file(model(tmp_path, CARDAN.format(*way))) for way in ways]
@@ -102,7 +102,7 @@ AXES = {
 
 
 @pytest.mark.parametrize(("version", "axis", "expected"), AXES.values(), ids=AXES)
-def test_axis_frame_by_version_and_attribute(version, axis, expected, tmp_path: Path):
+def test_axis_frame_by_version_and_attribute(version, axis, expected, tmp_path):
     half = np.pi / 2
     text = f"""<sdf version="{version}"><model name="m">
     <link name="a"><pose>0 0 0 0 {half} 0</pose></link>
@@ -114,7 +114,7 @@ def test_axis_frame_by_version_and_attribute(version, axis, expected, tmp_path: 
     assert [*hinge.point] == pytest.approx((1, 0, 0), abs=EXACT)
 
 
-def test_links_without_joint_are_free(tmp_path: Path):
+def test_links_without_joint_are_free(tmp_path):
     text = FOUR_BAR.replace("<parent>world</parent>", "<parent>base</parent>")
     text = text.replace("<visual", '<visual name="w"/><visual', 1).replace(
         '<link name="a">', '<link name="base"/><link name="a">', 1
@@ -168,14 +168,14 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_sdf_fault_is_one_message(kind: str, tmp_path: Path):
+def test_sdf_fault_is_one_message(kind, tmp_path):
     *edit, said = FAULTS[kind]
     file = edited(tmp_path, FOUR_BAR, edit, name="model.sdf")
     complains(file, f"{file}: line  ... {said}", DRIVE)
 
 
 @pytest.mark.parametrize("text", ['<sdf version="1.7"/>', '<sdf><model name="m"/></sdf>'])
-def test_sdf_without_mechanism_is_refused(text: str, tmp_path: Path):
+def test_sdf_without_mechanism_is_refused(text, tmp_path):
     complains(model(tmp_path, text), "has no  ... , expected", DRIVE)
 
 
@@ -194,7 +194,7 @@ GEARS = """<sdf version="1.9"><model name="gears"><link name="frame"/>
 
 @pytest.mark.parametrize(("axis", "turns"), [("0 0 1", -3.0), ("0 0 -1", 3.0)])
 @pytest.mark.parametrize("sign", ["1", "-1"])
-def test_gearbox_couples_turns_about_reference(axis, turns, sign, tmp_path: Path):
+def test_gearbox_couples_turns_about_reference(axis, turns, sign, tmp_path):
     """SDF: the child turns by minus the ratio times the turn of the parent, each about its axis."""
     text = GEARS.replace("SIGN", sign).replace("AXIS", axis)
     found = solution(load(model(tmp_path, text), driven("s:0:0.5:3")))
@@ -202,13 +202,13 @@ def test_gearbox_couples_turns_about_reference(axis, turns, sign, tmp_path: Path
     assert np.allclose(found.bodies["wheel"].p[:, 3] / found.bodies["wheel"].p[:, 0], np.tan(half))
 
 
-def test_gearbox_without_hinges_is_refused(tmp_path: Path):
+def test_gearbox_without_hinges_is_refused(tmp_path):
     text = GEARS.replace("SIGN", "1").replace("AXIS", "1 0 0")
     said = "<axis2>: there is no hinge between 'wheel' and 'frame'"
     complains(model(tmp_path, text), said, driven())
 
 
-def test_model_placement_frame_matches_drake(tmp_path: Path):
+def test_model_placement_frame_matches_drake(tmp_path):
     """As Drake 1.51 places the links, to its printed digits."""
     text = (
         '<sdf version="1.9"><model name="m" placement_frame="v"><pose>0 0 1 0 0 0.3</pose>'
@@ -242,7 +242,7 @@ def including(folder: Path, uri: str, more: str = "", version: str = "1.9") -> P
 
 
 @pytest.mark.parametrize("uri", INCLUDED.values(), ids=INCLUDED)
-def test_included_model_is_placed(uri: str, tmp_path: Path):
+def test_included_model_is_placed(uri, tmp_path):
     case = load(including(tmp_path, uri), DRIVE)
     found = solution(case)
     # the pose of the include takes the place of the model's own, 1 m up and turned by 30 degrees
@@ -265,21 +265,21 @@ NOT_INCLUDED = {
 
 
 @pytest.mark.parametrize(("uri", "more", "said"), NOT_INCLUDED.values(), ids=NOT_INCLUDED)
-def test_unreadable_include_is_refused(uri: str, more: str, said: str, tmp_path: Path):
+def test_unreadable_include_is_refused(uri, more, said, tmp_path):
     refused(lambda: load(including(tmp_path, uri, more), DRIVE), said)
 
 
-def test_include_of_other_version_is_refused(tmp_path: Path):
+def test_include_of_other_version_is_refused(tmp_path):
     file = including(tmp_path, "model://bars", version="1.4")
     refused(lambda: load(file, DRIVE), "is of SDF 1.9, whose axes have another meaning")
 
 
-def test_ring_of_includes_is_refused(tmp_path: Path):
+def test_ring_of_includes_is_refused(tmp_path):
     text = FOUR_BAR.replace("</model>", "<include><uri>model.sdf</uri></include></model>")
     complains(model(tmp_path, text), "found more than 100 includes, or a ring of them", DRIVE)
 
 
-def test_empty_moments_of_inertia_are_defaults(tmp_path: Path):
+def test_empty_moments_of_inertia_are_defaults(tmp_path):
     """As of Gazebo's four-bar, split and fixed."""
     inertia = "<ixx>2</ixx><iyy></iyy><izz>2.5</izz><ixy></ixy>"
     text = (

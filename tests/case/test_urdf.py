@@ -1,7 +1,6 @@
 """URDF with loops: links stand and move as Pinocchio, which reads the file itself, says they do."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,7 +42,7 @@ def random_tree(seed: int) -> str:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_tree_places_match_pinocchio(seed: int, tmp_path: Path):
+def test_random_tree_places_match_pinocchio(seed, tmp_path):
     pin = pytest.importorskip("pinocchio")
     text = random_tree(seed)
     found = read_tree(robot(tmp_path, text)).places
@@ -58,7 +57,7 @@ def test_random_tree_places_match_pinocchio(seed: int, tmp_path: Path):
         assert near(np.transpose(turned), frame.rotation)
 
 
-def test_closed_urdf_moves_as_in_pinocchio(tmp_path: Path):
+def test_closed_urdf_moves_as_in_pinocchio(tmp_path):
     """All links, at every sample; the frames of the loop coincide there."""
     pin = pytest.importorskip("pinocchio")
     case = load(robot(tmp_path, FOUR_BAR), DRIVE)
@@ -100,7 +99,7 @@ CLOSED = {
 
 
 @pytest.mark.parametrize("closing", CLOSED.values(), ids=CLOSED)
-def test_urdf_constraint_types_close_loop(closing: str, tmp_path: Path):
+def test_urdf_constraint_types_close_loop(closing, tmp_path):
     same = solution(load(robot(tmp_path, FOUR_BAR), DRIVE)).bodies
     case = load(robot(tmp_path, TREE.replace("</robot>", closing + "</robot>")), DRIVE)
     found = solution(case)
@@ -108,7 +107,7 @@ def test_urdf_constraint_types_close_loop(closing: str, tmp_path: Path):
         assert np.abs(found.bodies[name].r - same[name].r).max() < EXACT
 
 
-def test_left_out_elements_are_listed(tmp_path: Path):
+def test_left_out_elements_are_listed(tmp_path):
     text = FOUR_BAR.replace(
         '<link name="c"/>', '<link name="c"><visual><mesh filename="no.stl"/></visual></link>'
     )
@@ -120,7 +119,7 @@ PAIRED = seeds.PAIRED.decode().replace("yaml=", "said=")
 PAIRS = PAIRED.split('said="')[1].split('"')[0]
 
 
-def test_pairs_file_closes_loop(tmp_path: Path):
+def test_pairs_file_closes_loop(tmp_path):
     """Of example-parallel-robots: frames are links or joints, and joints get other types."""
     pytest.importorskip("yaml")
     case = load(robot(tmp_path, PAIRED, yaml=PAIRS), DRIVE)
@@ -131,7 +130,7 @@ def test_pairs_file_closes_loop(tmp_path: Path):
     solution(case)
 
 
-def test_pairs_file_with_open_zero_pose(tmp_path: Path):
+def test_pairs_file_with_open_zero_pose(tmp_path):
     """The file has no other start; another model so far open is refused."""
     pytest.importorskip("yaml")
     file = edited(tmp_path, PAIRED, ('xyz="0 0 3"', 'xyz="0 0 1.5"'), name="robot.urdf")
@@ -141,7 +140,7 @@ def test_pairs_file_with_open_zero_pose(tmp_path: Path):
     solution(case)
 
 
-def test_exported_polynomial_coupling_is_read(tmp_path: Path):
+def test_exported_polynomial_coupling_is_read(tmp_path):
     pins = [
         Revolute("A", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         Revolute("B", "ground", "b", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
@@ -161,7 +160,7 @@ AXES = ["3 4 0", "0.33 0 0.9439809320108114", "0 -0.6 0.8", "1e100 0 0", "2 3 6"
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_axis_is_normalized_once(axis: str, tmp_path: Path):
+def test_axis_is_normalized_once(axis, tmp_path):
     numbers = [float(each) for each in axis.split()]
     length = math.hypot(*numbers)
     unit = abs(length - 1.0) < 1e-15

@@ -1,7 +1,5 @@
 """URDF and the files beside it: one message for each fault."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from kincheck.core.case.models.files import load
@@ -48,7 +46,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_urdf_fault_is_one_message(kind: str, tmp_path: Path):
+def test_urdf_fault_is_one_message(kind, tmp_path):
     *edit, said = FAULTS[kind]
     file = edited(tmp_path, FOUR_BAR, edit, name="robot.urdf")
     complains(file, f"{file}: line  ... {said}", DRIVE)
@@ -70,7 +68,7 @@ BESIDE_FAULTS = {
 }
 
 
-def test_constraints_file_closes_loop(tmp_path: Path):
+def test_constraints_file_closes_loop(tmp_path):
     (other := tmp_path / "other").mkdir()
     found = solution(load(beside(tmp_path), DRIVE)).bodies["c"].r
     same = solution(load(robot(other, FOUR_BAR), DRIVE)).bodies["c"].r
@@ -78,7 +76,7 @@ def test_constraints_file_closes_loop(tmp_path: Path):
 
 
 @pytest.mark.parametrize(("changes", "said"), BESIDE_FAULTS.values(), ids=BESIDE_FAULTS)
-def test_constraints_file_fault_names_file(changes: dict, said: str, tmp_path: Path):
+def test_constraints_file_fault_names_file(changes, said, tmp_path):
     file = beside(tmp_path, **changes)
     complains(file, f"{file.with_suffix('.constraints.json')} ... {said}", DRIVE)
 
@@ -100,14 +98,14 @@ PAIRS = {
 
 
 @pytest.mark.parametrize(("text", "said"), PAIRS.values(), ids=PAIRS)
-def test_pairs_file_fault_names_file(text: str, said: str, tmp_path: Path):
+def test_pairs_file_fault_names_file(text, said, tmp_path):
     pytest.importorskip("yaml")
     file = robot(tmp_path, TREE, yaml=text)
     complains(file, f"{file.with_suffix('.yaml')} ... {said}", DRIVE)
 
 
 @pytest.mark.parametrize("name", ["robot.xacro", "robot.mo", "part.STL", "r.constraints.json"])
-def test_file_beside_model_is_refused(name: str, tmp_path: Path):
+def test_file_beside_model_is_refused(name, tmp_path):
     complains(write(tmp_path, b"\x00\xff", name), "found a . ...  file, which  ... ; ", driven())
 
 
@@ -119,11 +117,11 @@ def test_file_beside_model_is_refused(name: str, tmp_path: Path):
         (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
     ],
 )
-def test_other_document_gets_advice(text: str, advice: str, tmp_path: Path):
+def test_other_document_gets_advice(text, advice, tmp_path):
     complains(write(tmp_path, text, "model.xml"), advice, driven())
 
 
-def test_document_type_is_refused(tmp_path: Path):
+def test_document_type_is_refused(tmp_path):
     file = robot(tmp_path, '<!DOCTYPE r [<!ENTITY a "b">]>' + FOUR_BAR)
     complains(file, "found <!DOCTYPE>, expected none", DRIVE)
 
@@ -137,7 +135,7 @@ LIMIT = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 @pytest.mark.parametrize("name", ["ground", "world"])
-def test_moving_link_named_world_is_refused(name: str, kind: str, tmp_path: Path):
+def test_moving_link_named_world_is_refused(name, kind, tmp_path):
     """It is not taken for the world, which would fix it in silence."""
     file = robot(tmp_path, MOVING.format(name=name, kind=kind, limit=LIMIT))
     complains(file, f"found '{name}' ... rename", DRIVE)
