@@ -7,7 +7,6 @@ import json
 import random
 import re
 import tomllib
-from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
 
@@ -71,8 +70,6 @@ TEXTS = (
     '"',
     "a" * 250,
 )
-
-Step = Callable[[bytes, random.Random], bytes]
 
 
 def keys_and_values(value: Any, words: tuple[str, ...], rng: random.Random) -> Any:
