@@ -60,7 +60,12 @@ def test_freedoms_of_separate_joints(tmp_path):
     assert [part.basis.shape for part in model.free] == [(1, 1)] * 5
     freedom = Freedom(model, {})
     freedom.take("j2")
-    assert (freedom.dof, freedom.left, freedom.count("j2"), freedom.count("j3")) == (5, 4, 0, 1)
+    assert (freedom.dof, freedom.remaining, freedom.count("j2"), freedom.count("j3")) == (
+        5,
+        4,
+        0,
+        1,
+    )
 
 
 def test_axis_caption_of_many_drivers():

@@ -9,7 +9,7 @@ from kincheck.adapters.writers import mjcf, sdf
 from kincheck.core.algebra import vec
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.trees.tree import Mass, together
+from kincheck.core.case.models.trees.tree import Mass, sum_of_masses
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
 
@@ -62,8 +62,8 @@ def test_mjcf_masses_match_mujoco(tmp_path, settings):
             axes = data.ximat[body].reshape(3, 3)
             inertia = axes @ np.diag(model.body_inertia[body]) @ axes.T
             parts.append(Mass(model.body_mass[body], vec(data.xipos[body]), inertia))
-        theirs = together(parts)
-        ours = together(tree.masses[joint.inner]).seen_in(tree.moving[joint.inner])
+        theirs = sum_of_masses(parts)
+        ours = sum_of_masses(tree.masses[joint.inner]).in_frame(tree.moving[joint.inner])
         assert ours.mass == pytest.approx(theirs.mass, rel=EXACT)
         assert near([*ours.center], [*theirs.center])
         size = np.abs(theirs.inertia).max()
