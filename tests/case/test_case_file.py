@@ -45,12 +45,12 @@ def same(a, b):
     assert a.reference.keys() == b.reference.keys()
 
 
-def test_all_examples_are_here():
+def test_example_case_files_count():
     assert len(EXAMPLES) == 6
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
-def test_examples_are_read(file):
+def test_example_case_file_is_read(file):
     text = tomllib.loads(file.read_text())
     case = load_case(str(file))
     assert case.name == file.stem
@@ -67,13 +67,13 @@ def test_examples_are_read(file):
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
-def test_json_is_the_same(file, tmp_path):
+def test_json_case_equals_toml_case(file, tmp_path):
     data = json.dumps(tomllib.loads(file.read_text()))
     same(load_case(write(tmp_path, data, "case.json")), load_case(file))
     same(load_case(write(tmp_path, data, "case")), load_case(file))  # told by its brace
 
 
-def test_every_value_lands_where_it_belongs(tmp_path):
+def test_case_file_values(tmp_path):
     case = load_case(write(tmp_path, BASE + INLINE))
     assert (case.name, case.source, case.truth) == (
         "slider",
@@ -100,7 +100,7 @@ def test_every_value_lands_where_it_belongs(tmp_path):
     assert series.acceleration is None
 
 
-def test_millimetres_and_degrees_are_the_same_case(tmp_path):
+def test_case_in_millimetres_equals_metres(tmp_path):
     """Four joints, both kinds of driver: every number of the millimetre file is 1000 times that of
     the metre file.
     """
@@ -170,7 +170,7 @@ def test_millimetres_and_degrees_are_the_same_case(tmp_path):
     assert tie.length == 0.52
 
 
-def test_displacements_are_lengths(tmp_path):
+def test_displacement_sweep_in_millimetres(tmp_path):
     millimetres = load_case(
         write(
             tmp_path,
@@ -181,7 +181,7 @@ def test_displacements_are_lengths(tmp_path):
     assert millimetres.sweep.rate == 2e-3
 
 
-def test_design_value_of_an_absolute_point_driver(tmp_path):
+def test_absolute_point_driver_design_value(tmp_path):
     absolute = 'type = "point_coordinate"\npoint = "tip"\ndirection = [0, 3, 4]\nrelative = false'
     text = edited(('type = "joint_displacement"\njoint = "guide"', absolute))
     case = load_case(write(tmp_path, text))
@@ -192,7 +192,7 @@ def test_design_value_of_an_absolute_point_driver(tmp_path):
     )
 
 
-def test_default_outputs_say_that_they_are(tmp_path):
+def test_default_outputs_of_points(tmp_path):
     case = load_case(write(tmp_path, BASE[: BASE.index("[outputs")]))
     assert [output.name for output in case.outputs] == ["tip.x", "tip.y", "tip.z"]
     assert [output.direction for output in case.outputs] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -202,7 +202,7 @@ def test_default_outputs_say_that_they_are(tmp_path):
     )
 
 
-def test_an_output_without_tolerance_gets_the_default(tmp_path):
+def test_output_without_tolerance_gets_default(tmp_path):
     (output,) = load_case(
         write(tmp_path, edited(('atol = 1e-9\nwhy = "made up for this test"', "")))
     ).outputs
@@ -210,7 +210,7 @@ def test_an_output_without_tolerance_gets_the_default(tmp_path):
 
 
 @pytest.mark.parametrize("where", ["named", "all"])
-def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path, where):
+def test_default_tolerance_of_small_mechanism(tmp_path, where):
     """The tip is 5 um from the joint: a nanometre would let pass what is wrong in the fourth
     digit.
     """
@@ -224,7 +224,7 @@ def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path, w
     assert load_case(write(tmp_path, text)).outputs[0].atol == pytest.approx(5e-12, rel=1e-9)
 
 
-def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path):
+def test_rtol_is_zero_unless_stated(tmp_path):
     (output,) = load_case(write(tmp_path, BASE)).outputs
     assert (output.atol, output.rtol) == (1e-9, 0.0)
 
@@ -233,7 +233,7 @@ def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path):
     ("start", "stop", "steps", "values"),
     [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.2", "1", [0.2])],
 )
-def test_sweeps_may_run_down_or_have_one_sample(tmp_path, start, stop, steps, values):
+def test_sweep_downwards_or_of_one_sample(tmp_path, start, stop, steps, values):
     text = edited(
         ("start = -0.1", f"start = {start}"),
         ("stop = 0.1", f"stop = {stop}"),
@@ -242,11 +242,11 @@ def test_sweeps_may_run_down_or_have_one_sample(tmp_path, start, stop, steps, va
     assert load_case(write(tmp_path, text)).sweep.values.tolist() == values
 
 
-def test_rate_is_one_unless_given(tmp_path):
+def test_sweep_rate_defaults_to_one(tmp_path):
     assert load_case(write(tmp_path, edited(("rate = 2.0\n", "")))).sweep.rate == 1.0
 
 
-def test_a_new_joint_type_can_be_named_at_once(tmp_path):
+def test_own_joint_type_in_case_file(tmp_path):
     @dataclass(frozen=True)
     class Offset(Spherical):
         type = "offset_of_test_casefile"
@@ -270,7 +270,7 @@ def test_a_new_joint_type_can_be_named_at_once(tmp_path):
         del Joint.registry[Offset.type]
 
 
-def test_byte_order_mark_and_windows_lines_are_read(tmp_path):
+def test_byte_order_mark_and_windows_lines(tmp_path):
     same(
         load_case(write(tmp_path, "\ufeff" + BASE.replace("\n", "\r\n"))),
         load_case(write(tmp_path, BASE, "b.toml")),
@@ -345,7 +345,7 @@ steps = 9
 """
 
 
-def test_couplers_and_joints_without_geometry(tmp_path):
+def test_gear_rack_and_screw_move(tmp_path):
     """A steering column turns a pinion by a gear, that moves a rack, and lifts a nut by a
     thread.
     """
@@ -393,7 +393,7 @@ values = [10, 20]
 """
 
 
-def test_motions_are_in_the_units_of_the_file(tmp_path):
+def test_driver_motions_in_file_units(tmp_path):
     sweep = COUPLED[COUPLED.index("[sweep]") :]
     text = edited((sweep, MOTION + "start = 0\nstop = 1.5\nsteps = 4\n"), base=COUPLED)
     case = load_case(write(tmp_path, text))
@@ -412,7 +412,7 @@ def test_motions_are_in_the_units_of_the_file(tmp_path):
     same(named, case)
 
 
-def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path):
+def test_motion_table_covers_rounded_times(tmp_path):
     """2.1 m at 0.7 m/s take 3.0000000000000004 s, more than the table has."""
     motion = MOTION[MOTION.index("[drivers.hang]") :].replace("[0, 1.5]", "[-3, 3]")
     push = edited(
@@ -448,7 +448,7 @@ steps = 7
 """  # noqa: E501
 
 
-def test_a_polynomial_is_in_the_units_of_the_file(tmp_path):
+def test_polynomial_coupler_in_file_units(tmp_path):
     """Millimetres by powers of degrees, between the freedoms that the joints have."""
     case = load_case(write(tmp_path, CURVED))
     (knee,) = case.mechanism.couplers
@@ -459,7 +459,7 @@ def test_a_polynomial_is_in_the_units_of_the_file(tmp_path):
     assert found.points["pin"].position[:, 0] == pytest.approx(shift, abs=1e-15)
 
 
-def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
+def test_concurrent_writers_keep_file_whole(tmp_path):
     """One begins while the other is at it: what is there in the end is the whole of the one that
     ended last.
     """
@@ -477,7 +477,7 @@ def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["results.json"]
 
 
-def test_a_file_keeps_its_rights(tmp_path):
+def test_written_file_keeps_permissions(tmp_path):
     file = tmp_path / "secret.json"
     file.write_text("old")
     file.chmod(0o600)
@@ -486,14 +486,14 @@ def test_a_file_keeps_its_rights(tmp_path):
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
-def test_a_name_as_long_as_may_be(tmp_path):
+def test_written_file_with_longest_name(tmp_path):
     file = tmp_path / (250 * "n" + ".json")
     assert written(file, b"there") == []
     assert file.read_bytes() == b"there"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes have no names in the file system")
-def test_a_pipe_takes_what_several_have_to_say(tmp_path):
+def test_pipes_take_several_texts(tmp_path):
     named, end = tmp_path / "pipe", os.pipe()
     os.mkfifo(named)
     reader = os.open(named, os.O_RDONLY | os.O_NONBLOCK)
@@ -514,7 +514,7 @@ def test_a_pipe_takes_what_several_have_to_say(tmp_path):
     "command",
     ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"],
 )
-def test_a_full_disk_is_one_message(command, capsys):
+def test_full_disk_is_one_message(command, capsys):
     assert main([*command.split(), "--json", "/dev/full"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(
@@ -523,7 +523,7 @@ def test_a_full_disk_is_one_message(command, capsys):
     )
 
 
-def test_two_options_that_name_one_pipe(tmp_path):
+def test_two_options_name_one_pipe(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)

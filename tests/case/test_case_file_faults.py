@@ -257,19 +257,19 @@ BROKEN = {
 
 
 @pytest.mark.parametrize(("edit", "fragments"), BROKEN.values(), ids=BROKEN)
-def test_broken_files(tmp_path, edit, fragments):
+def test_broken_case_file_is_refused(tmp_path, edit, fragments):
     complains(write(tmp_path, edited(edit)), fragments)
 
 
 @pytest.mark.parametrize("claim", ["", 'truth = "consensus_only"'])
-def test_a_reference_has_to_say_what_it_is(tmp_path, claim):
+def test_reference_needs_truth(tmp_path, claim):
     complains(
         write(tmp_path, edited(('truth = "closed_form"', claim)) + INLINE),
         "truth ... beside a [reference] ... closed_form",
     )
 
 
-def test_files_that_cannot_be_read(tmp_path, monkeypatch):
+def test_unreadable_case_file_is_refused(tmp_path, monkeypatch):
     complains(tmp_path / "none.toml", "none.toml ... no such file")
     (tmp_path / "folder.toml").mkdir()
     complains(tmp_path / "folder.toml", "folder.toml ... not a regular file")
@@ -293,7 +293,7 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
         ('{"schema": NaN}', "schema ... nan"),
     ],
 )
-def test_broken_json(tmp_path, text, fragments):
+def test_broken_json_case_is_refused(tmp_path, text, fragments):
     complains(write(tmp_path, text, "case.json"), f"case.json ... {fragments}")
 
 
@@ -450,11 +450,11 @@ DRIVEN_BROKEN = {
 
 
 @pytest.mark.parametrize(("edits", "fragments"), DRIVEN_BROKEN.values(), ids=DRIVEN_BROKEN)
-def test_broken_couplers_and_motions(tmp_path, edits, fragments):
+def test_broken_coupler_or_motion_is_refused(tmp_path, edits, fragments):
     complains(write(tmp_path, edited(*edits, base=DRIVEN)), fragments)
 
 
-def test_what_is_broken_above_was_whole(tmp_path):
+def test_driven_case_is_valid(tmp_path):
     assert load_case(write(tmp_path, DRIVEN)).mechanism.couplers
     assert load_case(write(tmp_path, edited(TIME, NO_RATE, base=DRIVEN))).sweep.driver == "time"
 
@@ -493,7 +493,7 @@ def read_or_refuse(file):
     data=st.binary(max_size=60)
     | st.text(max_size=60).map(lambda text: text.encode(errors="surrogatepass"))
 )
-def test_garbage(tmp_path, data):
+def test_random_bytes_are_refused(tmp_path, data):
     for name in ("case.toml", "case.json", "case"):
         read_or_refuse(write(tmp_path, data, name))
 
@@ -502,7 +502,7 @@ def test_garbage(tmp_path, data):
 @given(
     cut=st.integers(0, len(BASE + INLINE)), length=st.integers(0, 12), instead=st.text(max_size=4)
 )
-def test_damaged_text(tmp_path, cut, length, instead):
+def test_damaged_case_text_is_refused(tmp_path, cut, length, instead):
     text = BASE + INLINE
     read_or_refuse(
         write(
@@ -531,7 +531,7 @@ PLACES = [
 
 @FUZZ
 @given(place=st.sampled_from(PLACES), value=ANYTHING)
-def test_wrong_values_anywhere(tmp_path, place, value):
+def test_random_value_anywhere_is_refused(tmp_path, place, value):
     text, place = place
     document = tomllib.loads(text)
     *way, last = place
@@ -544,7 +544,7 @@ def test_wrong_values_anywhere(tmp_path, place, value):
 
 @FUZZ
 @given(rows=st.lists(st.lists(st.floats() | st.text(max_size=5), max_size=4), max_size=5))
-def test_wrong_reference_files(tmp_path, rows):
+def test_random_reference_cells_are_refused(tmp_path, rows):
     lines = "\n".join(",".join(map(str, row)) for row in rows)
     write(
         tmp_path, ("push,tip_x,tip_x.velocity\n" + lines).encode(errors="surrogatepass"), "tip.csv"

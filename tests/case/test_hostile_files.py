@@ -92,7 +92,7 @@ def results(folders):
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_hostile_files_are_refused(kind, results):
+def test_hostile_file_is_refused(kind, results):
     found, (_, _, fragment) = results[kind], TEXTS[kind]
     said = str(found["said"])
     assert found["status"] == 2, said[-2000:]
@@ -122,7 +122,7 @@ PLACES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 @pytest.mark.parametrize("kind", PLACES)
 @pytest.mark.parametrize("end", [".toml", ".json", ".csv", ".sub", ".xml"])
-def test_what_is_no_file_is_refused(kind, end, tmp_path, capsys):
+def test_pipe_folder_or_device_is_refused(kind, end, tmp_path, capsys):
     from kincheck.core.cli.main import main
 
     make, said = PLACES[kind]

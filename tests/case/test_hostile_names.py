@@ -90,7 +90,7 @@ def run(name):
 
 
 @pytest.mark.parametrize("show", [print_table, print_matrix])
-def test_terminals_show_names_and_obey_none(name, show):
+def test_hostile_name_in_terminal_table(name, show):
     show(run(name), text := io.StringIO())
     said = text.getvalue()
     assert all(line.isprintable() for line in said.replace("\t", " ").split("\n"))
@@ -99,7 +99,7 @@ def test_terminals_show_names_and_obey_none(name, show):
         assert name in said
 
 
-def test_messages_and_progress_are_lines_that_obey_nothing(name, capsys, tmp_path):
+def test_hostile_name_in_messages(name, capsys, tmp_path):
     complain(
         [
             str(
@@ -118,7 +118,7 @@ def test_messages_and_progress_are_lines_that_obey_nothing(name, capsys, tmp_pat
     assert all(line.isprintable() for line in lines)
 
 
-def test_markdown_is_a_table_and_text_and_nothing_else(name):
+def test_hostile_name_in_markdown(name):
     text = to_markdown(run(name))
     text.encode()
     tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(text)
@@ -142,7 +142,7 @@ def test_markdown_is_a_table_and_text_and_nothing_else(name):
         assert shown.count(name) >= 3
 
 
-def test_junit_is_xml(name):
+def test_hostile_name_in_junit(name):
     root = ElementTree.fromstring(to_junit(run(name)))
     assert {element.tag for element in root.iter()} <= {
         "testsuites",
@@ -161,7 +161,7 @@ def plain_page():
     return Page(render(Material(run("name"), {}, {})))
 
 
-def test_pages_show_names_and_obey_none(name):
+def test_hostile_name_in_page(name):
     text = render(Material(run(name), {}, {}))
     page, plain = Page(text), plain_page()
     assert sorted(tag for tag, _ in page.tags) == sorted(tag for tag, _ in plain.tags)
@@ -173,20 +173,20 @@ def test_pages_show_names_and_obey_none(name):
     assert re.findall(r"(inner|outer)HTML *=|insertAdjacentHTML|document\.write", text) == []
 
 
-def test_json_is_read_again_as_it_was(name):
+def test_hostile_name_in_json(name):
     # UTF-8 cannot hold it; circumstances and messages are cleaned where they are made
     if name != NAMES["undecodable"]:
         assert msgspec.json.decode(to_json(run(name)), type=Results) == run(name)
 
 
-def test_spreadsheets_compute_nothing(name):
+def test_hostile_name_in_csv(name):
     _, row = csv.reader(io.StringIO(csv_text(["head"], [[name]])))
     assert len(row) == 1
     assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")
     assert row[0].isprintable()
 
 
-def test_numbers_are_cells_as_they_are():
+def test_csv_cell_of_number_and_formula():
     assert [cell(each) for each in (-1.5, None, 3, "a-b", "")] == [-1.5, None, 3, "a-b", ""]
     assert [cell(each) for each in ("=1+1", "-1", "+a", "@b", "\t=1")] == [
         "'=1+1",
@@ -197,7 +197,7 @@ def test_numbers_are_cells_as_they_are():
     ]
 
 
-def test_what_prints_stays_as_it_is():
+def test_visible_keeps_printable_text():
     assert visible("é α 漢 ² |<>") == "é α 漢 ² |<>"
     assert visible("a\nb\tc\x1b", also="\n") == "a\nb\\tc\\x1b"
     assert visible("\u202e\udcff\U000e0001") == "\\u202e\\udcff\\U000e0001"
@@ -206,13 +206,13 @@ def test_what_prints_stays_as_it_is():
 @pytest.mark.parametrize(
     "name", [*NAMES.values(), "../escaped", "/tmp/escaped", "..", "a\\b", "C:a"]
 )
-def test_no_name_leads_out_of_a_folder(name, tmp_path):
+def test_file_name_stays_in_folder(name, tmp_path):
     file = tmp_path / f"{file_name(name)}.reference.json"
     assert file.resolve().parent == tmp_path.resolve()
     assert not re.search(r"[/\\:]", file_name(name))
 
 
-def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
+def test_written_reference_stays_in_folder(kincheck_main, tmp_path):
     pytest.importorskip("flint")
     (tmp_path / "proofs").mkdir()
     case = replace(crank(reference=False), name="../escaped")
@@ -233,7 +233,7 @@ def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
     ]
 
 
-def test_two_names_of_one_file_are_refused_before_the_work(kincheck_main, tmp_path, capsys):
+def test_two_references_of_one_file(kincheck_main, tmp_path, capsys):
     cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
     assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2
     assert (

@@ -47,7 +47,7 @@ TURNS = np.linspace(-4.0 * math.pi, 4.0 * math.pi, 33)
 """Of the driver: eight samples a turn, and the slide turns by 135 degrees the other way."""
 
 
-def test_joint_angles_count_turns_from_the_design():
+def test_joint_angle_counts_turns():
     driven, spun = series(
         arm(TURNS), JointAngle("a", *TOLERANCE, "hinge"), JointAngle("b", *TOLERANCE, "bore")
     )
@@ -55,18 +55,18 @@ def test_joint_angles_count_turns_from_the_design():
     close(spun, -3.0 * TURNS, -3.0 * RATE, 0.0)
 
 
-def test_turns_are_counted_by_velocities_where_samples_are_coarse():
+def test_coarse_samples_count_turns_by_velocity():
     """A turn and a half from sample to sample, and no sample near the design."""
     values = np.arange(-4, 5) * math.pi + 0.3
     close(series(arm(values), JointAngle("b", *TOLERANCE, "bore")), -3.0 * values, -3.0 * RATE, 0.0)
 
 
-def test_turns_need_no_order_of_the_samples():
+def test_joint_angle_of_unordered_samples():
     values = np.random.default_rng(1).permutation(TURNS)
     close(series(arm(values), JointAngle("a", *TOLERANCE, "hinge")), values, RATE, 0.0)
 
 
-def test_an_angle_that_starts_away_from_the_design_is_the_smallest():
+def test_joint_angle_of_offset_start():
     """Its driver is a sine with a phase: at time zero it is not at the design."""
     case = arm([0.0])
     motions = {"turn": Sine(4.0, 1.0, 0.5), "spin": Ramp(0.0), "push": Ramp(0.0)}
@@ -76,7 +76,7 @@ def test_an_angle_that_starts_away_from_the_design_is_the_smallest():
     np.testing.assert_allclose(found.position, Sine(4.0, 1.0, 0.5).at(times)[0], atol=1e-12)
 
 
-def test_joint_displacements_are_along_the_axis_of_the_first_body():
+def test_joint_displacement_along_axis():
     close(
         series(arm(TURNS), JointDisplacement("d", *TOLERANCE, "bore")),
         0.25 * TURNS / RATE,
@@ -85,7 +85,7 @@ def test_joint_displacements_are_along_the_axis_of_the_first_body():
     )
 
 
-def test_the_reverse_joint_has_the_opposite_angle():
+def test_joint_angle_of_reversed_joint():
     case = arm(TURNS)
     hinge, *others = case.mechanism.joints
     mechanism = replace(case.mechanism, joints=[hinge.reversed(), *others])
@@ -107,7 +107,7 @@ def rotated(angle, component):
 
 
 @pytest.mark.parametrize("component", Component)
-def test_euler_parameters_are_continuous_and_vectors_smallest(component):
+def test_orientation_components_over_turns(component):
     """Through half turns, whole ones, and the design, where the axis of a rotation is unknown."""
     angle = np.linspace(-3.0 * math.pi, 4.0 * math.pi, 71)
     found = series(arm(angle), Orientation("o", *TOLERANCE, "disc", component))
@@ -117,7 +117,7 @@ def test_euler_parameters_are_continuous_and_vectors_smallest(component):
 
 
 @pytest.mark.parametrize("beyond", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
-def test_round_off_at_half_a_turn_does_not_turn_the_vector(beyond):
+def test_rotation_vector_at_half_turn(beyond):
     """Beyond the tolerance, the smaller rotation is the one the other way round."""
     found = series(arm([math.pi + beyond]), Orientation("o", 1e-9, 0.0, "t", "disc", Component.Z))
     wanted = beyond - math.pi if beyond > 1e-9 else math.pi + beyond
@@ -125,12 +125,12 @@ def test_round_off_at_half_a_turn_does_not_turn_the_vector(beyond):
 
 
 @pytest.mark.parametrize("away", [1e-9, 1e-5, 0.0316, 0.0633, 0.0634, 1.0])
-def test_the_rotation_vector_is_as_exact_near_the_design(away):
+def test_rotation_vector_near_design(away):
     found = series(arm([away]), Orientation("o", *TOLERANCE, "disc", Component.Z))
     close(found, AXIS[2] / 3.0 * away, AXIS[2] / 3.0 * RATE, 0.0, atol=1e-13)
 
 
-def test_rates_of_vanishing_lengths_are_unknown():
+def test_rates_of_vanishing_lengths():
     """Directions that become opposite or parallel, points that meet: what is left is round-off."""
     case = arm([math.pi, 2.0 * math.pi, math.pi + 1e-8, 1.0])
     meeting = [Point("A", "ground", (1.0, 1.0, 0.0)), *case.mechanism.points[1:]]
@@ -147,7 +147,7 @@ def test_rates_of_vanishing_lengths_are_unknown():
     assert np.isnan(apart.velocity).tolist() == [False, True, False, False]
 
 
-def test_distances_and_angles():
+def test_distance_and_angle_measures():
     angle = np.linspace(0.2, 3.0, 15)
     n = np.array(AXIS) / 3.0
     start = np.array([0.0, 1.0, 0.0])
@@ -176,7 +176,7 @@ def test_distances_and_angles():
         np.testing.assert_allclose(each.acceleration[2:-2], spline[2:-2], atol=0.1)
 
 
-def test_a_measure_of_a_mechanism_without_points_has_a_size():
+def test_measure_without_points():
     mechanism = replace(arm([0.1]).mechanism, points=[])
     case = replace(arm([0.1]), mechanism=mechanism)
     close(series(case, JointAngle("a", *TOLERANCE, "hinge")), 0.1, RATE, 0.0)
@@ -220,7 +220,7 @@ OUTPUT = (
 MM = BASE.replace(OUTPUT, '[units]\nlength = "mm"\nangle = "deg"\n')
 
 
-def test_a_case_file_has_all_measures(tmp_path):
+def test_measures_in_case_file(tmp_path):
     case = load_case(write(tmp_path, MM + MEASURES))
     length, stroke, turn, e2, wide = case.outputs
     assert length == Distance("length", length.atol, 1e-9, length.why, ("home", "tip"), True)
@@ -237,7 +237,7 @@ def test_a_case_file_has_all_measures(tmp_path):
     assert outputs["length"].velocity[1] == pytest.approx(middle, rel=1e-9)
 
 
-def test_measures_are_written_and_read_again(tmp_path):
+def test_measures_round_trip(tmp_path):
     case = load_case(write(tmp_path, MM + MEASURES))
     written_again(case, tmp_path)
 
@@ -259,5 +259,5 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("change", "fragments"), WRONG)
-def test_wrong_measures_are_refused(tmp_path, change, fragments):
+def test_wrong_measure_is_refused(tmp_path, change, fragments):
     complains(write(tmp_path, edited(change, base=MM + MEASURES)), fragments)

@@ -40,7 +40,7 @@ def file(made, tmp_path):
     return path
 
 
-def test_printed_numbers_are_the_closed_form_to_all_digits(made):
+def test_proved_digits_are_closed_form(made):
     case, (found, _) = crank(), made
     before, flint.ctx.prec = flint.ctx.prec, 300
     try:
@@ -55,7 +55,7 @@ def test_printed_numbers_are_the_closed_form_to_all_digits(made):
     assert found.proved == len(case.sweep.values)
 
 
-def test_rows_are_chosen_for_the_sample_where_those_of_the_design_are_singular():
+def test_proof_changes_rows_at_sample():
     """The Bennett loop at quarter turns; at the second and the fourth they depend on each other.
     One solution, its rows said.
     """
@@ -80,7 +80,7 @@ def test_native_errors_are_round_off(made):
         assert all(0.0 <= each < 8.0 for each in error.ulps)
 
 
-def test_a_file_gives_the_nearest_doubles(made, file):
+def test_proved_file_gives_nearest_doubles(made, file):
     case = crank(reference=False)
     (judged,) = judged_by([case], [file])
     assert judged.truth is Truth.IN_HOUSE_ORACLE
@@ -95,7 +95,7 @@ def test_a_file_gives_the_nearest_doubles(made, file):
     assert read(file) == made[0]
 
 
-def test_a_sample_without_proof_is_nan(made):
+def test_unproved_sample_is_nan(made):
     case, (found, _) = crank(), made
     x = found.outputs["x"]
     gap = msgspec.structs.replace(x, position=[None, *x.position[1:]])
@@ -124,14 +124,14 @@ def _changed(**changes):
         (lambda found: {"schema": "kincheck-results/1"}, "expected a proved reference"),
     ],
 )
-def test_a_reference_of_something_else_is_refused(made, tmp_path, change, problem):
+def test_proved_reference_mismatch_is_refused(made, tmp_path, change, problem):
     path = tmp_path / "wrong.json"
     path.write_bytes(msgspec.json.encode(change(made[0])))
     with pytest.raises(CaseError, match=f"wrong.json: .*{problem}"):
         judged_by([crank()], [path])
 
 
-def test_decimals_are_what_a_file_says():
+def test_proof_with_decimal_numbers():
     """A sweep of tenths: its doubles are not tenths, its decimals are, however they were rounded on
     the way.
     """
@@ -165,7 +165,7 @@ class Angle:
         return arctan2(tip.y, tip.x)
 
 
-def test_outputs_that_are_formulas_are_proved():
+def test_proof_of_formula_output():
     found, _ = prove_case(
         replace(crank(), outputs=(Angle(),)), digits=30, numbers="double", tol=TOL
     )
@@ -179,7 +179,7 @@ def test_outputs_that_are_formulas_are_proved():
     )
 
 
-def test_a_formula_that_balls_cannot_compute_says_so():
+def test_proof_of_unsupported_formula():
     odd = SimpleNamespace(
         name="odd",
         points=("tip",),
@@ -207,7 +207,7 @@ def kincheck_main(monkeypatch):
     return lambda *argv: main.main([str(each) for each in argv])
 
 
-def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, capsys):
+def test_reference_command_writes_usable_reference(kincheck_main, tmp_path, capsys):
     assert kincheck_main("reference", "crank", "--digits", 25, "--out", tmp_path) == 0
     assert "crank: 9 of 9 samples proved to 1e-25" in capsys.readouterr().out
     written = tmp_path / "crank.reference.json"
@@ -228,9 +228,7 @@ def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, c
     assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
 
 
-def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(
-    kincheck_main, tmp_path, capsys, made, file
-):
+def test_reference_of_unreadable_case(kincheck_main, tmp_path, capsys, made, file):
     stray = tmp_path / "gone.json"
     stray.write_bytes(msgspec.json.encode(msgspec.structs.replace(made[0], case="gone")))
     (tmp_path / "gone.toml").write_text('schema = "kincheck-case/9"\n')
@@ -246,7 +244,7 @@ def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(
     assert not (tmp_path / "out.json").exists()
 
 
-def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsys):
+def test_unproved_samples_have_status_1(kincheck_main, monkeypatch, capsys):
     two = replace(crank().sweep, values=np.array([0.0, 1.0]))
     monkeypatch.setattr(
         kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={})
@@ -258,12 +256,12 @@ def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsy
     assert f"sample 1 ({two.driver} = 1) not proved: singular pose" in out
 
 
-def test_digits_that_make_no_sense_give_status_two(kincheck_main, capsys):
+def test_senseless_digits_have_status_2(kincheck_main, capsys):
     assert kincheck_main("reference", "crank", "--digits", "16") == 2
     assert "not a whole number from 17 to 1000" in capsys.readouterr().err
 
 
-def test_without_flint_there_is_one_message(kincheck_main, monkeypatch, capsys):
+def test_missing_flint_is_one_message(kincheck_main, monkeypatch, capsys):
     def missing(name):
         raise ImportError(name)
 
@@ -272,7 +270,7 @@ def test_without_flint_there_is_one_message(kincheck_main, monkeypatch, capsys):
         ball_executor.flint()
 
 
-def test_a_case_file_can_name_a_proved_reference(tmp_path):
+def test_case_file_with_proved_reference(tmp_path):
     """In degrees: the reference is in SI units, whatever those of the case file are."""
     text = (kincheck.cases.FOLDER / "rssr.toml").read_text().replace("steps = 181", "steps = 5")
     bare, file = tmp_path / "bare.toml", tmp_path / "case.toml"

@@ -47,7 +47,7 @@ DIALECTS = {
 
 
 @pytest.mark.parametrize("kind", DIALECTS)
-def test_dialects_of_spreadsheets(tmp_path, kind):
+def test_reference_dialects(tmp_path, kind):
     text = DIALECTS[kind]
     write(tmp_path, text, "tip.csv")
     case = load_case(write(tmp_path, BASE + BY_FILE))
@@ -58,7 +58,7 @@ def test_dialects_of_spreadsheets(tmp_path, kind):
     assert series.velocity.tolist() == [2.0, 2.0, 2.0]
 
 
-def test_tables_of_recordings_have_gaps(tmp_path):
+def test_recording_table_with_gaps(tmp_path):
     """And lines above them, to a last one; without gaps, an empty cell is a fault."""
     text = "run 3\nversion=1\nendheader\ntime\ta\tb\n0\t1.5\n1\tNaN\t2\n"
     file = write(tmp_path, text, "run.sto")
@@ -71,7 +71,7 @@ def test_tables_of_recordings_have_gaps(tmp_path):
         reference_samples.samples_of(table)
 
 
-def test_outputs_may_lack_a_reference(tmp_path):
+def test_output_without_reference(tmp_path):
     more = '\n[outputs.tip_y]\npoint = "tip"\ncomponent = "y"\n'
     case = load_case(write(tmp_path, BASE + more + INLINE))
     assert [output.name for output in case.outputs] == ["tip_x", "tip_y"]
@@ -115,7 +115,7 @@ REFERENCES = [
 
 
 @pytest.mark.parametrize(("text", "fragments"), REFERENCES)
-def test_broken_reference_files(tmp_path, text, fragments):
+def test_broken_reference_is_refused(tmp_path, text, fragments):
     write(tmp_path, text, "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), fragments)
 
@@ -131,7 +131,7 @@ def test_broken_reference_files(tmp_path, text, fragments):
         "down/tip.csv",
     ],
 )
-def test_references_outside_the_folder_are_refused(tmp_path, name):
+def test_reference_outside_folder_is_refused(tmp_path, name):
     folder = tmp_path / "case"
     (folder / "sub").mkdir(parents=True)
     write(tmp_path, CSV, "tip.csv")
@@ -142,7 +142,7 @@ def test_references_outside_the_folder_are_refused(tmp_path, name):
     complains(write(folder, text), f"case.toml ... reference.file ... {expected}")
 
 
-def test_absolute_names_are_refused_even_inside_the_folder(tmp_path):
+def test_absolute_reference_path_is_refused(tmp_path):
     name = write(tmp_path, CSV, "tip.csv").as_posix()
     complains(
         write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)),
@@ -150,13 +150,13 @@ def test_absolute_names_are_refused_even_inside_the_folder(tmp_path):
     )
 
 
-def test_references_below_the_folder_are_fine(tmp_path):
+def test_reference_below_folder_is_read(tmp_path):
     (tmp_path / "data").mkdir()
     write(tmp_path / "data", CSV, "tip.csv")
     assert load_case(write(tmp_path, BASE + BY_FILE.replace("tip.csv", "data/tip.csv"))).reference
 
 
-def test_a_large_reference_is_refused(tmp_path, monkeypatch):
+def test_large_reference_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(reference_samples, "LARGEST_FILE", 20)
     write(tmp_path, CSV, "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), "tip.csv ... larger than 20 bytes ... thin out")
@@ -173,7 +173,7 @@ UNITS = {
 
 @pytest.mark.parametrize("at", ["", 'at = "reference"'])
 @pytest.mark.parametrize("kind", UNITS)
-def test_units_of_columns(tmp_path, kind, at):
+def test_reference_column_units(tmp_path, kind, at):
     """They go before those of the case file, also for samples taken from the reference."""
     rows = "-100, 1400, 2000\n0, 1500, 2000\n100, 1600, 2000\n"
     write(tmp_path, f"{UNITS[kind]}\n{rows}", "tip.csv")
@@ -188,7 +188,7 @@ def test_units_of_columns(tmp_path, kind, at):
     assert case.origin.units == {"push": "mm", "tip_x": "mm"}
 
 
-def test_units_of_rows_in_the_case_file(tmp_path):
+def test_inline_reference_column_units(tmp_path):
     text = INLINE.replace('"push", "tip_x"', '"push [cm]", "tip_x [m]"').replace(
         "0.1, 1.", "10, 1."
     )
@@ -206,7 +206,7 @@ def test_units_of_rows_in_the_case_file(tmp_path):
         ("push, tip_y [mm]", "line 1 ... column 'tip_y [mm]' ... tip_x"),
     ],
 )
-def test_wrong_units_of_columns(tmp_path, head, fragments):
+def test_wrong_column_unit_is_refused(tmp_path, head, fragments):
     write(tmp_path, f"{head}\n-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), f"tip.csv ... {fragments}")
 
@@ -270,7 +270,7 @@ OWN = np.linspace(-1.03, 1.021, 53)
 """Driver values of a rig: none is at a sample."""
 
 
-def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
+def test_reference_on_own_grid(tmp_path):
     case = case_of(tmp_path, curve(OWN))
     record = judged(case)
     assert record.outcome is Outcome.PASS
@@ -293,7 +293,7 @@ def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
 
 
 @pytest.mark.parametrize(("reach", "beyond"), [(1.0, ""), (1.1, "2 rows"), (2.0, "19 rows")])
-def test_rows_beyond_the_sweep_are_counted(tmp_path, reach, beyond):
+def test_reference_rows_beyond_sweep(tmp_path, reach, beyond):
     rows = np.linspace(-reach, reach, 41) + 1e-3
     grid = judged(case_of(tmp_path, curve(rows))).evidence.grid
     if beyond:
@@ -305,7 +305,7 @@ def test_rows_beyond_the_sweep_are_counted(tmp_path, reach, beyond):
 @pytest.mark.parametrize("sweep", [EVEN, AT])
 @pytest.mark.parametrize("noise", [0.0, 0.004])
 @pytest.mark.parametrize("first", [0, 20])
-def test_a_shift_of_two_tolerances_is_found(tmp_path, sweep, noise, first):
+def test_shifted_reference_fails(tmp_path, sweep, noise, first):
     """As measured: own grid, shorter than the sweep, noisy, and six digits."""
     rng = np.random.default_rng(7)
     rows = np.array(curve(OWN[first:]))
@@ -321,7 +321,7 @@ def test_a_shift_of_two_tolerances_is_found(tmp_path, sweep, noise, first):
     assert "y: position is off by" in wrong.message
 
 
-def test_a_shorter_reference_is_compared_where_it_is(tmp_path):
+def test_shorter_reference_is_compared(tmp_path):
     case = case_of(tmp_path, curve(np.linspace(-1.0, 1.0, 21)[3:18:2]), form="{:.17g}")
     assert np.flatnonzero(np.isfinite(case.reference["x"].position)).tolist() == [*range(3, 18, 2)]
     assert case.reference["x"].uncertainty == {}
@@ -335,7 +335,7 @@ def test_a_shorter_reference_is_compared_where_it_is(tmp_path):
     assert failed.errors["x"].position.worst_step == 7
 
 
-def test_samples_of_the_reference_are_taken_in_its_order(tmp_path):
+def test_sweep_at_unordered_reference(tmp_path):
     """Up and down, as a rig measures hysteresis; one value twice."""
     t = np.array([0.0, 0.31, 0.72, 0.9, 0.72, -0.2, -0.55])
     case = case_of(tmp_path, curve(t), AT, form="{:.17g}")
@@ -345,13 +345,13 @@ def test_samples_of_the_reference_are_taken_in_its_order(tmp_path):
     assert record.errors["y"].position.max_abs < 1e-15
 
 
-def test_reversed_rows_are_at_the_samples_of_their_driver_values(tmp_path):
+def test_reversed_reference_rows(tmp_path):
     case = case_of(tmp_path, curve(np.linspace(-1.0, 1.0, 21))[::-1], form="{:.17g}")
     assert judged(case).outcome is Outcome.PASS
     assert case.origin.grid == ""
 
 
-def test_a_rounded_reference_on_the_grid_is_judged_by_its_digits(tmp_path):
+def test_rounded_reference_on_grid(tmp_path):
     rows = curve(np.linspace(-1.0, 1.0, 21))
     case = case_of(tmp_path, rows, atol="1e-9", form="{:.6g}")
     assert judged(case).outcome is Outcome.PASS
@@ -364,7 +364,7 @@ def test_a_rounded_reference_on_the_grid_is_judged_by_its_digits(tmp_path):
     assert off.errors["x"].position.worst_step == 0
 
 
-def test_a_slip_of_a_rounded_reference_is_named(tmp_path):
+def test_slip_of_rounded_reference_is_named(tmp_path):
     """Metres in a file of millimetres, with six digits: times 1000 it fits within a sixth digit."""
     rows = [(t, x / 1000.0, y) for t, x, y in curve(np.linspace(-1.0, 1.0, 21))]
     case = case_of(tmp_path, rows, atol="1e-9", form="{:.6g}")
@@ -388,14 +388,14 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("rows", "sweep", "fragments"), WRONG)
-def test_wrong_grids_are_refused(tmp_path, rows, sweep, fragments):
+def test_wrong_reference_grid_is_refused(tmp_path, rows, sweep, fragments):
     case_text = CRANK.replace("SWEEP", sweep).replace("ATOL", "1e-6")
     lines = ["turn,x,y", *(",".join(f"{value:.6f}" for value in row) for row in rows)]
     write(tmp_path, "\n".join(lines), "rig.csv")
     complains(write(tmp_path, case_text), fragments)
 
 
-def test_samples_of_a_missing_reference_are_refused(tmp_path):
+def test_sweep_at_missing_reference(tmp_path):
     text = CRANK.partition("[reference]")[0].replace("SWEEP", AT).replace("ATOL", "1e-6")
     complains(write(tmp_path, text), "sweep.at ... no [reference]")
 
@@ -421,14 +421,14 @@ def test_samples_of_a_missing_reference_are_refused(tmp_path):
         (["0.00000", "0.12345"], [5e-6, 5e-6]),
     ],
 )
-def test_printed_digits(texts, half):
+def test_half_unit_of_printed_digits(texts, half):
     column = Printed()
     for text in texts:
         column.add(text)
     assert column.half(np.array([*map(float, texts)])) == pytest.approx(half, rel=1e-9)
 
 
-def test_driver_values_that_somebody_set_are_exact():
+def test_even_and_multiple_driver_values():
     assert even(np.array([0.0625, 0.125, 0.1875]))
     assert not even(np.round(np.arange(9) / 7.0, 6))
     assert multiples(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
@@ -465,7 +465,7 @@ def rounded(folder, form, grid, shifts):
 
 
 @pytest.mark.parametrize(("form", "decimals", "digits"), WRITERS.values(), ids=WRITERS)
-def test_a_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
+def test_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
     """And one that is off by a whole unit of a last digit fails, in one row or in all."""
     grid = np.linspace(-1.0, 1.0, 21)
     assert rounded(tmp_path, form, grid, 0.0).outcome is Outcome.PASS
@@ -480,7 +480,7 @@ def test_a_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
 
 
 @pytest.mark.parametrize("count", [4, 7, 30, 400])
-def test_rounding_of_rows_moves_a_spline_by_no_more(count):
+def test_spline_rounding_bound(count):
     """Against the splines of rows of nothing and one, and the whole matrix of weights."""
     rng = np.random.default_rng(count)
     x = np.arange(count) + rng.uniform(-0.3, 0.3, count)
@@ -501,7 +501,7 @@ citation = "made up"
 
 
 @pytest.mark.parametrize("name", ["velocity", "acceleration"])
-def test_rates_are_judged_by_their_own_digits(name, tmp_path):
+def test_reference_rates_have_own_digits(name, tmp_path):
     text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
     rows = [
         [t, round(100 * math.cos(t), 3), round(-100 * math.sin(t), 1), round(-100 * math.cos(t))]
@@ -516,7 +516,7 @@ def test_rates_are_judged_by_their_own_digits(name, tmp_path):
 
 
 @pytest.mark.parametrize(("truth", "half"), [("closed_form", 0.0), ("third_party_data", 0.05)])
-def test_rows_of_a_formula_are_exact(truth, half, tmp_path):
+def test_closed_form_rows_are_exact(truth, half, tmp_path):
     """A wrong result would pass as the rounding of 1.0 and 0.0; data may be printed so."""
     text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
     rows = '[reference]\nrows = [[0.0, 99.9]]\ncolumns = ["turn", "x"]\ncitation = "made up"\n'
@@ -526,7 +526,7 @@ def test_rows_of_a_formula_are_exact(truth, half, tmp_path):
     assert judged(case).outcome is Outcome.FAIL
 
 
-def test_a_column_of_all_digits_is_exact_beside_short_numbers(tmp_path):
+def test_column_of_all_digits_is_exact(tmp_path):
     """Zeros, constants and even numbers of a file of all digits are no rounded ones."""
     t = np.linspace(-1.0, 1.0, 21)
     lines = ["turn,x,y", *(f"{a:.17g},{100 * math.cos(a):.17g},{0.5 + k}" for k, a in enumerate(t))]
@@ -535,14 +535,14 @@ def test_a_column_of_all_digits_is_exact_beside_short_numbers(tmp_path):
     assert case.reference["x"].uncertainty == case.reference["y"].uncertainty == {}
 
 
-def test_a_reference_of_too_few_digits_is_told(tmp_path):
+def test_reference_of_few_digits_is_noted(tmp_path):
     rows = curve(np.linspace(-1.0, 1.0, 21))
     told = [note for note in notes(case_of(tmp_path, rows, form="{:.0e}")) if "too few" in note]
     assert [note.partition(": ")[0] for note in told] == ["x"]  # 100 mm, known to 50 mm
     assert not any("too few" in note for note in notes(case_of(tmp_path, rows, form="{:.2e}")))
 
 
-def test_rows_are_matched_by_driver_value():
+def test_rows_match_driver_values():
     at = np.array([0.0, 0.1, 0.2, 0.3])
     assert matched(at, at, 1e-12).tolist() == [0, 1, 2, 3]
     assert matched(np.array([0.3, 0.1]), at, 1e-12).tolist() == [-1, 1, -1, 0]
@@ -551,7 +551,7 @@ def test_rows_are_matched_by_driver_value():
 
 
 @pytest.mark.parametrize("count", [4, 5, 9, 30])
-def test_the_estimate_bounds_the_error_of_interpolation(count):
+def test_interpolation_error_bound(count):
     jitter = np.random.default_rng(count).uniform(-0.3, 0.3, count)
     x = 2.0 * (np.arange(count) + jitter) / count
     at = np.linspace(x[0], x[-1], 101)
@@ -561,20 +561,20 @@ def test_the_estimate_bounds_the_error_of_interpolation(count):
         assert error.max() < 1e-2
 
 
-def test_slopes_are_not_those_of_noise():
+def test_slopes_ignore_noise():
     x = np.repeat(np.linspace(0.0, 1.0, 101), 2) + np.tile([0.0, 1e-9], 101)
     noise = np.tile([0.0, 1e-3], 101)
     assert slopes(x, 2.0 * x + noise, np.array([0.0, 0.503, 1.0])).max() < 2.2
 
 
-def test_a_deviation_counts_in_tolerances_where_accuracy_differs():
+def test_deviation_counts_in_tolerances():
     off = deviation(np.array([1.0, 2.0]), np.zeros(2), 0.5, 0.0, "data", np.array([0.0, 2.0]))
     assert (off.worst_step, off.max_abs, off.tolerance, off.within) == (0, 1.0, 0.5, False)
     off = deviation(np.array([0.0, 2.0]), np.zeros(2), 0.0, 0.0, "data", np.array([0.0, 2.0]))
     assert (off.worst_step, off.max_abs, off.tolerance, off.within) == (1, 2.0, 2.0, True)
 
 
-def test_a_slip_scales_the_accuracy_with_the_reference():
+def test_slip_scales_accuracy():
     values = np.linspace(1.0, 2.0, 9)
     reference = Uncertain(values / 1000.0 + 4e-7, np.full(9, 5e-7))
     (slip,) = slips(Held(values, 1e-9, 0.0, "m"), reference, {}, offsets=False)

@@ -118,12 +118,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_refusals(name):
+def test_wrong_suspension_is_refused(name):
     data, said = WRONG[name]
     refused(lambda: loaded(unreferenced(data)), f"case.json ... {said}")
 
 
-def test_quotients_of_velocities_want_a_driver_of_travel():
+def test_motion_ratio_needs_travel_driver():
     rack = {**STRUT["bodies"]["rack"], "fixed": False}
     steered = STRUT | {
         "bodies": STRUT["bodies"] | {"rack": rack},
@@ -170,7 +170,7 @@ def test_quotients_of_velocities_want_a_driver_of_travel():
         loaded(unreferenced(named))
 
 
-def test_one_steering_axis():
+def test_kingpin_and_links_are_exclusive():
     rods = [["strut_top", "strut_foot"]] * 4
     with pytest.raises(CaseError, match=r"kingpin_links: found beside kingpin, .* remove"):
         loaded(changed("suspension", kingpin_links=rods))
@@ -179,7 +179,7 @@ def test_one_steering_axis():
         loaded(changed("suspension", kingpin_links=rods, kingpin=None))
 
 
-def test_signs_of_a_reference_table_must_be_those_of_the_case():
+def test_reference_signs_must_match():
     with pytest.raises(CaseError, match=r"signs: found 'iso8855' of signs, expected 'sae_j670'"):
         loaded(changed("suspension", convention="sae_j670"))
     with pytest.raises(
@@ -188,7 +188,7 @@ def test_signs_of_a_reference_table_must_be_those_of_the_case():
         loaded(STRUT, TABLE.replace("# signs: iso8855\n", ""))
 
 
-def test_millimetres_and_degrees():
+def test_suspension_in_millimetres_and_degrees():
     """All numbers of the file in mm and degrees: tolerances, references and outputs in SI are the
     same.
     """
@@ -251,7 +251,7 @@ def test_millimetres_and_degrees():
         assert two.position == pytest.approx(one.position, abs=1e-15)
 
 
-def test_slopes_can_be_left_out():
+def test_per_travel_false_omits_slopes():
     case = loaded(
         changed("suspension", per_travel=False)
         | TOE
@@ -261,7 +261,7 @@ def test_slopes_can_be_left_out():
     assert case.points == ("wheel_center", "~wheel_center.spin")  # and nothing else is computed
 
 
-def test_a_new_type_is_a_short_class(capsys):
+def test_own_suspension_output_type(capsys):
     @dataclass(frozen=True)
     class Lead(Attitude):
         type = "lead_of_test_suspension"
@@ -320,7 +320,7 @@ def results():
     return run([loaded(STRUT)], [Native(), Bent()], tol=1e-12)
 
 
-def test_a_twisted_wheel_fails_in_radians(results):
+def test_twisted_wheel_fails_in_radians(results):
     native, bent = results.records
     assert (native.outcome, bent.outcome) == (Outcome.PASS, Outcome.FAIL)
     error = bent.errors["toe"].position
@@ -329,7 +329,7 @@ def test_a_twisted_wheel_fails_in_radians(results):
     assert 'message="toe: position is off by 4e-06 rad at sample' in to_junit(results).decode()
 
 
-def test_signs_head_everything(results, tmp_path):
+def test_signs_in_reports(results, tmp_path):
     again = from_json(to_json(results))
     assert again.run["cases"]["mcpherson_suspension"]["signs"] == SIGNS
     assert again.records[0].outputs["steer_angle"].sense == "positive: to the left"
@@ -349,7 +349,7 @@ def test_signs_head_everything(results, tmp_path):
     assert "# signs: iso8855" in TABLE
 
 
-def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
+def test_signs_in_command_tables(tmp_path, capsys):
     parquet = pytest.importorskip("pyarrow.parquet")
     file = tmp_path / "strut.json"
     file.write_text(json.dumps(unreferenced(changed("sweep", steps=3)) | TOE))
@@ -384,7 +384,7 @@ def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
     )
 
 
-def test_tables_keep_lengths_and_angles_apart(results):
+def test_markdown_separates_lengths_and_angles(results):
     """Lengths are shown where there are any; errors in other units have theirs beside them."""
     assert "[" not in cells(results)[1]
     native, bent = cells(run([loaded(unreferenced(STRUT | TOE))], [Native(), Bent()], tol=1e-12))
@@ -425,7 +425,7 @@ def pointed(**changes):
     return data
 
 
-def test_points_give_what_the_numbers_give():
+def test_wheel_points_equal_wheel_numbers():
     data = deepcopy(unreferenced(STRUT))
     data["suspension"] |= {"static_toe": STATIC_TOE, "static_camber": STATIC_CAMBER}
     expected = solved(loaded(data))
@@ -444,12 +444,12 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("changes", "key", "words"), FAULTS)
-def test_wrong_point_is_told(changes, key, words):
+def test_wrong_wheel_point_is_refused(changes, key, words):
     refused(lambda: loaded(pointed(**changes)), f"{key} ... {words}")
 
 
 @pytest.mark.parametrize("axle", [None, "roll"])
-def test_case_file_of_a_table_keeps_the_points(tmp_path, axle):
+def test_import_keeps_wheel_points(tmp_path, axle):
     table = tmp_path / "car.csv"
     table.write_text(sample_table(TEMPLATES["mcpherson"]) + "wheel_axis,1,790,309,\n")
     case = load(table, Supplied(travel="0.04:3", axle=axle))

@@ -66,14 +66,14 @@ def largest(record, quantity="position"):
         ("fourbar_xyzw.csv", [w + ", first" if "=" in w else w for w in maps(XYZW)], 1e-8),
     ],
 )
-def test_recorded_poses_of_truth_pass(judged, file, options, gap):
+def test_true_recorded_poses_pass(judged, file, options, gap):
     status, record = judged(DATA / file, *options)
     assert (status, record["outcome"], record["mode"]) == (0, "pass", "recorded")
     assert record["engine"] == Path(file).stem
     assert 0.0 < record["details"]["rows"]["position"] < gap
 
 
-def test_map_of_a_body_to_a_prefix_suffices(judged, capsys):
+def test_map_of_body_to_prefix(judged, capsys):
     prefixes = [word for part, prefix in PARTS.items() for word in ("--map", f"{part}={prefix}")]
     status, record = judged(DATA / "fourbar_xyzw.csv", *prefixes)
     assert (status, record["outcome"]) == (0, "pass")
@@ -84,7 +84,7 @@ def test_map_of_a_body_to_a_prefix_suffices(judged, capsys):
     )
 
 
-def test_adams_results_are_judged_in_all_rates(judged):
+def test_adams_results_are_judged_with_rates(judged):
     _, record = judged(DATA / "fourbar.res", "--analysis", "kinematic_001")
     assert largest(record) < 2e-15
     assert largest(record, "velocity") < 1e-14
@@ -100,7 +100,7 @@ def test_adams_results_are_judged_in_all_rates(judged):
         ("fourbar.mot", ANGLES, 1e-9),
     ],
 )
-def test_results_of_truth_pass(judged, file, options, tolerance):
+def test_true_recorded_angles_pass(judged, file, options, tolerance):
     status, record = judged(DATA / file, *options)
     assert status == 0
     assert largest(record) < tolerance
@@ -139,7 +139,7 @@ def written_as(file, form, crank, rocker):
         ("struct", ".mat"),
     ],
 )
-def test_truth_in_other_formats_passes(judged, tmp_path, form, suffix):
+def test_recording_in_other_formats_is_judged(judged, tmp_path, form, suffix):
     _, truth = judged(DATA / "fourbar_modelica.mat", *MODELICA)
     crank = np.array(truth["driver"]["MOTION_1"])
     rocker = np.array(truth["outputs"]["JOINT_4.angle"]["position"])
@@ -153,7 +153,7 @@ def test_truth_in_other_formats_passes(judged, tmp_path, form, suffix):
     assert record["errors"]["JOINT_4.angle"]["position"]["worst_step"] == 30
 
 
-def test_matrix_without_rows_is_left_out(judged, tmp_path, capsys):
+def test_matlab_matrix_without_rows_is_ignored(judged, tmp_path, capsys):
     file = tmp_path / "run.mat"
     file.write_bytes(struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0")
     assert judged(file)[0] == 2
@@ -169,7 +169,7 @@ def test_matrix_without_rows_is_left_out(judged, tmp_path, capsys):
         (132, 10**9, "an element is cut off"),
     ],
 )
-def test_damaged_elements_of_matlab_are_refused(judged, tmp_path, capsys, place, number, text):
+def test_damaged_matlab_element_is_refused(judged, tmp_path, capsys, place, number, text):
     file = tmp_path / "run.mat"
     savemat(file, {"a": np.arange(9.0)})
     data = bytearray(file.read_bytes())
@@ -179,7 +179,7 @@ def test_damaged_elements_of_matlab_are_refused(judged, tmp_path, capsys, place,
     assert text in capsys.readouterr().err
 
 
-def test_unpacked_size_of_a_file_is_bounded(judged, tmp_path, capsys):
+def test_matlab_zip_bomb_is_refused(judged, tmp_path, capsys):
     head = b"MATLAB 5.0".ljust(124) + b"\0\1IM"
     packed = zlib.compress(bytes(300_000_000), 9)
     file = tmp_path / "run.mat"
@@ -190,7 +190,7 @@ def test_unpacked_size_of_a_file_is_bounded(judged, tmp_path, capsys):
 
 @pytest.mark.parametrize("column", [2, 5, 7, 8, 13, 14, 16, 18, 21])
 @pytest.mark.parametrize("name", ["fourbar_xyzw.csv", "fourbar_123.csv"])
-def test_one_moved_number_fails_by_name(judged, table, name, column):
+def test_wrong_number_in_poses_is_located(judged, table, name, column):
     quaternions = "xyzw" in name
     if not quaternions and column > 18:
         return
@@ -224,7 +224,7 @@ def rows_head(name, column):
         (51, "recorded accelerations leave 1e-05 m/s² in JOINT_4 at sample 40 (PART_4)"),
     ],
 )
-def test_moved_number_of_adams_results_is_named(judged, tmp_path, number, text):
+def test_wrong_number_in_adams_is_located(judged, tmp_path, number, text):
     steps = (DATA / "fourbar.res").read_text().split('<Step type="kinematic">')
     head, tail = steps[41].split("</Step>")
     numbers = head.split()
@@ -246,14 +246,14 @@ def test_moved_number_of_adams_results_is_named(judged, tmp_path, number, text):
         ("fourbar_xyzw.csv", XYZW + ", position x y z [mm]", "positions in m, not mm, the gap"),
     ],
 )
-def test_wrong_convention_is_named(judged, file, wrong, right):
+def test_wrong_attitude_convention_is_named(judged, file, wrong, right):
     texts = [w.replace("x y z, ", "") if "[mm]" in wrong else w for w in maps(wrong)]
     status, record = judged(DATA / file, *texts)
     assert status == 1
     assert right in record["message"]
 
 
-def test_other_zeros_are_explained_and_then_pass(judged):
+def test_other_zero_angles_are_explained(judged):
     rate = ["--map", "JOINT_4.angle.velocity=rocker rate"]
     status, record = judged(DATA / "fourbar_angles.csv", *ANGLES, *rate)
     stated = re.findall(r'--map "([^"]*)"', record["message"])
@@ -302,13 +302,13 @@ def from_zero(rows):
     ],
     ids=["late", "driver sign", "output unit", "driver unit"],
 )
-def test_slip_is_named_and_not_applied(judged, table, options, change, text):
+def test_slip_in_recording_is_named(judged, table, options, change, text):
     status, record = judged(table("fourbar_angles.csv", change), *options)
     assert status == 1
     assert text in record["message"]
 
 
-def test_offset_has_a_unit_of_its_own(judged):
+def test_map_offset_has_a_unit(judged):
     options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
     assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
 
@@ -322,7 +322,7 @@ def test_joints_without_poses_are_not_judged(judged):
     )
 
 
-def test_nothing_comparable_is_not_judged(judged, tmp_path):
+def test_recording_of_driver_alone_is_unjudged(judged, tmp_path):
     file = tmp_path / "driver.csv"
     file.write_text("MOTION_1 [deg]\n0\n5\n")
     status, record = judged(file)
@@ -330,19 +330,19 @@ def test_nothing_comparable_is_not_judged(judged, tmp_path):
 
 
 @pytest.mark.parametrize("rows", [slice(20, 50), slice(1, None, 4), slice(1, 2)])
-def test_windows_and_coarser_samples_pass(judged, table, rows):
+def test_recording_of_fewer_samples_passes(judged, table, rows):
     file = table("fourbar_xyzw.csv", lambda every: [every[0], *every[rows]])
     assert judged(file, *maps(XYZW))[0] == 0
 
 
-def test_equal_rows_at_an_event_are_merged(judged, table):
+def test_equal_event_rows_are_merged(judged, table):
     file = table("fourbar_xyzw.csv", lambda rows: [*rows[:10], *rows[9:]])
     status, record = judged(file, *maps(XYZW))
     assert (status, len(record["driver"]["MOTION_1"])) == (0, 73)
     assert "merged 1 row" in record["message"]
 
 
-def test_unequal_rows_at_an_event_need_a_choice(judged, table, capsys):
+def test_unequal_event_rows_need_option(judged, table, capsys):
     def changed(rows):
         return [*rows[:10], [*rows[9][:2], "-0.04", *rows[9][3:]], *rows[10:]]
 
@@ -358,7 +358,7 @@ def test_unequal_rows_at_an_event_need_a_choice(judged, table, capsys):
     ("column", "text"),
     [(2, "left out 1 sample without the pose of a driver"), (9, "PART_3 at 1 sample")],
 )
-def test_gaps_are_left_out_and_named(judged, table, cell, column, text):
+def test_gaps_in_poses_are_named(judged, table, cell, column, text):
     def holed(rows):
         rows[9][column] = cell
         return rows
@@ -397,14 +397,14 @@ def test_unreadable_adams_results_are_refused(judged, tmp_path, capsys, change, 
         ("a.csv", b"time,z\n0,1\n", "found the columns 'time', 'z', expected one of MOTION_1"),
     ],
 )
-def test_other_files_are_refused_with_the_export(judged, tmp_path, capsys, name, content, text):
+def test_other_recording_formats_are_refused(judged, tmp_path, capsys, name, content, text):
     file = tmp_path / name
     file.write_bytes(content)
     assert judged(file)[0] == 2
     assert text in capsys.readouterr().err
 
 
-def test_accuracy_is_stated_apart_from_digits(judged, table):
+def test_accuracy_option_of_recording(judged, table):
     def moved(rows):
         rows[8][1] = f"{float(rows[8][1]) + 1e-5:.9g}"
         return rows
@@ -416,7 +416,7 @@ def test_accuracy_is_stated_apart_from_digits(judged, table):
     assert record["details"]["rows"]["position"] == pytest.approx(1e-5, rel=1e-3)
 
 
-def test_driver_on_an_even_grid_has_no_digits(judged, tmp_path):
+def test_even_driver_values_are_exact(judged, tmp_path):
     _, truth = judged(DATA / "fourbar.mot", *ANGLES)
     angles = truth["outputs"]["JOINT_4.angle"]["position"]
     file = tmp_path / "a.csv"
@@ -475,7 +475,7 @@ RACK = RACK.replace('component = "x"', 'component = "z"')
 @pytest.mark.parametrize("driven", ["by column", "by poses"])
 @pytest.mark.parametrize("first", [0, 20, 45])
 @pytest.mark.parametrize("kind", ["gears", "rack"])
-def test_coupled_joints_pass_after_several_turns(last_record, tmp_path, kind, first, driven):
+def test_recorded_couplers_pass_after_turns(last_record, tmp_path, kind, first, driven):
     turn = np.linspace(0.0, 12.0, 61)[first:]
     half, nil = 0.5 * turn, 0.0 * turn
     other = {"gears": -1.25 * turn, "rack": nil}[kind]
@@ -502,7 +502,7 @@ def test_coupled_joints_pass_after_several_turns(last_record, tmp_path, kind, fi
     assert last_record(case, "--recorded", file)[0] == 1
 
 
-def test_wheel_half_a_turn_off_fails_where_turns_are_known(last_record, tmp_path):
+def test_recorded_gear_half_turn_off_fails(last_record, tmp_path):
     """A turn more of the driver would explain it; the driver's column says that there is none."""
     turn = np.linspace(0.0, 2.0, 11)
     rows = ["turn," + ",".join(f"b.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))]
@@ -522,7 +522,7 @@ def test_wheel_half_a_turn_off_fails_where_turns_are_known(last_record, tmp_path
     ("column", "outcome"),
     [(None, "pass"), ("position", "fail"), ("velocity", "fail"), ("acceleration", "fail")],
 )
-def test_long_curves_of_a_run_are_read(judged, kincheck_main, tmp_path, column, outcome):
+def test_long_csv_as_recording(judged, kincheck_main, tmp_path, column, outcome):
     """With its rates; a single number that is wrong by a thousandth shows."""
     file = tmp_path / "curves.csv"
     options = ["--csv", file, "--long", "--quiet"]
@@ -536,7 +536,7 @@ def test_long_curves_of_a_run_are_read(judged, kincheck_main, tmp_path, column, 
     assert (status, record["outcome"]) == (int(outcome == "fail"), outcome)
 
 
-def test_long_curves_of_two_cases_are_refused(judged, kincheck_main, tmp_path, capsys):
+def test_long_csv_of_two_cases(judged, kincheck_main, tmp_path, capsys):
     file = tmp_path / "curves.csv"
     options = ["--csv", file, "--long", "--quiet"]
     kincheck_main("run", CASE, "crank", *options, engines=[NATIVE])

@@ -94,7 +94,7 @@ vector = [0.0, 700.5, 0.0]
 ALL = PLAIN.replace("[units]", "gravity = [0.0, 0.0, -9806.65]\n[units]") + MASS + FORCES
 
 
-def test_units_of_a_file_in_millimetres_and_degrees(tmp_path):
+def test_loads_in_millimetres_and_degrees(tmp_path):
     """kg, s and N are the same everywhere; each number is that of the file in SI, rounded once."""
     mechanism = load_case(write(tmp_path, ALL)).mechanism
     assert mechanism.gravity == (0.0, 0.0, -9.80665)
@@ -122,7 +122,7 @@ def test_units_of_a_file_in_millimetres_and_degrees(tmp_path):
     assert mechanism.force("twist") == Torque("twist", "arm", (0.0, 0.7005, 0.0))
 
 
-def test_numbers_in_si_are_taken_as_they_are(tmp_path):
+def test_loads_in_si_units(tmp_path):
     in_si = ALL.replace('length = "mm"\nangle = "deg"', "")
     mechanism = load_case(write(tmp_path, in_si)).mechanism
     assert mechanism.gravity == (0.0, 0.0, -9806.65)
@@ -130,7 +130,7 @@ def test_numbers_in_si_are_taken_as_they_are(tmp_path):
     assert mechanism.force("clock") == TorsionSpringDamper("clock", "pin", 900.0, 18.0, -45.0)
 
 
-def test_what_is_left_out(tmp_path):
+def test_loads_with_defaults(tmp_path):
     """A mass is a point at the body's origin, a spring is as long as at design."""
     short = ALL.replace(MASS, "mass = 2.5\norigin = [10.0, 0.0, 0.0]\n")
     short = short.replace("free_length = 290.1\n", "").replace("damping = 1.7\n", "")
@@ -203,19 +203,19 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_wrong_loads_are_one_message(name, tmp_path):
+def test_wrong_load_is_refused(name, tmp_path):
     old, new, fragments = WRONG[name]
     assert ALL.count(old) == 1
     complains(write(tmp_path, ALL.replace(old, new)), fragments)
 
 
-def test_a_joint_that_does_not_turn_has_no_torsion_spring(tmp_path):
+def test_torsion_spring_needs_rotation(tmp_path):
     rail = '[joints.rod]\ntype = "spherical"\nbodies = ["ground", "arm"]\npoint = [0, 0, 0]\n'
     text = ALL.replace('joint = "pin"\nstiff', 'joint = "rod"\nstiff') + rail
     complains(write(tmp_path, text), "forces.clock.joint ... has no rotation")
 
 
-def test_wrong_loads_are_exit_status_2(tmp_path, capsys):
+def test_wrong_load_has_status_2(tmp_path, capsys):
     file = write(tmp_path, ALL.replace("mass = 2.5", "mass = -2.5"))
     assert main(["run", str(file), "--engine", "native"]) == 2
     assert "bodies.arm.mass: found -2.5" in capsys.readouterr().err
@@ -228,7 +228,7 @@ def of(mechanism):
     )
 
 
-def test_a_written_file_has_no_key_of_loads_without_loads():
+def test_case_text_without_loads():
     plain = replace(
         loaded(),
         bodies=[Body("crank"), Body("slider", (2.0, 0.5, 0.0)), Body("wall", fixed=True)],
@@ -257,7 +257,7 @@ def inertia(draw):
 
 @settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
-def test_what_is_written_reads_as_the_same(tmp_path, data):
+def test_written_loads_round_trip(tmp_path, data):
     draw = data.draw
     mass = draw(size)
     body = {"mass": mass, "center_of_mass": draw(vector)}
@@ -309,7 +309,7 @@ def within(found, digits, expected=None):
         assert np.nanmax(np.abs(each - right)) <= 32.0 * digits + 1e-12
 
 
-def test_exact_axes_give_the_true_forces(tmp_path):
+def test_exact_axes_give_true_forces(tmp_path):
     case, found = solved(written(tmp_path))
     assert case.closure is None
     within(found, 0.0)
@@ -318,7 +318,7 @@ def test_exact_axes_give_the_true_forces(tmp_path):
 @pytest.mark.parametrize("digits", [1e-6, 1e-5, 1e-4])
 @pytest.mark.parametrize("hinge", "abcd")
 @pytest.mark.parametrize("axis", [0, 2])
-def test_an_axis_off_by_digits_gives_the_true_forces(tmp_path, hinge, axis, digits):
+def test_rounded_axis_gives_true_forces(tmp_path, hinge, axis, digits):
     axes, closure = {hinge: off_by(digits, axis)}, {"tolerance": 2.0 * digits}
     case, found = solved(written(tmp_path, axes, closure=closure))
     assert case.closure
@@ -326,7 +326,7 @@ def test_an_axis_off_by_digits_gives_the_true_forces(tmp_path, hinge, axis, digi
 
 
 @pytest.mark.parametrize("order", ["abcd", "dcba", "cabd", "bdac"])
-def test_the_order_of_joints_changes_digits_only(tmp_path, order):
+def test_joint_order_keeps_forces(tmp_path, order):
     """The joint that loses rows is another one: they leave the same undetermined."""
     axes = {"c": off_by(1e-6), "b": off_by(-2e-6, 2)}
     case, found = solved(written(tmp_path, axes, order, closure={"tolerance": 1e-5}))
@@ -335,20 +335,20 @@ def test_the_order_of_joints_changes_digits_only(tmp_path, order):
 
 
 @pytest.mark.parametrize("bodies", [("rocker", "coupler", "crank"), ("coupler", "crank", "rocker")])
-def test_the_order_of_bodies_changes_digits_only(tmp_path, bodies):
+def test_body_order_keeps_forces(tmp_path, bodies):
     axes, closure = {"c": off_by(1e-6)}, {"tolerance": 1e-5}
     _, found = solved(written(tmp_path, axes, bodies=bodies, closure=closure))
     within(found, 1e-6)
 
 
 @pytest.mark.parametrize("tolerance", [2e-6, 1e-4, 1e-3])
-def test_the_tolerance_does_not_decide_what_is_determined(tmp_path, tolerance):
+def test_closure_tolerance_keeps_forces(tmp_path, tolerance):
     file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": tolerance})
     within(solved(file)[1], 1e-6)
 
 
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "mm"), (1e-3, "m"), (64.0, "mm")])
-def test_units_and_size_change_digits_only(tmp_path, scale, unit):
+def test_units_and_size_keep_forces(tmp_path, scale, unit):
     tolerance = 1e-5 * scale * {"m": 1.0, "mm": 1e3}[unit]
     more = {"closure": {"tolerance": tolerance}, "units": {"length": unit}}
     file = written(tmp_path, {"c": off_by(1e-6)}, scale=scale, **more)
@@ -357,7 +357,7 @@ def test_units_and_size_change_digits_only(tmp_path, scale, unit):
     within(found, 1e-6)
 
 
-def test_a_turned_plane_leaves_the_same_undetermined(tmp_path):
+def test_tilted_four_bar_forces(tmp_path):
     closure = {"tolerance": 1e-5}
     case, found = solved(
         written(tmp_path, {"c": off_by(1e-6)}, turn=TILTED, closure=closure), turn=TILTED
@@ -367,7 +367,7 @@ def test_a_turned_plane_leaves_the_same_undetermined(tmp_path):
 
 
 @pytest.mark.parametrize("carrying", ["bd", "bc", "cd"])
-def test_a_cross_turns_with_both_bodies(tmp_path, carrying):
+def test_universal_joint_carries_cross_moment(tmp_path, carrying):
     """A universal joint carries a moment across its axes, wherever they are."""
     cross, closure = (0.6, 0.0, 0.8), {"tolerance": 1e-5, "carrying": [*carrying]}
     more = {"turn": TILTED, "cross": cross, "closure": closure}
@@ -376,7 +376,7 @@ def test_a_cross_turns_with_both_bodies(tmp_path, carrying):
     within(found, 1e-6, truth(cross))
 
 
-def test_a_joint_without_a_row_left_is_undetermined(tmp_path):
+def test_joint_without_rows_is_undetermined(tmp_path):
     """A second hinge beside another one shares its load in any proportion."""
     file = written(
         tmp_path, {"c": off_by(1e-6)}, twin=(0.6, 0.2, 1e-6), closure={"tolerance": 1e-5}
@@ -395,7 +395,7 @@ def test_a_joint_without_a_row_left_is_undetermined(tmp_path):
     written_again(case, tmp_path)
 
 
-def test_a_hinge_with_a_torsional_spring_keeps_its_rows(tmp_path):
+def test_sprung_hinge_keeps_its_rows(tmp_path):
     """The spring counts its turns; it does nothing here."""
     springs = {
         f"spring {name}": {"type": "torsion_spring_damper", "joint": name, "stiffness": 0.0}
@@ -412,7 +412,7 @@ def test_a_hinge_with_a_torsional_spring_keeps_its_rows(tmp_path):
     "more", [{}, {"order": "dbca"}, {"cross": (0.6, 0.0, 0.8)}, {"twin": (0.6, 0.2, 1e-6)}]
 )
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn", "simbody", "drake", "dart"])
-def test_every_engine_leaves_the_same_undetermined(tmp_path, engine, more):
+def test_engines_agree_on_undetermined_forces(tmp_path, engine, more):
     if adapters.engine(engine).version() is None:
         pytest.skip(f"{engine} is not installed")
     axes, closure = {"a": off_by(1e-6), "b": off_by(-2e-6, 2)}, {"tolerance": 1e-5}
@@ -433,7 +433,7 @@ def test_every_engine_leaves_the_same_undetermined(tmp_path, engine, more):
     assert np.abs(np.linalg.norm(spanned, axis=1) - 1.0).max() < 1e-12
 
 
-def test_forces_that_multiply_digits_are_told(tmp_path):
+def test_amplified_forces_are_reported(tmp_path):
     """Only digits keep the four-bar from moving; what moves is a pendulum beside it."""
     keys = json.loads((file := written(tmp_path, {"c": off_by(1e-6)})).read_text())
     keys["bodies"]["pendulum"] = {"mass": 1.0, "center_of_mass": [2.0, 0.0, 0.5]}
@@ -452,14 +452,14 @@ def test_forces_that_multiply_digits_are_told(tmp_path):
     assert "without them the drivers do not determine the motion" in note
 
 
-def test_missing_forces_at_a_singular_pose_are_told():
+def test_missing_forces_are_reported():
     case = force_case(with_loads(chain(1)), [0.0, 0.7, 1.4, BRANCH, 2.3, 3.0])
     (record,) = run([case], [adapters.engine("native")], tol=1e-12).records
     assert (record.solved, record.samples) == (6, 6)
     assert "no forces at 1 sample" in record.message
 
 
-def test_digits_of_all_samples_count_at_each():
+def test_digits_of_all_samples_count():
     """At some pose digits may not show."""
     one, rows = np.ones(2), np.zeros((2, 0))
     found = Multipliers(rows, rows[..., None], np.array([1e-6, 0.0]), 0.5 * one, one, one)
@@ -468,20 +468,20 @@ def test_digits_of_all_samples_count_at_each():
     assert replace(found, regular=np.array([0.5, 5e-5])).singular.tolist() == [False, True]
 
 
-def test_a_written_case_has_the_joints_as_given(tmp_path):
+def test_case_text_keeps_reduced_joints(tmp_path):
     file = written(tmp_path, {"c": off_by(1e-6)}, "dcba", closure={"tolerance": 1e-5})
     case = load_case(file)
     assert written_again(case, tmp_path).closure.tolerance == case.closure.tolerance
     assert 'type = "inline"' not in case_text(case)
 
 
-def test_a_joint_that_is_to_carry_must_exist(tmp_path):
+def test_unknown_carrying_joint_is_refused(tmp_path):
     file = written(tmp_path, closure={"tolerance": 1e-5, "carrying": ["x"]})
     with pytest.raises(CaseError, match=r"closure\.carrying: .*joint.* 'x'"):
         load_case(file)
 
 
-def test_joints_that_are_to_carry_keep_their_rows(tmp_path):
+def test_carrying_joints_keep_their_rows(tmp_path):
     closure = {"tolerance": 1e-5, "carrying": ["b", "c", "d"]}
     case = load_case(written(tmp_path, {"c": off_by(1e-6)}, closure=closure))
     assert [each.joint.name for each in case.mechanism.reduced] == ["d"]  # the drive has "a"
@@ -490,7 +490,7 @@ def test_joints_that_are_to_carry_keep_their_rows(tmp_path):
     assert [each.joint.name for each in case.mechanism.reduced] == ["b"]
 
 
-def test_explain_names_redundant_rows_and_determined_directions(tmp_path):
+def test_explain_names_redundant_rows(tmp_path):
     file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": 1e-5})
     found = diagnose(load_case(file), samples=3, tol=1e-12)
     assert [each.row.owner for each in found.redundant] == ["d"] * 3
@@ -510,7 +510,7 @@ def test_explain_names_redundant_rows_and_determined_directions(tmp_path):
     assert "all reactions and efforts are determined" not in printed
 
 
-def test_proofs_print_determined_components_only(tmp_path):
+def test_proof_omits_undetermined_components(tmp_path):
     pytest.importorskip("flint")
     file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": 1e-5})
     case = load_case(file)
@@ -531,7 +531,7 @@ def component(name, k, moment, found):
     return found.joints[name].along(np.eye(3)[k], moment=moment)
 
 
-def test_variants_of_a_design_leave_the_same_undetermined(tmp_path):
+def test_design_variants_keep_undetermined_forces(tmp_path):
     file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": 1e-5})
     mechanism, path = (case := load_case(file)).mechanism, case.sweep.path
     designs = NativeSolver(order=2).prepare_designs(

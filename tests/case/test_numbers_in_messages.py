@@ -74,7 +74,7 @@ def refused(file, **more):
 
 @quick
 @given(number=numbers, unit=st.sampled_from(["mm", "m", "deg", "rad"]), inline=st.booleans())
-def test_a_driver_value_off_the_grid_is_quoted(tmp_path, number, unit, inline):
+def test_driver_value_off_grid_is_quoted(tmp_path, number, unit, inline):
     """The start is quoted too: as expected."""
     units = {"angle": unit} if unit in ANGLES else {"length": unit, "driver": SHIFT}
     start, found = str(number), str(number * 2)
@@ -97,7 +97,7 @@ def test_a_driver_value_off_the_grid_is_quoted(tmp_path, number, unit, inline):
 
 @quick
 @given(number=numbers, unit=st.sampled_from(["mm", "m"]))
-def test_a_length_that_is_none_is_quoted(tmp_path, number, unit):
+def test_negative_length_is_quoted(tmp_path, number, unit):
     rod = ROD.replace("SIDE", "100") + f"length = -{number}\n"
     message = refused(write(tmp_path, text(length=unit) + rod))
     assert f"length is {as_read(-number)} {unit}, expected a positive one" in message
@@ -106,7 +106,7 @@ def test_a_length_that_is_none_is_quoted(tmp_path, number, unit):
 
 @quick
 @given(number=st.decimals(1, 999, places=6), unit=st.sampled_from(["mm", "m"]))
-def test_a_note_on_a_rod_quotes_its_length(tmp_path, number, unit):
+def test_rod_note_quotes_length(tmp_path, number, unit):
     rod = ROD.replace("SIDE", "1234.5") + f"length = {number}\n"
     found = next(
         note for note in notes(load_case(write(tmp_path, text(length=unit) + rod))) if "rod" in note
@@ -116,7 +116,7 @@ def test_a_note_on_a_rod_quotes_its_length(tmp_path, number, unit):
 
 @quick
 @given(number=numbers, unit=st.sampled_from(["mm", "m"]))
-def test_a_wheel_on_the_other_side_is_quoted(tmp_path, number, unit):
+def test_wheel_on_other_side_is_quoted(tmp_path, number, unit):
     vehicle = (
         '[suspension]\nconvention = "iso8855"\nside = "right"\nforward = [1, 0, 0]\nup = [0, 0,'
         ' 1]\nwheel_center = "tip"\n'
@@ -163,7 +163,7 @@ wheel_center,0.2,WHEEL,0
         ),
     ],
 )
-def test_hardpoints_are_quoted_in_the_axes_of_their_file(tmp_path, unit, upper, wheel, axes, words):
+def test_hardpoints_quoted_in_file_axes(tmp_path, unit, upper, wheel, axes, words):
     file = write(tmp_path, POINTS.replace("UPPER", upper).replace("WHEEL", wheel), "points.csv")
     message = refused(file, template="double_wishbone", units=unit, axes=axes)
     if unit == "mm":  # less than a millimetre
@@ -180,7 +180,7 @@ def test_hardpoints_are_quoted_in_the_axes_of_their_file(tmp_path, unit, upper, 
 
 @quick
 @given(number=st.floats(1e-6, 1e6), unit=st.sampled_from([*LENGTHS.values(), *ANGLES.values()]))
-def test_what_a_unit_writes_is_read_back(number, unit):
+def test_unit_round_trip(number, unit):
     written, name = unit.written(unit(number)).split()
     assert name == unit.name
     assert math.isclose(float(written), number, rel_tol=1e-9)
@@ -188,12 +188,12 @@ def test_what_a_unit_writes_is_read_back(number, unit):
 
 
 @pytest.mark.parametrize("number", ["0.0349", "350", "12.7", "0.1", "123456.789", "1e-05"])
-def test_decimals_come_back_as_they_are(number):
+def test_unit_keeps_decimals(number):
     for unit in (*LENGTHS.values(), *ANGLES.values()):
         assert unit.written(unit(float(number))) == f"{number} {unit.name}"
 
 
-def test_a_description_in_python_speaks_in_metres():
+def test_python_joint_fault_in_metres():
     with pytest.raises(
         MechanismError,
         match=r"length is -0\.35 m, expected a positive one; the points are 0\.5 m apart",

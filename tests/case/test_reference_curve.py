@@ -82,7 +82,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_a_curve_is_judged(tmp_path, car, kind):
+def test_measured_curve_is_judged(tmp_path, car, kind):
     record, notes, suspect = judged(car, rig(tmp_path, car[1], **FORMS[kind]), citation="made up")
     assert record.outcome is Outcome.PASS
     assert suspect is None
@@ -100,7 +100,7 @@ def test_a_curve_is_judged(tmp_path, car, kind):
     )
 
 
-def test_what_the_user_states(tmp_path, car):
+def test_curve_with_map_and_signs(tmp_path, car):
     """Columns of other names, one with the opposite sign and without a unit; signs; the samples."""
     toe, camber = car[1]
     file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
@@ -115,7 +115,7 @@ def test_what_the_user_states(tmp_path, car):
 
 
 @pytest.mark.parametrize("k", [0, 1])
-def test_a_shift_of_two_tolerances_is_found(tmp_path, car, k):
+def test_shifted_curve_fails(tmp_path, car, k):
     record, *_ = judged(car, rig(tmp_path, car[1]))
     name = ("toe", "camber")[k]
     shift = np.zeros((2, 1))
@@ -135,7 +135,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("change", SLIPS)
-def test_slips_are_named(tmp_path, car, change):
+def test_slip_of_curve_is_named(tmp_path, car, change):
     record, _, suspect = judged(car, rig(tmp_path, SLIPS[change](car[1])))
     assert record.outcome is Outcome.FAIL
     assert f"the reference {change} fits" in suspect.message
@@ -179,14 +179,14 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, car, kind):
+def test_faulty_curve_is_refused(tmp_path, car, kind):
     form, options, fragments = FAULTS[kind]
     file = rig(tmp_path, car[1], **form)
     message = refused(lambda: with_curve(car[0], file, CurveOptions(**options)), fragments)
     assert message.startswith(str(tmp_path))
 
 
-def test_the_command_line(tmp_path, car, capsys):
+def test_run_with_measured_curve(tmp_path, car, capsys):
     table = tmp_path / "car.csv"
     table.write_text(sample_table(TEMPLATES["mcpherson"]))
     toe, camber = car[1]
@@ -207,7 +207,7 @@ def test_the_command_line(tmp_path, car, capsys):
 
 
 @pytest.mark.parametrize("accuracy", ["0.02", "toe=0.02", "toe=0.02deg", "toe=0.02 deg"])
-def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
+def test_bare_accuracy_has_column_unit(tmp_path, car, accuracy):
     case, rows = car
     file = rig(tmp_path, rows, "Travel [mm],toe [deg]", "{0},{1}")
     judged_by, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
@@ -215,7 +215,7 @@ def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
     assert toe.atol == pytest.approx(math.radians(0.02), rel=1e-14)
 
 
-def test_bare_accuracy_holds_for_all_columns(tmp_path, car):
+def test_bare_accuracy_of_all_columns(tmp_path, car):
     case, rows = car
     file = rig(tmp_path, rows, "Travel [mm],toe [deg],camber [rad]", "{0},{1},{2}")
     judged_by, _ = with_curve(case, file, CurveOptions(accuracy=("0.02",)))
@@ -224,7 +224,7 @@ def test_bare_accuracy_holds_for_all_columns(tmp_path, car):
     assert found["camber"] == 0.02
 
 
-def test_first_rows_with_gaps_are_samples(tmp_path):
+def test_first_rows_with_gaps(tmp_path):
     """A lone number below the head is a sample without the other columns, and never a title."""
     file = tmp_path / "rig.csv"
     file.write_text("Travel [mm],toe [deg]\n-50,\n-40,\n0,0.1\n50,0.2\n")
@@ -232,7 +232,7 @@ def test_first_rows_with_gaps_are_samples(tmp_path):
     assert samples.numbers[:, 0].tolist() == [-50.0, -40.0, 0.0, 50.0]
 
 
-def test_rows_of_a_case_are_no_remarks(tmp_path):
+def test_remark_in_case_reference_is_refused(tmp_path):
     """Only curves and recordings may hold remarks: their readers tell what is left out."""
     file = tmp_path / "reference.csv"
     file.write_text("push,tip_x\n0,1\nsensor changed\n1,2\n")
@@ -242,7 +242,7 @@ def test_rows_of_a_case_are_no_remarks(tmp_path):
         samples_of(table)
 
 
-def test_blank_row_of_a_curve_is_left_out(tmp_path):
+def test_blank_curve_row_is_ignored(tmp_path):
     file = tmp_path / "rig.csv"
     file.write_text("Travel [mm],toe [deg]\n-50,0.3\n,,\n50,0.2\n")
     samples = samples_of(read_table(file, None, "--sheet"), [0, 1], remarks=True, gaps=True)

@@ -70,7 +70,7 @@ def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"
         {"size": "0", "way": "0.001"},
     ],
 )
-def test_what_is_probable_gets_no_note(tmp_path, given):
+def test_probable_size_has_no_note(tmp_path, given):
     assert said(tmp_path, **given) == []
 
 
@@ -111,16 +111,16 @@ def test_what_is_probable_gets_no_note(tmp_path, given):
         ),
     ],
 )
-def test_what_is_improbable_gets_a_note_in_the_units_of_the_file(tmp_path, given, words):
+def test_improbable_size_is_noted(tmp_path, given, words):
     (note,) = said(tmp_path, **given)
     assert [each for each in words if each not in note] == []
 
 
-def test_no_built_in_case_gets_one():
+def test_built_in_cases_have_no_notes():
     assert {name: found for name in cases.names() if (found := notes(cases.load(name)))} == {}
 
 
-def test_run_explain_and_the_page_say_it(tmp_path, capsys):
+def test_size_note_in_run_and_explain(tmp_path, capsys):
     said(tmp_path, way="0.08")
     file = str(tmp_path / "case.toml")
     note = "driver 'push' goes from -0.08 mm to 0.08 mm"

@@ -78,25 +78,25 @@ SHEETS = {
 
 
 @pytest.mark.parametrize("kind", SHEETS)
-def test_sheets(tmp_path, plain, kind):
+def test_workbook_layouts(tmp_path, plain, kind):
     assert load(book(tmp_path, SHEETS[kind]), SAID).mechanism == plain
 
 
-def test_numbers_of_three_decimals_are_no_thousands(tmp_path):
+def test_workbook_three_decimals_are_no_thousands(tmp_path):
     """A text 1.125 beside whole numbers may be grouped; a number of a sheet is what it is."""
     rows = [HEAD, *([name, *map(int, at)] for name, at in POINTS.items())]
     rows[1][1] = -89.125
     assert load(book(tmp_path, {"a": rows}), SAID).mechanism.points
 
 
-def test_the_left_out_is_listed(tmp_path):
+def test_workbook_omissions_are_listed(tmp_path):
     source = load(book(tmp_path, {"Front": merged}), SAID).source
     assert source.startswith("Sheet 'Front': hardpoints of car.xlsx on the template")
     for part in ("row 1 (Front suspension, left", "row 3 (", "(all from CAD)"):
         assert part in source.split(LEFT_OUT)[1]
 
 
-def test_formulas_are_read_by_their_values(tmp_path, plain):
+def test_workbook_formulas_are_read_by_value(tmp_path, plain):
     """openpyxl writes no values; a spreadsheet program does, as here into the file."""
     rows = [list(row) for row in ROWS]
     rows[1][1] = "=-90+0.25"
@@ -115,7 +115,7 @@ def test_formulas_are_read_by_their_values(tmp_path, plain):
     assert load(file, SAID).mechanism == plain
 
 
-def test_a_sheet_is_chosen(tmp_path, plain, capsys):
+def test_sheet_option_chooses_hardpoints(tmp_path, plain, capsys):
     rear = [HEAD, *([name, x, 2 * y, z] for name, (x, y, z) in POINTS.items())]
     file = book(tmp_path, {"Front axle": ROWS, "Rear axle": rear, "Notes": [["x"]]})
     with pytest.raises(
@@ -160,14 +160,14 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, monkeypatch, kind):
+def test_faulty_workbook_is_refused(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(hardpoint_rows, "MOST_ROWS", 100)
     sheets, fragments = FAULTS[kind]
     file = book(tmp_path, sheets)
     complains(file, f"{file}: ... {fragments}", SAID)
 
 
-def test_a_damaged_workbook(tmp_path):
+def test_damaged_workbook_is_refused(tmp_path):
     file = book(tmp_path, {"a": ROWS})
     data = file.read_bytes()
     for part in (data[: len(data) // 2], data[:30] + b"\0" * 200 + data[230:]):
@@ -176,7 +176,7 @@ def test_a_damaged_workbook(tmp_path):
             load(file, SAID)
 
 
-def test_a_workbook_that_unpacks_to_much(tmp_path, monkeypatch):
+def test_workbook_zip_bomb_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "MOST_BYTES", 10_000)
     file = tmp_path / "car.xlsx"
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -185,7 +185,7 @@ def test_a_workbook_that_unpacks_to_much(tmp_path, monkeypatch):
         load(file, SAID)
 
 
-def test_without_openpyxl(tmp_path, monkeypatch):
+def test_workbook_without_openpyxl_is_refused(tmp_path, monkeypatch):
     file = book(tmp_path, {"a": ROWS})
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(CaseError, match=r"needs openpyxl, .* pip install .*openpyxl.*as CSV"):
@@ -199,7 +199,7 @@ def judged(folder, sheets, sheet="", sweep=AT):
     return record
 
 
-def test_a_reference_in_a_workbook(tmp_path):
+def test_reference_in_workbook(tmp_path):
     """Typed with six digits, below a title, judged by them; shifted by two tolerances, found."""
     rows = [[float(f"{x:.6g}") for x in row] for row in curve(OWN)]
     sheets = {"Rig": [["Rig 3, sheet 12"], ["turn", "x", "y"], *rows]}
@@ -211,7 +211,7 @@ def test_a_reference_in_a_workbook(tmp_path):
     assert judged(tmp_path, sheets).outcome is Outcome.FAIL
 
 
-def test_a_sheet_of_a_reference_is_chosen(tmp_path):
+def test_sheet_key_chooses_reference(tmp_path):
     rows = np.array(curve(OWN)).tolist()
     sheets = {"Rig": [["turn", "x", "y"], *rows], "Old": [["turn", "x", "y"], [0, 1, 2]]}
     assert judged(tmp_path, sheets, 'sheet = "Rig"').outcome is Outcome.PASS
@@ -219,7 +219,7 @@ def test_a_sheet_of_a_reference_is_chosen(tmp_path):
         judged(tmp_path, sheets)
 
 
-def test_whole_numbers_of_a_workbook_have_no_decimal(tmp_path):
+def test_workbook_whole_numbers_are_rounded(tmp_path):
     """Its file has them as 5.0 or 5, and a program may have rounded them."""
     rows = [
         ["turn", "x", "y"],

@@ -42,7 +42,7 @@ def smallest_singular_value(case):
 
 
 @pytest.mark.parametrize("name", JOINTS + COUPLERS)
-def test_a_probe_is_well_conditioned_and_its_points_move(name):
+def test_probe_is_well_conditioned(name):
     case = probed(name)
     found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
     assert found.solved.all(), found.message
@@ -57,7 +57,7 @@ def test_a_probe_is_well_conditioned_and_its_points_move(name):
 
 
 @pytest.mark.parametrize("name", JOINTS)
-def test_every_freedom_moves(name):
+def test_probe_moves_every_freedom(name):
     """Of shifts and turns along f, g, h at the joint's point, as many move as the joint has
     freedoms.
     """
@@ -78,13 +78,13 @@ def test_every_freedom_moves(name):
     assert (np.ptp(moves, axis=0) > 5e-3).sum() >= 6 - joint.rows
 
 
-def test_a_probe_keeps_the_geometry_it_is_given():
+def test_probe_of_given_joint():
     rod = Distance("mine", "x", "y", ((0.2, 0.0, 0.1), (0.6, 0.1, 0.1)), 0.45)
     tested = probe(rod).mechanism.joint("mine")
     assert (tested.bodies, tested.points, tested.length) == (("a", "b"), rod.points, 0.45)
 
 
-def test_probes_are_of_all_registered_types():
+def test_probes_of_all_types():
     assert sorted(case.name for case in probes()) == sorted([*Joint.registry, *Coupler.registry])
 
 
@@ -94,7 +94,7 @@ def test_specimens_are_made_from_the_kinds_of_their_fields(name):
     assert type(specimen(kind)) is kind
 
 
-def test_axes_forty_degrees_apart_are_for_those_that_refuse_a_right_angle():
+def test_specimen_axes_at_forty_degrees():
     kinds = {
         name: specimen(Joint.registry[name]).axes for name in ("universal", "constant_velocity")
     }
@@ -107,7 +107,7 @@ def test_axes_forty_degrees_apart_are_for_those_that_refuse_a_right_angle():
     )
 
 
-def test_a_joint_that_refuses_every_pair_says_why():
+def test_specimen_of_refusing_joint():
     @dataclass(frozen=True)
     class Fussy(Universal):
         def __post_init__(self):

@@ -68,7 +68,7 @@ def curve(folder, car, lines):
 
 
 @pytest.mark.parametrize("kind", LAYOUTS)
-def test_layout_of_a_curve_is_read(tmp_path, car, kind):
+def test_curve_layout_is_read(tmp_path, car, kind):
     case, notes = curve(tmp_path, car, LAYOUTS[kind])
     assert case.reference.keys() == {"toe", "camber"}
     np.testing.assert_allclose(case.sweep.values, 1e-3 * TRAVEL, atol=1e-15)
@@ -81,7 +81,7 @@ def test_layout_of_a_curve_is_read(tmp_path, car, kind):
     )
 
 
-def test_empty_cells_have_no_value(tmp_path, car):
+def test_empty_curve_cell_is_nan(tmp_path, car):
     lines = [HEAD, *rows()]
     lines[3] = lines[3].replace(f"{TOE[2]:.5f}", "")
     case, _ = curve(tmp_path, car, lines)
@@ -90,7 +90,7 @@ def test_empty_cells_have_no_value(tmp_path, car):
     assert np.isfinite(case.reference["camber"].position).all()
 
 
-def test_empty_cells_are_interpolated_over(tmp_path, car):
+def test_empty_curve_cell_is_interpolated(tmp_path, car):
     """On a grid of its own, a column has the rows that have a number in it."""
     lines = [
         HEAD,
@@ -113,7 +113,7 @@ def test_empty_cells_are_interpolated_over(tmp_path, car):
         ({k: f"{TRAVEL[k - 1]},,0.1,1" for k in range(1, 12)}, "0 numbers in column"),
     ],
 )
-def test_damaged_rows_are_refused(tmp_path, car, change, words):
+def test_damaged_curve_row_is_refused(tmp_path, car, change, words):
     lines = [HEAD, *rows()]
     for k, line in change.items():
         lines[k] = line
@@ -121,7 +121,7 @@ def test_damaged_rows_are_refused(tmp_path, car, change, words):
         curve(tmp_path, car, lines)
 
 
-def test_right_wheel_has_the_columns_of_its_side(tmp_path, car):
+def test_right_wheel_takes_right_columns(tmp_path, car):
     file = tmp_path / "right.csv"
     text = sample_table(TEMPLATES["mcpherson"])
     head, *points = text.split("meaning\n")
@@ -137,7 +137,7 @@ def test_right_wheel_has_the_columns_of_its_side(tmp_path, car):
 
 @pytest.mark.parametrize("decimals", range(6))
 @pytest.mark.parametrize("samples", [11, 17])
-def test_rounded_curve_is_within_its_digits(tmp_path, car, decimals, samples):
+def test_rounded_curve_is_within_digits(tmp_path, car, decimals, samples):
     """The curve of the case itself, at its samples and between rows, is off by the rounding."""
     file = tmp_path / "car.csv"
     file.write_text(sample_table(TEMPLATES["mcpherson"]))
