@@ -18,6 +18,15 @@ MIRROR = np.diag([1, -1, 1])
 TABLE = (cases.FOLDER / "mcpherson_suspension.csv").read_text()
 
 
+TOE = {"outputs": {"toe": {"type": "toe"}}}
+
+
+def changed(table="suspension", data=STRUT, **keys):
+    """The data with keys of a top-level table changed, or left out where None."""
+    table_keys = (data[table] | keys).items()
+    return data | {table: {key: value for key, value in table_keys if value is not None}}
+
+
 def unreferenced(data):
     """The same data without true values."""
     return {key: value for key, value in data.items() if key not in ("reference", "truth")}
