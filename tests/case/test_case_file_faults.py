@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from kincheck.core.case.io import case_file
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.errors import CaseError
 
@@ -269,14 +268,9 @@ def test_reference_needs_truth(tmp_path, claim):
     )
 
 
-def test_unreadable_case_file_is_refused(tmp_path, monkeypatch):
-    complains(tmp_path / "none.toml", "none.toml ... no such file")
-    (tmp_path / "folder.toml").mkdir()
-    complains(tmp_path / "folder.toml", "folder.toml ... not a regular file")
+def test_unreadable_case_file_is_refused(tmp_path):
     complains(write(tmp_path, b"\xff" + BASE.encode()), "byte 0 is not UTF-8")
     complains(tmp_path / f"{'long' * 1000}.toml", "cannot be read ... check path")
-    monkeypatch.setattr(case_file, "LARGEST_FILE", 100)
-    complains(write(tmp_path, BASE), "larger than 100 bytes ... reference file")
 
 
 @pytest.mark.parametrize(
@@ -285,7 +279,6 @@ def test_unreadable_case_file_is_refused(tmp_path, monkeypatch):
         ("[1, 2]", "found [1, 2] ... expected the keys of a case"),
         ("{", "not valid JSON"),
         ('{"name": "a", "name": "b"}', "not valid JSON ... 'name' is given twice"),
-        ("[" * 100_000, "not valid JSON ... nested too deeply"),
         (
             '{"schema": "kincheck-case/1", "name": "a", "source": "\\ud800"}',
             "source ... printable",

@@ -12,10 +12,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from kincheck.core.case.io import case_file
 from kincheck.core.case.io.document import LONGEST_MESSAGE
 
-from ..support.case_texts import BASE, CSV
+from ..support.case_texts import CSV
 from ..support.hostile_texts import TEXTS, proved
 
 # A file of 4 MB, the largest that is read, takes some seconds to be parsed in Python and some
@@ -103,12 +102,6 @@ def test_hostile_file_is_refused(kind, results):
     assert len(said) < LONGEST_MESSAGE + 100
     assert "; " in said or ". " in said  # what to type
     assert found["opened"] == []
-
-
-def test_marks_and_line_ends_of_other_systems_are_read(tmp_path):
-    for text in ("\ufeff" + BASE, BASE.replace("\n", "\r\n")):
-        (tmp_path / "case.toml").write_bytes(text.encode())
-        assert case_file.load_case(tmp_path / "case.toml").name == "slider"
 
 
 PLACES: dict[str, tuple[Callable[[Path], object], str]] = {
