@@ -51,6 +51,20 @@ def table(tmp_path):
     return write
 
 
+def changed_cell(row, column, change):
+    """Return the change of a table that changes the text of one cell."""
+
+    def changed(rows):
+        rows[row][column] = change(rows[row][column])
+        return rows
+
+    return changed
+
+
+def more(by):
+    return lambda cell: f"{float(cell) + by:.9g}"
+
+
 def largest(record, quantity="position"):
     """Return the largest deviation of outputs."""
     found = [each[quantity] for each in record["errors"].values()]
@@ -188,32 +202,28 @@ def test_matlab_zip_bomb_is_refused(judged, tmp_path, capsys):
     assert "bytes when unpacked; write fewer samples or channels" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("column", [2, 5, 7, 8, 13, 14, 16, 18, 21])
-@pytest.mark.parametrize("name", ["fourbar_xyzw.csv", "fourbar_123.csv"])
-def test_wrong_number_in_poses_is_located(judged, table, name, column):
-    quaternions = "xyzw" in name
-    if not quaternions and column > 18:
-        return
+COLUMNS = [2, 5, 7, 8, 13, 14, 16, 18, 21]
+
+
+@pytest.mark.parametrize(
+    ("name", "attitude", "column"),
+    [
+        *(("fourbar_xyzw.csv", XYZW, column) for column in COLUMNS),
+        *(("fourbar_123.csv", EULER, column) for column in COLUMNS[:-1]),
+    ],
+)
+def test_wrong_number_in_poses_is_located(judged, table, name, attitude, column):
     sample = 7 * column % 73
-
-    def moved(rows):
-        head, cell = rows[0][column], rows[sample + 1][column]
-        length = head.endswith("m]")
-        by = (1e-5 if quaternions else 1e-2) if length else (1e-4 if quaternions else 6e-3)
-        rows[sample + 1][column] = f"{float(cell) + by:.9g}"
-        return rows
-
-    status, record = judged(table(name, moved), *maps(XYZW if quaternions else EULER))
-    part = next(p for p, body in PARTS.items() if rows_head(name, column).startswith(body))
+    heads = (DATA / name).read_text().split("\n", 1)[0].split(",")
+    length, angle = {XYZW: (1e-5, 1e-4), EULER: (1e-2, 6e-3)}[attitude]
+    by = length if heads[column].endswith("m]") else angle
+    file = table(name, changed_cell(sample + 1, column, more(by)))
+    status, record = judged(file, *maps(attitude))
+    part = next(p for p, body in PARTS.items() if heads[column].startswith(body))
     found = re.search(r"gap of \S+ m in (\w+) at sample (\d+) \(([^)]*)\)", record["message"])
     assert status == 1
-    assert found is not None
     assert (int(found[2]), part in found[3]) == (sample, True)
     assert "72 of 73 samples" in record["message"]
-
-
-def rows_head(name, column):
-    return (DATA / name).read_text().split("\n", 1)[0].split(",")[column]
 
 
 @pytest.mark.parametrize(
@@ -359,11 +369,8 @@ def test_unequal_event_rows_need_option(judged, table, capsys):
     [(2, "left out 1 sample without the pose of a driver"), (9, "PART_3 at 1 sample")],
 )
 def test_gaps_in_poses_are_named(judged, table, cell, column, text):
-    def holed(rows):
-        rows[9][column] = cell
-        return rows
-
-    status, record = judged(table("fourbar_xyzw.csv", holed), *maps(XYZW))
+    file = table("fourbar_xyzw.csv", changed_cell(9, column, lambda _: cell))
+    status, record = judged(file, *maps(XYZW))
     assert status == 0
     assert text in record["message"]
 
@@ -405,10 +412,7 @@ def test_other_recording_formats_are_refused(judged, tmp_path, capsys, name, con
 
 
 def test_accuracy_option_of_recording(judged, table):
-    def moved(rows):
-        rows[8][1] = f"{float(rows[8][1]) + 1e-5:.9g}"
-        return rows
-
+    moved = changed_cell(8, 1, more(1e-5))
     file = table("fourbar_xyzw.csv", moved)
     assert judged(file, *maps(XYZW))[0] == 1
     status, record = judged(file, *maps(XYZW), "--accuracy", "position=0.02 mm")
@@ -472,50 +476,52 @@ RACK = RACK.replace('type = "gear"', 'type = "rack_pinion"\nradius = 0.05')
 RACK = RACK.replace('component = "x"', 'component = "z"')
 
 
+def turning(body, place, angle):
+    """Return the columns of a body that turns about z."""
+    nil, half = 0.0 * angle, 0.5 * angle
+    values = (*(nil + x for x in place), np.cos(half), nil, nil, np.sin(half))
+    names = ("x", "y", "z", "e0", "e1", "e2", "e3")
+    return {f"{body}.{name}": each for name, each in zip(names, values, strict=True)}
+
+
+@pytest.fixture
+def coupled(last_record, tmp_path):
+    """Returns the status and record of columns, recorded of a case of coupled joints."""
+
+    def run(text, columns):
+        case, file = tmp_path / "case.toml", tmp_path / "run.csv"
+        case.write_text(text)
+        rows = np.column_stack([*columns.values()])
+        np.savetxt(file, rows, "%.9f", ",", header=",".join(columns), comments="")
+        return last_record(case, "--recorded", file)
+
+    return run
+
+
 @pytest.mark.parametrize("driven", ["by column", "by poses"])
 @pytest.mark.parametrize("first", [0, 20, 45])
 @pytest.mark.parametrize("kind", ["gears", "rack"])
-def test_recorded_couplers_pass_after_turns(last_record, tmp_path, kind, first, driven):
+def test_recorded_couplers_pass_after_turns(coupled, kind, first, driven):
     turn = np.linspace(0.0, 12.0, 61)[first:]
-    half, nil = 0.5 * turn, 0.0 * turn
-    other = {"gears": -1.25 * turn, "rack": nil}[kind]
-    lift = {"gears": nil, "rack": 0.05 * turn}[kind]
-    columns = {
-        **({"turn": turn} if driven == "by column" else {}),
-        **dict(zip("xyz", (nil, nil, nil), strict=True)),
-        **dict(zip(("e0", "e1", "e2", "e3"), (np.cos(half), nil, nil, np.sin(half)), strict=True)),
-    }
-    columns = {name if name == "turn" else f"a.{name}": x for name, x in columns.items()}
-    columns |= {"b.x": nil + 0.3, "b.y": nil, "b.z": lift, "b.e0": np.cos(other)}
-    columns |= {"b.e1": nil, "b.e2": nil, "b.e3": np.sin(other)}
-    rows = [
-        ",".join(columns),
-        *(",".join(f"{x:.9f}" for x in row) for row in zip(*columns.values(), strict=True)),
-    ]
-    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
-    case.write_text({"gears": GEARS, "rack": RACK}[kind])
-    file.write_text("\n".join(rows))
-    status, record = last_record(case, "--recorded", file)
+    other, lift = {"gears": (-1.25, 0.0), "rack": (0.0, 0.05)}[kind]
+    columns = {"turn": turn} if driven == "by column" else {}
+    columns |= turning("a", (0.0, 0.0, 0.0), turn)
+    columns |= turning("b", (0.3, 0.0, lift * turn), 2.0 * other * turn)
+    text = {"gears": GEARS, "rack": RACK}[kind]
+    status, record = coupled(text, columns)
     assert status == 0
     assert ("coupled joints begin after whole turns" in record["message"]) == (first > 0)
-    case.write_text(case.read_text().replace("-0.4", "-0.40001").replace("0.05", "0.05001"))
-    assert last_record(case, "--recorded", file)[0] == 1
+    wrong = text.replace("-0.4", "-0.40001").replace("0.05", "0.05001")
+    assert coupled(wrong, columns)[0] == 1
 
 
-def test_recorded_gear_half_turn_off_fails(last_record, tmp_path):
+def test_recorded_gear_half_turn_off_fails(coupled):
     """A turn more of the driver would explain it; the driver's column says that there is none."""
     turn = np.linspace(0.0, 2.0, 11)
-    rows = ["turn," + ",".join(f"b.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))]
-    rows[0] += "," + ",".join(f"a.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))
-    for a in turn.tolist():
-        b = -2.5 * a - np.pi
-        wheel = (0.3, 0, 0, np.cos(b / 2), 0, 0, np.sin(b / 2))
-        crank = (0, 0, 0, np.cos(a / 2), 0, 0, np.sin(a / 2))
-        rows.append(",".join(f"{x:.9f}" for x in (a, *wheel, *crank)))
-    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
-    case.write_text(GEARS.replace('body = "b"\nposition = [0.4', 'body = "a"\nposition = [0.1'))
-    file.write_text("\n".join(rows))
-    assert last_record(case, "--recorded", file)[0] == 1
+    columns = {"turn": turn} | turning("b", (0.3, 0.0, 0.0), -2.5 * turn - np.pi)
+    columns |= turning("a", (0.0, 0.0, 0.0), turn)
+    text = GEARS.replace('body = "b"\nposition = [0.4', 'body = "a"\nposition = [0.1')
+    assert coupled(text, columns)[0] == 1
 
 
 @pytest.mark.parametrize(
