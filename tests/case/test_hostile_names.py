@@ -52,39 +52,24 @@ def run(name):
     """Everything that is a name or a message is called so."""
 
     def renamed(record, **changes):
-        outputs = [
-            msgspec.structs.replace(each, unit=name, sense=name, reason=name)
-            for each in record.outputs.values()
-        ]
-        errors = [msgspec.structs.replace(each, reason=name) for each in record.errors.values()]
-        texts = {
-            "case": name,
-            "engine": name,
-            "version": name,
-            "message": name,
-            "loop": name,
+        (output, *_), (error, *_) = record.outputs.values(), record.errors.values()
+        texts = dict.fromkeys(("case", "engine", "version", "message", "loop"), name)
+        quantities = {
+            "outputs": {name: msgspec.structs.replace(output, unit=name, sense=name, reason=name)},
+            "errors": {name: msgspec.structs.replace(error, reason=name)},
+            "driver": {name: [*range(21)]},
             "settings": {name: name},
         }
-        return msgspec.structs.replace(
-            record,
-            **(
-                {
-                    "outputs": {name: outputs[0]},
-                    "errors": {name: errors[0]},
-                    "driver": {name: [*range(21)]},
-                }
-                | texts
-                | changes
-            ),
-        )
+        return msgspec.structs.replace(record, **quantities | texts | changes)
 
     made = results()
     records = [
         renamed(made.records[0]),
         renamed(made.records[1], mode="simulate"),
-        renamed(made.records[1], outcome=Outcome.ERROR, mode=name, outputs={}, errors={}),
+        renamed(
+            made.records[1], engine="other", outcome=Outcome.ERROR, mode=name, outputs={}, errors={}
+        ),
     ]
-    records[2] = msgspec.structs.replace(records[2], engine="other")
     about = {"source": name, "signs": name, "driver": {"name": name, "type": name, "point": name}}
     return Results(run={"cases": {name: about}, name: name, "command": name}, records=records)
 
@@ -100,18 +85,8 @@ def test_hostile_name_in_terminal_table(name, show):
 
 
 def test_hostile_name_in_messages(name, capsys, tmp_path):
-    complain(
-        [
-            str(
-                fault(
-                    tmp_path / f"{name.replace('/', '')}.toml",
-                    name,
-                    "found nothing, expected something; add it",
-                )
-            ),
-            name,
-        ]
-    )
+    file = tmp_path / f"{name.replace('/', '')}.toml"
+    complain([str(fault(file, name, "found nothing, expected something; add it")), name])
     progress([])(run(name).records[0], 1, 2)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 3
@@ -124,8 +99,8 @@ def test_hostile_name_in_markdown(name):
     tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(text)
     kinds = [token.type for token in tokens]
     assert kinds.count("table_open") == 1
-    cells = len(re.findall(r"table_open.*?table_close", " ".join(kinds))[0].split("td_open")) - 1
-    assert cells == 3  # one case in two engines
+    table = kinds[kinds.index("table_open") : kinds.index("table_close")]
+    assert table.count("td_open") == 3  # one case in two engines
     inside = [child for token in tokens for child in token.children or ()]
     assert {child.type for child in inside} <= {"text", "code_inline", "softbreak"}
     assert not {
@@ -187,14 +162,10 @@ def test_hostile_name_in_csv(name):
 
 
 def test_csv_cell_of_number_and_formula():
-    assert [cell(each) for each in (-1.5, None, 3, "a-b", "")] == [-1.5, None, 3, "a-b", ""]
-    assert [cell(each) for each in ("=1+1", "-1", "+a", "@b", "\t=1")] == [
-        "'=1+1",
-        "'-1",
-        "'+a",
-        "'@b",
-        "'\\t=1",
-    ]
+    plain = [-1.5, None, 3, "a-b", ""]
+    assert [*map(cell, plain)] == plain
+    assert [*map(cell, ("=1+1", "-1", "+a", "@b"))] == ["'=1+1", "'-1", "'+a", "'@b"]
+    assert cell("\t=1") == "'\\t=1"
 
 
 def test_visible_keeps_printable_text():
@@ -216,18 +187,8 @@ def test_written_reference_stays_in_folder(kincheck_main, tmp_path):
     pytest.importorskip("flint")
     (tmp_path / "proofs").mkdir()
     case = replace(crank(reference=False), name="../escaped")
-    assert (
-        kincheck_main(
-            "reference",
-            "crank",
-            "--digits",
-            20,
-            "--out",
-            tmp_path / "proofs",
-            cases={"crank": case},
-        )
-        == 0
-    )
+    options = "--digits", 20, "--out", tmp_path / "proofs"
+    assert kincheck_main("reference", "crank", *options, cases={"crank": case}) == 0
     assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [
         Path("proofs/.._escaped.reference.json")
     ]
@@ -236,8 +197,6 @@ def test_written_reference_stays_in_folder(kincheck_main, tmp_path):
 def test_two_references_of_one_file(kincheck_main, tmp_path, capsys):
     cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
     assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2
-    assert (
-        "a_b.reference.json: found the file of a/b, expected one of its own"
-        in capsys.readouterr().err
-    )
+    told = "a_b.reference.json: found the file of a/b, expected one of its own"
+    assert told in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -35,8 +35,7 @@ def test_built_in_case_round_trip(name, tmp_path):
     for output, series in case.reference.items():
         for quantity in QUANTITIES:
             there, here = (getattr(each.reference[output], quantity) for each in (case, again))
-            assert (there is None) == (here is None)
-            assert there is None or np.array_equal(there, here, equal_nan=True)
+            np.testing.assert_equal(there, here)
         assert again.reference[output].uncertainty == {} == series.uncertainty
 
 
