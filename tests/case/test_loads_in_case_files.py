@@ -370,7 +370,9 @@ def test_sprung_hinge_keeps_its_rows(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "more", [{}, {"order": "dbca"}, {"cross": (0.6, 0.0, 0.8)}, {"twin": (0.6, 0.2, 1e-6)}]
+    "more",
+    [{}, {"order": "dbca"}, {"cross": (0.6, 0.0, 0.8)}, {"twin": (0.6, 0.2, 1e-6)}],
+    ids=["plain", "order", "cross", "twin"],
 )
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn", "simbody", "drake", "dart"])
 def test_engines_agree_on_undetermined_forces(tmp_path, engine, more):

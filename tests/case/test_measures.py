@@ -238,6 +238,6 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("change", "fragments"), WRONG)
+@pytest.mark.parametrize(("change", "fragments"), WRONG, ids=str)
 def test_wrong_measure_is_refused(tmp_path, change, fragments):
     complains(write(tmp_path, edited(change, base=MM + MEASURES)), fragments)

@@ -111,6 +111,7 @@ def test_unproved_sample_is_nan(made):
         ({"outputs": {}}, "outputs: found none, expected outputs of the case"),
         ({"schema": "kincheck-results/1"}, "expected a proved reference"),
     ],
+    ids=str,
 )
 def test_proved_reference_mismatch_is_refused(file, changes, problem):
     file.write_text(json.dumps(json.loads(file.read_text()) | changes))

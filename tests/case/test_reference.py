@@ -345,21 +345,25 @@ def test_slip_of_rounded_reference_is_named(tmp_path):
     assert "times 1000" in results.suspects["crank"].message
 
 
-WRONG = [
-    (
+WRONG = {
+    "few rows": (
         curve(OWN[:3]),
         EVEN,
         "rig.csv ... line 4 ... -0.951115 rad ... nearest is -1 rad",
     ),
-    (curve(OWN + 5.0), EVEN, "found driver values from 3.97 rad to ... -1 rad to 1 rad"),
-    (curve([*OWN, OWN[7]]), EVEN, "line 55 ... driver value ... twice ... at = "),
-    (curve(OWN), AT + "\nsteps = 3", "sweep.steps ... beside at ... remove steps or at"),
-    (curve(OWN), "start = 1\nstop = 2", 'sweep.steps ... missing ... at = "reference"'),
-    (curve(OWN), 'at = "rig"', "sweep.at ... 'rig' ... \"reference\""),
-]
+    "beyond the sweep": (
+        curve(OWN + 5.0),
+        EVEN,
+        "found driver values from 3.97 rad to ... -1 rad to 1 rad",
+    ),
+    "twice": (curve([*OWN, OWN[7]]), EVEN, "line 55 ... driver value ... twice ... at = "),
+    "steps": (curve(OWN), AT + "\nsteps = 3", "sweep.steps ... beside at ... remove steps or at"),
+    "no steps": (curve(OWN), "start = 1\nstop = 2", 'sweep.steps ... missing ... at = "reference"'),
+    "at": (curve(OWN), 'at = "rig"', "sweep.at ... 'rig' ... \"reference\""),
+}
 
 
-@pytest.mark.parametrize(("rows", "sweep", "fragments"), WRONG)
+@pytest.mark.parametrize(("rows", "sweep", "fragments"), WRONG.values(), ids=WRONG)
 def test_wrong_reference_grid_is_refused(tmp_path, rows, sweep, fragments):
     complains(crank_file(tmp_path, rows, sweep), fragments)
 

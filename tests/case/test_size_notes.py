@@ -69,6 +69,7 @@ def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"
         {"driver": "turn", "angle": "rad", "way": "6.28"},
         {"size": "0", "way": "0.001"},
     ],
+    ids=str,
 )
 def test_probable_size_has_no_note(tmp_path, given):
     assert said(tmp_path, **given) == []
@@ -108,6 +109,7 @@ def test_probable_size_has_no_note(tmp_path, given):
             "0.001 rad ... degrees converted to radians twice?",
         ),
     ],
+    ids=str,
 )
 def test_improbable_size_is_noted(tmp_path, given, words):
     """In the units of the file."""

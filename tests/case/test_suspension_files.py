@@ -364,7 +364,7 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "key", "words"), FAULTS)
+@pytest.mark.parametrize(("changes", "key", "words"), FAULTS, ids=str)
 def test_wrong_wheel_point_is_refused(changes, key, words):
     refused(lambda: loaded(pointed(**changes)), f"{key} ... {words}")
 

@@ -195,6 +195,7 @@ def test_wrong_co_simulation_output_fails(judged):
         ({"maps": ["sum=turn [rad]", "x=tip_x"]}, "found sum for turn, expected an input"),
         ({"jobs": "0"}, "--fmu runs foreign machine code in workers alone. Leave out --jobs 0"),
     ],
+    ids=str,
 )
 def test_unusable_fmu_is_refused(judged, capsys, options, text):
     given = {"fmi": 2, "kinds": [STEPS], "maps": ["angle=turn", "x=tip_x"], **options}

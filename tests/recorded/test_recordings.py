@@ -79,6 +79,7 @@ def largest(record, quantity="position"):
         ("fourbar_123.csv", maps(EULER), 3.3e-9),
         ("fourbar_xyzw.csv", [w + ", first" if "=" in w else w for w in maps(XYZW)], 1e-8),
     ],
+    ids=["Adams", "quaternions", "Euler angles", "from the first pose"],
 )
 def test_true_recorded_poses_pass(judged, file, options, gap):
     status, record = judged(DATA / file, *options)
@@ -113,6 +114,7 @@ def test_adams_results_are_judged_with_rates(judged):
         ("fourbar_modelica_single.mat", MODELICA, 1e-7),
         ("fourbar.mot", ANGLES, 1e-9),
     ],
+    ids=["Modelica", "single precision", "OpenSim"],
 )
 def test_true_recorded_angles_pass(judged, file, options, tolerance):
     status, record = judged(DATA / file, *options)
@@ -339,7 +341,11 @@ def test_recording_of_driver_alone_is_unjudged(judged, tmp_path):
     assert (status, record["outcome"]) == (2, "unjudged")
 
 
-@pytest.mark.parametrize("rows", [slice(20, 50), slice(1, None, 4), slice(1, 2)])
+@pytest.mark.parametrize(
+    "rows",
+    [slice(20, 50), slice(1, None, 4), slice(1, 2)],
+    ids=["window", "coarser", "one sample"],
+)
 def test_recording_of_fewer_samples_passes(judged, table, rows):
     file = table("fourbar_xyzw.csv", lambda every: [every[0], *every[rows]])
     assert judged(file, *maps(XYZW))[0] == 0
