@@ -354,7 +354,7 @@ WRONG = {
     "beyond the sweep": (
         curve(OWN + 5.0),
         EVEN,
-        "found driver values from 3.97 rad to ... -1 rad to 1 rad",
+        "driver values from 3.97 rad to ... -1 rad to 1 rad",
     ),
     "twice": (curve([*OWN, OWN[7]]), EVEN, "line 55 ... driver value ... twice ... at = "),
     "steps": (curve(OWN), AT + "\nsteps = 3", "sweep.steps ... beside at ... remove steps or at"),
