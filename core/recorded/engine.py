@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ..case.case import TIME, Case, Quantity, Series, Sweep, Truth
 from ..case.io.case_file import case_text
 from ..case.io.document import fault
+from ..case.io.reference_samples import RATES
 from ..case.measures import ForceMeasure
 from ..errors import CaseError, KincheckError, SolveError, UnsupportedError, number_of
 from ..harness.compare import output_series
@@ -137,12 +138,9 @@ class RecordedEngine:
 
     def _series(self, case: Case, output: Quantity) -> Series:
         """Return an output of its columns, or else of the recorded poses."""
-        own, count = self.samples.numbers.get(output.name), self.samples.count
-        if own is not None:
-            columns = [
-                own,
-                *(self.samples.numbers.get(f"{output.name}.{q}") for q in QUANTITIES[1:]),
-            ]
+        count = self.samples.count
+        if output.name in self.samples.numbers:
+            columns = [self.samples.numbers.get(output.name + ending) for ending in RATES]
             values = [None if each is None else each.values for each in columns]
             halves = [np.zeros(count) if each is None else each.half for each in columns]
         else:
@@ -367,7 +365,7 @@ def write_samples(case: Case, file: Path) -> None:
     names = [driver.name for driver in mechanism.drivers]
     heads, columns = [TIME], [path.times]
     for name, (x, v, a) in zip(names, path.drive(names, path.times).swapaxes(0, 1), strict=True):
-        heads += [name, f"{name}.velocity", f"{name}.acceleration"]
+        heads += [f"{name}{ending}" for ending in RATES]
         columns += [x + mechanism.design_value(name), v, a]
     with file.open("w", encoding="utf-8", newline="") as stream:
         table = csv.writer(stream)

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from ..case.case import TIME, Case, Quantity, Series, Sweep
-from ..case.io.reference_samples import DERIVATIVES
+from ..case.io.reference_samples import RATES
 from ..errors import shortened
 from ..harness.compare import deviation
 from ..harness.suspects import Held, Uncertain, slips
@@ -285,7 +285,7 @@ class _Change:
                     if sign < 0.0 or total != column.offset / column.size:
                         part = each.output.name, sign * column.sign, total, column.unit
                         maps.append(_map(column, *part))
-                    for key in (f"{each.output.name}{ending}" for ending in DERIVATIVES):
+                    for key in (f"{each.output.name}{ending}" for ending in RATES if ending):
                         if sign < 0.0 and (own_rate := self.stated.get(key)):
                             maps.append(_map(own_rate, key, -own_rate.sign, 0.0, own_rate.unit))
                 fits = fits and each.fits(left - middle)

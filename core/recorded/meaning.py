@@ -20,7 +20,7 @@ import numpy as np
 from ..algebra import Quat, Vec3, X, Y, Z, quat
 from ..case.case import TIME, Case, Quantity
 from ..case.io.document import decimal, fault, require_known, shown, unknown_name
-from ..case.io.reference_samples import DERIVATIVES, known_columns
+from ..case.io.reference_samples import RATES, known_columns
 from ..case.io.table import read_unit, required_unit
 from ..errors import MOST_NAMED, brief, shortened
 from ..trajectory import QUANTITIES, Array
@@ -91,8 +91,8 @@ def readings(count: int) -> list[Reading]:
 MAP = "--map"
 EVENT = "event"
 _AXES = {"x": "1", "y": "2", "z": "3"}
-_RATES = {"velocity": "m/s", "omega": "rad/s", "acceleration": "m/s^2", "alpha": "rad/s^2"}
-_UNITS = {"position": "m", "attitude": "rad", **_RATES}
+_OF_MOTION = {"velocity": "m/s", "omega": "rad/s", "acceleration": "m/s^2", "alpha": "rad/s^2"}
+_UNITS = {"position": "m", "attitude": "rad", **_OF_MOTION}
 _ADAMS = {
     "position": ("X", "Y", "Z"),
     "attitude": ("PSI", "THETA", "PHI"),
@@ -184,8 +184,7 @@ def inputs_of(case: Case) -> dict[str, str]:
     units = {TIME: "s"}
     for driver in case.mechanism.drivers:
         si = "rad" if driver.turns else "m"
-        rates = zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
-        units |= {driver.name + ending: si + per for ending, per in rates}
+        units |= {driver.name + ending: si + per for ending, per in RATES.items()}
     return units
 
 
@@ -318,7 +317,7 @@ class Reader:
             if key in ("euler", "quaternion"):
                 reading, names = self._reading(key, names)
                 what, si, count = "attitude", *(("rad", 3) if reading.angles else ("1", 4))
-            elif key in _RATES:
+            elif key in _OF_MOTION:
                 turned += [key] * ("body" in names)
                 names = [name for name in names if name != "body"]
             elif key != "position":

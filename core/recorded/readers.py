@@ -20,7 +20,7 @@ import numpy as np
 
 from ..case.curves import Printed
 from ..case.io.document import decimal, fault, read_bytes, read_text, shown
-from ..case.io.reference_samples import layout_of, read_table, samples_of
+from ..case.io.reference_samples import RATES, layout_of, read_table, samples_of
 from ..case.io.table import Table, unit_of_head
 from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, CaseError, brief, remedy, shortened
@@ -317,7 +317,7 @@ def _widened(table: Table) -> Table:
         at = dict(zip(heads, map(str, cells), strict=False))
         name, unit = at["output"], at["unit"]
         found = {f"{at['driver']} [{at['driver_unit']}]": at["driver_value"]}
-        for what, time in zip(("", ".velocity", ".acceleration"), ("", "/s", "/s^2"), strict=True):
+        for what, time in RATES.items():
             value = at[what.removeprefix(".") or "position"]
             if value or not what:
                 found[f"{name}{what} [{unit}{time}]"] = value

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..case.case import TIME, Case, Series, Sweep, Truth
 from ..case.curves import matched
 from ..case.io.document import fault, shown
+from ..case.io.reference_samples import RATES
 from ..case.io.schema import MOST_SAMPLES
 from ..kinematics import TURN, begun_turns
 from ..mechanism.motions import Absolute, JointDriver, Motion, Table
@@ -161,10 +162,7 @@ def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
     found = dict[str, Drive]()
     begun = begun_turns(case.mechanism, samples.motions)
     for driver in case.mechanism.drivers:
-        columns = [
-            samples.numbers.get(driver.name + ending)
-            for ending in ("", ".velocity", ".acceleration")
-        ]
+        columns = [samples.numbers.get(driver.name + ending) for ending in RATES]
         known = [each for each in columns if each is not None]
         if columns[0] is not None:
             known = known if len(known) == 3 else known[:1]

@@ -29,7 +29,7 @@ from ..units import Convert, FileUnits, Unit
 from .document import fault, shown, toml_table
 from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
-    DERIVATIVES,
+    RATES,
     Columns,
     Samples,
     driver_unit,
@@ -152,7 +152,7 @@ def compared(samples: Samples, columns: Columns, case: Case, *, own: bool) -> Ca
             continue
         found = {
             quantity: grid.column(columns.of[name].place, columns.of[name].convert)
-            for quantity, ending in zip(QUANTITIES, ("", *DERIVATIVES), strict=True)
+            for quantity, ending in zip(QUANTITIES, RATES, strict=True)
             if (name := output.name + ending) in columns.of
         }
         known[output.name] = Series(
@@ -421,7 +421,7 @@ def _columns(case: Case) -> dict[str, Array]:
     found = dict[str, Array]()
     for name, known in case.reference.items():
         quantities: Sequence[Array | None] = [getattr(known, each) for each in QUANTITIES]
-        for ending, values in zip(("", *DERIVATIVES), quantities, strict=True):
+        for ending, values in zip(RATES, quantities, strict=True):
             if values is not None:
                 found[name + ending] = values
     return found

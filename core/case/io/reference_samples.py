@@ -52,7 +52,8 @@ MOST_LINES = 2_000_000
 MOST_ABOVE = 1000
 COLUMNS, ROWS = "reference.columns", "reference.rows"
 """Places of a table in a case file."""
-DERIVATIVES = (".velocity", ".acceleration")
+RATES: Mapping[str, str] = {"": "", ".velocity": "/s", ".acceleration": "/s^2"}
+"""Endings of the columns of a quantity and of its rates, with their part of the unit."""
 _SIGNS = re.compile(r"\"?\s*#\s*signs:\s*(\w+)")
 
 
@@ -376,7 +377,7 @@ def known_columns(outputs: Iterable[Quantity]) -> dict[str, str]:
     return {
         output.name + ending: output.unit + time
         for output in outputs
-        for ending, time in zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
+        for ending, time in RATES.items()
     }
 
 
