@@ -35,12 +35,12 @@ from ..harness.native_engine import NativeEngine
 from ..harness.record import ROWS
 from ..harness.trajectory_check import Reported
 from ..trajectory import QUANTITIES, Array, Trajectory
-from .explain import Stated, explained
+from .explain import Stated, explain_slips
 from .judgement import judge_forces, judge_rows
 from .meaning import Accuracy, Meaning, Reader, inputs_of, unit_of
 from .readers import Head, read_recording
 from .samples import Samples, jet_of, point_motion, samples_of
-from .sweep import Resampled, as_is
+from .sweep import Resampled, at_own_samples
 
 TOL = 1e-12
 
@@ -106,8 +106,8 @@ class RecordedEngine:
         judged = judge_rows(case, self.samples, self.accuracy)
         standard = {**self._native, **case.reference}
         columns = {name: each.values for name, each in self.samples.numbers.items()}
-        values = self.resampled.lead, self.resampled.values, self._solved
-        slips = explained(case, outputs, columns, standard, self._columns, *values)
+        values = self.resampled.lead, self.resampled.values, self._solve_sweep
+        slips = explain_slips(case, outputs, columns, standard, self._columns, *values)
         notes = [*slips, *self.samples.notes, *self.resampled.notes]
         if gaps := self.samples.gaps:
             listed = ", ".join(f"{name} at {number_of(n, 'sample')}" for name, n in gaps.items())
@@ -156,7 +156,7 @@ class RecordedEngine:
             position = position + output.period * np.round(np.nan_to_num(turns))
         uncertainty = {
             quantity: half
-            + self._driven(output.name, quantity)
+            + self._driver_digits(output.name, quantity)
             + self.accuracy.of_output(output, quantity, x)
             for quantity, x, half in zip(QUANTITIES, values, halves, strict=True)
             if x is not None
@@ -202,7 +202,7 @@ class RecordedEngine:
             found[name] = Stated(column.head.name, use.sign, offset, unit, size, use.si)
         return found
 
-    def _solved(self, sweep: Sweep) -> Mapping[str, Series]:
+    def _solve_sweep(self, sweep: Sweep) -> Mapping[str, Series]:
         return native_outputs(replace(self.resampled.case, sweep=sweep))
 
     @cached_property
@@ -212,9 +212,9 @@ class RecordedEngine:
 
     @cached_property
     def _variants(self) -> list[Mapping[str, Series]]:
-        return [*map(self._solved, self.resampled.variants)]
+        return [*map(self._solve_sweep, self.resampled.variants)]
 
-    def _driven(self, name: str, quantity: str) -> Array:
+    def _driver_digits(self, name: str, quantity: str) -> Array:
         """Return the share of the digits of time and drivers in an output of native."""
         total = np.zeros(self.samples.count)
         base: Array | None = getattr(self._native.get(name), quantity, None)
@@ -301,7 +301,7 @@ class ProgramEngine:
         later.
         """
         try:
-            written(case)
+            case_for_program(case)
         except CaseError as error:
             return str(error)
         return None
@@ -322,7 +322,7 @@ class ProgramEngine:
                 name: Path(folder) / f"{name}.{'toml' if name == 'case' else 'csv'}"
                 for name in FILES
             }
-            files["case"].write_text(written(case), encoding="utf-8")
+            files["case"].write_text(case_for_program(case), encoding="utf-8")
             write_samples(case, files["samples"])
             said = self._run({name: str(file) for name, file in files.items()})
             if not files["out"].is_file():
@@ -349,7 +349,7 @@ class ProgramEngine:
         return said
 
 
-def written(case: Case) -> str:
+def case_for_program(case: Case) -> str:
     """Return the case file of a case without its reference; uneven samples stand in their own file
     alone.
     """
@@ -397,5 +397,5 @@ def read_answer(name: str, case: Case, file: Path) -> Reported:
     solved = np.atleast_1d(np.isfinite(values).any(axis=0))
     lost = number_of(int((~solved).sum()), "sample")
     message = "" if solved.all() else f"{name} gives no values at {lost}"
-    engine = RecordedEngine(name, samples, as_is(case))
+    engine = RecordedEngine(name, samples, at_own_samples(case))
     return engine.report(case, solved, message)

@@ -33,7 +33,7 @@ from .engine import RecordedEngine
 from .meaning import MAP, Meaning, Reader, Use, inputs_of, unit_of
 from .readers import Column, Head, Recording
 from .samples import samples_of
-from .sweep import as_is
+from .sweep import at_own_samples
 
 LARGEST_FMU, LARGEST_DESCRIPTION = 1_000_000_000, 64_000_000
 _REALS = ("Real", "Float64")
@@ -124,7 +124,7 @@ class FmuEngine:
         }
         recording = Recording(self.file, columns, self.tool, notes=notes)
         samples = samples_of(case, recording, Meaning(self.outputs, {}), whole=True)
-        return RecordedEngine(self.name, samples, as_is(case)).report(case)
+        return RecordedEngine(self.name, samples, at_own_samples(case)).report(case)
 
     def _notes(self) -> list[str]:
         """Return notes on inputs at their start values, and drivers without an input."""

@@ -14,7 +14,7 @@ import pytest
 from kincheck.core.case.case import ORDERS, Case, Sweep, Truth
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import with_all_coordinates
-from kincheck.core.case.io.reference_file import judged_by, read, series
+from kincheck.core.case.io.reference_file import read, series, with_proved_references
 from kincheck.core.errors import KincheckError
 from kincheck.core.jet import arctan2
 from kincheck.core.program import ball_executor
@@ -81,7 +81,7 @@ def test_native_errors_are_round_off(made):
 
 
 def test_proved_file_gives_nearest_doubles(made, file):
-    (judged,) = judged_by([crank(reference=False)], [file])
+    (judged,) = with_proved_references([crank(reference=False)], [file])
     assert judged.truth is Truth.IN_HOUSE_ORACLE
     for name, truth in crank().reference.items():
         for quantity in ("position", "velocity", "acceleration"):
@@ -115,13 +115,15 @@ def test_unproved_sample_is_nan(made):
 )
 def test_proved_reference_mismatch_is_refused(file, changes, problem):
     file.write_text(json.dumps(json.loads(file.read_text()) | changes))
-    refused(lambda: judged_by([crank()], [file]), f"crank.reference.json:  ... {problem}")
+    refused(
+        lambda: with_proved_references([crank()], [file]), f"crank.reference.json:  ... {problem}"
+    )
 
 
 def test_proved_reference_of_other_unit(file):
     file.write_text(file.read_text().replace('"unit":"m"', '"unit":"rad"', 1))
     told = "outputs.x: found another unit or convention of signs"
-    refused(lambda: judged_by([crank()], [file]), told)
+    refused(lambda: with_proved_references([crank()], [file]), told)
 
 
 def test_proof_with_decimal_numbers():

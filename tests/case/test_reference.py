@@ -11,11 +11,11 @@ import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.curves import (
     Printed,
-    bounded,
-    even,
-    interpolated,
-    matched,
-    multiples,
+    bound_rounding,
+    have_common_factor,
+    interpolate,
+    is_even_grid,
+    match_rows,
     slopes,
 )
 from kincheck.core.case.io import reference_samples
@@ -403,12 +403,12 @@ def test_half_unit_of_printed_digits(texts, half):
 
 
 def test_even_and_multiple_driver_values():
-    assert even(np.array([0.0625, 0.125, 0.1875]))
-    assert not even(np.round(np.arange(9) / 7.0, 6))
-    assert multiples(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
-    assert multiples(np.array([0.25, 0.5, 1.75]), 2)
-    assert not multiples(np.array([-79.9, -65.2, -5.1]), 1)
-    assert not multiples(np.array([1e60, 3e60]), 2)
+    assert is_even_grid(np.array([0.0625, 0.125, 0.1875]))
+    assert not is_even_grid(np.round(np.arange(9) / 7.0, 6))
+    assert have_common_factor(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
+    assert have_common_factor(np.array([0.25, 0.5, 1.75]), 2)
+    assert not have_common_factor(np.array([-79.9, -65.2, -5.1]), 1)
+    assert not have_common_factor(np.array([1e60, 3e60]), 2)
 
 
 def stripped(decimals):
@@ -460,7 +460,7 @@ def test_spline_rounding_bound(count):
     within = at > 1.0
     weights = np.abs(CubicSpline(x, np.eye(count))(at))
     expected = np.where(within, weights @ half, 0.0)
-    assert bounded(x, half, at, within) == pytest.approx(expected, rel=1e-9)
+    assert bound_rounding(x, half, at, within) == pytest.approx(expected, rel=1e-9)
 
 
 VELOCITIES = """
@@ -517,10 +517,10 @@ def test_reference_of_few_digits_is_noted(tmp_path):
 
 def test_rows_match_driver_values():
     at = np.array([0.0, 0.1, 0.2, 0.3])
-    assert matched(at, at, 1e-12).tolist() == [0, 1, 2, 3]
-    assert matched(np.array([0.3, 0.1]), at, 1e-12).tolist() == [-1, 1, -1, 0]
-    assert matched(np.array([0.3, 0.11]), at, 1e-12) is None
-    assert matched(np.array([0.3, 0.3]), at, 1e-12) is None
+    assert match_rows(at, at, 1e-12).tolist() == [0, 1, 2, 3]
+    assert match_rows(np.array([0.3, 0.1]), at, 1e-12).tolist() == [-1, 1, -1, 0]
+    assert match_rows(np.array([0.3, 0.11]), at, 1e-12) is None
+    assert match_rows(np.array([0.3, 0.3]), at, 1e-12) is None
 
 
 @pytest.mark.parametrize("count", [4, 5, 9, 30])
@@ -528,7 +528,7 @@ def test_interpolation_error_bound(count):
     jitter = np.random.default_rng(count).uniform(-0.3, 0.3, count)
     x = 2.0 * (np.arange(count) + jitter) / count
     at = np.linspace(x[0], x[-1], 101)
-    found, error = interpolated(x, np.sin(3.0 * x), at)
+    found, error = interpolate(x, np.sin(3.0 * x), at)
     assert (np.abs(found - np.sin(3.0 * at)) <= error + 1e-12).all()
     if count == 30:
         assert error.max() < 1e-2

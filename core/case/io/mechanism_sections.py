@@ -79,7 +79,7 @@ def read_mechanism(root: Section, keys: CaseKeys) -> Mechanism:
     free = any(root.at(table).value is not None for table in ("free", "equilibrium"))
     drivers = _drivers(root.at("drivers"), free=free)
     forces = [
-        _built(section, section.class_of("force", ELEMENTS), name)
+        _build(section, section.class_of("force", ELEMENTS), name)
         for name, section in root.at("forces").each()
     ]
     gravity = units.power(ACCELERATION, keys.gravity)
@@ -136,7 +136,7 @@ def _body(name: str, section: Section) -> Body:
         )
 
 
-def _built(section: Section, cls: Any, *name: str, driver: Unit | None = None) -> Any:
+def _build(section: Section, cls: Any, *name: str, driver: Unit | None = None) -> Any:
     """Return a joint, coupler, driver, motion or force element of a class.
 
     Args:
@@ -169,7 +169,7 @@ def _joints(root: Section) -> tuple[list[Joint], list[Coupler]]:
     sections = dict(root.at("joints").each())
     known = Joint.registry | Coupler.registry
     parts: list[Joint | Coupler] = [
-        _built(section, section.class_of("joint", known), name)
+        _build(section, section.class_of("joint", known), name)
         for name, section in sections.items()
     ]
     for name, section in root.at("couplers").each():
@@ -177,7 +177,7 @@ def _joints(root: Section) -> tuple[list[Joint], list[Coupler]]:
             raise section.fault(
                 f"found {name!r} in [joints] too, expected one name; rename one of them"
             )
-        parts.append(_built(section, section.class_of("coupler", Coupler.registry), name))
+        parts.append(_build(section, section.class_of("coupler", Coupler.registry), name))
         sections[name] = section
     freedoms = {part.name: part.freedoms for part in parts if isinstance(part, Joint)}
     couplers = list[Coupler]()
@@ -201,7 +201,7 @@ def _drivers(section: Section, *, free: bool) -> list[Driver]:
             f"found the name {TIME!r}, which [sweep] has for time itself; rename the driver"
         )
     found: list[Driver] = [
-        _built(each, each.class_of("driver", DRIVERS), name) for name, each in section.each()
+        _build(each, each.class_of("driver", DRIVERS), name) for name, each in section.each()
     ]
     driven = dict[tuple[str, str], str]()
     for each in found:
@@ -334,7 +334,7 @@ def _require_moved(
 def _motion(mechanism: Mechanism, name: str, section: Section) -> Motion:
     cls = section.class_of("motion", Motion.registry)
     driver = _unit(mechanism.driver(name), section.units)
-    motion = _built(section, cls, driver=driver)
+    motion = _build(section, cls, driver=driver)
     design = mechanism.design_value(name)
     return Absolute(motion, design) if design else motion
 
@@ -399,10 +399,10 @@ def mechanism_lines(case: Case) -> Iterator[str]:
         between = (
             {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         )
-        yield from toml_table(_own(joint, **between), "joints", joint.name)
+        yield from toml_table(_table_of(joint, **between), "joints", joint.name)
         for each in mechanism.bushings:
             if each.joint == joint.name:
-                own = {key: x for key, x in _own(each).items() if key != "type"}
+                own = {key: x for key, x in _table_of(each).items() if key != "type"}
                 name = each.name.removeprefix(f"{joint.name}.")
                 table = {"bodies": each.bodies, **own}
                 yield from toml_table(table, "joints", joint.name, "bushings", name)
@@ -411,16 +411,16 @@ def mechanism_lines(case: Case) -> Iterator[str]:
             place = {"body": point.body, "position": point.position}
             yield from toml_table(place, "points", point.name)
     for driver in mechanism.drivers:
-        yield from toml_table(_own(driver), "drivers", driver.name)
+        yield from toml_table(_table_of(driver), "drivers", driver.name)
         if motion := case.sweep.motions.get(driver.name):
             moved = _from_design(motion, mechanism.design_value(driver.name))
-            yield from toml_table(_own(moved), "drivers", driver.name, "motion")
+            yield from toml_table(_table_of(moved), "drivers", driver.name, "motion")
     for force in mechanism.forces:
         ends = {"bodies": force.bodies} if len(force.bodies) == 2 else {}
-        yield from toml_table(_own(force, **ends), "forces", force.name)
+        yield from toml_table(_table_of(force, **ends), "forces", force.name)
 
 
-def _own(item: Any, **between: Any) -> Mapping[str, Any]:
+def _table_of(item: Any, **between: Any) -> Mapping[str, Any]:
     """Return type and fields for a file, without optional fields at their defaults."""
     described: Any = type(item)  # pyright: ignore[reportUnknownVariableType]
     own = {f.name: getattr(item, f.name) for f in own_fields(described)}

@@ -74,7 +74,7 @@ def read_suspension(section: Section, case: Case) -> SuspensionTable:
     given |= {name: units.angle(given[name]) for name in ("static_toe", "static_camber")}
     given["kingpin"] = _kingpin(section, keys, case.mechanism)
     given |= {"forward": forward, "up": up, "middle": units.place(keys.center_plane)}
-    vehicle = _checked(section, Vehicle(**given), case.mechanism)
+    vehicle = _check_vehicle(section, Vehicle(**given), case.mechanism)
     travel = _travel(section, keys.travel, vehicle, case)
     if keys.other is None:
         alone = [travel] == list(case.sweep.path.motions)
@@ -94,7 +94,7 @@ def read_suspension(section: Section, case: Case) -> SuspensionTable:
         wheel_radius=keys.wheel_radius and vehicle.wheel_radius,
         wheel_contact=of_other.wheel_contact,
     )
-    other = _checked(section, other, case.mechanism)
+    other = _check_vehicle(section, other, case.mechanism)
     beside = _travel(section, of_other.travel, other, case)
     both = () if travel is None or beside is None else (travel, beside)
     vehicle, other = (replace(each, travel=both) for each in (vehicle, other))
@@ -141,7 +141,7 @@ def _kingpin(
     return keys.kingpin or rods
 
 
-def _checked(section: Section, vehicle: Vehicle, mechanism: Mechanism) -> Vehicle:
+def _check_vehicle(section: Section, vehicle: Vehicle, mechanism: Mechanism) -> Vehicle:
     """Return the vehicle with the radius by the point of the wheel's contact, after checks of its
     side and its points. The most common mistake is hardpoints of the other side, or in mirrored
     axes.
