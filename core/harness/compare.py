@@ -97,8 +97,8 @@ def _force_series(output: ForceMeasure, trajectory: Trajectory, moved: Trajector
     # a simulator may replace a joint by an equivalent, which gives no reaction of the joint
     if given is None or not given.has(output.forces):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
-    if output.placed:
-        output = output.located({name: _moving(moved.points[name]) for name in output.points})
+    if output.follows_points:
+        output = output.with_points({name: _moving(moved.points[name]) for name in output.points})
     values = np.where(trajectory.solved, output.values(given), np.nan)
     return Series(values, reason=output.undetermined(given))
 
