@@ -1,6 +1,7 @@
 """Recordings as engines: a four-bar by closed form in 40 digits, as other programs write it."""
 
 import csv
+import io
 import re
 import struct
 import zlib
@@ -11,6 +12,8 @@ import openpyxl
 import pytest
 from kincheck.adapters import engine
 from scipy.io import savemat
+
+from ..support.case_texts import write
 
 DATA = Path(__file__).parent.parent / "data" / "recordings"
 NATIVE = engine("native")
@@ -94,9 +97,8 @@ def test_map_of_body_to_prefix(judged, capsys):
     assert (status, record["outcome"]) == (0, "pass")
     assert 0.0 < record["details"]["rows"]["position"] < 7.6e-10
     assert judged(DATA / "fourbar_123.csv", *prefixes)[0] == 2
-    assert "found no pose of PART_2 in columns of known names below 'crank'" in (
-        capsys.readouterr().err
-    )
+    told = "found no pose of PART_2 in columns of known names below 'crank'"
+    assert told in capsys.readouterr().err
 
 
 def test_adams_results_are_judged_with_rates(judged):
@@ -169,38 +171,57 @@ def test_recording_in_other_formats_is_judged(judged, tmp_path, form, suffix):
     assert record["errors"]["JOINT_4.angle"]["position"]["worst_step"] == 30
 
 
-def test_matlab_matrix_without_rows_is_ignored(judged, tmp_path, capsys):
-    file = tmp_path / "run.mat"
-    file.write_bytes(struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0")
-    assert judged(file)[0] == 2
-    assert "found the columns none, expected one of MOTION_1" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("place", "number", "text"),
-    [
-        (176, 199, "numbers of type 199"),  # with which scipy 1.17 ends the process
-        (128, 13, "an element of type 13"),
-        (152, 1, "a matrix without its head"),
-        (132, 10**9, "an element is cut off"),
-    ],
-)
-def test_damaged_matlab_element_is_refused(judged, tmp_path, capsys, place, number, text):
-    file = tmp_path / "run.mat"
-    savemat(file, {"a": np.arange(9.0)})
-    data = bytearray(file.read_bytes())
+def damaged(place, number):
+    """Return a MAT-file with another number at a place."""
+    savemat(stream := io.BytesIO(), {"a": np.arange(9.0)})
+    data = bytearray(stream.getvalue())
     struct.pack_into("<I", data, place, number)
-    file.write_bytes(data)
-    assert judged(file)[0] == 2
+    return bytes(data)
+
+
+RESULTS = (DATA / "fourbar.res").read_text()
+TWO = RESULTS.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term")
+REFUSED = {
+    "MotionSolve": ("a.abf", b"\0", "of MotionSolve; in HyperGraph, export the curves as CSV"),
+    "Simpack": ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
+    "requests": ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
+    "level 7.3": ("a.mat", b"MATLAB 7.3 MAT-file", "of version 7.3; in MATLAB: save"),
+    "no MAT-file": ("a.mat", b"junk" * 99, "found no readable MAT-file"),
+    "no driver": ("a.csv", "time,z\n0,1\n", "the columns 'time', 'z', expected one of MOTION_1"),
+    "two analyses": (
+        "a.res",
+        TWO,
+        "the analyses 'kinematic_001', 'dynamic_002', expected one; say --analysis NAME",
+    ),
+    "cut off": ("a.res", RESULTS[:5000], "not valid XML"),
+    "old text": ("a.res", "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),
+    "entities": ("a.res", "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "expected"),
+    # a matrix without rows is left out
+    "no rows": (
+        "a.mat",
+        struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0",
+        "found the columns none, expected one of MOTION_1",
+    ),
+    # with which scipy 1.17 ends the process
+    "type of numbers": ("a.mat", damaged(176, 199), "numbers of type 199"),
+    "type of element": ("a.mat", damaged(128, 13), "an element of type 13"),
+    "no head": ("a.mat", damaged(152, 1), "a matrix without its head"),
+    "length": ("a.mat", damaged(132, 10**9), "an element is cut off"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_unreadable_recording_is_refused(judged, tmp_path, capsys, kind):
+    name, content, text = REFUSED[kind]
+    assert judged(write(tmp_path, content, name))[0] == 2
     assert text in capsys.readouterr().err
 
 
 def test_matlab_zip_bomb_is_refused(judged, tmp_path, capsys):
     head = b"MATLAB 5.0".ljust(124) + b"\0\1IM"
     packed = zlib.compress(bytes(300_000_000), 9)
-    file = tmp_path / "run.mat"
-    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
-    assert judged(file)[0] == 2
+    data = head + struct.pack("<II", 15, len(packed)) + packed
+    assert judged(write(tmp_path, data, "run.mat"))[0] == 2
     assert "bytes when unpacked; write fewer samples or channels" in capsys.readouterr().err
 
 
@@ -237,14 +258,13 @@ def test_wrong_number_in_poses_is_located(judged, table, name, attitude, column)
     ],
 )
 def test_wrong_number_in_adams_is_located(judged, tmp_path, number, text):
-    steps = (DATA / "fourbar.res").read_text().split('<Step type="kinematic">')
+    steps = RESULTS.split('<Step type="kinematic">')
     head, tail = steps[41].split("</Step>")
     numbers = head.split()
     numbers[number - 1] = repr(float(numbers[number - 1]) + 0.01)
     steps[41] = "\n" + " ".join(numbers) + "\n</Step>" + tail
-    file = tmp_path / "moved.res"
-    file.write_text('<Step type="kinematic">'.join(steps))
-    status, record = judged(file)
+    moved = '<Step type="kinematic">'.join(steps)
+    status, record = judged(write(tmp_path, moved, "moved.res"))
     assert status == 1
     assert text in record["message"]
 
@@ -328,16 +348,12 @@ def test_map_offset_has_a_unit(judged):
 def test_joints_without_poses_are_not_judged(judged):
     status, record = judged(DATA / "fourbar_xyzw.csv", *maps(XYZW, ["PART_2", "PART_4"]))
     assert status == 0
-    assert (
-        "joints not judged, without the pose of a body: JOINT_2 (PART_3), JOINT_3 (PART_3)"
-        in (record["message"])
-    )
+    told = "joints not judged, without the pose of a body: JOINT_2 (PART_3), JOINT_3 (PART_3)"
+    assert told in record["message"]
 
 
 def test_recording_of_driver_alone_is_unjudged(judged, tmp_path):
-    file = tmp_path / "driver.csv"
-    file.write_text("MOTION_1 [deg]\n0\n5\n")
-    status, record = judged(file)
+    status, record = judged(write(tmp_path, "MOTION_1 [deg]\n0\n5\n", "driver.csv"))
     assert (status, record["outcome"]) == (2, "unjudged")
 
 
@@ -381,42 +397,6 @@ def test_gaps_in_poses_are_named(judged, table, cell, column, text):
     assert text in record["message"]
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        (lambda t: t.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term"),
-         "found the analyses 'kinematic_001', 'dynamic_002', expected one; say --analysis NAME"),
-        (lambda t: t[:5000], "not valid XML"),
-        (lambda t: "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),
-        (lambda t: "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "expected"),
-    ],
-    ids=["two analyses", "cut off", "old text", "entities"],
-)  # fmt: skip
-def test_unreadable_adams_results_are_refused(judged, tmp_path, capsys, change, text):
-    file = tmp_path / "changed.res"
-    file.write_text(change((DATA / "fourbar.res").read_text()))
-    assert judged(file)[0] == 2
-    assert text in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "text"),
-    [
-        ("a.abf", b"\0", "binary result of MotionSolve; in HyperGraph, export the curves as CSV"),
-        ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
-        ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
-        ("a.mat", b"MATLAB 7.3 MAT-file", "found a MAT-file of version 7.3; in MATLAB: save"),
-        ("a.mat", b"junk" * 99, "found no readable MAT-file"),
-        ("a.csv", b"time,z\n0,1\n", "found the columns 'time', 'z', expected one of MOTION_1"),
-    ],
-)
-def test_other_recording_formats_are_refused(judged, tmp_path, capsys, name, content, text):
-    file = tmp_path / name
-    file.write_bytes(content)
-    assert judged(file)[0] == 2
-    assert text in capsys.readouterr().err
-
-
 def test_accuracy_option_of_recording(judged, table):
     moved = changed_cell(8, 1, more(1e-5))
     file = table("fourbar_xyzw.csv", moved)
@@ -429,15 +409,11 @@ def test_accuracy_option_of_recording(judged, table):
 def test_even_driver_values_are_exact(judged, tmp_path):
     _, truth = judged(DATA / "fourbar.mot", *ANGLES)
     angles = truth["outputs"]["JOINT_4.angle"]["position"]
-    file = tmp_path / "a.csv"
-
-    def write(change):
+    for change, status in ((0.0, 0), (1e-6, 1)):
         rows = [f"{5 * k},{x + change * (k == 30)!r}" for k, x in enumerate(angles)]
-        file.write_text("\n".join(["MOTION_1 [deg],JOINT_4.angle [rad]", *rows]))
-        return judged(file, "--accuracy", "JOINT_4.angle=1e-8 rad")[0]
-
-    assert write(0.0) == 0
-    assert write(1e-6) == 1
+        text = "\n".join(["MOTION_1 [deg],JOINT_4.angle [rad]", *rows])
+        file = write(tmp_path, text, "a.csv")
+        assert judged(file, "--accuracy", "JOINT_4.angle=1e-8 rad")[0] == status
 
 
 GEARS = """schema = "kincheck-case/1"
