@@ -17,10 +17,6 @@ BROKEN = {
         ("axis = [1", "axes = [1"),
         "joints.guide.axes ... unknown key ... did you mean 'axis'",
     ),
-    "unknown key at the top": (
-        ("[bodies.slider]", "[body.slider]"),
-        "body ... unknown key ... did you mean 'bodies'",
-    ),
     "unknown key far off": (
         ("atol = 1e-9", "atol = 1e-9\nqqq = 1"),
         "outputs.tip_x.qqq ... unknown key ... remove it",
@@ -103,10 +99,6 @@ BROKEN = {
         ("axis = [1.0, 0.0, 0.0]", "axis = [1, 0]"),
         "joints.guide.axis ... [1, 0] ... a direction [x, y, z]",
     ),
-    "axis of text": (
-        ("axis = [1.0, 0.0, 0.0]", 'axis = ["a", 0, 0]'),
-        "joints.guide.axis ... 'a'",
-    ),
     "axis of truth": (
         ("axis = [1.0, 0.0, 0.0]", "axis = [true, 0, 0]"),
         "joints.guide.axis ... True",
@@ -114,10 +106,6 @@ BROKEN = {
     "NaN": (
         ("axis = [1.0, 0.0, 0.0]", "axis = [1, nan, 0]"),
         "joints.guide.axis[1] ... nan ... finite",
-    ),
-    "infinity": (
-        ("position = [1.5", "position = [-inf"),
-        "points.tip.position[0] ... -inf ... finite",
     ),
     "overflowing": (("position = [1.5", "position = [1e200"), "points.tip.position[0] ... 1e+200"),
     "underflowing axis": (
@@ -151,8 +139,6 @@ BROKEN = {
     "no steps": (("steps = 3", "steps = 0"), "sweep.steps ... found 0 ... 1 to 1000000"),
     "half a step": (("steps = 3", "steps = 2.5"), "sweep.steps ... 2.5 ... whole number"),
     "too many steps": (("steps = 3", "steps = 1_000_000_000_000"), "sweep.steps ... 1 to 1000000"),
-    "endless start": (("start = -0.1", "start = inf"), "sweep.start ... inf"),
-    "NaN rate": (("rate = 2.0", "rate = nan"), "sweep.rate ... nan"),
     "no motion": (("stop = 0.1", "stop = -0.1"), "sweep.stop ... steps = 1"),
     "one step of two": (
         ("steps = 3", "steps = 1"),
