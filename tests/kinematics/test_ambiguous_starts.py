@@ -18,7 +18,7 @@ FAR = 1.0
 
 
 @pytest.mark.parametrize("solved", WAYS)
-def test_two_ways_to_different_turns_are_never_chosen_in_silence(solved):
+def test_ambiguous_start_is_noted(solved):
     mechanism = arm(60.0)
     motions = circling(mechanism, [phase + FAR for phase in phases_of(60.0)])
     found = solved(case_of(mechanism, motions))
@@ -34,7 +34,7 @@ def test_two_ways_to_different_turns_are_never_chosen_in_silence(solved):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_two_samples_at_the_design_are_ambiguous(sign):
+def test_start_with_two_design_samples(sign):
     """The nearer one to time zero is the start, before it or after."""
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     waves = {name: Sine(0.5, 0.5, -0.5 * math.pi * sign) for name in "uv"}
@@ -44,7 +44,7 @@ def test_two_samples_at_the_design_are_ambiguous(sign):
     assert start.other.time == times[2]
 
 
-def test_two_ways_to_one_motion_are_one():
+def test_equal_starts_are_not_ambiguous():
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     found = by_style("native")(case_of(mechanism, {"u": Sine(2.0, 1.0, 1.0), "v": Ramp(0.3)}))
     (note,) = found.details["notes"]
@@ -55,7 +55,7 @@ def test_two_ways_to_one_motion_are_one():
 
 
 @pytest.mark.parametrize("solved", WAYS)
-def test_where_one_way_is_closed_the_other_is_taken(solved):
+def test_start_with_one_reachable_way(solved):
     """Straight to time zero, the tip would go through the hinge, where links of different lengths
     cannot bring it.
     """

@@ -66,7 +66,7 @@ def found_from(mechanism, angle, shift, style="mixed"):
 @pytest.mark.parametrize(
     ("angle", "shift"), [(0.01, 0.01), (0.3, 0.03), (0.8, 0.08), (0.8, 0.2), (1.2, 0.12)]
 )
-def test_errors_up_to_a_radian_are_always_mended(angle, shift):
+def test_assembly_from_errors_below_radian(angle, shift):
     assert found_from(mcpherson(), angle, shift) == (1.0, 1.0, 0.0)
 
 
@@ -74,7 +74,7 @@ def test_errors_up_to_a_radian_are_always_mended(angle, shift):
     ("angle", "shift", "share"),
     [(0.8, 1.0, 0.7), (0.8, 2.0, 0.5), (1.2, 1.0, 0.6), (2.0, 0.2, 0.4)],
 )
-def test_metres_of_offset_are_mostly_mended_and_the_rest_are_other_assemblies(angle, shift, share):
+def test_assembly_from_offsets_of_metres(angle, shift, share):
     """Measured 81, 60, 68 and 46 %; the rest ends in other assemblies or, rarely, nowhere: never on
     a zero that is none.
     """
@@ -84,7 +84,7 @@ def test_metres_of_offset_are_mostly_mended_and_the_rest_are_other_assemblies(an
     assert spurious == 0.0
 
 
-def test_what_contradicts_redundant_rows_is_no_assembly(monkeypatch):
+def test_assembly_rejects_violated_redundant_rows(monkeypatch):
     """A hinge 2e-10 out of line is accepted as rounding; with a limit below that, it is told as
     spurious.
     """
@@ -101,31 +101,31 @@ def test_what_contradicts_redundant_rows_is_no_assembly(monkeypatch):
     assert not found.converged.any()
 
 
-def test_bodies_ten_sizes_away_come_home_or_to_another_assembly():
+def test_assembly_from_ten_sizes_away():
     converged, _, spurious = found_from(mcpherson(), 0.8, 10.0)
     assert converged >= 0.75  # 3 % where the damping has no limit
     assert spurious == 0.0
 
 
-def test_half_a_turn_away_nothing_is_spurious():
+def test_assembly_from_half_turn_away():
     converged, _, spurious = found_from(mcpherson(), 3.0, 1.0)
     assert converged >= 0.3
     assert spurious == 0.0
 
 
-def test_exact_rows_do_worse_and_their_spurious_zeros_are_told():
+def test_assembly_by_exact_rows_is_spurious():
     _, home, spurious = found_from(mcpherson(), 0.8, 0.08, "conventional")
     assert home < 0.9
     assert spurious > 0.1  # formulation section 3
 
 
-def test_damping_is_what_mends_offsets(monkeypatch):
+def test_assembly_without_damping_is_worse(monkeypatch):
     damped = found_from(mcpherson(), 0.8, 1.0)[1]
     monkeypatch.setattr("kincheck.core.kinematics.assembly.assemble.DAMPING", 1e-9)
     assert found_from(mcpherson(), 0.8, 1.0)[1] < damped - 0.2
 
 
-def test_poses_close_in_the_papers_variables():
+def test_assembled_poses_match_solved_poses():
     mechanism = mcpherson()
     rng = np.random.default_rng(5)
     found = assemble(
@@ -141,7 +141,7 @@ def test_poses_close_in_the_papers_variables():
 
 
 @pytest.mark.parametrize("angle", [0.0, 3.0, 7.0])
-def test_a_driven_joint_may_be_turns_away(angle):
+def test_assembly_with_driver_turns_away(angle):
     mechanism = four_bar()
     (driver,) = mechanism.drivers
     bodies = [b.name for b in mechanism.moving]
@@ -151,7 +151,7 @@ def test_a_driven_joint_may_be_turns_away(angle):
     assert found.iterations[0] <= 8
 
 
-def test_estimates_that_lead_nowhere_are_nan():
+def test_assembly_beyond_reach_is_nan():
     mechanism = mcpherson()
     knuckle = mechanism.body("knuckle")
     found = assemble(
@@ -163,13 +163,13 @@ def test_estimates_that_lead_nowhere_are_nan():
     assert np.isnan(found.bodies["knuckle"].r).all()
 
 
-def test_without_estimates_it_closes_from_the_design():
+def test_assembly_without_estimates():
     found = assemble(four_bar(), {})
     assert found.converged.tolist() == [True]
 
 
 @pytest.mark.parametrize("close", [assemble, find_assemblies])
-def test_names_that_are_not_there_are_told(close):
+def test_assembly_of_unknown_name_is_refused(close):
     with pytest.raises(
         SolveError,
         match=rf"{close.__name__}: there is no moving body 'crnk'; did you mean 'crank'\?",
@@ -181,7 +181,7 @@ def test_names_that_are_not_there_are_told(close):
         close(four_bar(), {}, {"trn": 0.1})
 
 
-def test_estimates_of_what_does_not_move_or_of_other_shapes_are_refused():
+def test_assembly_refuses_bad_estimates():
     """A fixed body has no pose to be found, and lanes are the same for all bodies."""
     mechanism = replace(four_bar(), bodies=[*four_bar().bodies, Body("wall", fixed=True)])
     r, p = np.zeros((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
@@ -207,7 +207,7 @@ def test_estimates_of_what_does_not_move_or_of_other_shapes_are_refused():
 
 
 @pytest.mark.parametrize("tol", [np.inf, np.nan, 0.0, -1.0])
-def test_a_tolerance_that_is_none_is_refused(tol):
+def test_assembly_refuses_bad_tolerance(tol):
     """All that is not closed would be, or nothing."""
     for close in (assemble, find_assemblies):
         with pytest.raises(

@@ -33,7 +33,7 @@ def closes(mechanism, assembly):
 @pytest.mark.parametrize(
     "mechanism", [four_bar(), cases.load("rssr").mechanism], ids=["four_bar", "rssr"]
 )
-def test_a_four_bar_has_two_assemblies_that_its_branch_tells_apart(mechanism):
+def test_four_bar_has_two_assemblies(mechanism):
     found = find_assemblies(mechanism, at_design(mechanism), samples=40, spread=None)
     assert len(found.found) == 2
     assert all(closes(mechanism, each) for each in found.found)
@@ -48,7 +48,7 @@ def test_a_four_bar_has_two_assemblies_that_its_branch_tells_apart(mechanism):
     assert min(here.starts, other.starts) >= 5
 
 
-def test_the_other_assembly_of_the_four_bar_is_its_mirror_image():
+def test_second_assembly_is_mirror_image():
     """C mirrored in the line through B and D, by the law of the circles."""
     mechanism = four_bar()
     _, other = find_assemblies(mechanism, at_design(mechanism), samples=20, spread=None).found
@@ -59,7 +59,7 @@ def test_the_other_assembly_of_the_four_bar_is_its_mirror_image():
     assert np.abs(r + naive.A(p) @ C - mirrored).max() <= 1e-12
 
 
-def test_nearest_of_many_starts_is_the_intended_assembly():
+def test_nearest_assembly_is_intended():
     """0.8 rad and a metre of offset: one start ends elsewhere every fifth time; the nearest of many
     hardly ever.
     """
@@ -81,7 +81,7 @@ def test_nearest_of_many_starts_is_the_intended_assembly():
     assert right >= 27
 
 
-def test_a_body_of_unknown_pose_may_be_anywhere():
+def test_assemblies_with_body_of_unknown_pose():
     mechanism = mcpherson()
     known = perturbed(mechanism, 0.2, 0.05, np.random.default_rng(2), 1)
     known = {name: (r[0], p[0]) for name, (r, p) in known.items() if name != "strut"}
@@ -89,7 +89,7 @@ def test_a_body_of_unknown_pose_may_be_anywhere():
     assert is_home(mechanism, {name: r for name, (r, _) in found.found[0].poses.items()})
 
 
-def test_the_same_seed_finds_the_same():
+def test_assemblies_repeat_by_seed():
     mechanism = mcpherson()
     one, same, other = (
         find_assemblies(mechanism, {}, samples=30, seed=seed, spread=None) for seed in (4, 4, 5)
@@ -98,7 +98,7 @@ def test_the_same_seed_finds_the_same():
     assert [each.starts for each in one.found] != [each.starts for each in other.found]
 
 
-def test_the_delta_robot_has_two_assemblies_with_a_level_platform_and_others():
+def test_delta_robot_assemblies():
     """A level platform is where three spheres meet, above or below; with the rods of a pair crossed
     it is tilted.
     """
@@ -111,7 +111,7 @@ def test_the_delta_robot_has_two_assemblies_with_a_level_platform_and_others():
     assert 10 <= len(found) <= 40
 
 
-def test_a_gough_platform_has_several():
+def test_gough_platform_assemblies():
     mechanism = cases.load("gough_platform").mechanism
     found = find_assemblies(mechanism, at_design(mechanism), samples=24, spread=None)
     assert len(found.found) >= 8
@@ -127,7 +127,7 @@ def counted(*starts):
     return Assemblies(found, sum(starts) + 3, 3, 0)
 
 
-def test_few_starts_tell_how_many_assemblies_are_missing():
+def test_estimate_of_missing_assemblies_by_hand():
     """Chao's and Good's estimates by hand: four found once, one twice, one three times."""
     found = counted(1, 1, 1, 1, 2, 3)
     assert (found.once, found.estimated, found.unlisted) == (4, 6 + 4 * 3 / (2 * 2), 4 / 9)
@@ -136,7 +136,7 @@ def test_few_starts_tell_how_many_assemblies_are_missing():
     assert found.missing in found.summary()
 
 
-def test_estimates_are_right_for_many_classes():
+def test_estimate_of_missing_assemblies_converges():
     """512 ways that random starts lead to alike: the estimates hit the number and the share."""
     random = np.random.default_rng(3)
     for n in (600, 2400):
@@ -146,14 +146,14 @@ def test_estimates_are_right_for_many_classes():
         assert abs(found.unlisted - (seen == 0).mean()) < 0.05
 
 
-def test_a_list_found_often_is_not_called_complete():
+def test_repeated_assemblies_may_be_incomplete():
     found = counted(98, 102)
     assert (found.once, found.estimated, found.unlisted) == (0, 2.0, 0.0)
     assert "one that fewer than 1 of 66 starts reach can be missing" in found.missing
     assert counted().missing == ""
 
 
-def test_the_command_says_what_may_be_missing(tmp_path, capsys):
+def test_assemblies_command_reports_missing(tmp_path, capsys):
     file = tmp_path / "found.json"
     assert main(["assemblies", "gough_platform", "--samples", "24", "--json", str(file)]) == 0
     out, written = capsys.readouterr().out, json.loads(file.read_text())
@@ -163,7 +163,7 @@ def test_the_command_says_what_may_be_missing(tmp_path, capsys):
     assert out.rstrip().endswith("raise --samples.")
 
 
-def test_assemblies_that_meet_are_one_and_singular():
+def test_meeting_assemblies_are_one():
     """A chain of four-bars on one side of which a loop has folded flat: poses there are known to
     half the digits only.
     """
@@ -177,7 +177,7 @@ def test_assemblies_that_meet_are_one_and_singular():
     assert len(found.found) <= 6  # poses known to 1e-7 only are not taken for many
 
 
-def test_the_command_lists_and_writes_them(tmp_path, capsys):
+def test_assemblies_command_writes_json(tmp_path, capsys):
     assert (
         main(
             [
@@ -205,7 +205,7 @@ def test_the_command_lists_and_writes_them(tmp_path, capsys):
     assert "assemblies from" in captured.err
 
 
-def test_beyond_its_reach_it_has_none(capsys):
+def test_assemblies_command_beyond_reach(capsys):
     assert main(["assemblies", "mcpherson_strut", "--at", "0.6", "--samples", "20"]) == 1
     out = capsys.readouterr().out
     assert "0 assemblies" in out
@@ -214,7 +214,7 @@ def test_beyond_its_reach_it_has_none(capsys):
 
 
 @pytest.mark.parametrize("to", READERS)
-def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkeypatch):
+def test_export_starts_in_chosen_assembly(to, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mechanism = cases.load("four_bar").mechanism
     argv = [
@@ -260,7 +260,7 @@ def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkey
         (["rssr", "--samples", "0"], "not a whole number of 1 or more"),
     ],
 )
-def test_what_cannot_be_done_is_said(argv, said, tmp_path, monkeypatch, capsys):
+def test_assemblies_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["assemblies", *argv]) == 2
     assert said in capsys.readouterr().err

@@ -44,7 +44,7 @@ IN_BLOCKS = pytest.mark.parametrize("method", METHODS[1:])
         "rssr",
     ],
 )
-def test_blocks_give_what_one_program_gives(name, method):
+def test_blocks_match_one_program(name, method):
     case = cases.load(name)
     assert_alike(*with_one_program(method, case.mechanism, case.sweep.path, case.points))
 
@@ -59,7 +59,7 @@ def test_blocks_give_what_one_program_gives(name, method):
         np.array([0.5, 0.5, -0.5]),
     ],
 )
-def test_any_samples_in_blocks(times, method):
+def test_blocks_with_unordered_samples(times, method):
     for mechanism in (slider_crank(1.01), four_bar()):
         points = tuple(point.name for point in mechanism.points)
         path = Path({"turn": Ramp(2.0)}, times)
@@ -111,7 +111,7 @@ def test_bennett_loop_has_one_verdict():
 
 @pytest.mark.parametrize("ends", ["distance", "hinges"])
 @pytest.mark.parametrize(("off", "reached"), [(0.0, 9), (1e-6, 5), (1e-4, 5)])
-def test_parallelogram_in_a_ring_has_one_verdict(off, reached, ends):
+def test_parallelogram_in_ring_has_one_verdict(off, reached, ends):
     turn = np.linspace(0.0, -1.1, 9)
     for found in in_every_way(inside(off, ends), turn, ()):
         assert found.solved.sum() == reached
@@ -127,7 +127,7 @@ def test_links_in_line_have_one_verdict(count):
         assert np.abs(found.points["end"].position - expected).max() <= 1e-11
 
 
-def test_components_refuse_no_wrong_rates():
+def test_component_rates_beside_singular_pose():
     """Two millionths of a radian from a singular pose, rates were wrong in silence."""
     turn = LEAN + np.pi / 2.0 - np.array([1e-1, 1e-5, 2e-6])
     found = solve(chain(21), "turn", turn)
@@ -136,7 +136,7 @@ def test_components_refuse_no_wrong_rates():
     assert (off[found.solved] <= 1e-9).all()
 
 
-def test_scrutiny_of_a_route_is_remembered():
+def test_singular_samples_are_cached_by_route():
     """A route that is solved again gives the same digits, findings and details, and its owner may
     change them.
     """
@@ -155,7 +155,7 @@ def test_scrutiny_of_a_route_is_remembered():
     assert solver(1e-12).details == first.details
 
 
-def test_scrutiny_of_other_poses_is_not_taken():
+def test_singular_samples_of_other_poses():
     mechanism, _ = torus(2, 2)
     path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
     route = Route(recent_model(mechanism, Request(("turn",), ("tip",))), path)

@@ -39,7 +39,7 @@ SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
 
 
 @pytest.mark.parametrize("turn", SPURIOUS)
-def test_dot12_has_none_of_the_papers_spurious_zeros(turn):
+def test_dot12_has_no_spurious_zeros(turn):
     """(17) vanishes at seven wrong rotations, of 180 and 120 degrees; the Euler parameters do not
     (formulation section 3).
     """
@@ -53,7 +53,7 @@ def test_dot12_has_none_of_the_papers_spurious_zeros(turn):
 
 
 @pytest.mark.parametrize("style", [PaperDot12(), LockTest(Y, Z)])
-def test_other_styles_name_the_spurious_zeros(style):
+def test_branch_of_spurious_zeros(style):
     assert all(style.branch(GROUND_POSE, Pose.of(ZERO, turn))[0] < 0.0 for turn in SPURIOUS)
     assert style.branch(GROUND_POSE, Pose.of(ZERO, rotation(X, 0.5)))[0] > 0.0
 
@@ -96,7 +96,7 @@ def test_branch_of_constant_velocity():
         assert (shafts.branch(GROUND_POSE, over)[0] > 0.0) == right
 
 
-def test_a_shaft_is_bent_up_to_where_it_is_folded():
+def test_constant_velocity_shaft_bends_to_fold():
     """Two shafts of one speed, the second on a carrier that is turned from straight to 175 degrees:
     their turns stay the same.
     """
@@ -119,7 +119,7 @@ def test_a_shaft_is_bent_up_to_where_it_is_folded():
     assert np.abs(found.points["rim"].position - expected).max() <= 1e-12
 
 
-def test_of_the_native_primitives_these_need_a_branch_test(rng):
+def test_primitives_with_branch_test(rng):
     i, j = body(rng), body(rng)
     assert [kind for kind in MAKERS if make(kind, rng).primitive.branch(i.pose, j.pose)] == [
         p.ConstantVelocity,
@@ -176,7 +176,7 @@ def test_basin_of_dot11(rng):
 
 
 @pytest.mark.parametrize("degrees", [1.0, 30.0, 66.0, 80.0, 100.0, 150.0, 179.0])
-def test_one_step_of_dot11(degrees):
+def test_newton_step_of_dot11(degrees):
     """Isolated, a misalignment a is turned back by 2 atan(sin(a) / 2) with the simplified rows,
     which always shrinks it, and by 2 atan(tan(a) / 2) with the exact ones: forward, beyond 90
     degrees. (Turned back by the full angle instead of its tangent, the exact ones fail beyond 66.8
@@ -239,7 +239,7 @@ def test_branch_of_driven_angle(coupled):
 
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("turns", [1, 2, 3, -1, -4])
-def test_a_turn_between_two_samples_is_not_lost(turns, style):
+def test_turns_between_samples_are_counted(turns, style):
     """A wheel stands, makes whole turns and stands again: where it stands it says nothing of them,
     but the wheel it drives does.
     """

@@ -8,7 +8,7 @@ import pytest
 from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
 
 
-def test_what_was_made_for_a_thread_goes_with_it():
+def test_thread_cache_ends_with_thread():
     bound = ThreadCache()
     made = WeakSet()
 
@@ -27,7 +27,7 @@ def test_what_was_made_for_a_thread_goes_with_it():
     assert len(made) == 1
 
 
-def test_a_thread_keeps_what_it_used_last():
+def test_thread_cache_replaces_oldest_key():
     bound, made = ThreadCache(), list[int]()
 
     def ask(key):
@@ -43,7 +43,7 @@ def test_a_thread_keeps_what_it_used_last():
 
 
 @pytest.mark.parametrize("per_thread", [False, True])
-def test_a_function_keeps_its_last_results(per_thread):
+def test_cache_last_keeps_recent_results(per_thread):
     made = list[int]()
 
     @cache_last(2, per_thread=per_thread)
@@ -61,7 +61,7 @@ def test_a_function_keeps_its_last_results(per_thread):
 
 
 @pytest.mark.parametrize("per_thread", [False, True])
-def test_clearing_reaches_every_thread(per_thread):
+def test_clear_caches_reaches_every_thread(per_thread):
     class Large:
         pass
 

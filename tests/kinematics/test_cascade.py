@@ -34,7 +34,7 @@ def compared(mechanism, path, points):
     assert_alike(*with_one_program(Method.BY_COMPONENTS, mechanism, path, points))
 
 
-def test_numpy_runs_components_too():
+def test_components_by_numpy():
     path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
     assert_alike(
         *(
@@ -45,7 +45,7 @@ def test_numpy_runs_components_too():
 
 
 @pytest.mark.parametrize("first", [-7.0, 1000.0])
-def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
+def test_components_start_away_from_design(first):
     """The drivers go there in a second of their own; the path's own time may be any."""
     mechanism, path = (
         chain(3),
@@ -55,7 +55,7 @@ def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
     compared(mechanism, path, ("end",))
 
 
-def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():
+def test_singular_pose_before_first_sample_is_reported():
     path = Path({"turn": Sine(2.4, 1e-2, np.pi / 2.0)}, np.linspace(2.0, 3.0, 5))
     solve = NativeSolver(method=Method.BY_COMPONENTS).prepare(chain(6), path, ("end",))
     told = [solve(1e-12).details["notes"] for _ in range(2)]
@@ -63,7 +63,7 @@ def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():
     assert "crosses a singular pose near turn = 1.870" in told[0][0]
 
 
-def test_what_is_fixed_stands_still_beside_many_components():
+def test_fixed_bodies_beside_components():
     m = chain(2)
     still = Body("frame", fixed=True, origin=(0.5, 0.0, 0.0))
     m = type(m)(
@@ -91,7 +91,7 @@ def test_what_is_fixed_stands_still_beside_many_components():
         assert np.array_equal(values, [wanted] * 2)
 
 
-def test_components_iterate_no_more_than_is_asked_for():
+def test_components_stop_at_last_iteration():
     path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.2, 9))
     solver = NativeSolver(last_iteration=np.inf, method=Method.BY_COMPONENTS)
     found = solver.prepare(chain(3), path, ("end",))(np.inf)
@@ -99,7 +99,7 @@ def test_components_iterate_no_more_than_is_asked_for():
     assert found.residual > 1e-10
 
 
-def test_components_built_alike_share_a_program():
+def test_equal_components_share_program():
     """Whatever the numbers, those of outputs too."""
     whole = chain(40)
     bodies = [
@@ -114,7 +114,7 @@ def test_components_built_alike_share_a_program():
     assert cascade.details["largest_component"] == 12
 
 
-def test_driven_components_alike_share_a_program():
+def test_equal_driven_components_share_program():
     names = [f"j{k}" for k in range(12)]
     cranks = Mechanism(
         "cranks",
@@ -154,7 +154,7 @@ class Tilted(primitives.Spherical):
 
 @pytest.mark.usefixtures("own_joint_types")
 @pytest.mark.parametrize("beside", [tuple, list])
-def test_settings_of_own_joints_stay_plain_numbers(beside):
+def test_component_joint_settings_stay_numbers(beside):
     @dataclass(frozen=True)
     class Ball(Spherical):
         type = "tilted_ball"
@@ -181,7 +181,7 @@ def test_settings_of_own_joints_stay_plain_numbers(beside):
     assert_alike(own, plain)
 
 
-def test_a_chain_of_two_hundred_loops_closes_to_round_off():
+def test_chain_of_200_loops():
     loops = 200
     turn = np.linspace(-0.3, 0.3, 33)
     found = solve_components(chain(loops), Path({"turn": Ramp(1.0)}, turn), ("end",))
@@ -193,7 +193,7 @@ def test_a_chain_of_two_hundred_loops_closes_to_round_off():
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
+def test_components_go_on_from_last_lane(compiled):
     path, request = (
         Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
         Request(("turn",), ("end",), compiled=compiled),
@@ -220,7 +220,7 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
 @pytest.mark.parametrize(
     ("part", "compiled"), [(0, True), (1, False), (1, True), (2, True), (3, False), (3, True)]
 )
-def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
+def test_sample_takes_worst_component(part, compiled):
     """The first, which is driven, any of those that are alike, and the last; what is not a number
     is the worst of all.
     """
@@ -247,7 +247,7 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
         assert np.isnan(lanes.worst[WORST.index(name)]).all()
 
 
-def test_nothing_may_be_wanted():
+def test_components_without_outputs():
     found = solve(chain(30), "turn", np.linspace(0.0, 0.3, 5), points=())
     assert found.details["components"] == 31
     assert found.solved.all()
@@ -256,7 +256,7 @@ def test_nothing_may_be_wanted():
 
 @pytest.mark.parametrize("lanes", [8, 16])
 @pytest.mark.parametrize("part", [1, 2, 7, 8, 9, 14, 15, 16, 17, 30, 31, 39])
-def test_a_step_is_divided_as_often_whatever_the_lanes(part, lanes):
+def test_step_division_by_any_lanes(part, lanes):
     """Lanes are fewer than the parts of a step: those take turns, and no part counts whose half is
     not reached.
     """

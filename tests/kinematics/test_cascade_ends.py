@@ -16,7 +16,7 @@ from ..support.mechanisms import mcpherson
 from .test_chain import LEAN, chain
 
 
-def test_an_end_of_the_travel_is_told_with_the_component():
+def test_component_limit_of_travel_is_reported():
     mechanism = mcpherson()
     values = np.linspace(0.0, 0.4, 41)
     path = Path({"stroke": Ramp(1.0)}, values)
@@ -32,7 +32,7 @@ def test_an_end_of_the_travel_is_told_with_the_component():
     )
 
 
-def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
+def test_singular_component_is_named():
     """The second of two four-bars, which cannot turn on; the first one's crank can, and its
     residuals are no larger.
     """
@@ -77,7 +77,7 @@ def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
         assert "the component of rod1, rocker1: there is a singular pose ahead" in found.message
 
 
-def test_what_it_cannot_take_apart_is_refused():
+def test_components_refuse_couplers_and_freedom():
     m = chain(2)
     coupled = type(m)(
         m.name,
@@ -95,7 +95,7 @@ def test_what_it_cannot_take_apart_is_refused():
     assert isinstance(m.drivers[0], JointAngle)
 
 
-def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
+def test_chain_passes_links_in_line():
     """Every loop may fold there; that the motion goes on is said."""
     loops, turn = 20, np.linspace(-0.1, 2.4, 26)
     found = solve_components(chain(loops), Path({"turn": Ramp(1.0)}, turn), ("end",))
@@ -108,7 +108,7 @@ def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
     assert "crosses a singular pose near turn = 1.870" in note
 
 
-def test_sample_with_links_in_line_is_interpolated():
+def test_links_in_line_are_interpolated():
     turn = np.array([0.0, 1.8, LEAN + np.pi / 2.0, 1.9, 2.4])
     for values in (turn, turn[2:3]):
         found = solve_components(chain(3), Path({"turn": Ramp(1.0)}, values), ("end",))
@@ -118,7 +118,7 @@ def test_sample_with_links_in_line_is_interpolated():
         assert np.abs(found.points["end"].position - expected).max() <= 1e-12
 
 
-def test_sweep_without_samples_has_no_numbers():
+def test_components_without_solved_sample():
     found = solve_components(mcpherson(), Path({"stroke": Ramp(1.0)}, np.array([0.4])), ("wheel",))
     assert not found.solved.any()
     # nothing was found, which is not zero
@@ -126,7 +126,7 @@ def test_sweep_without_samples_has_no_numbers():
 
 
 @pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])
-def test_a_narrow_gap_is_not_stepped_over(name):
+def test_components_stop_at_narrow_gap(name):
     """The sample is beyond a gap, or a corner, of less than a thousandth of the step."""
     case = load_case(File(__file__).parents[1] / "data" / "stress" / f"{name}.toml")
     path = case.sweep.path

@@ -42,7 +42,7 @@ def chain(loops, lean=LEAN):
 
 
 @pytest.mark.parametrize("loops", [1, 5])
-def test_the_last_crank_turns_as_the_first(loops):
+def test_chain_through_change_points(loops):
     # through the change points, where the loops could fold over
     turn = np.linspace(-np.pi, np.pi, 37)
     found = solve(chain(loops), "turn", turn)
@@ -53,7 +53,7 @@ def test_the_last_crank_turns_as_the_first(loops):
     assert np.abs(found.points["end"].position - expected).max() <= 1e-13 * loops
 
 
-def test_every_loop_costs_the_same():
+def test_chain_cost_grows_linearly():
     flops = []
     for loops in (4, 8, 12):
         sizes = compile_model(chain(loops), Request(("turn",), (), compiled=False)).sizes

@@ -53,7 +53,7 @@ def errors(found, turn, turn_t=1.0, turn_tt=0.0):
 
 
 @pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
-def test_a_bennett_loop_round_and_round(style):
+def test_bennett_loop_over_turns(style):
     turn = np.linspace(-3.5, 7.5, 111)
     found = solve(loop(), "turn", turn, style=style)
     assert found.solved.all(), found.message
@@ -63,7 +63,7 @@ def test_a_bennett_loop_round_and_round(style):
 
 
 @pytest.mark.parametrize(("order", "compiled"), [(0, True), (1, False), (2, True), (2, False)])
-def test_where_the_rows_of_the_design_are_singular(order, compiled):
+def test_bennett_loop_at_dependent_rows(order, compiled):
     """At the pose itself and beside it; it is regular, and no digits are lost."""
     turn = ALONG + np.array([-1e-3, -1e-6, -1e-12, 0.0, 1e-12, 1e-6, 1e-3])
     model = recent_model(loop(), Request(("turn",), ("tracer",), order=order, compiled=compiled))
@@ -81,7 +81,7 @@ def test_where_the_rows_of_the_design_are_singular(order, compiled):
         )
 
 
-def test_on_the_way_to_the_first_sample():
+def test_row_exchange_before_first_sample():
     """A motion that is beyond the pose at its beginning: the way there leads over it."""
     path = Path({"turn": Sine(2.0, 0.16, 1.2)}, np.linspace(0.0, 7.0, 71))
     model = recent_model(loop(), Request(("turn",), ("crank_pin", "follower_pin", "tracer")))
@@ -93,7 +93,7 @@ def test_on_the_way_to_the_first_sample():
 
 
 @pytest.mark.parametrize("near", [1e-2, 1e-3, 1e-5, 0.0])
-def test_a_last_sample_near_there_has_its_digits(near):
+def test_last_sample_beside_dependent_rows(near):
     """Nothing ends the motion before it; rows chosen there are better, for accelerations long
     before anything is in doubt.
     """
@@ -107,7 +107,7 @@ def test_a_last_sample_near_there_has_its_digits(near):
     assert found.details["smallest_singular_value"] > 0.05
 
 
-def test_a_mechanism_that_is_singular_itself_is_followed_as_before():
+def test_bifurcation_exchanges_no_rows():
     found = solve(locomotive(np.pi), "turn", np.linspace(0.0, 4.0, 33))
     assert "(bifurcation)" in found.details["notes"][0]
     assert "rows_chosen_anew" not in found.details
@@ -116,7 +116,7 @@ def test_a_mechanism_that_is_singular_itself_is_followed_as_before():
 @pytest.mark.parametrize(
     ("first", "turn"), [(1.0, np.linspace(0.0, 4.0, 41)), (1.8, np.array([0.0, 1.0, BRANCH, 4.0]))]
 )
-def test_a_singular_pose_is_passed_by_the_rows_that_were_chosen_before_it(first, turn):
+def test_bifurcation_after_row_exchange(first, turn):
     """A locomotive that turns over the dead points of its rods, and a chain that branches after the
     first or before.
     """
@@ -137,7 +137,7 @@ def test_a_singular_pose_is_passed_by_the_rows_that_were_chosen_before_it(first,
     assert [pose["kind"] for pose in found.details["singular_poses"]] == ["bifurcation"]
 
 
-def test_a_diagnosis_follows_the_sign_of_the_determinant_over_a_bifurcation():
+def test_conditioning_orientation_over_bifurcation():
     turn = np.linspace(0.0, 3.0, 31)
     found = conditioning(chain(1), Path({"turn": Ramp(1.0)}, turn), turn, ["end"], {}, 31, 1e-12)
     assert [pose.orientation for pose in found.poses] == [
@@ -145,7 +145,7 @@ def test_a_diagnosis_follows_the_sign_of_the_determinant_over_a_bifurcation():
     ]
 
 
-def test_a_diagnosis_knows_no_singular_pose_there():
+def test_conditioning_at_dependent_rows():
     turn = np.linspace(0.0, 2.0 * np.pi, 41)
     found = conditioning(loop(), Path({"turn": Ramp(1.0)}, turn), turn, ["tracer"], {}, 41, 1e-12)
     assert [pose.orientation for pose in found.poses] == [1.0] * 41
@@ -162,7 +162,7 @@ def test_a_diagnosis_knows_no_singular_pose_there():
         ("mixed", 0.008),
     ],
 )
-def test_a_spherical_kite_beside_its_corner(off, style):
+def test_spherical_kite_beside_corner(off, style):
     """Rod and rocker are alike, crank and ground nearly so: beside the corner all rows are nearly
     singular, those kept more so.
     """

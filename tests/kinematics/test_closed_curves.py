@@ -56,7 +56,7 @@ def driven_slider(crank_angle):
         *((np.pi, -1, past) for past in BOTH_SIDES[1::2]),
     ],
 )
-def test_both_dead_centres_wherever_the_curve_begins(centre, past, direction):
+def test_closed_curve_finds_dead_centres(centre, past, direction):
     mechanism, x = driven_slider(centre + past)
     curve = trace(mechanism, "push", length=25.0, direction=direction, longest=COARSE)
     assert curve.closed
@@ -69,7 +69,7 @@ def test_both_dead_centres_wherever_the_curve_begins(centre, past, direction):
 
 
 @pytest.mark.parametrize("style", ["native", "relative"])
-def test_the_length_of_a_closed_curve_is_that_of_one_turn(style):
+def test_closed_curve_length_is_one_turn(style):
     """Wherever it begins; also where the coordinates are angles, which a turn does not bring
     back.
     """
@@ -85,7 +85,7 @@ def test_the_length_of_a_closed_curve_is_that_of_one_turn(style):
 
 
 @pytest.mark.parametrize(("past", "direction"), [(-0.1, 1), (-1e-5, -1), (1e-5, 1), (0.02, -1)])
-def test_both_dead_centres_of_a_rocker(past, direction):
+def test_rocker_curve_finds_dead_centres(past, direction):
     """The four-bar that its rocker drives, with its crank beside the pose in which it stretches the
     coupler.
     """
@@ -124,7 +124,7 @@ def test_both_dead_centres_of_a_rocker(past, direction):
 
 
 @pytest.mark.parametrize(("past", "direction"), [(-0.03, 1), (-0.004, -1), (0.004, 1), (0.03, -1)])
-def test_a_branch_point_beside_the_beginning(past, direction):
+def test_branch_point_beside_closed_start(past, direction):
     """All cranks in line, a little before or behind: once each way round, and the other one half a
     turn away.
     """
@@ -139,7 +139,7 @@ def test_a_branch_point_beside_the_beginning(past, direction):
 
 
 @pytest.mark.parametrize("past", [-0.004, -0.001, 0.001, 0.004])
-def test_a_branch_point_beside_an_open_beginning(past):
+def test_branch_point_beside_open_start(past):
     """Seen by one of both directions."""
     curves = [
         trace(chain(2, np.pi / 2.0 + past), "turn", length=1.0, direction=way) for way in (1, -1)
@@ -149,7 +149,7 @@ def test_a_branch_point_beside_an_open_beginning(past):
     )
 
 
-def test_many_bodies_are_not_back_when_they_have_hardly_left():
+def test_open_curve_of_many_bodies():
     """The length is shared by all unknowns: each moves little at first."""
     curve = trace(chain(5), "turn", length=0.4)
     assert not curve.closed

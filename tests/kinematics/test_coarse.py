@@ -63,19 +63,19 @@ def divided(monkeypatch):
 
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
-def test_a_coarse_sweep_goes_in_equal_parts(values, compiled, divided):
+def test_coarse_sweep_in_equal_parts(values, compiled, divided):
     assert_right(swept(values, compiled=compiled), values)
     assert not divided
 
 
 @pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
-def test_or_in_parts_that_are_looked_for_one_by_one(values, divided, monkeypatch):
+def test_coarse_sweep_in_searched_parts(values, divided, monkeypatch):
     monkeypatch.setattr(walk, "FINER", ())
     assert_right(swept(values), values)
     assert divided
 
 
-def test_a_step_too_long_for_all_equal_parts_is_divided(divided, monkeypatch):
+def test_long_step_is_divided(divided, monkeypatch):
     """Its parts are of more than a radian."""
     value = np.array([1.2 * FINER[1]])
     assert_right(swept(value), value)
@@ -85,14 +85,14 @@ def test_a_step_too_long_for_all_equal_parts_is_divided(divided, monkeypatch):
     assert divided
 
 
-def test_longer_sweeps_than_are_kept_ready_are_divided(divided, monkeypatch):
+def test_long_sweep_is_divided(divided, monkeypatch):
     monkeypatch.setattr(walk, "ROOM", 8)
     values = np.array([0.0, 6.0])
     assert_right(swept(values), values)
     assert divided
 
 
-def test_the_worst_is_of_the_samples_that_were_asked_for():
+def test_worst_sigma_is_of_samples():
     """Not of the poses between, which are nearer to singular."""
     whole, least = 2.0 * np.pi, "smallest_singular_value"
     assert swept(np.linspace(0.0, whole, 41)).details[least] < 0.97

@@ -41,7 +41,7 @@ def strut_curve(direction, style="native"):
 
 
 @pytest.mark.parametrize(("direction", "style"), [(1, "native"), (-1, "native"), (1, "relative")])
-def test_limits_of_the_strut(direction, style):
+def test_trace_limits_of_strut(direction, style):
     """To 1e-9 m and much better; the dip of the condition at +0.26 m on the way is no branch
     point.
     """
@@ -54,12 +54,12 @@ def test_limits_of_the_strut(direction, style):
     assert event.points["wheel"][2] == pytest.approx(0.101 + LIMITS[direction], abs=1e-12)
 
 
-def test_the_limit_does_not_depend_on_the_steps():
+def test_trace_limit_by_other_steps():
     curve = trace(mcpherson(), "stroke", direction=-1, length=2.5, longest=0.11)
     assert curve.events[0].value == pytest.approx(strut_curve(-1).events[0].value, abs=1e-14)
 
 
-def test_the_strut_goes_on_beyond():
+def test_trace_beyond_limit_point():
     curve = strut_curve(-1)
     beyond = np.abs(curve.arc) > abs(curve.events[0].arc)
     assert (np.diff(curve.values[~beyond]) < 0.0).all()
@@ -71,7 +71,7 @@ def test_the_strut_goes_on_beyond():
     assert lengths == pytest.approx(lengths[0], abs=1e-14)
 
 
-def test_a_rod_that_is_shorter_than_its_crank():
+def test_trace_of_rod_below_crank():
     """Limits where the rod stands upright; between them the slider takes both places that the crank
     leaves it.
     """
@@ -89,7 +89,7 @@ def test_a_rod_that_is_shorter_than_its_crank():
     assert ((offset < 0.0) == ((curve.arc > first) & (curve.arc < second))).all()
 
 
-def test_a_rocker_that_drives_its_crank():
+def test_trace_of_rocker_driving_crank():
     """Limits where crank and coupler are in line; the crank goes round, and the curve is closed."""
     rocked = replace(four_bar(), drivers=[replace(four_bar().drivers[0], name="rock", joint="D")])
     curve = trace(rocked, "rock", length=12.0, longest=0.1)
@@ -111,7 +111,7 @@ def test_a_rocker_that_drives_its_crank():
     assert curve.values[-1] == pytest.approx(0.0, abs=0.1)
 
 
-def test_a_limit_at_which_the_curve_branches_too():
+def test_trace_limit_with_branch():
     """Bricard's hinge turns back at 30 degrees, folded flat: corrections do not converge there, and
     the limit is interpolated.
     """
@@ -125,7 +125,7 @@ def test_a_limit_at_which_the_curve_branches_too():
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("loops", [1, 2])
-def test_change_points(loops, direction):
+def test_trace_branch_points_of_chain(loops, direction):
     """All links in line: the determinant changes its sign with an odd number of loops, and not with
     an even one.
     """
@@ -140,7 +140,7 @@ def test_change_points(loops, direction):
 
 
 @pytest.mark.parametrize("longer", [1e-8, 1e-4])
-def test_branches_that_miss_each_other(longer):
+def test_trace_of_nearly_parallelogram(longer):
     """The coupler of a parallelogram is too long by a little: the crank locks up just before the
     change point, where a step is a thousand times as long as the bend of the curve.
     """
@@ -170,7 +170,7 @@ def test_branches_that_miss_each_other(longer):
     assert event.value == pytest.approx(np.arccos(cosine) - lean, abs=1e-9)
 
 
-def test_a_motion_without_singular_poses():
+def test_trace_without_singular_poses():
     """A whole turn of a crank, and back at the design."""
     curve = trace(four_bar(), "turn", length=12.0, longest=0.1)
     assert curve.closed
@@ -194,12 +194,12 @@ def test_a_motion_without_singular_poses():
         ({"points": ["hub"]}, "no point 'hub'; known: rod_end, wheel"),
     ],
 )
-def test_what_makes_no_sense(arguments, message):
+def test_trace_refuses_bad_arguments(arguments, message):
     with pytest.raises(SolveError, match=message):
         trace(mcpherson(), **({"driver": "stroke"} | arguments))
 
 
-def test_the_command_line(tmp_path, capsys):
+def test_trace_command(tmp_path, capsys):
     file = tmp_path / "curve.json"
     assert main(["trace", "mcpherson_strut", "--length", "2.5", "--json", str(file)]) == 0
     assert "limit point at stroke = -0.316737084 m" in capsys.readouterr().out

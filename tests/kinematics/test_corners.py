@@ -71,7 +71,7 @@ def latin(rows, columns, others):
     ("beside", "count", "loops"),
     latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2]),
 )
-def test_a_corner_is_turned_round(beside, count, loops):
+def test_corner_is_turned(beside, count, loops):
     """The rocker makes half a turn while the crank's pin passes its pivot."""
     turn = np.linspace(0.0, 2.0, count)
     found = solve(loop(-1.0, beside, loops=loops), "turn", turn, order=loops - 1)
@@ -84,7 +84,7 @@ def test_a_corner_is_turned_round(beside, count, loops):
 
 
 @pytest.mark.parametrize(("beside", "loops"), [(1e-6, 1), (1e-9, 2), (-1e-12, 1), (1e-6, 2)])
-def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
+def test_narrow_corner_ends_motion(beside, loops):
     turn = np.linspace(0.0, 2.0, 9)
     found = solve(loop(-1.0, beside, loops=loops), "turn", turn)
     assert found.solved[:4].all()
@@ -99,7 +99,7 @@ def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
 @pytest.mark.parametrize(
     ("short", "count", "loops"), latin([1e-2, 1e-5, 1e-8, 1e-10], [2, 5, 9, 300], [1, 2])
 )
-def test_a_gap_is_the_end(short, count, loops):
+def test_gap_ends_motion(short, count, loops):
     turn = np.linspace(0.0, 2.0, count)
     mechanism = loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops)
     found = solve(mechanism, "turn", turn, order=0)
@@ -124,7 +124,7 @@ COUNTS = [2, 3, 5, 9, 300]
     ("ground", "short", "start", "count"),
     [(*kite, count) for k, kite in enumerate(KITES) for count in COUNTS[k % 2 :: 2]],
 )
-def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, start, count):
+def test_kite_gap_ends_motion(ground, short, start, count):
     """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond,
     what crosses there is as near.
     """
@@ -135,7 +135,7 @@ def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, 
     assert (found.solved == (turn < -start - end)).all()
 
 
-def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
+def test_singular_pose_verdict_ignores_order():
     """The rates interpolated at the pose are worse than the pose; they are not wanted, and what is
     beyond is solved as anywhere.
     """
@@ -159,7 +159,7 @@ def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
         )
 
 
-def test_verdict_beside_a_gap_ignores_wanted_points():
+def test_gap_verdict_ignores_wanted_points():
     """The crank's own motion is smooth, whatever the rocker does."""
     mechanism, turn = (
         loop(np.pi - 1.0, 1e-7, rod=1.2 - 1e-10, rocker=0.8),

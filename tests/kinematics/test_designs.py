@@ -23,7 +23,7 @@ from .test_variants import SAME, strut
 
 
 @pytest.mark.parametrize("values", [[0.0], [0.1, 0.0, -0.1]])
-def test_a_variant_that_cannot_move_is_not_solved_at_its_design_either(values):
+def test_locked_variant_is_refused(values):
     """A four-bar of four hinges with the last one tilted: it closes where it is, and is a frame."""
     mechanism, tilts = four_bar(), np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-3], [0.1, 1.0, 0.0]])
     found = solve_designs(mechanism, "turn", values, {"joints.D.axis": tilts}, order=2)
@@ -38,7 +38,7 @@ def test_a_variant_that_cannot_move_is_not_solved_at_its_design_either(values):
 
 # of their table: many at once, or the least
 @pytest.mark.parametrize("room", [design_batch.BYTES, 0])
-def test_designs_are_solved_as_one_by_one(monkeypatch, room):
+def test_designs_match_single_solves(monkeypatch, room):
     monkeypatch.setattr(design_batch, "BYTES", room)
     mechanism, _ = strut()
     values = np.linspace(-0.05, 0.05, 7)
@@ -82,17 +82,17 @@ def test_designs_are_solved_as_one_by_one(monkeypatch, room):
         ({}, "^solve_designs: geometry names no place to vary; known: joints.lca_pivot.point, "),
     ],
 )
-def test_designs_that_make_no_sense_are_refused(geometry, message):
+def test_designs_refuse_bad_geometry(geometry, message):
     with pytest.raises(SolveError, match=message):
         solve_designs(strut()[0], "stroke", [0.0], geometry)
 
 
-def test_an_argument_that_makes_no_sense_is_told_by_who_was_asked():
+def test_designs_refuse_bad_order():
     with pytest.raises(SolveError, match=r"^solve_designs: order is 5, expected 0, 1 or 2"):
         solve_designs(strut()[0], "stroke", [0.0], {"joints.ball.point": np.zeros((4, 3))}, order=5)
 
 
-def test_samples_that_are_nearly_singular_are_refused():
+def test_designs_refuse_nearly_singular_samples():
     """What a run by itself would solve more closely; a study of many does not, and says so."""
     mechanism, samples = chain(1), [0.0, 1.8, LEAN + np.pi / 2.0 - 1e-4, 1.9]
     ends = np.array([mechanism.point("end").position]) + np.array(
@@ -107,7 +107,7 @@ def test_samples_that_are_nearly_singular_are_refused():
         assert "as at turn = 1.87069633" in message
 
 
-def test_the_lead_of_a_screw_varies():
+def test_designs_vary_screw_lead():
     """In the rows it is a weight, which is known only when the programs run."""
     thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), lead=0.01)
     mechanism = Mechanism(
@@ -130,7 +130,7 @@ def test_the_lead_of_a_screw_varies():
         np.testing.assert_allclose(found.velocity[k], rate, rtol=0, atol=1e-15 * max(1.0, lead))
 
 
-def test_a_variant_that_ends_early_is_told_that_it_may_go_on_by_itself():
+def test_variant_beyond_travel_says_why():
     found = solve_designs(
         strut()[0], "stroke", [0.0, 0.5], {"joints.ball.point": [strut()[0].joint("ball").point]}
     )
@@ -140,7 +140,7 @@ def test_a_variant_that_ends_early_is_told_that_it_may_go_on_by_itself():
     )
 
 
-def test_a_variant_that_other_rows_would_follow_is_told_so():
+def test_variant_with_dependent_rows_says_why():
     """A kite off by a twentieth, its rod on universals: one row too many, and the one that is left
     out does not stay so.
     """

@@ -56,7 +56,7 @@ EVERY = [*OWN, *(case.mechanism for case in probes())]
 
 
 @pytest.mark.parametrize("mechanism", EVERY, ids=lambda each: each.name)
-def test_elements_give_the_equations_of_the_whole(mechanism):
+def test_elements_match_whole_equations(mechanism):
     drivers = tuple(each.name for each in mechanism.drivers)
     points = tuple(each.name for each in mechanism.points)
     bodies = tuple(each.name for each in mechanism.moving)

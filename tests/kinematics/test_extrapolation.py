@@ -26,7 +26,7 @@ STROKES = np.linspace(-0.08, 0.08, 33)
 
 
 @pytest.mark.parametrize(("lanes", "behind"), [(2, 3), (4, 2), (5, 2), (6, 1), (8, 1), (30, 1)])
-def test_nodes_reach_from_the_first_lane_to_the_last_of_the_groups_that_hold_them(lanes, behind):
+def test_extrapolation_nodes_span_groups(lanes, behind):
     nodes = [group * lanes + lane for group, lane in (place_of(k, lanes) for k in range(NODES))]
     assert groups_behind(lanes) == behind
     assert (nodes[0], nodes[-1]) == (0, behind * lanes - 1)
@@ -34,7 +34,7 @@ def test_nodes_reach_from_the_first_lane_to_the_last_of_the_groups_that_hold_the
 
 
 @pytest.mark.parametrize("lanes", [2, 4, 8])
-def test_weights_continue_what_is_of_fifth_order(lanes):
+def test_extrapolation_weights_are_fifth_order(lanes):
     times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 40))
     values = np.polynomial.Polynomial([1.0, -2.0, 0.5, 1.0, -0.3, 0.02])(times / 10.0)
     of_samples, of_groups = weights_of_samples(times), weights_of_groups(times, lanes)
@@ -82,7 +82,7 @@ def eight_lanes(monkeypatch):
 
 @pytest.mark.usefixtures("eight_lanes")
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_lanes_are_extrapolated_to_one_iteration(order):
+def test_extrapolated_lanes_need_one_iteration(order):
     fine = np.linspace(-0.08, 0.08, 161)
     found = positions(fine, order)
     # there is nothing yet to extrapolate the first eight on either side from
@@ -99,7 +99,7 @@ def test_lanes_are_extrapolated_to_one_iteration(order):
 @pytest.mark.parametrize("interpreted", [False, True])
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
-def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, interpreted, monkeypatch):
+def test_extrapolation_by_several_vectors(lanes, order, interpreted, monkeypatch):
     """Whatever the processor's: it runs such vectors too. On from where the grid changes it takes
     as many again.
     """
@@ -129,7 +129,7 @@ def test_vectors_of_few_lanes_are_extrapolated_by_several(lanes, order, interpre
 
 
 @pytest.mark.parametrize("order", [0, 2])
-def test_what_is_continued_is_all_that_tests_need_and_no_step_behind(order):
+def test_extrapolation_carries_no_earlier_step(order):
     """Neither rates, nor what was predicted: where lanes are predicted after all, the step before
     is none.
     """
@@ -165,7 +165,7 @@ GRIDS = {
 @pytest.mark.usefixtures("eight_lanes")
 @pytest.mark.parametrize("values", GRIDS.values(), ids=GRIDS)
 @pytest.mark.parametrize("order", [0, 2])
-def test_where_extrapolation_fails_the_rates_take_over(values, order, monkeypatch):
+def test_rates_replace_failed_extrapolation(values, order, monkeypatch):
     """Two samples at one time make it infinite, a long step makes it wild. A lane alone is never
     extrapolated.
     """
@@ -182,7 +182,7 @@ def test_where_extrapolation_fails_the_rates_take_over(values, order, monkeypatc
 
 
 @pytest.mark.parametrize("lanes", [2, 4, 8])
-def test_beyond_a_long_step_groups_are_counted_anew(lanes, monkeypatch):
+def test_extrapolation_after_long_step(lanes, monkeypatch):
     """A group of eight is accepted in part there, and those after it begin at no multiple of
     eight.
     """
@@ -204,7 +204,7 @@ def test_beyond_a_long_step_groups_are_counted_anew(lanes, monkeypatch):
 
 @pytest.mark.usefixtures("eight_lanes")
 @pytest.mark.parametrize("order", [0, 2])
-def test_a_grid_that_gets_fine_is_extrapolated_from_there(order):
+def test_extrapolation_where_grid_gets_fine(order):
     """Long steps are taken one by one; from the first group that is accepted whole it is on to a
     multiple of eight.
     """

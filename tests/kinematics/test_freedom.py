@@ -42,7 +42,7 @@ def jacobian(formulation, at):
     return matrix
 
 
-def test_mcpherson_account():
+def test_freedom_account_of_mcpherson():
     """Table 5 of the paper: five bodies, 35 coordinates, 34 equations; the native count: 18
     coordinates, rank 17.
     """
@@ -69,7 +69,7 @@ A, B, X = (0.1, -0.2, 0.3), (0.5, 0.4, 0.9), (1.0, 2.0, -0.5)
         (Distance("j", "ground", "body", (A, B)), 5),
     ],
 )
-def test_freedoms_of_the_joints(joint, dof):
+def test_freedom_of_joints(joint, dof):
     """Formulation section 6."""
     found = account_of(Mechanism("m", [Body("body")], [joint]))
     assert (found.dof, found.rank) == (dof, joint.rows)
@@ -89,7 +89,7 @@ def tilted(point):
 @pytest.mark.parametrize(
     "mechanism", [four_bar(), placed(four_bar(), tilted, tilted)], ids=["upright", "tilted"]
 )
-def test_four_bar_of_spatial_revolutes(mechanism):
+def test_freedom_of_spatial_four_bar(mechanism):
     """20 rows, 18 coordinates, rank 17 (formulation section 7): three rows are left out, named, and
     hold all the same.
     """
@@ -105,7 +105,7 @@ def test_four_bar_of_spatial_revolutes(mechanism):
     assert motion.details["redundant_residual"] < 1e-14
 
 
-def test_redundant_rows_that_contradict_are_not_passed_over():
+def test_contradicting_redundant_rows_are_refused():
     """A rod across a guide gives way to first order only: its row is redundant at design and
     violated beyond.
     """
@@ -120,7 +120,7 @@ def test_redundant_rows_that_contradict_are_not_passed_over():
     assert "the redundant rows (rod: Distance) contradict the others" in motion.message
 
 
-def test_a_body_held_twice():
+def test_freedom_of_body_held_twice():
     m = mechanism_of(
         Fixed("weld", "ground", "a", A),
         Fixed("weld again", "ground", "a", B),
@@ -216,7 +216,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_move_is_refused_by_name(case):
+def test_wrong_freedom_is_refused(case):
     mechanism, kind, message = REFUSED[case]
     driver = mechanism.drivers[0].name if mechanism.drivers else "none"
     with pytest.raises(SolveError, match=message) as error:
@@ -224,7 +224,7 @@ def test_what_cannot_move_is_refused_by_name(case):
     assert error.value.kind is kind
 
 
-def test_two_drivers_of_the_same_freedom():
+def test_drivers_of_same_freedom():
     """Two freedoms, two drivers, but both drive the same one."""
     m = mechanism_of(
         Revolute("r", "ground", "a", A, X),
@@ -238,7 +238,7 @@ def test_two_drivers_of_the_same_freedom():
 
 
 @pytest.mark.parametrize("style", ["native", "mixed", "conventional"])
-def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_what_to_do(style):
+def test_locked_driver_names_its_joints(style):
     pushed = replace(slider_crank(), drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
     said = (
         r"driver 'push' does not move it .* already from 'pivot', 'rod'; give the design in another"
@@ -248,7 +248,7 @@ def test_a_driver_that_is_locked_at_the_design_is_named_with_what_locks_it_and_w
         solve(pushed, "push", [0.0], style=style)
 
 
-def test_motions_that_have_nothing_to_do_with_each_other_are_not_mixed():
+def test_free_motions_are_reported_separately():
     """Three motions of two columns each, in a null space whose orthonormal basis mixes them."""
     rng = np.random.default_rng(7)
     apart = np.kron(np.eye(3), [[1.0, -1.0]])  # each row ties two columns together

@@ -42,7 +42,7 @@ def indexing():
     )
 
 
-def test_turns_between_two_samples_are_not_lost():
+def test_engines_count_turns_between_samples():
     turns = -3
     rest = np.arange(-40.0, 41.0) * 0.01
     table = Table(

@@ -123,7 +123,7 @@ CHOSEN = [
 
 
 @pytest.mark.parametrize(("name", "made", "style"), CHOSEN)
-def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
+def test_chosen_rows_do_not_hide_corner(name, made, style):
     """A determinant of rows chosen from more changes its sign by a singular pose, and by one of the
     choice; not by both.
     """
@@ -142,7 +142,7 @@ def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
     ("made", "beside", "style"),
     latin([universal_loop, revolute_loop], [1e-2, -3e-3, 1e-3], ["native", "relative"]),
 )
-def test_other_rows_are_chosen_where_a_kite_is_nearly_singular(made, beside, style):
+def test_nearly_singular_kite_exchanges_rows(made, beside, style):
     """Those that were chosen at design depend on each other where it lies flat, or so nearly that
     it cannot be told from that.
     """
@@ -168,7 +168,7 @@ def test_other_rows_are_chosen_where_a_kite_is_nearly_singular(made, beside, sty
         for style in ("native", STYLES[1 + k % 4])
     ],
 )
-def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):
+def test_small_loop_does_not_hide_corner(count, style):
     """Its singular values are the smaller ones all the way round, but where the large one folds."""
     x, y, rest, end = (
         -0.35245745516404536,

@@ -31,12 +31,12 @@ Z = (0.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize("cranks", [12, 24])
-def test_a_large_mechanism_that_is_not_driven_is_told_what_can_move(cranks):
+def test_undriven_ring_names_freedom(cranks):
     with pytest.raises(SolveError, match=r"1 degree of freedom .* but 0 drivers; .*crank"):
         solve(replace(ring(cranks), drivers=()), "turn", [0.0])
 
 
-def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself():
+def test_designs_of_large_ring():
     """What is known of sigma of many variants at once leaves all samples of such a ring in doubt.
     Designs that end early say why.
     """
@@ -60,7 +60,7 @@ def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself():
     assert "cannot be followed beyond turn = " in found.messages[0]
 
 
-def test_a_gear_leaves_a_large_mechanism_a_sparse_system():
+def test_gear_on_large_ring():
     """As one program 47 bodies take seventeen seconds to be made ready."""
     whole, cranks = ring(24), 24
     at = (-2.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ def test_a_gear_leaves_a_large_mechanism_a_sparse_system():
 
 
 @pytest.mark.parametrize(("rod", "end"), [(1.000001, 2.0), (0.99999, 1.098176)])
-def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, end):
+def test_sparse_kite_beside_corner(rod, end):
     """On the driven crank of a ring a kite on its side, on hinges: three rows more than are
     needed.
     """
@@ -104,7 +104,7 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
 @pytest.mark.parametrize(
     ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (22, -2, 2), (22, 1, 11)]
 )
-def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
+def test_ring_counts_turns_between_samples(cranks, turns, count):
     """A nut stands at both: where it stands says nothing of the turns, which its driver makes
     between them, but its lead does.
     """
@@ -167,7 +167,7 @@ def stretched(crank, rod, angle):
 @pytest.mark.parametrize(
     ("short", "solved"), [(1e-2, True), (1e-3, True), (1e-7, False), (1e-9, False)]
 )
-def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short, solved):
+def test_sparse_rates_beside_dead_centre(short, solved):
     """Rates were off by up to 3e-6 of their own. The crank's angle follows from the slider's place
     by a triangle.
     """
@@ -194,7 +194,7 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
     )
 
 
-def test_uncertainty_that_is_no_number_is_refused(monkeypatch):
+def test_nan_error_bound_refuses_sample(monkeypatch):
     """Wherever it stands: Python's own maximum passes over what is no number."""
     mechanism, begin = stretched(0.5, 1.5, 0.3)
     values = [(2.0 - begin) * (1.0 - 1e-7)]

@@ -57,13 +57,13 @@ def mirrored(mechanism):
 
 
 @pytest.mark.parametrize("engine", adapters.ENGINES)
-def test_the_other_wheel_moves_as_this_one(engine):
+def test_mirrored_strut_in_every_engine(engine):
     found = motion(mirrored(mcpherson()), STROKES, engine)
     assert_same(found * (1.0, -1.0, 1.0), motion(mcpherson(), STROKES), LIMITS[engine])
 
 
 @pytest.mark.parametrize("case", probes(), ids=lambda each: each.name)
-def test_every_joint_moves_as_its_mirror_image(case):
+def test_mirrored_joints(case):
     """A turn backwards: the velocity changes its sign once more."""
     turns = np.linspace(-0.4, 0.4, 9)
     found, expected = motion(mirrored(case.mechanism), -turns), motion(case.mechanism, turns)
@@ -84,7 +84,7 @@ FAR = np.array([1000.0, -1000.0, 500.0])
     [(mcpherson(), STROKES), (four_bar(), TURNS)],
     ids=["strut", "four_bar"],
 )
-def test_a_kilometre_away(mechanism, values, engine):
+def test_motion_kilometre_away(mechanism, values, engine):
     """Every hardpoint is rounded at 1.1e-13 m there, and so is every sum that a simulator makes of
     them.
     """
@@ -97,7 +97,7 @@ LENGTHS = ("origin", "point", "points", "position", "length", "atol")
 
 
 @pytest.mark.parametrize(("name", "swept"), [("mcpherson_strut", 1e3), ("rssr", np.pi / 180.0)])
-def test_millimetres_and_degrees_move_as_metres_and_radians(name, swept, tmp_path):
+def test_case_in_other_units(name, swept, tmp_path):
     """The strut is in metres, the RSSR in metres and degrees; both once more in millimetres and
     radians.
     """
@@ -134,7 +134,7 @@ def test_millimetres_and_degrees_move_as_metres_and_radians(name, swept, tmp_pat
     [(mcpherson(), STROKES), (slider_crank(), TURNS)],
     ids=["strut", "slider_crank"],
 )
-def test_samples_do_not_depend_on_their_order_nor_on_others(mechanism, values, engine):
+def test_samples_do_not_depend_on_order(mechanism, values, engine):
     once = motion(mechanism, values, engine)
     assert_same(motion(mechanism, values[::-1], engine)[:, ::-1], once, LIMITS[engine])
     twice = np.linspace(values[0], values[-1], 2 * len(values) - 1)

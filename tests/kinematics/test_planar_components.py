@@ -40,7 +40,7 @@ def parallel_cranks(seed: int) -> Mechanism:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_components_with_redundant_rows_are_all_solved(seed: int):
+def test_tilted_components_with_redundant_rows(seed: int):
     found = solve(parallel_cranks(seed), "drive", np.array([0.0, 0.2]))
     assert found.solved.all()
     # positive angles turn y towards -x

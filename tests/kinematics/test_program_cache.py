@@ -22,7 +22,7 @@ for name, module in sys.modules.items():
 """
 
 
-def test_every_module_that_tracing_imports_is_part_of_the_key():
+def test_program_cache_key_covers_modules():
     done = subprocess.run(
         [sys.executable, "-c", TRACE], capture_output=True, text=True, check=True
     ).stdout

@@ -144,7 +144,7 @@ def for_random_loops(test):
 
 
 @for_random_loops
-def test_rigid_motion_moves_the_motion(seed):
+def test_random_loop_moved_rigidly(seed):
     case, expected, allowed = known(seed)
     if expected is None:
         return
@@ -166,7 +166,7 @@ def test_rigid_motion_moves_the_motion(seed):
 
 
 @for_random_loops
-def test_size_scales_the_motion(seed):
+def test_random_loop_scaled(seed):
     """From a tenth of a millimetre to kilometres; not by powers of two, so that every number is
     rounded anew.
     """
@@ -180,7 +180,7 @@ def test_size_scales_the_motion(seed):
 
 
 @for_random_loops
-def test_order_and_names_do_not_matter(seed):
+def test_random_loop_shuffled_and_renamed(seed):
     case, expected, allowed = known(seed)
     if expected is None:
         return
@@ -218,7 +218,7 @@ def test_order_and_names_do_not_matter(seed):
 
 
 @for_random_loops
-def test_order_of_the_bodies_of_joints_does_not_matter(seed):
+def test_random_loop_with_reversed_joints(seed):
     """Of those that are the same both ways; where a joint is driven or coupled, it is the sign of
     its coordinate.
     """
@@ -238,7 +238,7 @@ def test_order_of_the_bodies_of_joints_does_not_matter(seed):
 
 
 @for_random_loops
-def test_speed_scales_velocities_and_accelerations(seed):
+def test_random_loop_at_other_speed(seed):
     case, expected, allowed = known(seed)
     if expected is None:
         return
@@ -255,7 +255,7 @@ def test_speed_scales_velocities_and_accelerations(seed):
     assert_same(found / powers[:, None, None], expected, allowed)
 
 
-def test_random_loops_are_of_every_joint_type_and_most_can_be_driven():
+def test_random_loops_cover_joint_types():
     """Else the properties would hold of nothing."""
     found = [known(seed) for seed in range(LOOPS)]
     types = {joint.type for case, _, _ in found for joint in case.mechanism.joints}

@@ -37,7 +37,7 @@ def made(monkeypatch):
     return calls(monkeypatch, compiled_model, "compile_model")
 
 
-def test_the_same_mechanism_and_request_need_one_model(made):
+def test_model_cache_of_equal_requests(made):
     first = solve(mcpherson(), "stroke", STROKES).points["wheel"]
     was = first.position.copy()
     other = solve(mcpherson(), "stroke", STROKES[::-1] / 2.0).points["wheel"]
@@ -54,7 +54,7 @@ def test_the_same_mechanism_and_request_need_one_model(made):
     assert np.abs(moved.position - was).max() > 1e-3
 
 
-def test_designs_too(made):
+def test_model_cache_of_designs(made):
     place = "points.wheel.position"
     values = {place: np.array([mcpherson().point("wheel").position, (0.1, 0.7, 0.3)])}
     first, again = (
@@ -65,7 +65,7 @@ def test_designs_too(made):
     np.testing.assert_array_equal(first, again)
 
 
-def test_threads_share_it():
+def test_model_cache_is_shared_by_threads():
     alone = solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy()
     with ThreadPoolExecutor(4) as threads:
         for found in threads.map(lambda _: solve(mcpherson(), "stroke", STROKES), range(24)):
@@ -78,7 +78,7 @@ def swept(monkeypatch):
     return calls(monkeypatch, block_sweep.BlockSweep, "__init__")
 
 
-def test_of_a_chain_the_last_path_is_kept(swept):
+def test_cache_keeps_last_path_of_chain(swept):
     turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
     found = []
     for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
@@ -88,7 +88,7 @@ def test_of_a_chain_the_last_path_is_kept(swept):
         np.testing.assert_array_equal(each, found[0])
 
 
-def test_threads_take_turns_at_a_chain_and_each_keeps_its_own(swept):
+def test_path_cache_is_per_thread(swept):
     turn = np.linspace(-0.1, 0.2, 9)
     with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
         found = [
@@ -102,7 +102,7 @@ def test_threads_take_turns_at_a_chain_and_each_keeps_its_own(swept):
         )
 
 
-def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
+def test_user_motion_of_chain_not_cached(swept):
     @dataclass(frozen=True)
     class Mine(Motion):
         def at(self, t):
@@ -115,7 +115,7 @@ def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
 
 
 @pytest.mark.usefixtures("own_joint_types")
-def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
+def test_chain_of_user_joints_not_cached(monkeypatch):
     @dataclass(frozen=True)
     class Hinge(Revolute):
         type = "hinge_of_mine"
@@ -132,7 +132,7 @@ def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
 
 
 @pytest.mark.usefixtures("own_joint_types")
-def test_joints_of_a_users_own_are_made_anew(made):
+def test_user_joints_are_not_cached(made):
     """They may be equal, and yet not mean the same."""
 
     @dataclass(frozen=True)
@@ -154,7 +154,7 @@ def bound(monkeypatch):
     return calls(monkeypatch, walk.Marcher, "__init__")
 
 
-def test_the_same_samples_are_laid_out_once(bound):
+def test_route_cache_of_equal_samples(bound):
     first, again = (
         solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy() for _ in range(2)
     )
@@ -168,7 +168,7 @@ def test_the_same_samples_are_laid_out_once(bound):
         assert len(bound) == k
 
 
-def test_samples_of_the_users_may_change_afterwards():
+def test_changed_sample_array_is_harmless():
     strokes = STROKES.copy()
     far = solve(mcpherson(), "stroke", strokes).points["wheel"].position[0].copy()
     strokes *= 0.5
@@ -179,7 +179,7 @@ def test_samples_of_the_users_may_change_afterwards():
     )
 
 
-def test_motions_of_a_users_own_are_followed_anew(bound):
+def test_user_motions_are_not_cached(bound):
     """They may be equal, and yet not mean the same."""
 
     @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def test_motions_of_a_users_own_are_followed_anew(bound):
         assert len(bound) == number
 
 
-def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
+def test_very_long_route_is_not_cached(bound, monkeypatch):
     monkeypatch.setattr(samples, "LONGEST_KEPT", 20)
     for number in (1, 2):
         solve(mcpherson(), "stroke", STROKES)
@@ -222,7 +222,7 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
         (circle(22).mechanism, sparse_lanes.SparseLanes),
     ],
 )
-def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
+def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):
     made = calls(monkeypatch, kind, "__init__")
     values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
     first = solve(large, driver, values).points
@@ -239,7 +239,7 @@ def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
     assert len(made) == 2
 
 
-def test_after_clearing_models_are_made_anew(made):
+def test_clear_caches_drops_models(made):
     for number in (1, 2):
         solve(mcpherson(), "stroke", STROKES)
         solve(mcpherson(), "stroke", STROKES)

@@ -19,7 +19,7 @@ from kincheck.core.program import Elimination
 from kincheck.core.studies.stress.families.linkages import any_plane, beside, crank_rocker, four_bar
 
 
-def test_independent_rows_of_a_known_matrix():
+def test_independent_rows_of_known_matrix():
     rows = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
     kept = independent_rows(rows, 0)
     assert len(kept) == np.linalg.matrix_rank(rows) == np.linalg.matrix_rank(rows[kept])
@@ -38,7 +38,7 @@ def test_independent_rows_of_random_matrices(seed):
     assert 11 in kept
 
 
-def test_a_senseless_number_of_rows_is_looked_at_in_portions():
+def test_independent_rows_in_portions():
     """What is left out of the first is not taken up again, and what is kept is judged with the
     rest.
     """
@@ -52,7 +52,7 @@ def test_a_senseless_number_of_rows_is_looked_at_in_portions():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
+def test_redundant_rows_of_loops_sharing_crank(seed):
     """Each loop keeps a system of its own: of hinges alone three of its rows are left out, and they
     are none of the crank's.
     """
@@ -73,7 +73,7 @@ def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_rows_kept_at_the_design_are_good_for_the_whole_turn(seed):
+def test_kept_rows_are_good_all_round(seed):
     """Against the best there is, all rows. Where one row each of two hinges kept an axis parallel
     there were poses without rank.
     """
@@ -137,7 +137,7 @@ def locomotive(lead, first=LEFT):
     )
 
 
-def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_pose():
+def test_dead_rod_is_no_singular_pose():
     """The rod whose rows were chosen comes to its dead points; the mechanism is regular there, for
     the other rod is not.
     """
@@ -151,7 +151,7 @@ def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_po
     assert trace(locomotive(np.pi / 2.0), "turn", length=7.0, longest=0.1).events == ()
 
 
-def test_where_both_rods_are_at_their_dead_points_there_is_one():
+def test_two_dead_rods_are_singular():
     found = solve(locomotive(np.pi), "turn", np.linspace(0.0, 4.0 * np.pi, 49))
     assert all("(bifurcation)" in note for note in found.details["notes"])
     assert [
@@ -159,7 +159,7 @@ def test_where_both_rods_are_at_their_dead_points_there_is_one():
     ][:1] == ["branch point"]
 
 
-def test_branches_beside_a_loop_do_not_count():
+def test_redundancy_beside_many_branches():
     """A four-bar with a tilted hinge, among a thousand wheels that follow its crank."""
     tilted = (1e-6, 0.0, 1.0)
     joints = [

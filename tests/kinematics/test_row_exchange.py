@@ -19,7 +19,7 @@ from .test_choice import ALONG, DEAD, loop
 from .test_redundancy import locomotive
 
 
-def test_no_more_often_than_so(monkeypatch):
+def test_row_exchange_stops_at_limit(monkeypatch):
     """Then the motion ends, or is refused, and says that it was the choice of rows."""
     turn = np.linspace(0.0, 3.0, 31)
     monkeypatch.setattr(segments, "MOST", 0)
@@ -28,7 +28,7 @@ def test_no_more_often_than_so(monkeypatch):
     assert "the mechanism is regular there" in found.message
 
 
-def test_few_samples_are_tried_in_vain(monkeypatch):
+def test_limit_of_failed_row_exchanges(monkeypatch):
     tried, found, renew = list[float](), list[int](), Followed.renew
     monkeypatch.setattr(
         segments,
@@ -45,7 +45,7 @@ def test_few_samples_are_tried_in_vain(monkeypatch):
     assert found == [3]
 
 
-def test_sample_is_kept_if_not_reached_again(monkeypatch):
+def test_unreached_sample_is_kept(monkeypatch):
     monkeypatch.setattr(Followed, "visit", lambda self, samples: {})
     turn, question = np.append(0.0, DEAD - np.geomspace(1.0, 1e-2, 12)), segments.needs_check
     found = list[int]()
@@ -58,7 +58,7 @@ def test_sample_is_kept_if_not_reached_again(monkeypatch):
     assert found[0] >= 1
 
 
-def test_what_cannot_be_better_is_asked_once(monkeypatch):
+def test_dead_centre_is_examined_once(monkeypatch):
     """The Bricard linkage comes near its dead centre, which no choice of rows changes."""
     asked, values = list[int](), singular_samples.smallest_singular_values
     monkeypatch.setattr(
@@ -76,7 +76,7 @@ def test_what_cannot_be_better_is_asked_once(monkeypatch):
     assert len(asked) == 2
 
 
-def test_the_best_rows_known_are_taken_again_where_they_are_good_enough():
+def test_known_rows_are_chosen_if_good():
     matrix = np.array([[1.0, 0.0], [0.0, 1e-3], [0.0, 1.0], [0.0, 0.2]])
     drivers, none = 0, ()
     assert chosen(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 2)
@@ -90,7 +90,7 @@ def test_the_best_rows_known_are_taken_again_where_they_are_good_enough():
     )
 
 
-def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
+def test_pose_off_chosen_rows_is_refused():
     """What rows chosen anew make of a pose is near it, or it is another."""
     model = recent_model(loop(), Request(("turn",), ("tracer",)))
     route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.0, 1.5])))
@@ -108,7 +108,7 @@ def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
     assert segments._standing(standing.model, off, sample, 1e-6) is None
 
 
-def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
+def test_pose_against_redundant_rows_is_refused(monkeypatch):
     """Rows chosen anew leave out others than before: those must hold as well. A hinge is askew by a
     part of what is allowed.
     """
@@ -125,7 +125,7 @@ def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
 
 
 @pytest.mark.parametrize("part", [2.0, 4.0])
-def test_a_sample_is_taken_again_only_where_it_is_much_farther_from_singular(part, monkeypatch):
+def test_sample_is_replaced_if_more_regular(part, monkeypatch):
     model = recent_model(loop(), Request(("turn",), ("tracer",)))
     route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.1, 0.2, 0.3])))
     found = follow_samples(route, 1e-12)
@@ -138,7 +138,7 @@ def test_a_sample_is_taken_again_only_where_it_is_much_farther_from_singular(par
     assert whole.part_of.tolist() == [int(part > 3.0)] * 3
 
 
-def test_other_rows_are_looked_for_before_a_step_is_divided_down_to_the_pose(monkeypatch):
+def test_row_exchange_comes_before_division(monkeypatch):
     """Down to where nothing is seen through rounding takes thirty parts each time."""
     divided, divide = list[float](), SideWalk._divided
     monkeypatch.setattr(

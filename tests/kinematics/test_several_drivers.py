@@ -26,7 +26,7 @@ def steered():
     )
 
 
-def test_a_held_driver_holds():
+def test_held_driver_keeps_value():
     held = solve(steered(), "stroke", STROKES)
     fixed = solve(mcpherson(), "stroke", STROKES)
     assert np.abs(held.points["wheel"].position - fixed.points["wheel"].position).max() <= 5e-16
@@ -36,7 +36,7 @@ def test_a_held_driver_holds():
     )
 
 
-def test_a_driven_displacement():
+def test_driven_displacement():
     """Steering with the stroke held: the rack moves as driven, all joints hold, the wheel keeps its
     height.
     """
@@ -60,7 +60,7 @@ def test_a_driven_displacement():
         ] == [True] * 3
 
 
-def test_swept_from_either_end_the_two_drivers_meet():
+def test_drivers_in_either_order():
     """Stroke at a steered design and steering at a stroked one pass through the same pose."""
     corner = {}
     for first, second, a, b in (("stroke", "steer", 0.03, 0.02), ("steer", "stroke", 0.02, 0.03)):

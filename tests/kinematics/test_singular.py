@@ -41,7 +41,7 @@ def chain_end(loops, turn):
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, monkeypatch):
+def test_doubtful_estimate_is_judged_by_sigma(compiled, monkeypatch):
     """The estimate says a fifth of sigma; equations for that are traced for the first sweep
     only.
     """
@@ -71,7 +71,7 @@ def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, mo
 
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("near", [0.0, 1e-13, -1e-9])
-def test_a_sample_where_the_motion_branches(loops, near):
+def test_sample_at_bifurcation(loops, near):
     """Its equations say nothing of it; it is interpolated, said to be, and the samples beyond are
     reached.
     """
@@ -99,7 +99,7 @@ def test_a_sample_where_the_motion_branches(loops, near):
     assert "turn" not in pose["rows_of"]
 
 
-def test_many_samples_around_it():
+def test_samples_around_bifurcation():
     """Fine steps up to it: some are interpolated, none is wrong."""
     turn = BRANCH + np.linspace(-1e-3, 1e-3, 21)
     found = solve(chain(1), "turn", turn)
@@ -108,7 +108,7 @@ def test_many_samples_around_it():
     assert found.details["retried_samples"] >= 1
 
 
-def test_a_singular_pose_between_samples():
+def test_bifurcation_between_samples():
     turn = np.linspace(0.0, 2.4, 7)
     found = solve(chain(1), "turn", turn)
     assert found.solved.all()
@@ -118,14 +118,14 @@ def test_a_singular_pose_between_samples():
     assert "crosses a singular pose between turn = 1.6 and turn = 2" in found.details["notes"][0]
 
 
-def test_both_ways_and_twice():
+def test_bifurcations_on_both_sides():
     found = solve(chain(1), "turn", np.linspace(-3.0, 6.0, 40))
     assert found.solved.all()
     places = sorted(pose["driver"]["turn"] for pose in found.details["singular_poses"])
     assert places == pytest.approx([BRANCH - np.pi, BRANCH, BRANCH + np.pi], abs=0.02)
 
 
-def test_a_run_says_what_a_passing_record_passed():
+def test_run_reports_singular_pose():
     case = cases.load("iftomm_n_four_bar")
     sweep = replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0])))
     (record,) = run([replace(case, sweep=sweep, reference={})], [Native()], tol=1e-12).records
@@ -134,7 +134,7 @@ def test_a_run_says_what_a_passing_record_passed():
     assert "passes a singular pose at crank = 1.57079633" in record.message
 
 
-def test_ordinary_sweeps_say_nothing():
+def test_ordinary_sweeps_report_nothing():
     for mechanism, driver in ((mcpherson(), "stroke"), (chain(1), "turn")):
         details = solve(mechanism, driver, np.linspace(-0.08, 0.08, 9)).details
         assert not {"notes", "singular_poses", "retried_samples"} & set(details)
@@ -171,7 +171,7 @@ def pin_height(design, pin, push):
 GAPS = np.array([1e-3, 1e-6, 1e-9, 1e-12])
 
 
-def test_near_a_dead_centre_positions_are_right():
+def test_positions_beside_dead_centre():
     """1e-12 m before it a residual of 1e-12 would be 1e-6 m of the pin; samples are solved again
     until rounding ends it.
     """
@@ -184,7 +184,7 @@ def test_near_a_dead_centre_positions_are_right():
     assert found.details["retried_samples"] >= 2
 
 
-def test_near_a_dead_centre_uncertain_rates_are_refused():
+def test_uncertain_rates_are_refused():
     mechanism, design, _ = pushed()
     found = solve(mechanism, "push", CRANK + 1.0 - design - GAPS)
     assert found.solved.tolist() == [True, True, False, False]
@@ -196,7 +196,7 @@ def test_near_a_dead_centre_uncertain_rates_are_refused():
     assert [pose["outcome"] for pose in found.details["singular_poses"]] == ["refused", "refused"]
 
 
-def test_a_tolerance_below_rounding_is_no_singular_pose():
+def test_tolerance_below_rounding_is_refused():
     found = solve(mcpherson(), "stroke", [0.0], tol=1e-30)
     assert not found.solved.any()
     assert "rounding alone leaves the pose uncertain by" in found.message
@@ -206,7 +206,7 @@ def test_a_tolerance_below_rounding_is_no_singular_pose():
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
+def test_strut_limit_is_reported(direction):
     found = solve(mcpherson(), "stroke", direction * np.linspace(0.0, 0.4, 21))
     assert f"the limit of travel is stroke = {LIMITS[direction]:.9g}" in found.message
     assert "kincheck trace" in found.message
@@ -218,7 +218,7 @@ def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
     assert {"lca", "knuckle"} <= set(pose["direction"])
 
 
-def test_beside_a_singular_pose_accelerations_keep_their_digits():
+def test_accelerations_beside_singular_pose():
     """There sigma is 6e-4: solved only as any other sample they are off by 1e-8."""
     turn = BRANCH + np.array([-0.2, -0.1, -0.05, -0.002])
     found = solve(chain(1), "turn", turn)
@@ -236,5 +236,5 @@ def test_beside_a_singular_pose_accelerations_keep_their_digits():
         ([-1.0, 1.0], None),
     ],
 )
-def test_a_part_of_a_step_is_gone_only_where_its_half_could_be(margins, part):
+def test_part_of_step_needs_half(margins, part):
     assert longest(np.array(margins)) == part

@@ -57,7 +57,7 @@ def deviation(found, *columns):
 
 
 @pytest.mark.parametrize("style", [style.value for style in Style])
-def test_wheel_against_the_reference(style):
+def test_wheel_against_reference(style):
     """Round-off of numbers near one, amplified by the condition (36) and the second derivatives (3
     1/m).
     """
@@ -70,7 +70,7 @@ def test_wheel_against_the_reference(style):
 
 
 @pytest.mark.parametrize("style", [style.value for style in Style])
-def test_knuckle_against_the_reference(style):
+def test_knuckle_against_reference(style):
     """The body's own frame, in the paper's variables: its origin is the wheel centre."""
     knuckle = solution(style).bodies["knuckle"]
     assert deviation(knuckle.r, "x_W", "y_W", "z_W") <= 5e-16
@@ -78,7 +78,7 @@ def test_knuckle_against_the_reference(style):
     assert np.abs(np.linalg.norm(knuckle.p, axis=1) - 1.0).max() <= 5e-16
 
 
-def test_iterations_and_residual():
+def test_strut_iterations_and_residual():
     found = solution()
     assert found.iterations.max() <= 4
     assert found.iterations.min() >= 1
@@ -155,7 +155,7 @@ WRITTEN = [
 
 
 @pytest.mark.parametrize(("name", "write", "style"), WRITTEN)
-def test_the_papers_equations_hold(name, write, style):
+def test_paper_equations_hold(name, write, style):
     """Residuals of all joints at the solved poses, and their first two derivatives by time along r,
     p, v and a.
 
@@ -184,7 +184,7 @@ def test_the_papers_equations_hold(name, write, style):
         assert np.abs(phi_tt).max() <= 1e-11
 
 
-def test_wrong_angular_velocities_would_show():
+def test_paper_equations_find_wrong_rates():
     """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by
     orders of magnitude.
     """
@@ -206,7 +206,7 @@ def test_wrong_angular_velocities_would_show():
     )
 
 
-def test_points_are_carried_by_their_bodies():
+def test_points_follow_bodies():
     """Position, velocity and acceleration of a point by the bodies' r, p, omega' alone."""
     mechanism, found = mcpherson(), solution()
     arm = naive.arm(naive.design(mechanism)["knuckle"], mechanism.point("rod_end").position)

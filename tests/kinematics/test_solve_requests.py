@@ -27,7 +27,7 @@ def flops(found):
     return {name: size["flops"] for name, size in found.details["program"].items()}
 
 
-def test_lower_orders_give_the_same_and_cost_less():
+def test_lower_orders_cost_less():
     by_order = [
         solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)
     ]
@@ -71,7 +71,7 @@ def test_fixed_bodies_cost_nothing(style):
     assert free.details["rank"] == fixed.details["rank"]
 
 
-def test_the_ground_may_be_either_body():
+def test_ground_as_either_body():
     """Which body of a joint is the fixed one costs nothing either."""
     m = mcpherson()
     turned = [
@@ -83,7 +83,7 @@ def test_the_ground_may_be_either_body():
     )
 
 
-def test_only_what_is_asked_for_is_there():
+def test_solution_has_requested_names_only():
     everything = solve(mcpherson(), "stroke", [0.0, 0.01], bodies=MOVING)
     assert set(everything.points) == {"wheel", "rod_end"}
     assert set(everything.bodies) == set(MOVING)
@@ -96,7 +96,7 @@ def test_only_what_is_asked_for_is_there():
     assert flops(nothing)["newton"] == flops(everything)["newton"]
 
 
-def test_fixed_bodies_and_their_points_stay():
+def test_fixed_bodies_stay():
     mechanism = mcpherson()
     mechanism = replace(
         mechanism, points=[*mechanism.points, Point("top", "chassis", (1.0, 0.55, 0.6))]
@@ -111,7 +111,7 @@ def test_fixed_bodies_and_their_points_stay():
     assert not rack.a.any()
 
 
-def test_motions_are_views_by_name_made_when_looked_at():
+def test_motions_are_lazy_views():
     table = np.arange(12.0).reshape(2, 6)
     motions = Motions(PointMotion, table, {"P": [slice(0, 3), slice(3, 6), None]})
     assert (list(motions), len(motions), "Q" in motions) == (["P"], 1, False)
@@ -125,7 +125,7 @@ def test_motions_are_views_by_name_made_when_looked_at():
 
 
 @pytest.mark.parametrize("name", ["rssr", "four_bar", "iftomm_n_four_bar"])
-def test_of_no_values_there_are_no_samples(name):
+def test_solve_without_samples(name):
     """Also where rows are left out, which may be chosen anew."""
     case = cases.load(name)
     found = solve(case.mechanism, case.sweep.driver, [])
@@ -158,6 +158,6 @@ def test_of_no_values_there_are_no_samples(name):
         ),
     ],
 )
-def test_an_argument_that_makes_no_sense_is_told(arguments, message):
+def test_solve_refuses_bad_arguments(arguments, message):
     with pytest.raises(SolveError, match=message):
         solve(mcpherson(), **({"driver": "stroke", "values": [0.0, 0.1]} | arguments))

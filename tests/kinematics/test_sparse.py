@@ -48,7 +48,7 @@ def compared(mechanism, path, points):
     assert_alike(*with_one_program(Method.SPARSE, mechanism, path, points))
 
 
-def test_couplers_and_their_coordinates():
+def test_sparse_couplers():
     mechanism = Mechanism(
         "gears",
         [
@@ -77,12 +77,12 @@ def test_couplers_and_their_coordinates():
     )
 
 
-def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample():
+def test_sparse_start_away_from_design():
     for times in (np.linspace(0.0, 2.0, 15), np.linspace(2.0, 1.0, 4)):
         compared(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",))
 
 
-def test_a_motion_that_begins_beyond_the_travel_ends_on_the_way_to_its_first_sample():
+def test_sparse_start_beyond_travel():
     steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))
     assert solve_sparse(mcpherson(), steep).message.startswith(
         "on the way to the first sample: cannot be followed beyond"
@@ -98,7 +98,7 @@ CRANK = Mechanism(
 )
 
 
-def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another():
+def test_sparse_step_is_limited():
     path = turning(6.0 * np.pi + 0.3)
     found = solve_sparse(CRANK, path, (), ["b"])  # an odd number of turns changes the sign
     assert found.bodies["b"].p[0] == pytest.approx(
@@ -123,7 +123,7 @@ def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another()
 
 
 @pytest.mark.parametrize("cranks", [9, 120])
-def test_every_crank_of_a_ring_turns_as_the_first(cranks):
+def test_ring_of_any_size(cranks):
     """Of a ring of 17 bodies as one program, whose samples are beyond doubt, and of a large one as
     a sparse system.
     """
@@ -145,7 +145,7 @@ def test_every_crank_of_a_ring_turns_as_the_first(cranks):
         assert np.abs(motion.acceleration - np.column_stack([-s, -c, o])).max() <= 1e-13 * cranks
 
 
-def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
+def test_ring_factors_grow_linearly():
     sizes = [len(part) for part in components(ring(20), frames(ring(20)))]
     assert sorted(sizes) == [1, 38]  # the driven crank, and all others
     small, large = (
@@ -154,7 +154,7 @@ def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
     assert large < 4.4 * small
 
 
-def test_numpy_and_machine_code_agree():
+def test_sparse_by_numpy():
     path = turning(*np.linspace(-0.5, 0.5, 5))
     assert_alike(
         *(
@@ -164,7 +164,7 @@ def test_numpy_and_machine_code_agree():
     )
 
 
-def test_redundant_rows_of_many_loops_are_found_where_they_are():
+def test_redundant_rows_of_many_loops():
     loops = 60
     found = solve_sparse(chain_of_hinges(loops), turning(-0.5, 0.5), ["end"])
     assert found.solved.all(), found.message
@@ -174,7 +174,7 @@ def test_redundant_rows_of_many_loops_are_found_where_they_are():
     assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
 
 
-def test_samples_of_a_ring_are_factored_together(monkeypatch):
+def test_ring_samples_are_factored_together(monkeypatch):
     calls, splu = [], linalg.splu
     monkeypatch.setattr(
         linalg, "splu", lambda *matrix, **how: (calls.append(1), splu(*matrix, **how))[1]
@@ -191,7 +191,7 @@ def test_samples_of_a_ring_are_factored_together(monkeypatch):
     assert np.abs(motion.acceleration - expected.acceleration).max() <= 3e-12
 
 
-def test_poses_that_outgrow_an_order_are_factored_in_their_own():
+def test_factors_of_outgrown_order():
     """Two rows change places: by the order of the first matrix, multipliers of the others grow."""
     rows, columns = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     first = np.array([1.0, 0.5, 0.25, 1.0])

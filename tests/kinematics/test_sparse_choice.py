@@ -85,7 +85,7 @@ PLAIN, KITE, ASIDE = (0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.0
         (65, ASIDE, "hinges"),
     ],
 )
-def test_rows_that_come_to_depend_on_each_other_end_nothing(sizes, ends, count):
+def test_sparse_rows_are_exchanged(sizes, ends, count):
     """A plain four-bar, a kite off by a twentieth, and one on its side beside its corner."""
     turn = np.linspace(0.0, 1.6, count)
     found = swept(four_bar(sizes, -1.1, ends), turn)
@@ -94,13 +94,13 @@ def test_rows_that_come_to_depend_on_each_other_end_nothing(sizes, ends, count):
     assert np.abs(found.points["meet"].position[:, :2] - meet).max() < 1e-12
 
 
-def test_rows_chosen_anew_are_counted():
+def test_sparse_row_exchanges_are_counted():
     found = swept(four_bar(KITE, -1.1, "hinges"), np.linspace(0.0, 1.6, 65))
     assert found.details["rows_chosen_anew"] >= 1
     assert "rows_chosen_anew" not in swept(ring(CRANKS), np.linspace(0.0, 0.8, 9)).details
 
 
-def test_rates_with_rows_chosen_anew_keep_lengths():
+def test_sparse_rates_after_row_exchange():
     mechanism = four_bar(KITE, -1.1, "hinges")
     path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.6, 41))
     found = solve_sparse(mechanism, path, ["meet"])
@@ -183,14 +183,14 @@ def test_parallelogram_in_line_goes_on(ends, turn):
         (MIDDLE, "hinges", 1e-4, 0.56846),
     ],
 )
-def test_a_gap_in_the_largest_block_is_not_stepped_over(off, end, ends, turn):
+def test_sparse_gap_ends_motion(off, end, ends, turn):
     found = swept(inside(off, ends), turn, order=0)
     assert found.solved.tolist() == (turn > -end).tolist()
     assert "cannot be followed beyond" in found.message
 
 
 @pytest.mark.parametrize("ends", ["distance", "hinges"])
-def test_the_largest_block_is_followed_where_it_is_regular(ends):
+def test_largest_block_is_followed(ends):
     turn = np.linspace(0.0, 0.8, 9)
     found = swept(inside(0.0, ends), turn)
     assert found.solved.all(), found.message
@@ -228,7 +228,7 @@ def test_sigmas_of_blocks():
         assert (ratio <= (4.0 if near == 1.0 else 1.0 + 1e-6)).all()
 
 
-def test_rows_that_are_kept_are_well_conditioned():
+def test_kept_rows_are_well_conditioned():
     """Of a chain of loops rows were left out at one end: the smallest singular value was nothing,
     that of all rows is not.
     """

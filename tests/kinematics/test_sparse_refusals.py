@@ -24,7 +24,7 @@ from .test_chain import chain
 from .test_sparse import CRANK, X, turning
 
 
-def test_a_wrong_branch_is_no_solution():
+def test_sparse_wrong_branch_is_refused():
     lanes = SparseLanes(CRANK, Request(("turn",), ()))
     lanes.solve_near(lanes.design, 1e-12)
     lanes.set_prediction_start(0.0, turning(0.0))
@@ -36,7 +36,7 @@ def test_a_wrong_branch_is_no_solution():
     assert "wrong branch" in str(lanes.failure(1e-12))
 
 
-def test_a_hinge_askew_has_one_verdict():
+def test_tilted_hinge_has_one_verdict():
     mechanism = four_bar()
     joints = [
         joint.changed(axis=(0.0, 1.0, 1e-3)) if joint.name == "D" else joint
@@ -47,7 +47,7 @@ def test_a_hinge_askew_has_one_verdict():
             solve_as(method, replace(mechanism, joints=joints), turning(0.5))
 
 
-def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
+def test_sparse_limit_of_travel():
     values = np.linspace(-0.04, 0.4, 23)
     found = solve_sparse(
         mcpherson(), Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1
@@ -106,6 +106,6 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("mechanism", "message"), REFUSED)
-def test_what_cannot_be_solved_is_refused_by_name(mechanism, message):
+def test_sparse_refusals_name_cause(mechanism, message):
     with pytest.raises(SolveError, match=message):
         SparseLanes(mechanism, Request(tuple(each.name for each in mechanism.drivers), ()))

@@ -146,7 +146,7 @@ WAYS = [
         *(pytest.param(*way.values, ANGLES[:2], id=way.id, marks=way.marks) for way in WAYS),
     ],
 )
-def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved, angles):
+def test_pinion_rolls_from_any_angle(solved, angles):
     """At 60 degrees the sine of the phase is not the design value to the last bit, at 45 it is."""
     for degrees in angles:
         mechanism = arm(degrees)
@@ -161,7 +161,7 @@ def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved, angl
 
 @pytest.mark.parametrize("solved", WAYS)
 @pytest.mark.parametrize("kind", ["sine", "typed table"])
-def test_six_typed_digits_are_as_good_as_all(solved, kind):
+def test_typed_digits_start_at_design(solved, kind):
     degrees = ANGLES[2 if kind == "sine" else 3]
     phases = phases_of(degrees)
     mechanism = arm(degrees)
@@ -187,7 +187,7 @@ def test_six_typed_digits_are_as_good_as_all(solved, kind):
         for k, way in enumerate(WAYS)
     ],
 )
-def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
+def test_relative_drivers_with_typed_phase(solved, turns):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     for phase in (turns * math.pi, six(turns * math.pi)):
@@ -200,7 +200,7 @@ def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
         assert found.details["start"]["time"] == 0.0
 
 
-def test_a_design_value_that_is_rounding_itself_is_zero_to_a_driver_held_there():
+def test_rounded_design_value_is_zero():
     mechanism = arm(180.0)
     assert 0.0 < mechanism.design_value("y") < 1e-15
     motions = {
@@ -213,7 +213,7 @@ def test_a_design_value_that_is_rounding_itself_is_zero_to_a_driver_held_there()
     assert (start.time, start.lead, start.starts_at_design) == (0.0, None, True)
 
 
-def test_what_is_exact_is_where_it_was():
+def test_exact_start_is_design():
     mechanism = arm(30.0, relative=True)
     start = start_of(mechanism, Path({"x": Sine(0.1, 1.0), "y": Ramp(0.1)}, TIMES))
     assert (start.time, start.lead, start.other, start.facts) == (
@@ -224,7 +224,7 @@ def test_what_is_exact_is_where_it_was():
     )
 
 
-def test_a_table_that_does_not_know_time_zero_begins_at_its_first_sample():
+def test_table_starts_at_first_sample():
     """Beyond its ends a line goes on through the design, and is not asked there."""
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     table = Table((1.0, 2.0, 3.0), (1.0, 2.0, 3.0))
@@ -235,7 +235,7 @@ def test_a_table_that_does_not_know_time_zero_begins_at_its_first_sample():
 
 
 @pytest.mark.parametrize("solved", WAYS)
-def test_a_sample_at_which_the_design_stands_is_a_start(solved):
+def test_start_at_sample_of_design(solved):
     """A table of one turn and a half that is at the design in its middle, at 0.75 s."""
     degrees, times = 60.0, np.linspace(0.0, 1.5, 13)
     mechanism = arm(degrees)
@@ -249,7 +249,7 @@ def test_a_sample_at_which_the_design_stands_is_a_start(solved):
 
 
 @pytest.mark.parametrize("phase", [3.0 * math.pi, six(3.0 * math.pi)])
-def test_a_singular_pose_between_the_start_and_the_first_sample_is_passed(phase):
+def test_start_passes_singular_pose(phase):
     """The cranks of a parallelogram pass their base line, 1.87 rad from design, before any
     sample.
     """
@@ -261,7 +261,7 @@ def test_a_singular_pose_between_the_start_and_the_first_sample_is_passed(phase)
     )
 
 
-def test_a_start_nearer_than_rounding_may_be_a_dead_centre():
+def test_start_near_dead_centre():
     """Design: stretched out. To depart from there for 1e-16 rad is to depart from there."""
     found = solve(slider_crank(), "turn", np.linspace(-0.4, 0.4, 5), motions={})
     path = Path({"turn": Sine(-0.4, 0.25, math.pi)}, np.array([-1.0, 0.0, 1.0]))

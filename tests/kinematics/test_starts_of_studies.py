@@ -23,7 +23,7 @@ from .test_chain import chain
 from .test_start import RADIUS, TIMES, arm, case_of, circling, phases_of, six
 
 
-def test_components_start_alike():
+def test_components_start_at_typed_phase():
     for phase in (math.pi, six(math.pi)):
         path = Path({"turn": Sine(-1.2, 0.2, phase)}, TIMES)
         found = solve_components(chain(3), path, ("end",))
@@ -33,7 +33,7 @@ def test_components_start_alike():
         assert found.details["start"]["time"] == 0.0
 
 
-def test_many_designs_start_alike():
+def test_designs_start_at_typed_phase():
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     values, tips = np.linspace(-1.0, 1.0, 5), np.array([(1.0, 0.1, 0.0), (0.9, 0.2, 0.0)])
     for phase in (math.pi, six(math.pi), 1.0):
@@ -47,7 +47,7 @@ def test_many_designs_start_alike():
             )
 
 
-def test_what_is_assumed_of_many_designs_is_said():
+def test_designs_note_assumed_start():
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     tips = {"points.tip.position": np.array([(1.0, 0.1, 0.0)])}
     near, far = (
@@ -59,7 +59,7 @@ def test_what_is_assumed_of_many_designs_is_said():
 
 
 @pytest.mark.parametrize(("phase", "said"), [(six(math.pi), False), (1.0, True)])
-def test_what_is_assumed_of_a_study_is_said(phase, said, tmp_path):
+def test_study_notes_assumed_start(phase, said, tmp_path):
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     file = tmp_path / "vary.toml"
     what = '[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
@@ -69,7 +69,7 @@ def test_what_is_assumed_of_a_study_is_said(phase, said, tmp_path):
     assert any("go straight" in note for note in found.run["cases"]["case"]["notes"]) == said
 
 
-def test_a_simulator_starts_there_too():
+def test_simulator_starts_at_typed_phase():
     """Turns of a coupled joint are counted from the design, where a typed phase begins as well as
     an exact one.
     """
@@ -89,7 +89,7 @@ def test_a_simulator_starts_there_too():
     )
 
 
-def test_a_written_start_is_reached_from_the_design():
+def test_written_start_is_reached():
     """The way begins at the design, also where the motion does not, so that turns are counted."""
     mechanism = replace(arm(60.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     case = case_of(mechanism, {"u": Sine(9.0, 0.1, 1.5), "v": Ramp(0.1)})

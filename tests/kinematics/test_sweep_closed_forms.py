@@ -39,7 +39,7 @@ def wheel(values=STROKES):
 # Grids
 
 
-def test_order_of_the_samples_does_not_matter():
+def test_samples_in_any_order():
     shuffled = np.random.default_rng(1).permutation(STROKES)
     back = np.argsort(shuffled)
     expected, found = wheel(), wheel(shuffled)
@@ -93,7 +93,7 @@ TURNS = 2.0 * np.pi * np.linspace(-3.0, 3.0, 31)
 
 @pytest.mark.parametrize("angles", [TURNS, np.linspace(-7.0, 7.0, 301)], ids=["coarse", "fine"])
 @pytest.mark.parametrize("rate", [1.0, -3.0])
-def test_slider_crank(angles, rate):
+def test_slider_crank_closed_form(angles, rate):
     found = solve(slider_crank(), "turn", angles, rate=rate)
     assert found.solved.all(), found.message
     expected, end = slider_crank_motion(angles, rate), found.points["end"]
@@ -106,7 +106,7 @@ def test_slider_crank(angles, rate):
     assert pin.position[:, 2] == pytest.approx(-CRANK * np.sin(angles), abs=1e-15)
 
 
-def test_several_turns_come_back_to_the_design():
+def test_whole_turns_return_to_design():
     found = solve(slider_crank(), "turn", 2.0 * np.pi * np.arange(-20, 21), bodies=["crank"])
     # the angle itself rounds at 126 rad
     assert np.abs(found.points["end"].position[:, 0] - (CRANK + ROD)).max() <= 1e-14
@@ -114,7 +114,7 @@ def test_several_turns_come_back_to_the_design():
     assert sign == pytest.approx((-1.0) ** np.arange(-20, 21), abs=1e-14)
 
 
-def test_four_bar():
+def test_four_bar_closed_form():
     found = solve(four_bar(), "turn", TURNS)
     assert found.solved.all(), found.message
     x, z = four_bar_motion(TURNS)
@@ -126,7 +126,7 @@ def test_four_bar():
 
 
 @pytest.mark.parametrize("rod", [0.8, 0.999, 1.3])
-def test_a_rod_of_another_length_than_designed(rod):
+def test_rod_of_other_length(rod):
     """The design is closed first: the slider moves to where the rod reaches."""
     found = solve(slider_crank(rod), "turn", TURNS)
     assert found.solved.all(), found.message
@@ -136,7 +136,7 @@ def test_a_rod_of_another_length_than_designed(rod):
     assert np.abs(end.acceleration[:, 0] - expected.a).max() <= 1e-14
 
 
-def test_a_driven_slider():
+def test_driven_slider():
     """A joint displacement from an open angle: the crank angle by the cosine rule."""
     angle = 1.0
     design = float(slider_crank_motion([angle]).x[0])
@@ -153,7 +153,7 @@ def test_a_driven_slider():
     assert found.points["pin"].position[:, 0] == pytest.approx(CRANK * cosine, abs=1e-15)
 
 
-def test_a_relative_angle_between_moving_bodies():
+def test_relative_angle_of_moving_bodies():
     """Two arms in line: the second driven against the first, which is held."""
     arms = Mechanism(
         "arms",
@@ -177,7 +177,7 @@ def test_a_relative_angle_between_moving_bodies():
         assert pytest.approx(np.array(expected), abs=2e-15) == hand.position[:, :2].T
 
 
-def test_an_open_chain():
+def test_open_chain():
     """Three links in line, without a loop: the middle hinge swept, the others held."""
     links = [Body(f"link {k}") for k in range(3)]
     hinges = [
@@ -202,7 +202,7 @@ def test_an_open_chain():
     assert tip.acceleration[:, 0] == pytest.approx(-2.0 * np.cos(angles), abs=5e-15)
 
 
-def test_an_arm_on_a_ball_and_two_rods():
+def test_arm_on_ball_and_rods():
     """No joint with an axis: the arm swings about the line through the ball and where the rods
     meet, driven at its tip.
     """

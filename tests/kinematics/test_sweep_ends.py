@@ -25,7 +25,7 @@ from ..support.mechanisms import (
         (Method.SPARSE, 100.0, True),  # a part takes it a hundred times as long
     ],
 )
-def test_step_of_many_turns_is_divided(way, turn, solved):
+def test_step_of_many_turns(way, turn, solved):
     m = slider_crank()
     path = Path({"turn": Ramp(1.0)}, np.array([0.0, turn]))
     found = NativeSolver(method=way).prepare(m, path, ("end",))(1e-12)
@@ -40,7 +40,7 @@ def test_step_of_many_turns_is_divided(way, turn, solved):
 
 @pytest.mark.parametrize(("far", "limit"), [(0.4, 0.29337), (-0.4, -0.31674)])
 @pytest.mark.parametrize("steps", [401, 9])
-def test_lock_up(far, limit, steps):
+def test_lock_up_of_strut(far, limit, steps):
     """Formulation section 10: the first extrema of the wheel's height along the branch, to the
     digits given there.
     """
@@ -66,14 +66,14 @@ def test_lock_up(far, limit, steps):
     assert 0.0 < pivot < 0.02
 
 
-def test_an_end_before_the_first_sample():
+def test_end_before_first_sample():
     found = solve(mcpherson(), "stroke", [0.4])
     assert not found.solved.any()
     assert "no sample reached on this side" in found.message
     assert found.points["wheel"].position.shape == (1, 3)
 
 
-def test_samples_beyond_dead_centre_stay_unsolved():
+def test_samples_beyond_dead_centre():
     """Past a dead centre the crank could be assembled again, but not without passing where it
     cannot.
     """
@@ -85,7 +85,7 @@ def test_samples_beyond_dead_centre_stay_unsolved():
 
 
 @pytest.mark.parametrize("samples", [3, 5, 9, 20])
-def test_both_directions_may_end_on_a_coarse_grid(samples):
+def test_both_directions_end(samples):
     """Both fronts divide their steps at once, in one block of lanes."""
     found = solve(mcpherson(), "stroke", np.linspace(-1.5, 1.5, samples))
     assert found.message.count("cannot be followed beyond stroke = ") == 2

@@ -63,7 +63,7 @@ PATHS = {
         pytest.param(PATHS["in no order"], False, id="in no order, by numpy"),
     ],
 )
-def test_a_lane_is_what_a_model_of_its_own_gives(path, compiled):
+def test_lane_matches_own_model(path, compiled):
     mechanism, varied = strut()
     request = Request(("stroke",), ("wheel_center",), varied=varied, compiled=compiled)
     model = recent_model(mechanism, request)
@@ -96,9 +96,7 @@ ROUGH = {
         for compiled, order in ((True, (0, 2)[k % 2]), (False, (2, 0)[k % 2]))
     ],
 )
-def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(
-    values, compiled, order, monkeypatch
-):
+def test_lanes_extrapolate_or_use_rates(values, compiled, order, monkeypatch):
     mechanism, varied = strut()
     model = compile_model(
         mechanism,
@@ -128,7 +126,7 @@ def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(
     "path",
     [PATHS["from design, both ways"], Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 61))],
 )
-def test_a_lane_does_not_see_its_neighbours(path):
+def test_lane_ignores_neighbours(path):
     mechanism, varied = strut()
     model = compile_model(
         mechanism, Request(("stroke",), ("wheel_center",), order=0, varied=varied)
@@ -143,7 +141,7 @@ def test_a_lane_does_not_see_its_neighbours(path):
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_the_worst_of_each_lane_is_found_on_the_way(compiled):
+def test_worst_sample_of_each_lane(compiled):
     """Over both sides of the start, and of lanes that are lost on one of them, in the middle and at
     the end of a vector.
     """
@@ -168,7 +166,7 @@ def test_the_worst_of_each_lane_is_found_on_the_way(compiled):
 @pytest.mark.parametrize(
     "times", [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])]
 )
-def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there(times):
+def test_unsolved_variant_says_why(times):
     """A ball 0.28 m higher shortens the way of the arm; samples in no order find their places."""
     mechanism, _ = strut()
     varied = ("joints.ball.point",)
@@ -195,7 +193,7 @@ def test_what_cannot_be_followed_is_nan_with_the_reason_and_the_others_are_there
     np.testing.assert_array_equal(found.kept[:14, :, 0], found.kept[:14, :, 2])
 
 
-def test_a_lane_that_gets_lost_on_the_way_to_the_first_sample_is_solved_again_alone(monkeypatch):
+def test_lost_lane_is_solved_alone(monkeypatch):
     """Half a turn of the crank in one step instead of sixteen."""
     monkeypatch.setattr(design_batch, "LEAD", 1)
     mechanism, varied = load("rssr").mechanism, ("joints.rod.points.0",)
@@ -212,7 +210,7 @@ def test_a_lane_that_gets_lost_on_the_way_to_the_first_sample_is_solved_again_al
     np.testing.assert_allclose(found.kept[rows], usual.kept[rows], rtol=0, atol=SAME)
 
 
-def test_a_variant_that_does_not_close_says_so():
+def test_open_variant_is_refused():
     """A rod that is a third of the distance it has to span."""
     case = load("mcpherson_strut")
     joints = [
