@@ -27,14 +27,13 @@ from kincheck.core.studies.diagnosis.diagnose import diagnose
 from kincheck.core.studies.diagnosis.text import print_diagnosis
 from kincheck.core.studies.verified_reference import prove_case
 
-from ..kinematics.test_chain import chain
-from ..kinematics.test_singular import BRANCH
 from ..oracles import naive
 from ..support.case_texts import complains, write
 from ..support.engine_forces import Beside, every_force, force_case, values
 from ..support.four_bar_within_digits import solved, truth, written
 from ..support.loaded import loaded
 from ..support.loads import loaded as with_loads
+from ..support.mechanisms import BRANCH, chain
 from ..support.written_again import written_again
 
 PLAIN = """

@@ -14,8 +14,7 @@ from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.size import ring, tip
 
 from ..support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
-from ..support.mechanisms import four_bar, slider_crank
-from .test_chain import chain
+from ..support.mechanisms import chain, four_bar, slider_crank
 from .test_sparse_choice import inside
 
 METHODS = Method.ONE_PROGRAM, Method.BY_COMPONENTS, Method.SPARSE

@@ -4,41 +4,11 @@ grows by the loop.
 
 import numpy as np
 import pytest
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Spherical, Universal, solve
+from kincheck.core import solve
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 
-LEAN = 0.3
-"""Of the cranks at design [rad]; at a right angle from upright the chain is singular."""
-
-
-def chain(loops, lean=LEAN):
-    """Cranks at (k, 0) that lean alike, tied by couplers of length one; only the first is
-    driven.
-    """
-    s, c, n = np.sin(lean), np.cos(lean), range(loops)
-    cranks = [
-        Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), (0.0, 0.0, 1.0))
-        for k in range(loops + 1)
-    ]
-    balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
-    crosses = [
-        Universal(
-            f"cross{k}",
-            f"crank{k + 1}",
-            f"coupler{k}",
-            (k + 1 + s, c, 0.0),
-            ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-        )
-        for k in n
-    ]
-    return Mechanism(
-        "chain",
-        [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)],
-        [*cranks, *balls, *crosses],
-        [Point("end", f"crank{loops}", (loops + s, c, 0.0))],
-        [JointAngle("turn", "pivot0")],
-    )
+from ..support.mechanisms import LEAN, chain
 
 
 @pytest.mark.parametrize("loops", [1, 5])

@@ -14,8 +14,7 @@ from kincheck.core import (
 )
 from kincheck.core.kinematics.continuation.trace import trace
 
-from ..support.mechanisms import Z
-from .test_chain import chain
+from ..support.mechanisms import Z, chain
 
 # The closing step and the first one
 

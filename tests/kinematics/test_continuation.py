@@ -13,8 +13,18 @@ from kincheck.core import Body, JointAngle, Mechanism, Revolute, SolveError
 from kincheck.core.cli.main import main
 from kincheck.core.kinematics.continuation.trace import trace
 
-from ..support.mechanisms import A0, B0, C0, CRANK, D0, four_bar, mcpherson, slider_crank
-from .test_chain import LEAN, chain
+from ..support.mechanisms import (
+    A0,
+    B0,
+    C0,
+    CRANK,
+    D0,
+    LEAN,
+    chain,
+    four_bar,
+    mcpherson,
+    slider_crank,
+)
 
 # The strut's limits of travel [m] to 18 digits, by other means than the package's: the six numbers
 # of the knuckle's pose in 40 digits close two rods, the arm's axis and the strut's line (as in

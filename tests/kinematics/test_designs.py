@@ -17,9 +17,8 @@ from kincheck.core import (
 from kincheck.core.kinematics import design_batch
 from kincheck.core.kinematics.formulation.parameters import placed
 
-from ..support.mechanisms import four_bar
-from .test_chain import LEAN, chain
-from .test_variants import SAME, strut
+from ..support.mechanisms import LEAN, chain, four_bar
+from .test_design_lanes import SAME, strut
 
 
 @pytest.mark.parametrize("values", [[0.0], [0.1, 0.0, -0.1]])

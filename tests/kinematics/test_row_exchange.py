@@ -15,8 +15,8 @@ from kincheck.core.kinematics.continuation.walk import SideWalk, follow_samples
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp
 
-from .test_choice import ALONG, DEAD, loop
 from .test_redundancy import locomotive
+from .test_row_choice import ALONG, DEAD, loop
 
 
 def test_row_exchange_stops_at_limit(monkeypatch):

@@ -23,19 +23,16 @@ from kincheck.core.kinematics.formulation.acceptance_criteria import is_uncertai
 from kincheck.core.kinematics.one_design import solve
 from mpmath import mp, mpf
 
-from ..support.mechanisms import CRANK, mcpherson, slider_crank, slider_crank_motion
-from .test_chain import LEAN, chain
+from ..support.mechanisms import (
+    BRANCH,
+    CRANK,
+    chain,
+    chain_end,
+    mcpherson,
+    slider_crank,
+    slider_crank_motion,
+)
 from .test_continuation import LIMITS
-
-BRANCH = LEAN + np.pi / 2.0
-"""Where all links of the chain are in line."""
-
-
-def chain_end(loops, turn):
-    """Closed form of the last crank's pin, its velocity and acceleration at rate one."""
-    s, c, zero = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
-    return [np.column_stack(each) for each in ([loops + s, c, zero], [-c, s, zero], [-s, -c, zero])]
-
 
 # In doubt
 

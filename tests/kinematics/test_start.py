@@ -28,8 +28,7 @@ from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 
 from ..support.block_structures import solve_sparse
-from ..support.mechanisms import X, slider_crank
-from .test_chain import chain
+from ..support.mechanisms import X, chain, slider_crank
 
 RADIUS = 0.1
 TIMES = np.linspace(-0.75, 0.75, 13)

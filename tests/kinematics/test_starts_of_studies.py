@@ -19,7 +19,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.block_structures import solve_components
-from .test_chain import chain
+from ..support.mechanisms import chain
 from .test_start import RADIUS, TIMES, arm, case_of, circling, phases_of, six
 
 

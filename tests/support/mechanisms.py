@@ -14,6 +14,7 @@ from kincheck.core import (
     Revolute,
     Spherical,
     Translational,
+    Universal,
 )
 
 ORIGIN, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -154,3 +155,46 @@ def without_fixed_bodies(mechanism):
 
     joints = [replace(joint, i=name(joint.i), j=name(joint.j)) for joint in mechanism.joints]
     return replace(mechanism, bodies=mechanism.moving, joints=joints)
+
+
+LEAN = 0.3
+"""Of the cranks at design [rad]; at a right angle from upright the chain is singular."""
+
+
+def chain(loops, lean=LEAN):
+    """Cranks at (k, 0) that lean alike, tied by couplers of length one; only the first is
+    driven.
+    """
+    s, c, n = np.sin(lean), np.cos(lean), range(loops)
+    cranks = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), (0.0, 0.0, 1.0))
+        for k in range(loops + 1)
+    ]
+    balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
+    crosses = [
+        Universal(
+            f"cross{k}",
+            f"crank{k + 1}",
+            f"coupler{k}",
+            (k + 1 + s, c, 0.0),
+            ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+        )
+        for k in n
+    ]
+    return Mechanism(
+        "chain",
+        [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)],
+        [*cranks, *balls, *crosses],
+        [Point("end", f"crank{loops}", (loops + s, c, 0.0))],
+        [JointAngle("turn", "pivot0")],
+    )
+
+
+BRANCH = LEAN + np.pi / 2.0
+"""Where all links of the chain are in line."""
+
+
+def chain_end(loops, turn):
+    """Closed form of the last crank's pin, its velocity and acceleration at rate one."""
+    s, c, zero = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
+    return [np.column_stack(each) for each in ([loops + s, c, zero], [-c, s, zero], [-s, -c, zero])]

@@ -12,8 +12,7 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..support.block_structures import assert_alike, solve_components, with_one_program
-from ..support.mechanisms import mcpherson
-from .test_chain import LEAN, chain
+from ..support.mechanisms import LEAN, chain, mcpherson
 
 
 def test_component_limit_of_travel_is_reported():

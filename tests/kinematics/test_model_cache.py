@@ -16,8 +16,7 @@ from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.studies.bench.size import circle
 
-from ..support.mechanisms import mcpherson
-from .test_chain import chain
+from ..support.mechanisms import chain, mcpherson
 
 STROKES = np.linspace(-0.05, 0.05, 21)
 

@@ -27,7 +27,7 @@ from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
 
 from ..support.block_structures import assert_alike, solve_components, with_one_program
-from .test_chain import LEAN, chain
+from ..support.mechanisms import LEAN, chain
 
 
 def compared(mechanism, path, points):

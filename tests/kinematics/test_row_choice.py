@@ -18,9 +18,8 @@ from kincheck.core.kinematics.diagnosis.conditioning import conditioning
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
-from .test_chain import chain
+from ..support.mechanisms import BRANCH, chain, chain_end
 from .test_redundancy import LEFT, locomotive
-from .test_singular import BRANCH, chain_end
 
 ALONG = np.pi / 2.0
 """Turn of the Bennett loop at which the rows chosen at the design depend on each other; the other
