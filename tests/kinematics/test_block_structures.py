@@ -11,10 +11,10 @@ from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import follow_samples
 from kincheck.core.mechanism.motions import Path, Ramp
-from kincheck.core.studies.bench.size import ring, tip
+from kincheck.core.studies.bench.size import pivot, ring
 
 from ..support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
-from ..support.mechanisms import chain, four_bar, slider_crank
+from ..support.mechanisms import BRANCH, chain, chain_end, crank_tip, errors, four_bar, slider_crank
 from .test_sparse_choice import inside
 
 METHODS = Method.ONE_PROGRAM, Method.BY_COMPONENTS, Method.SPARSE
@@ -74,26 +74,24 @@ def test_torus_has_one_verdict(rows, columns, crossed):
     """
     mechanism, at = torus(rows, columns)
     turn = np.linspace(-0.5, 0.5, 32)
-    s, c, o = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
     for found in in_every_way(mechanism, turn, ("tip",)):
         assert found.solved.all(), found.message
         notes = found.details["notes"]
         assert sum("crosses a singular pose" in note for note in notes) >= crossed
-        motion = found.points["tip"]
-        assert np.abs(motion.position - np.column_stack([at[0] + s, at[1] + c, o])).max() <= 3e-14
+        position, *rates = crank_tip(at[0], LEAN - turn)
+        expected = position + [0.0, at[1], 0.0], *rates
         # what is interpolated is allowed 1e-9
-        assert np.abs(motion.velocity - np.column_stack([-c, s, o])).max() <= 1e-11
-        assert np.abs(motion.acceleration - np.column_stack([-s, -c, o])).max() <= 1e-9
+        assert (errors(found.points["tip"], expected) <= [3e-14, 1e-11, 1e-9]).all()
 
 
 @pytest.mark.parametrize("cranks", [5, 9])
 def test_ring_has_one_verdict(cranks):
     turn = np.linspace(-0.8, 0.8, 25)
-    expected = np.array([tip(cranks // 2, cranks, each) for each in turn])
-    for found in in_every_way(ring(cranks), turn, (f"tip{cranks // 2}",)):
+    far, expected = f"tip{cranks // 2}", crank_tip(pivot(cranks // 2, cranks), LEAN - turn)
+    for found in in_every_way(ring(cranks), turn, (far,)):
         assert found.solved.all(), found.message
         assert "notes" not in found.details
-        assert np.abs(found.points[f"tip{cranks // 2}"].position - expected).max() <= 1e-13
+        assert errors(found.points[far], expected)[0] <= 1e-13
 
 
 def test_bennett_loop_has_one_verdict():
@@ -119,20 +117,22 @@ def test_parallelogram_in_ring_has_one_verdict(off, reached, ends):
 @pytest.mark.parametrize("count", [3, 9, 65])
 def test_links_in_line_have_one_verdict(count):
     """The middle sample is where all links are in line: what is known on both sides gives it."""
-    turn = LEAN + np.pi / 2.0 + np.linspace(-0.5, 0.5, count)
-    expected = np.column_stack([3.0 + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    turn = BRANCH + np.linspace(-0.5, 0.5, count)
     for found in in_every_way(chain(3), turn, ("end",)):
         assert found.solved.all(), found.message
-        assert np.abs(found.points["end"].position - expected).max() <= 1e-11
+        assert errors(found.points["end"], chain_end(3, turn))[0] <= 1e-11
 
 
 def test_component_rates_beside_singular_pose():
     """Two millionths of a radian from a singular pose, rates were wrong in silence."""
-    turn = LEAN + np.pi / 2.0 - np.array([1e-1, 1e-5, 2e-6])
+    turn = BRANCH - np.array([1e-1, 1e-5, 2e-6])
     found = solve(chain(21), "turn", turn)
-    expected = np.column_stack([-np.sin(LEAN - turn), -np.cos(LEAN - turn), 0.0 * turn])
-    off = np.abs(found.points["end"].acceleration - expected).max(axis=1)
+    off = np.abs(found.points["end"].acceleration - chain_end(21, turn)[2]).max(axis=1)
     assert (off[found.solved] <= 1e-9).all()
+
+
+ACROSS = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
+"""Over singular poses of the torus."""
 
 
 def test_singular_samples_are_cached_by_route():
@@ -140,8 +140,7 @@ def test_singular_samples_are_cached_by_route():
     change them.
     """
     mechanism, _ = torus(2, 2)
-    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
-    solver = NativeSolver(method=Method.ONE_PROGRAM).prepare(mechanism, path, ("tip",))
+    solver = NativeSolver(method=Method.ONE_PROGRAM).prepare(mechanism, ACROSS, ("tip",))
     first, second = solver(1e-12), solver(1e-12)
     assert first.details["retried_samples"] > 0
     assert first.details == second.details
@@ -156,8 +155,7 @@ def test_singular_samples_are_cached_by_route():
 
 def test_singular_samples_of_other_poses():
     mechanism, _ = torus(2, 2)
-    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
-    route = Route(recent_model(mechanism, Request(("turn",), ("tip",))), path)
+    route = Route(recent_model(mechanism, Request(("turn",), ("tip",))), ACROSS)
     findings = [scrutinise(route, follow_samples(route, 1e-12), 1e-12) for _ in range(2)]
     assert findings[0] is findings[1]
     other = follow_samples(route, 1e-12)

@@ -9,16 +9,14 @@ from kincheck.core import (
     ConstantVelocity,
     Gear,
     JointAngle,
-    JointDisplacement,
     Mechanism,
     Point,
     Revolute,
-    Translational,
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
 from kincheck.core.kinematics.one_design import solve
-from kincheck.core.mechanism.motions import Ramp, Table
+from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
 from kincheck.core.primitives.dot12 import LockTest, PaperDot12
 
@@ -235,36 +233,3 @@ def test_branch_of_driven_angle(coupled):
     turn = np.linspace(-20.0, 20.0, 9)
     found = solve(mechanism, "turn", turn)
     assert found.points["rim"].position[:, 0] == pytest.approx(np.cos(turn), abs=1e-14)
-
-
-@pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
-@pytest.mark.parametrize("turns", [1, 2, 3, -1, -4])
-def test_turns_between_samples_are_counted(turns, style):
-    """A wheel stands, makes whole turns and stands again: where it stands it says nothing of them,
-    but the wheel it drives does.
-    """
-    rest, move = np.arange(101) * 0.01, np.linspace(0.0, 1.0, 7)[1:-1]
-    times = np.concatenate([rest - 1.0, 0.04 * move, 0.04 + rest])
-    values = 2.0 * np.pi * turns * np.concatenate([0.0 * rest, move, 1.0 + 0.0 * rest])
-    joints = [
-        Revolute("first", "ground", "wheel", ORIGIN, (0.0, 0.0, 1.0)),
-        Revolute("second", "ground", "driven", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        Translational("guide", "ground", "slide", (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
-    ]
-    mechanism = Mechanism(
-        "indexing",
-        [Body("wheel"), Body("driven"), Body("slide")],
-        joints,
-        [Point("rim", "driven", (1.2, 0.0, 0.0))],
-        [JointDisplacement("clock", "guide"), JointAngle("turn", "first")],
-        [Gear("gear", ("second", "first"), 0.25)],
-    )
-    clock = np.array([0.0, 1.0])
-    indexed = Table(tuple(times + 0.5), tuple(values))
-    found = solve(
-        mechanism, "clock", 0.01 * clock, rate=0.01, motions={"turn": indexed}, style=style
-    )
-    assert found.solved.all(), found.message
-    angle = 0.25 * indexed.at(clock)[0]
-    expected = np.stack([1.0 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0 * angle], axis=1)
-    assert np.abs(found.points["rim"].position - expected).max() < 1e-12

@@ -3,6 +3,7 @@ and programs are shared.
 """
 
 import math
+import random
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,44 +16,38 @@ from kincheck.core import (
     Revolute,
     Spherical,
     primitives,
-    solve,
 )
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import WORST
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.compiled.routes import start_of
 from kincheck.core.kinematics.continuation.walk import HALVINGS, part_of_step
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
 
-from ..support.block_structures import assert_alike, solve_components, with_one_program
-from ..support.mechanisms import LEAN, chain
-
-
-def compared(mechanism, path, points):
-    assert_alike(*with_one_program(Method.BY_COMPONENTS, mechanism, path, points))
+from ..support.block_structures import (
+    assert_alike,
+    chain_of_hinges,
+    solve_components,
+    with_one_program,
+)
+from ..support.mechanisms import chain, chain_end, errors, placed, solve_all
 
 
 def test_components_by_numpy():
     path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
-    assert_alike(
-        *(
-            solve_components(chain(3), path, ("end",), ("crank3",), compiled=each)
-            for each in (False, True)
-        )
-    )
+    given = chain(3), path, ("end",), ("crank3",)
+    assert_alike(*(solve_components(*given, compiled=each) for each in (False, True)))
 
 
 @pytest.mark.parametrize("first", [-7.0, 1000.0])
 def test_components_start_away_from_design(first):
     """The drivers go there in a second of their own; the path's own time may be any."""
-    mechanism, path = (
-        chain(3),
-        Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5)),
-    )
+    path = Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5))
     assert not start_of(chain(3), path).starts_at_design
-    compared(mechanism, path, ("end",))
+    assert_alike(*with_one_program(Method.BY_COMPONENTS, chain(3), path, ("end",)))
 
 
 def test_singular_pose_before_first_sample_is_reported():
@@ -66,29 +61,15 @@ def test_singular_pose_before_first_sample_is_reported():
 def test_fixed_bodies_beside_components():
     m = chain(2)
     still = Body("frame", fixed=True, origin=(0.5, 0.0, 0.0))
-    m = type(m)(
-        m.name,
-        [*m.bodies, still],
-        m.joints,
-        [*m.points, Point("mark", "frame", (1.0, 2.0, 3.0))],
-        m.drivers,
-    )
+    mark = Point("mark", "frame", (1.0, 2.0, 3.0))
+    m = replace(m, bodies=[*m.bodies, still], points=[*m.points, mark])
     path = Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2]))
     found = solve_components(m, path, ("mark",), ("frame",))
     assert found.solved.all()
     mark, frame = found.points["mark"], found.bodies["frame"]
-    given = mark.position, mark.velocity, mark.acceleration, frame.r, frame.p, frame.v, frame.a
-    expected = (
-        (1.0, 2.0, 3.0),
-        [0.0] * 3,
-        [0.0] * 3,
-        (0.5, 0.0, 0.0),
-        (1.0, 0.0, 0.0, 0.0),
-        [0.0] * 6,
-        [0.0] * 6,
-    )
-    for values, wanted in zip(given, expected, strict=True):
-        assert np.array_equal(values, [wanted] * 2)
+    given = np.hstack([mark.position, mark.velocity, mark.acceleration, frame.r, frame.p])
+    assert (given == [1.0, 2.0, 3.0, *[0.0] * 6, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]).all()
+    assert not np.hstack([frame.v, frame.a]).any()
 
 
 def test_components_stop_at_last_iteration():
@@ -168,7 +149,7 @@ def test_component_joint_settings_stay_numbers(beside):
 
     whole, balls = chain(3), iter(range(3))
     joints = [
-        Ball(each.name, each.i, each.j, each.point, 0.1 * next(balls))
+        Ball(each.name, *each.bodies, each.point, 0.1 * next(balls))
         if type(each) is Spherical
         else each
         for each in whole.joints
@@ -188,23 +169,27 @@ def test_chain_of_200_loops():
     assert found.solved.all(), found.message
     assert found.residual <= 1e-15
     # the end is two hundred metres away: its coordinates round at 1.4e-14 m
-    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
-    assert np.abs(found.points["end"].position - expected).max() <= 3e-14
+    assert errors(found.points["end"], chain_end(loops, turn))[0] <= 3e-14
+
+
+PATH = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10))
+
+
+def at_design(lanes):
+    """Bring lanes to the design position, from where they go along the path."""
+    lanes.solve_near(lanes.design, 1e-12)
+    lanes.set_prediction_start(0.0, PATH)
 
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_components_go_on_from_last_lane(compiled):
-    path, request = (
-        Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
-        Request(("turn",), ("end",), compiled=compiled),
-    )
+    request = Request(("turn",), ("end",), compiled=compiled)
     for count in (LANES, 5):  # all that there are, or the last ones are as the last
         going, carrying = (ComponentLanes(chain(3), request) for _ in range(2))
         for lanes in (going, carrying):
-            lanes.solve_near(lanes.design, 1e-12)
-            lanes.set_prediction_start(0.0, path)
+            at_design(lanes)
             for first in (0.0, 0.1, 0.2):  # there and back again
-                assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
+                assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), PATH) > 0.0).all()
                 if lanes is going:
                     lanes.go_on()
                 else:
@@ -224,15 +209,11 @@ def test_sample_takes_worst_component(part, compiled):
     """The first, which is driven, any of those that are alike, and the last; what is not a number
     is the worst of all.
     """
-    path, request = (
-        Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.3, 10)),
-        Request(("turn",), ("end",), compiled=compiled),
-    )
-    lanes, times = ComponentLanes(chain(3), request), np.linspace(0.005, 0.1, LANES)
-    lanes.solve_near(lanes.design, 1e-12)
-    lanes.set_prediction_start(0.0, path)
+    lanes = ComponentLanes(chain(3), Request(("turn",), ("end",), compiled=compiled))
+    times = np.linspace(0.005, 0.1, LANES)
+    at_design(lanes)
     assert len(lanes.parts) == 4
-    assert (lanes.attempt(times, path) > 0.0).all()
+    assert (lanes.attempt(times, PATH) > 0.0).all()
     np.testing.assert_array_equal(
         lanes.worst[WORST.index("closure")], lanes.each("closure").max(axis=0)
     )
@@ -242,15 +223,14 @@ def test_sample_takes_worst_component(part, compiled):
     column = [*model.plan.fixed].index(model.vectors[FROM + "q b0"][0])
     anchor.pose[lanes.kinds.index(kind)][member, column] = np.nan
     lanes.restore(anchor)
-    assert not (lanes.attempt(times, path) > 0.0).any()
+    assert not (lanes.attempt(times, PATH) > 0.0).any()
     for name in ("closure", MARGIN):
         assert np.isnan(lanes.worst[WORST.index(name)]).all()
 
 
 def test_components_without_outputs():
-    found = solve(chain(30), "turn", np.linspace(0.0, 0.3, 5), points=())
+    found = solve_all(chain(30), "turn", np.linspace(0.0, 0.3, 5), points=())
     assert found.details["components"] == 31
-    assert found.solved.all()
     assert not found.points
 
 
@@ -273,3 +253,38 @@ def test_step_division_by_any_lanes(part, lanes):
     last = lambda times: tried.append(times) or np.where(times - 1.0 <= 2.0**-HALVINGS, 1.0, -1.0)  # noqa: E731
     assert part_of_step(1.0, 2.0, last, lanes) is None
     assert tried[-1][-1] <= 1.0 + 2.0**-HALVINGS
+
+
+@pytest.mark.parametrize("loops", [1, 5])
+def test_chain_through_change_points(loops):
+    # through the change points, where the loops could fold over
+    turn = np.linspace(-np.pi, np.pi, 37)
+    found = solve_all(chain(loops), "turn", turn)
+    # round-off grows with the length of the chain, and by the condition near the change points,
+    # sampled no nearer than 0.1 rad
+    assert errors(found.points["end"], chain_end(loops, turn))[0] <= 1e-13 * loops
+
+
+def test_chain_cost_grows_linearly():
+    sizes = [
+        compile_model(chain(loops), Request(("turn",), (), compiled=False)).sizes
+        for loops in (4, 8, 12)
+    ]
+    for name in ("newton", "outputs"):
+        one, two, three = (size[name]["flops"] for size in sizes)
+        assert two - one == three - two
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_tilted_components_with_redundant_rows(seed):
+    """Planar loops of hinges in a tilted plane, in any order: all are solved, whatever rows are
+    matched.
+    """
+    tilt = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
+    m = placed(chain_of_hinges(22), *[lambda point: tuple((tilt @ point).tolist())] * 2)
+    order = random.Random(seed)
+    joints, bodies = (order.sample(each, len(each)) for each in (m.joints, m.bodies))
+    values = np.array([0.0, 0.2])
+    found = solve_all(replace(m, joints=joints, bodies=bodies), "turn", values)
+    end = chain_end(22, values)[0] @ tilt.T
+    assert found.points["end"].position == pytest.approx(end, abs=1e-13)

@@ -1,5 +1,6 @@
 """Where a motion by components ends, what it passes, and the component that is named."""
 
+from dataclasses import replace
 from pathlib import Path as File
 
 import numpy as np
@@ -12,7 +13,17 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..support.block_structures import assert_alike, solve_components, with_one_program
-from ..support.mechanisms import LEAN, chain, mcpherson
+from ..support.mechanisms import (
+    BRANCH,
+    LEAN,
+    ORIGIN,
+    Z,
+    chain,
+    chain_end,
+    circles_meet,
+    errors,
+    mcpherson,
+)
 
 
 def test_component_limit_of_travel_is_reported():
@@ -35,39 +46,25 @@ def test_singular_component_is_named():
     """The second of two four-bars, which cannot turn on; the first one's crank can, and its
     residuals are no larger.
     """
-    # ground, rod, rocker, crank, angle
-    links = {"rod0": (4.0, 3.2, 2.6, 1.0, 1.0), "rod1": (4.0, 3.0, 1.5, 2.0, 1.3)}
-    axis = (0.0, 0.0, 1.0)
-    bodies, joints, start = (
-        [Body("crank")],
-        [Revolute("turn", "ground", "crank", (0.0, 0.0, 0.0), axis)],
-        0.0,
-    )
-    carrier = "crank"
-    for k, (rod, (ground, long, rocker, crank, angle)) in enumerate(links.items()):
-        a, c = (
-            np.array([start, 0.0]) + crank * np.array([np.cos(angle), np.sin(angle)]),
-            np.array([start + ground, 0.0]),
-        )
-        apart = c - a
-        along = (apart @ apart + long**2 - rocker**2) / (2.0 * (apart @ apart))
-        off = np.sqrt(long**2 / (apart @ apart) - along**2)
-        b = a + along * apart + off * np.array([-apart[1], apart[0]])
-        bodies += [Body(rod), Body(f"rocker{k}")]
-        ends = (
-            (f"a{k}", carrier, rod, a),
-            (f"b{k}", rod, f"rocker{k}", b),
-            (f"c{k}", "ground", f"rocker{k}", c),
-        )
+    bodies, joints = [Body("crank")], [Revolute("turn", "ground", "crank", ORIGIN, Z)]
+    carrier, start = "crank", 0.0
+    for k, (angle, crank, rod, rocker) in enumerate(((1.0, 1.0, 3.2, 2.6), (1.3, 2.0, 3.0, 1.5))):
+        pin = (start + crank * np.cos(angle), crank * np.sin(angle), 0.0)
+        start += 4.0
+        rest = (start, 0.0, 0.0)
+        meet = tuple(circles_meet(pin, rod, rest, rocker).tolist())
+        bodies += [Body(f"rod{k}"), Body(f"rocker{k}")]
         joints += [
-            Revolute(name, i, j, (*map(float, place), 0.0), axis) for name, i, j, place in ends
+            Revolute(f"a{k}", carrier, f"rod{k}", pin, Z),
+            Revolute(f"b{k}", f"rod{k}", f"rocker{k}", meet, Z),
+            Revolute(f"c{k}", "ground", f"rocker{k}", rest, Z),
         ]
-        carrier, start = f"rocker{k}", start + ground
+        carrier = f"rocker{k}"
     mechanism = Mechanism(
         "two loops",
         bodies,
         joints,
-        [Point("end", carrier, (start, 0.0, 0.0))],
+        [Point("end", carrier, rest)],
         [JointAngle("turn", "turn")],
     )
     for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
@@ -78,20 +75,11 @@ def test_singular_component_is_named():
 
 def test_components_refuse_couplers_and_freedom():
     m = chain(2)
-    coupled = type(m)(
-        m.name,
-        m.bodies,
-        m.joints,
-        m.points,
-        m.drivers,
-        [Gear("gear", ("pivot0", "pivot1"), ratio=1.0)],
-    )
+    coupled = replace(m, couplers=[Gear("gear", ("pivot0", "pivot1"), ratio=1.0)])
     with pytest.raises(SolveError, match="couplers"):
         ComponentLanes(coupled, Request(("turn",), ()))
-    free = type(m)(m.name, m.bodies, m.joints, m.points, [])
     with pytest.raises(SolveError, match="not driven enough"):
-        ComponentLanes(free, Request((), ()))
-    assert isinstance(m.drivers[0], JointAngle)
+        ComponentLanes(replace(m, drivers=[]), Request((), ()))
 
 
 def test_chain_passes_links_in_line():
@@ -99,7 +87,7 @@ def test_chain_passes_links_in_line():
     loops, turn = 20, np.linspace(-0.1, 2.4, 26)
     found = solve_components(chain(loops), Path({"turn": Ramp(1.0)}, turn), ("end",))
     assert found.solved.all(), found.message
-    expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    expected, *_ = chain_end(loops, turn)
     # every loop adds its rounding, over the sine of how far its links are from in line
     rounding = 4.0 * loops * np.finfo(float).eps / np.abs(np.cos(turn - LEAN))
     assert (np.abs(found.points["end"].position - expected).max(axis=1) <= rounding).all()
@@ -108,13 +96,12 @@ def test_chain_passes_links_in_line():
 
 
 def test_links_in_line_are_interpolated():
-    turn = np.array([0.0, 1.8, LEAN + np.pi / 2.0, 1.9, 2.4])
+    turn = np.array([0.0, 1.8, BRANCH, 1.9, 2.4])
     for values in (turn, turn[2:3]):
         found = solve_components(chain(3), Path({"turn": Ramp(1.0)}, values), ("end",))
         assert found.solved.all(), found.message
         assert any("interpolated there" in note for note in found.details["notes"])
-        expected = np.column_stack([3.0 + np.sin(LEAN - values), np.cos(LEAN - values), 0 * values])
-        assert np.abs(found.points["end"].position - expected).max() <= 1e-12
+        assert errors(found.points["end"], chain_end(3, values))[0] <= 1e-12
 
 
 def test_components_without_solved_sample():

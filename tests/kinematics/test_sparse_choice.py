@@ -10,9 +10,7 @@ from kincheck.core import (
     Body,
     Distance,
     Inline,
-    Point,
     Revolute,
-    Universal,
 )
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
@@ -23,8 +21,8 @@ from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.size import LEAN, pivot, ring
 
 from ..support.block_structures import chain_of_hinges, solve_sparse
+from ..support.mechanisms import Z, circles_meet, crank_tip, planar_four_bar
 
-X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 CRANKS = 5
 """A small ring is solved as one sparse system on request; the front door does so from 40 bodies."""
 
@@ -36,38 +34,21 @@ def swept(mechanism, turn, order=2):
 
 
 def pin_meeting(crank, ground, rod, rocker, angle):
-    """Where a rod from a crank's pin meets a rocker, by two circles; shape (n, 2)."""
-    pin = crank * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    d = np.array([ground, 0.0]) - pin
-    square = (d * d).sum(axis=-1)
-    along = 0.5 * (square + rod**2 - rocker**2) / square
-    off = np.sqrt(np.maximum(rod**2 / square - along**2, 0.0))
-    return pin, pin + along[:, None] * d + off[:, None] * np.stack([-d[:, 1], d[:, 0]], axis=-1)
+    """A crank's pin, and where a rod from there meets a rocker; of shape (n, 3) each."""
+    pin = crank * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+    return pin, circles_meet(pin, rod, (ground, 0.0, 0.0), rocker)
 
 
 def four_bar(sizes, start, ends, cranks=CRANKS):
-    """A four-bar on the driven crank of a ring, its rod on hinges or on universals: three rows or
-    one more than are needed.
-    """
-    pin, meet = ((*each[0].tolist(), 0.0) for each in pin_meeting(*sizes, np.array([start])))
-    joints = [Revolute("rest", "ground", "rocker", (sizes[1], 0.0, 0.0), Z)]
-    if ends == "hinges":
-        joints += [
-            Revolute("pin", "crank0", "rod", pin, Z),
-            Revolute("end", "rod", "rocker", meet, Z),
-        ]
-    else:
-        joints += [
-            Universal("pin", "crank0", "rod", pin, (X, Z)),
-            Universal("end", "rod", "rocker", meet, (Z, X)),
-        ]
+    """A four-bar on the driven crank of a ring."""
+    pin, meet = pin_meeting(*sizes, start)
+    bar = planar_four_bar(pin, meet, (sizes[1], 0.0, 0.0), ends, crank="crank0")
     whole = ring(cranks)
-    bodies = [*whole.bodies, Body("rod"), Body("rocker")]
     return replace(
         whole,
-        bodies=bodies,
-        joints=[*whole.joints, *joints],
-        points=[Point("meet", "rocker", meet)],
+        bodies=[*whole.bodies, *bar.bodies[1:]],
+        joints=[*whole.joints, *bar.joints[1:]],
+        points=bar.points,
     )
 
 
@@ -91,13 +72,7 @@ def test_sparse_rows_are_exchanged(sizes, ends, count):
     found = swept(four_bar(sizes, -1.1, ends), turn)
     assert found.solved.all(), found.message
     _, meet = pin_meeting(*sizes, turn - 1.1)
-    assert np.abs(found.points["meet"].position[:, :2] - meet).max() < 1e-12
-
-
-def test_sparse_row_exchanges_are_counted():
-    found = swept(four_bar(KITE, -1.1, "hinges"), np.linspace(0.0, 1.6, 65))
-    assert found.details["rows_chosen_anew"] >= 1
-    assert "rows_chosen_anew" not in swept(ring(CRANKS), np.linspace(0.0, 0.8, 9)).details
+    assert np.abs(found.points["meet"].position - meet).max() < 1e-12
 
 
 def test_sparse_rates_after_row_exchange():
@@ -105,22 +80,17 @@ def test_sparse_rates_after_row_exchange():
     path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.6, 41))
     found = solve_sparse(mechanism, path, ["meet"])
     assert found.solved.all(), found.message
+    assert found.details["rows_chosen_anew"] >= 1
+    assert "rows_chosen_anew" not in swept(ring(CRANKS), np.linspace(0.0, 0.8, 9)).details
     pin, meet = pin_meeting(*KITE, path.times - 1.1)
     point = found.points["meet"]
-    assert np.abs(point.position[:, :2] - meet).max() < 1e-13
+    assert np.abs(point.position - meet).max() < 1e-13
     # the rod and the rocker keep their lengths, to the second derivative
     for end, rate, second in (
-        (pin, np.stack([-pin[:, 1], pin[:, 0]], axis=-1), -pin),
-        (np.array([1.2, 0.0]), np.zeros(2), np.zeros(2)),
+        (pin, np.cross((0.0, 0.0, 1.0), pin), -pin),
+        (np.array([1.2, 0.0, 0.0]), 0.0, 0.0),
     ):
-        d, v, a = (
-            x[:, :2] - y
-            for x, y in (
-                (point.position, end),
-                (point.velocity, rate),
-                (point.acceleration, second),
-            )
-        )
+        d, v, a = point.position - end, point.velocity - rate, point.acceleration - second
         assert np.abs((d * v).sum(axis=1)).max() < 1e-12
         assert np.abs((v * v).sum(axis=1) + (d * a).sum(axis=1)).max() < 1e-10
 
@@ -167,8 +137,7 @@ def test_parallelogram_in_line_goes_on(ends, turn):
     found = swept(inside(0.0, ends), turn, order=0)
     assert found.solved.all(), found.message
     assert "crosses a singular pose near turn = -0.5707" in found.details["notes"][0]
-    at = pivot(2, CRANKS)
-    tip = np.column_stack([at + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    tip, *_ = crank_tip(pivot(2, CRANKS), LEAN - turn)
     assert np.abs(found.points["tip2"].position - tip).max() <= 1e-12
 
 
@@ -194,8 +163,7 @@ def test_largest_block_is_followed(ends):
     turn = np.linspace(0.0, 0.8, 9)
     found = swept(inside(0.0, ends), turn)
     assert found.solved.all(), found.message
-    at = pivot(2, CRANKS)
-    tip = np.column_stack([at + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    tip, *_ = crank_tip(pivot(2, CRANKS), LEAN - turn)
     assert np.abs(found.points["tip2"].position - tip).max() <= 1e-13
 
 

@@ -19,8 +19,8 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..support.block_structures import solve_as, solve_sparse
-from ..support.mechanisms import chain, four_bar, mcpherson, slider_crank
-from .test_sparse import CRANK, X, turning
+from ..support.mechanisms import X, chain, four_bar, mcpherson, slider_crank
+from .test_sparse import CRANK, turning
 
 
 def test_sparse_wrong_branch_is_refused():
