@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
-from kincheck.core import Distance, JointDisplacement, Point, Translational
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Joint
@@ -28,9 +27,10 @@ from ..support.mechanisms import (
     CRANK,
     chain,
     chain_end,
+    errors,
     mcpherson,
-    slider_crank,
-    slider_crank_motion,
+    pushed,
+    solve_all,
 )
 from .test_continuation import LIMITS
 
@@ -73,16 +73,8 @@ def test_sample_at_bifurcation(loops, near):
     reached.
     """
     turn = np.array([0.0, 0.7, 1.4, BRANCH + near, 2.3, 3.0])
-    found = solve(chain(loops), "turn", turn)
-    assert found.solved.all(), found.message
-    end = found.points["end"]
-    for values, expected, error in zip(
-        (end.position, end.velocity, end.acceleration),
-        chain_end(loops, turn),
-        (1e-12, 1e-11, 1e-9),
-        strict=True,
-    ):
-        assert np.abs(values - expected).max() <= error
+    found = solve_all(chain(loops), "turn", turn)
+    assert (errors(found.points["end"], chain_end(loops, turn)) <= [1e-12, 1e-11, 1e-9]).all()
     (note,) = found.details["notes"]
     assert note.startswith(f"passes a singular pose at turn = {BRANCH:.9g}")
     assert "the branch followed is the continuation of the motion" in note
@@ -99,16 +91,13 @@ def test_sample_at_bifurcation(loops, near):
 def test_samples_around_bifurcation():
     """Fine steps up to it: some are interpolated, none is wrong."""
     turn = BRANCH + np.linspace(-1e-3, 1e-3, 21)
-    found = solve(chain(1), "turn", turn)
-    assert found.solved.all(), found.message
-    assert np.abs(found.points["end"].position - chain_end(1, turn)[0]).max() <= 1e-9
+    found = solve_all(chain(1), "turn", turn)
+    assert errors(found.points["end"], chain_end(1, turn))[0] <= 1e-9
     assert found.details["retried_samples"] >= 1
 
 
 def test_bifurcation_between_samples():
-    turn = np.linspace(0.0, 2.4, 7)
-    found = solve(chain(1), "turn", turn)
-    assert found.solved.all()
+    found = solve_all(chain(1), "turn", np.linspace(0.0, 2.4, 7))
     (pose,) = found.details["singular_poses"]
     assert pose["outcome"] == "crossed"
     assert pose["driver"]["turn"] == pytest.approx(BRANCH, abs=0.4 / 17)
@@ -116,8 +105,7 @@ def test_bifurcation_between_samples():
 
 
 def test_bifurcations_on_both_sides():
-    found = solve(chain(1), "turn", np.linspace(-3.0, 6.0, 40))
-    assert found.solved.all()
+    found = solve_all(chain(1), "turn", np.linspace(-3.0, 6.0, 40))
     places = sorted(pose["driver"]["turn"] for pose in found.details["singular_poses"])
     assert places == pytest.approx([BRANCH - np.pi, BRANCH, BRANCH + np.pi], abs=0.02)
 
@@ -140,27 +128,11 @@ def test_ordinary_sweeps_report_nothing():
 # Lock-up
 
 
-def pushed():
-    """A slider that drives its crank, from an open angle; its dead centre is at the second
-    value.
-    """
-    design = float(slider_crank_motion([1.0]).x[0])
-    pin = (CRANK * np.cos(1.0), 0.0, -CRANK * np.sin(1.0))
-    m = slider_crank()
-    rod = Distance("rod", "crank", "slider", (pin, (design, 0.0, 0.0)))
-    guide = Translational("guide", "ground", "slider", (design, 0.0, 0.0), (1.0, 0.0, 0.0))
-    driven = replace(m, joints=[m.joint("pivot"), rod, guide], points=[Point("pin", "crank", pin)])
-    return replace(driven, drivers=[JointDisplacement("push", "guide")]), design, pin
-
-
 def pin_height(design, pin, push):
     """Of the pin below the guide [m], in 40 digits from the doubles that the mechanism has."""
     with mp.workdps(40):
-        x, crank, rod = (
-            mpf(design) + mpf(push),
-            mp.norm([mpf(v) for v in pin]),
-            mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])]),
-        )
+        x, crank = mpf(design) + mpf(push), mp.norm([mpf(v) for v in pin])
+        rod = mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])])
         along = (x * x + crank * crank - rod * rod) / (2 * x)
         return -mp.sqrt(crank * crank - along * along)
 
@@ -174,8 +146,7 @@ def test_positions_beside_dead_centre():
     """
     mechanism, design, pin = pushed()
     values = CRANK + 1.0 - design - GAPS
-    found = solve(mechanism, "push", values, order=0)
-    assert found.solved.all(), found.message
+    found = solve_all(mechanism, "push", values, order=0)
     for position, value in zip(found.points["pin"].position, values.tolist(), strict=True):
         assert abs(mpf(float(position[2])) - pin_height(design, pin, value)) <= 1e-9
     assert found.details["retried_samples"] >= 2
@@ -220,7 +191,7 @@ def test_accelerations_beside_singular_pose():
     turn = BRANCH + np.array([-0.2, -0.1, -0.05, -0.002])
     found = solve(chain(1), "turn", turn)
     assert found.details["retried_samples"] == 1
-    assert np.abs(found.points["end"].acceleration - chain_end(1, turn)[2]).max() <= 1e-9
+    assert errors(found.points["end"], chain_end(1, turn))[2] <= 1e-9
 
 
 @pytest.mark.parametrize(
