@@ -71,15 +71,22 @@ def test_assembly_from_errors_below_radian(angle, shift):
 
 
 @pytest.mark.parametrize(
-    ("angle", "shift", "share"),
-    [(0.8, 1.0, 0.7), (0.8, 2.0, 0.5), (1.2, 1.0, 0.6), (2.0, 0.2, 0.4)],
+    ("angle", "shift", "closed", "share"),
+    [
+        (0.8, 1.0, 0.95, 0.7),
+        (0.8, 2.0, 0.95, 0.5),
+        (1.2, 1.0, 0.95, 0.6),
+        (2.0, 0.2, 0.95, 0.4),
+        (0.8, 10.0, 0.75, 0.0),  # 3 % where the damping has no limit
+        (3.0, 1.0, 0.3, 0.0),
+    ],
 )
-def test_assembly_from_offsets_of_metres(angle, shift, share):
+def test_assembly_from_offsets_of_metres(angle, shift, closed, share):
     """Measured 81, 60, 68 and 46 %; the rest ends in other assemblies or, rarely, nowhere: never on
     a zero that is none.
     """
     converged, home, spurious = found_from(mcpherson(), angle, shift)
-    assert converged >= 0.95
+    assert converged >= closed
     assert home >= share
     assert spurious == 0.0
 
@@ -101,28 +108,10 @@ def test_assembly_rejects_violated_redundant_rows(monkeypatch):
     assert not found.converged.any()
 
 
-def test_assembly_from_ten_sizes_away():
-    converged, _, spurious = found_from(mcpherson(), 0.8, 10.0)
-    assert converged >= 0.75  # 3 % where the damping has no limit
-    assert spurious == 0.0
-
-
-def test_assembly_from_half_turn_away():
-    converged, _, spurious = found_from(mcpherson(), 3.0, 1.0)
-    assert converged >= 0.3
-    assert spurious == 0.0
-
-
 def test_assembly_by_exact_rows_is_spurious():
     _, home, spurious = found_from(mcpherson(), 0.8, 0.08, "conventional")
     assert home < 0.9
     assert spurious > 0.1  # formulation section 3
-
-
-def test_assembly_without_damping_is_worse(monkeypatch):
-    damped = found_from(mcpherson(), 0.8, 1.0)[1]
-    monkeypatch.setattr("kincheck.core.kinematics.assembly.assemble.DAMPING", 1e-9)
-    assert found_from(mcpherson(), 0.8, 1.0)[1] < damped - 0.2
 
 
 def test_assembled_poses_match_solved_poses():

@@ -1,20 +1,13 @@
 """Curves that close: events beside their beginning, the closing step and their length."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from kincheck.core import (
-    Body,
-    JointAngle,
-    JointDisplacement,
-    Mechanism,
-    Point,
-    Revolute,
-    Spherical,
-    Translational,
-)
+from kincheck.core import JointAngle
 from kincheck.core.kinematics.continuation.trace import trace
 
-from ..support.mechanisms import Z, chain
+from ..support.mechanisms import CRANK, ROD, chain, circles_meet, planar_four_bar, pushed
 
 # The closing step and the first one
 
@@ -27,27 +20,6 @@ COARSE = 0.25
 """Longest step of closed curves: the coarser the walk, the harder are its ends."""
 
 
-def driven_slider(crank_angle):
-    """A crank of 1 m and a rod of 2.5 m, driven at the slider; its dead centres are at x = 1.5 and
-    3.5.
-    """
-    tip = (np.cos(crank_angle), np.sin(crank_angle), 0.0)
-    x = tip[0] + np.sqrt(2.5**2 - tip[1] ** 2)
-    mechanism = Mechanism(
-        "slider",
-        [Body("crank"), Body("rod"), Body("slider")],
-        [
-            Revolute("pivot", "ground", "crank", (0, 0, 0), Z),
-            Revolute("pin", "crank", "rod", tip, Z),
-            Spherical("ball", "rod", "slider", (x, 0, 0)),
-            Translational("guide", "ground", "slider", (x, 0, 0), (1, 0, 0)),
-        ],
-        [Point("slider", "slider", (x, 0, 0))],
-        [JointDisplacement("push", "guide")],
-    )
-    return mechanism, x
-
-
 @pytest.mark.parametrize(
     ("centre", "direction", "past"),
     [
@@ -56,15 +28,17 @@ def driven_slider(crank_angle):
     ],
 )
 def test_closed_curve_finds_dead_centres(centre, past, direction):
-    mechanism, x = driven_slider(centre + past)
+    mechanism, x, _ = pushed(centre + past)
     curve = trace(mechanism, "push", length=25.0, direction=direction, longest=COARSE)
     assert curve.closed
-    assert sorted(x + event.value for event in curve.events) == pytest.approx([1.5, 3.5], abs=1e-12)
+    assert sorted(x + event.value for event in curve.events) == pytest.approx(
+        [ROD - CRANK, ROD + CRANK], abs=1e-12
+    )
     assert all(event.kind == "limit point" for event in curve.events)
     arcs = [abs(event.arc) for event in curve.events]
     assert arcs == sorted(arcs)
     assert arcs[-1] <= abs(curve.arc[-1])
-    assert curve.points["slider"][-1] == pytest.approx(curve.points["slider"][0], abs=1e-12)
+    assert curve.points["pin"][-1] == pytest.approx(curve.points["pin"][0], abs=1e-12)
 
 
 @pytest.mark.parametrize("style", ["native", "relative"])
@@ -74,7 +48,7 @@ def test_closed_curve_length_is_one_turn(style):
     """
     lengths = []
     for begins, longest in ((-0.04, 0.1), (0.002, 0.09), (1.0, 0.077)):
-        mechanism, _ = driven_slider(np.pi + begins)
+        mechanism, *_ = pushed(np.pi + begins)
         curve = trace(mechanism, "push", length=25.0, longest=longest, style=style)
         assert curve.closed
         assert len(curve.events) == 2
@@ -88,27 +62,13 @@ def test_rocker_curve_finds_dead_centres(past, direction):
     """The four-bar that its rocker drives, with its crank beside the pose in which it stretches the
     coupler.
     """
-    pivot, base, crank, coupler, rocker = (0.0, 0.0, 0.0), 2.0, 0.5, 1.8, 1.2
-    reach = crank + coupler
+    base, crank, coupler, rocker = 2.0, 0.5, 1.8, 1.2
+    reach, rest = crank + coupler, (base, 0.0, 0.0)
     stretched = np.arccos((reach**2 + base**2 - rocker**2) / (2.0 * reach * base))
-    pin = (crank * np.cos(stretched + past), crank * np.sin(stretched + past), 0.0)
-    d = np.hypot(base - pin[0], pin[1])
-    at = np.arctan2(-pin[1], base - pin[0]) + np.arccos(
-        (d**2 + coupler**2 - rocker**2) / (2.0 * d * coupler)
-    )
-    end, z = (pin[0] + coupler * np.cos(at), pin[1] + coupler * np.sin(at), 0.0), Z
-    mechanism = Mechanism(
-        "rocked",
-        [Body("crank"), Body("coupler"), Body("rocker")],
-        [
-            Revolute("A", "ground", "crank", pivot, z),
-            Revolute("B", "crank", "coupler", pin, z),
-            Spherical("C", "coupler", "rocker", end),
-            Revolute("D", "ground", "rocker", (base, 0.0, 0.0), z),
-        ],
-        [Point("C", "rocker", end)],
-        [JointAngle("rock", "D")],
-    )
+    pin = crank * np.array([np.cos(stretched + past), np.sin(stretched + past), 0.0])
+    end = circles_meet(pin, coupler, rest, rocker)
+    mechanism = planar_four_bar(pin, end, rest, "ball")
+    mechanism = replace(mechanism, drivers=[JointAngle("rock", "rest")])
     curve = trace(mechanism, "rock", length=25.0, direction=direction, longest=COARSE)
     assert curve.closed
 
@@ -117,9 +77,8 @@ def test_rocker_curve_finds_dead_centres(past, direction):
 
     design = np.arctan2(end[1], end[0] - base)
     expected = sorted(inner(length) for length in (coupler + crank, coupler - crank))
-    assert sorted(design + event.value for event in curve.events) == pytest.approx(
-        expected, abs=1e-11
-    )
+    found = sorted(design + event.value for event in curve.events)
+    assert found == pytest.approx(expected, abs=1e-11)
 
 
 @pytest.mark.parametrize(("past", "direction"), [(-0.03, 1), (-0.004, -1), (0.004, 1), (0.03, -1)])

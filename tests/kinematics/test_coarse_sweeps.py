@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.continuation import walk
 from kincheck.core.kinematics.continuation.sweep import sweep
-from kincheck.core.kinematics.continuation.walk import FINER, SideWalk
+from kincheck.core.kinematics.continuation.walk import FINER, ROOM, SideWalk
 from kincheck.core.mechanism.motions import Path, Ramp
 
-from ..support.mechanisms import slider_crank, slider_crank_motion
+from ..support.mechanisms import errors, slider_crank, slider_crank_motion
 
 COARSE = {
     "a turn in six": np.linspace(0.0, 2.0 * np.pi, 7),
     "turns of three radians": np.linspace(-12.0, 12.0, 9),
     "one step of six turns": np.array([12.0 * np.pi]),
+    "a step in parts of more than a radian": np.array([1.2 * FINER[1]]),
     "in no order, and twice the same": np.array([5.0, -4.0, 0.0, 2.5, 5.0, -1.0]),
     "small steps, then large": np.concatenate(
         [np.linspace(0.0, 0.1, 40), np.linspace(2.0, 9.0, 5)]
@@ -44,9 +44,9 @@ def assert_right(found, values):
     assert found.solved.all()
     assert not found.message
     assert found.residual <= 1e-15
-    end, x = found.points["end"], slider_crank_motion(values)
-    motions = zip((end.position, end.velocity, end.acceleration), (x.x, x.v, x.a), strict=True)
-    assert max(np.abs(each[:, 0] - truth).max() for each, truth in motions) <= 1e-14
+    x = slider_crank_motion(values)
+    expected = [np.column_stack([each, 0.0 * x.x, 0.0 * x.x]) for each in (x.x, x.v, x.a)]
+    assert (errors(found.points["end"], expected) <= 1e-14).all()
 
 
 @pytest.fixture
@@ -69,25 +69,9 @@ def test_coarse_sweep_in_equal_parts(values, compiled, divided):
 
 
 @pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
-def test_coarse_sweep_in_searched_parts(values, divided, monkeypatch):
-    monkeypatch.setattr(walk, "FINER", ())
-    assert_right(swept(values), values)
-    assert divided
-
-
-def test_long_step_is_divided(divided, monkeypatch):
-    """Its parts are of more than a radian."""
-    value = np.array([1.2 * FINER[1]])
-    assert_right(swept(value), value)
-    assert not divided
-    monkeypatch.setattr(walk, "FINER", FINER[:2])
-    assert_right(swept(value), value)
-    assert divided
-
-
-def test_long_sweep_is_divided(divided, monkeypatch):
-    monkeypatch.setattr(walk, "ROOM", 8)
-    values = np.array([0.0, 6.0])
+def test_coarse_sweep_in_searched_parts(values, divided):
+    """After so many samples that equal parts of all of them are not kept ready."""
+    values = np.append(np.linspace(0.0, 1e-3, 1 + ROOM // FINER[0]), values)
     assert_right(swept(values), values)
     assert divided
 

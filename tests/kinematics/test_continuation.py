@@ -3,13 +3,14 @@ lies beyond them.
 """
 
 import json
+import math
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import Body, JointAngle, Mechanism, Revolute, SolveError
+from kincheck.core import SolveError
 from kincheck.core.cli.main import main
 from kincheck.core.kinematics.continuation.trace import trace
 
@@ -21,8 +22,11 @@ from ..support.mechanisms import (
     D0,
     LEAN,
     chain,
+    chain_end,
+    circles_meet,
     four_bar,
     mcpherson,
+    planar_four_bar,
     slider_crank,
 )
 
@@ -30,10 +34,6 @@ from ..support.mechanisms import (
 # of the knuckle's pose in 40 digits close two rods, the arm's axis and the strut's line (as in
 # strut_oracle.py), and a secant rule makes the stroke stationary.
 LIMITS = {1: 0.293337313746648221, -1: -0.316737084187394147}
-
-
-def distance(a, b):
-    return np.linalg.norm(np.subtract(a, b))
 
 
 # Limit points
@@ -103,17 +103,12 @@ def test_trace_of_rocker_driving_crank():
     """Limits where crank and coupler are in line; the crank goes round, and the curve is closed."""
     rocked = replace(four_bar(), drivers=[replace(four_bar().drivers[0], name="rock", joint="D")])
     curve = trace(rocked, "rock", length=12.0, longest=0.1)
-    crank, coupler, rocker, base = (
-        distance(A0, B0),
-        distance(B0, C0),
-        distance(C0, D0),
-        distance(A0, D0),
-    )
+    crank, coupler, rocker, base = map(math.dist, (A0, B0, C0, A0), (B0, C0, D0, D0))
 
     def angle(reach):
         return np.arccos((base**2 + rocker**2 - reach**2) / (2.0 * base * rocker))
 
-    design = angle(distance(A0, C0))
+    design = angle(math.dist(A0, C0))
     assert [event.value for event in curve.events] == pytest.approx(
         [angle(reach) - design for reach in (coupler + crank, coupler - crank)]
     )
@@ -145,8 +140,7 @@ def test_trace_branch_points_of_chain(loops, direction):
     assert event.value == pytest.approx(LEAN + direction * np.pi / 2.0, abs=1e-11)
     assert "turn" not in event.singularity.owners
     # straight on: the cranks stay parallel
-    expected = np.column_stack([loops + np.sin(LEAN - curve.values), np.cos(LEAN - curve.values)])
-    assert curve.points["end"][:, :2] == pytest.approx(expected, abs=1e-9)
+    assert curve.points["end"] == pytest.approx(chain_end(loops, curve.values)[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("longer", [1e-8, 1e-4])
@@ -154,25 +148,10 @@ def test_trace_of_nearly_parallelogram(longer):
     """The coupler of a parallelogram is too long by a little: the crank locks up just before the
     change point, where a step is a thousand times as long as the bend of the curve.
     """
-    crank, ground, lean, z = 0.15, 0.4, 0.2, (0.0, 0.0, 1.0)
-    tip = crank * np.array([np.cos(lean), np.sin(lean)])
-    reach, coupler = np.array([ground, 0.0]) - tip, ground + longer
-    span = np.linalg.norm(reach)
-    along = (coupler**2 - crank**2 + span**2) / (2.0 * span)
-    across = np.sqrt(coupler**2 - along**2) * np.array([-reach[1], reach[0]]) / span
-    knee = tip + along * reach / span + across
-    mechanism = Mechanism(
-        "nearly a parallelogram",
-        [Body("crank"), Body("coupler"), Body("rocker")],
-        [
-            Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), z),
-            Revolute("B", "crank", "coupler", (*tip, 0.0), z),
-            Revolute("C", "coupler", "rocker", (*knee, 0.0), z),
-            Revolute("D", "ground", "rocker", (ground, 0.0, 0.0), z),
-        ],
-        [],
-        [JointAngle("turn", "A")],
-    )
+    crank, ground, lean = 0.15, 0.4, 0.2
+    tip, rest = crank * np.array([np.cos(lean), np.sin(lean), 0.0]), (ground, 0.0, 0.0)
+    coupler = ground + longer
+    mechanism = planar_four_bar(tip, circles_meet(tip, coupler, rest, crank), rest)
     (event,) = trace(mechanism, "turn", length=0.7, direction=-1).events
     folded = coupler - crank  # from A's tip to D
     cosine = (crank**2 + ground**2 - folded**2) / (2.0 * crank * ground)

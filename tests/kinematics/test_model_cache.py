@@ -207,10 +207,10 @@ def test_user_motions_are_not_cached(bound):
         assert len(bound) == number
 
 
-def test_very_long_route_is_not_cached(bound, monkeypatch):
-    monkeypatch.setattr(samples, "LONGEST_KEPT", 20)
+def test_very_long_route_is_not_cached(bound):
+    strokes = np.linspace(-0.05, 0.05, samples.LONGEST_KEPT + 1)
     for number in (1, 2):
-        solve(mcpherson(), "stroke", STROKES)
+        solve(mcpherson(), "stroke", strokes)
         assert len(bound) == number
 
 

@@ -287,7 +287,8 @@ def solve_all(mechanism, driver, values, **options):
 
 def errors(motion, expected):
     """The largest errors of a point's position, velocity and acceleration, or of as many of them as
-    are expected.
+    there are on both sides.
     """
-    found = motion.position, motion.velocity, motion.acceleration
-    return np.array([np.abs(a - b).max() for a, b in zip(found, expected, strict=False)])
+    found = [motion.position, motion.velocity, motion.acceleration]
+    pairs = [(a, b) for a, b in zip(found, expected, strict=False) if a is not None]
+    return np.array([np.abs(a - b).max() for a, b in pairs])
