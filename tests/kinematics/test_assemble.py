@@ -116,10 +116,8 @@ def test_assembly_by_exact_rows_is_spurious():
 
 def test_assembled_poses_match_solved_poses():
     mechanism = mcpherson()
-    rng = np.random.default_rng(5)
-    found = assemble(
-        mechanism, {b.name: turned(b, 0.4, 0.05, rng) for b in mechanism.moving}, {"stroke": 0.05}
-    )
+    start = perturbed(mechanism, 0.4, 0.05, np.random.default_rng(5))
+    found = assemble(mechanism, start, {"stroke": 0.05})
     assert found.converged.all()
     expected = solve(mechanism, "stroke", [0.05], bodies=[b.name for b in mechanism.moving])
     for body in mechanism.moving:
@@ -141,13 +139,9 @@ def test_assembly_with_driver_turns_away(angle):
 
 
 def test_assembly_beyond_reach_is_nan():
-    mechanism = mcpherson()
-    knuckle = mechanism.body("knuckle")
-    found = assemble(
-        mechanism,
-        {"knuckle": (np.array([knuckle.origin]), np.array([knuckle.euler_parameters]))},
-        {"stroke": 0.6},
-    )
+    knuckle = mcpherson().body("knuckle")
+    start = {"knuckle": (np.array([knuckle.origin]), np.array([knuckle.euler_parameters]))}
+    found = assemble(mcpherson(), start, {"stroke": 0.6})
     assert not found.converged.any()
     assert np.isnan(found.bodies["knuckle"].r).all()
 
@@ -157,53 +151,58 @@ def test_assembly_without_estimates():
     assert found.converged.tolist() == [True]
 
 
-@pytest.mark.parametrize("close", [assemble, find_assemblies])
-def test_assembly_of_unknown_name_is_refused(close):
-    with pytest.raises(
-        SolveError,
-        match=rf"{close.__name__}: there is no moving body 'crnk'; did you mean 'crank'\?",
-    ):
-        close(four_bar(), {"crnk": (np.zeros((1, 3)), np.zeros((1, 4)))})
-    with pytest.raises(
-        SolveError, match=rf"{close.__name__}: there is no driver 'trn'; did you mean 'turn'\?"
-    ):
-        close(four_bar(), {}, {"trn": 0.1})
+POSE = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+POSES = np.zeros((2, 3)), np.tile(POSE[1], (2, 1))
+UNKNOWN = r"there is no {} '{}'; did you mean '{}'\?"
 
 
-def test_assembly_refuses_bad_estimates():
-    """A fixed body has no pose to be found, and lanes are the same for all bodies."""
+@pytest.mark.parametrize(
+    ("close", "arguments", "message"),
+    [
+        *(
+            (close, arguments, message)
+            for close in (assemble, find_assemblies)
+            for arguments, message in (
+                (({"crnk": POSE},), UNKNOWN.format("moving body", "crnk", "crank")),
+                (({}, {"trn": 0.1}), UNKNOWN.format("driver", "trn", "turn")),
+                (({"wall": POSE},), "there is no moving body 'wall'"),  # a fixed one
+            )
+        ),
+        (
+            assemble,
+            ({"crank": POSES, "coupler": (np.zeros((3, 3)), np.ones((3, 4)))},),
+            r"origin r of body 'coupler': shape \(3, 3\), expected \(2, 3\)",
+        ),
+        (
+            assemble,
+            ({"crank": (POSES[0],) * 2},),
+            r"Euler parameters p of body 'crank': shape \(2, 3\), expected \(2, 4\)",
+        ),
+        (
+            find_assemblies,
+            ({"crank": POSES},),
+            r"origin r of body 'crank': shape \(2, 3\), expected \(3,\)",
+        ),
+    ],
+)
+def test_assembly_refuses_bad_estimates(close, arguments, message):
     mechanism = replace(four_bar(), bodies=[*four_bar().bodies, Body("wall", fixed=True)])
-    r, p = np.zeros((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    with pytest.raises(SolveError, match="assemble: there is no moving body 'wall'"):
-        assemble(mechanism, {"wall": (r, p)})
-    with pytest.raises(SolveError, match="find_assemblies: there is no moving body 'wall'"):
-        find_assemblies(mechanism, {"wall": (r[0], p[0])})
-    first, second = (body.name for body in mechanism.moving[:2])
-    with pytest.raises(
-        SolveError, match=rf"origin r of body '{second}': shape \(3, 3\), expected \(2, 3\)"
-    ):
-        assemble(mechanism, {first: (r, p), second: (np.zeros((3, 3)), np.ones((3, 4)))})
-    with pytest.raises(
-        SolveError,
-        match=rf"Euler parameters p of body '{first}': shape \(2, 3\), expected \(2, 4\)",
-    ):
-        assemble(mechanism, {first: (r, r)})
-    with pytest.raises(
-        SolveError,
-        match=rf"find_assemblies: origin r of body '{first}': shape \(2, 3\), expected \(3,\)",
-    ):
-        find_assemblies(mechanism, {first: (r, p)})
+    with pytest.raises(SolveError, match=f"{close.__name__}: {message}"):
+        close(mechanism, *arguments)
 
 
-@pytest.mark.parametrize("tol", [np.inf, np.nan, 0.0, -1.0])
-def test_assembly_refuses_bad_tolerance(tol):
-    """All that is not closed would be, or nothing."""
-    for close in (assemble, find_assemblies):
-        with pytest.raises(
-            SolveError, match=f"{close.__name__}: tol is {tol}, expected a positive number"
-        ):
-            close(four_bar(), {}, tol=tol)
+@pytest.mark.parametrize(
+    ("close", "number"),
+    [
+        *((assemble, {"tol": tol}) for tol in (np.inf, np.nan, 0.0, -1.0)),
+        *((find_assemblies, {"tol": tol}) for tol in (np.inf, np.nan, 0.0, -1.0)),
+        (find_assemblies, {"samples": -1}),
+    ],
+)
+def test_assembly_refuses_bad_numbers(close, number):
+    """Of a tolerance all that is not closed would be, or nothing."""
+    ((name, value),) = number.items()
     with pytest.raises(
-        SolveError, match="find_assemblies: samples is -1, expected a positive number"
+        SolveError, match=f"{close.__name__}: {name} is {value}, expected a positive number"
     ):
-        find_assemblies(four_bar(), {}, samples=-1)
+        close(four_bar(), {}, **number)

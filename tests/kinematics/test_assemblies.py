@@ -14,7 +14,7 @@ from kincheck.core.kinematics.assembly.assembly_modes import Assemblies, Assembl
 
 from ..oracles import naive
 from ..support.exported import READERS, read
-from ..support.mechanisms import four_bar, mcpherson
+from ..support.mechanisms import B0, C0, D0, four_bar, mcpherson
 from .test_assemble import at_design, is_home, perturbed
 
 # Residuals of 1e-12 at the most, through the lever of a mechanism: the paper's equations differ
@@ -52,7 +52,7 @@ def test_second_assembly_is_mirror_image():
     """C mirrored in the line through B and D, by the law of the circles."""
     mechanism = four_bar()
     _, other = find_assemblies(mechanism, at_design(mechanism), samples=20, spread=None).found
-    B, C, D = (np.array(point) for point in ((0.3, 0.0, 0.4), (1.6, 0.0, 1.2), (1.4, 0.0, 0.0)))
+    B, C, D = map(np.array, (B0, C0, D0))
     along = (D - B) / np.linalg.norm(D - B)
     mirrored = B + 2.0 * along * (along @ (C - B)) - (C - B)
     r, p = other.poses["rocker"]
@@ -66,17 +66,12 @@ def test_nearest_assembly_is_intended():
     mechanism, rng = mcpherson(), np.random.default_rng(11)
     estimates, right = perturbed(mechanism, 0.8, 1.0, rng, 30), 0
     for k in range(30):
-        found = find_assemblies(
-            mechanism,
-            {name: (r[k], p[k]) for name, (r, p) in estimates.items()},
-            samples=24,
-            seed=k,
-        )
+        start = {name: (r[k], p[k]) for name, (r, p) in estimates.items()}
+        found = find_assemblies(mechanism, start, samples=24, seed=k)
         assert found.spurious == 0
         assert all(closes(mechanism, each) for each in found.found)
-        assert [each.distance for each in found.found] == sorted(
-            each.distance for each in found.found
-        )
+        distances = [each.distance for each in found.found]
+        assert distances == sorted(distances)
         right += is_home(mechanism, {name: r for name, (r, _) in found.found[0].poses.items()})
     assert right >= 27
 
@@ -91,11 +86,11 @@ def test_assemblies_with_body_of_unknown_pose():
 
 def test_assemblies_repeat_by_seed():
     mechanism = mcpherson()
-    one, same, other = (
+    found = (
         find_assemblies(mechanism, {}, samples=30, seed=seed, spread=None) for seed in (4, 4, 5)
     )
-    assert [each.starts for each in one.found] == [each.starts for each in same.found]
-    assert [each.starts for each in one.found] != [each.starts for each in other.found]
+    one, same, other = ([each.starts for each in one.found] for one in found)
+    assert one == same != other
 
 
 def test_delta_robot_assemblies():
@@ -178,25 +173,13 @@ def test_meeting_assemblies_are_one():
 
 
 def test_assemblies_command_writes_json(tmp_path, capsys):
-    assert (
-        main(
-            [
-                "assemblies",
-                "rssr",
-                "--at",
-                "0.5",
-                "--samples",
-                "40",
-                "--json",
-                str(tmp_path / "found.json"),
-            ]
-        )
-        == 0
-    )
+    file = tmp_path / "found.json"
+    argv = ["assemblies", "rssr", "--at", "0.5", "--samples", "40", "--json", str(file)]
+    assert main(argv) == 0
     out = capsys.readouterr().out
     assert "rssr at crank = 0.5: 2 assemblies from 40 starts (seed 0)" in out
     assert out.count("intended ") >= 1
-    written = json.loads((tmp_path / "found.json").read_text())
+    written = json.loads(file.read_text())
     assert written["drivers"] == {"crank": 0.5}
     assert [each["intended"] for each in written["assemblies"]] == [True, False]
     assert main(["assemblies", "rssr", "--samples", "8", "--json", "-"]) == 0
@@ -217,21 +200,8 @@ def test_assemblies_command_beyond_reach(capsys):
 def test_export_starts_in_chosen_assembly(to, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mechanism = cases.load("four_bar").mechanism
-    argv = [
-        "assemblies",
-        "four_bar",
-        "--at",
-        "1.0",
-        "--samples",
-        "30",
-        "--json",
-        "found.json",
-        "--export",
-        to,
-        "--number",
-        "2",
-    ]
-    assert main([*argv, "--out", "model"]) == 0
+    argv = "assemblies four_bar --at 1.0 --samples 30 --json found.json --number 2 --out model"
+    assert main([*argv.split(), "--export", to]) == 0
     main_ending = {"exudyn": ".py", "mjcf": ".xml"}.get(to, f".{to}")
     texts = {
         file.name.removeprefix("model") or main_ending: file.read_text()
@@ -239,10 +209,8 @@ def test_export_starts_in_chosen_assembly(to, tmp_path, monkeypatch):
     }
     found = read(to, texts, mechanism, tmp_path)
     if to == "mjcf":  # hinges have turned the short way
-        assert all(
-            abs(float(each)) <= np.pi
-            for each in re.search('qpos="([^"]*)"', texts[".xml"])[1].split()
-        )
+        turned = re.search('qpos="([^"]*)"', texts[".xml"])[1].split()
+        assert np.abs(np.array(turned, dtype=float)).max() <= np.pi
     assert np.abs(found.residuals).max() <= 1e-12
     chosen = json.loads((tmp_path / "found.json").read_text())["assemblies"][1]
     for name, pose in chosen["bodies"].items():

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from kincheck.core import Revolute, Spherical, solve, solve_designs
+from kincheck.core import Spherical, solve, solve_designs
 from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics.blocks import component_lanes, sparse_lanes
 from kincheck.core.kinematics.blocks import sweep as block_sweep
@@ -16,7 +16,7 @@ from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.studies.bench.size import circle
 
-from ..support.mechanisms import chain, mcpherson
+from ..support.mechanisms import chain, mcpherson, solve_all
 
 STROKES = np.linspace(-0.05, 0.05, 21)
 
@@ -91,60 +91,38 @@ def test_path_cache_is_per_thread(swept):
     turn = np.linspace(-0.1, 0.2, 9)
     with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
         found = [
-            pool.submit(solve, chain(21), "turn", turn).result()
+            pool.submit(solve, chain(21), "turn", turn).result().points["end"].acceleration
             for pool in (one, other, one, other)
         ]
     assert len(swept) == 2
     for each in found[1:]:
-        np.testing.assert_array_equal(
-            each.points["end"].acceleration, found[0].points["end"].acceleration
-        )
-
-
-def test_user_motion_of_chain_not_cached(swept):
-    @dataclass(frozen=True)
-    class Mine(Motion):
-        def at(self, t):
-            return t, 1.0 + 0.0 * t, 0.0 * t
-
-    request, times = samples.Request(("turn",), ("end",)), np.linspace(0.0, 0.1, 5)
-    for number in (1, 2):
-        assert prepare(chain(21), request, Path({"turn": Mine()}, times))(1e-12).solved.all()
-        assert len(swept) == number
+        np.testing.assert_array_equal(each, found[0])
 
 
 @pytest.mark.usefixtures("own_joint_types")
-def test_chain_of_user_joints_not_cached(monkeypatch):
-    @dataclass(frozen=True)
-    class Hinge(Revolute):
-        type = "hinge_of_mine"
-
-    made = calls(monkeypatch, component_lanes.ComponentLanes, "__init__")
-    mechanism = chain(21)
-    joints = [
-        Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j
-        for j in mechanism.joints
-    ]
-    for number in (1, 2):
-        assert solve(replace(mechanism, joints=joints), "turn", [0.0, 0.1]).solved.all()
-        assert len(made) == number
-
-
-@pytest.mark.usefixtures("own_joint_types")
-def test_user_joints_are_not_cached(made):
+@pytest.mark.parametrize(
+    ("mechanism", "owner", "name"),
+    [
+        (mcpherson(), compiled_model, "compile_model"),
+        (chain(21), component_lanes.ComponentLanes, "__init__"),
+    ],
+    ids=["one program", "components"],
+)
+def test_user_joints_are_not_cached(mechanism, owner, name, monkeypatch):
     """They may be equal, and yet not mean the same."""
 
     @dataclass(frozen=True)
     class Ball(Spherical):
         type = "ball_of_mine"
 
+    built = calls(monkeypatch, owner, name)
     joints = [
-        Ball(j.name, j.i, j.j, j.point) if type(j) is Spherical else j for j in mcpherson().joints
+        Ball(j.name, *j.bodies, j.point) if type(j) is Spherical else j for j in mechanism.joints
     ]
-    assert any(type(j) is Ball for j in joints)
-    for _ in range(2):
-        assert solve(replace(mcpherson(), joints=joints), "stroke", STROKES).solved.all()
-    assert len(made) == 2
+    own, (driver,) = replace(mechanism, joints=joints), mechanism.drivers
+    for number in (1, 2):
+        solve_all(own, driver.name, STROKES)
+        assert len(built) == number
 
 
 @pytest.fixture
@@ -159,10 +137,8 @@ def test_route_cache_of_equal_samples(bound):
     )
     assert len(bound) == 1
     np.testing.assert_array_equal(first, again)
-    for k, other in enumerate(
-        [{"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}],
-        start=2,
-    ):
+    others = {"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}
+    for k, other in enumerate(others, start=2):
         solve(mcpherson(), "stroke", **({"values": STROKES} | other))
         assert len(bound) == k
 
@@ -178,7 +154,7 @@ def test_changed_sample_array_is_harmless():
     )
 
 
-def test_user_motions_are_not_cached(bound):
+def test_user_motions_are_not_cached(bound, swept):
     """They may be equal, and yet not mean the same."""
 
     @dataclass(frozen=True)
@@ -189,22 +165,22 @@ def test_user_motions_are_not_cached(bound):
     assert Path({}, np.ones(2)) == Path({}, np.ones(2)) != Path({}, np.ones(3))
     # their messages differ
     assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})
-    for motion in (Mine(), Absolute(Mine(), 0.0)):
-        assert not Path({"steer": motion}, np.ones(1)).is_builtin
-    assert not Path(
-        {"steer": Ramp(np.array(1.0))}, np.ones(1)
-    ).is_builtin  # whoever has it may change it
-    for motion in (
-        Ramp(1.0),
-        Absolute(Sine(1.0, 1.0, 0.0), 0.2),
-        Table(np.arange(2.0), [0.0, 1.0]),
+    table, wave = Table(np.arange(2.0), [0.0, 1.0]), Absolute(Sine(1.0, 1.0, 0.0), 0.2)
+    # whoever has an array may change it
+    for motion, builtin in (
+        *((own, False) for own in (Mine(), Absolute(Mine(), 0.0), Ramp(np.array(1.0)))),
+        *((ours, True) for ours in (Ramp(1.0), wave, table)),
     ):
-        assert Path({"steer": motion}, np.ones(1)).is_builtin
-    request = samples.Request(("stroke",), ("wheel",))
-    for number in (1, 2):
-        path = Path({"stroke": Mine()}, STROKES)
-        walk.follow_samples(samples.recent_route(mcpherson(), request, path), 1e-12)
-        assert len(bound) == number
+        assert Path({"steer": motion}, np.ones(1)).is_builtin == builtin
+    for made, mechanism, driver, point in (
+        (bound, mcpherson(), "stroke", "wheel"),
+        (swept, chain(21), "turn", "end"),
+    ):
+        for number in (1, 2):
+            request = samples.Request((driver,), (point,))
+            found = prepare(mechanism, request, Path({driver: Mine()}, STROKES))(1e-12)
+            assert found.solved.all()
+            assert len(made) == number
 
 
 def test_very_long_route_is_not_cached(bound):
@@ -220,6 +196,7 @@ def test_very_long_route_is_not_cached(bound):
         (chain(21), component_lanes.ComponentLanes),
         (circle(22).mechanism, sparse_lanes.SparseLanes),
     ],
+    ids=["components", "sparse"],
 )
 def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):
     made = calls(monkeypatch, kind, "__init__")

@@ -24,6 +24,7 @@ from kincheck.core import (
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import start_of
+from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 
@@ -71,6 +72,11 @@ def arm(degrees, *, relative=False):
     )
 
 
+def turned_arm(degrees=30.0):
+    """The arm, driven at its two hinges."""
+    return replace(arm(degrees), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+
+
 def circling(mechanism, phases, kind="sine"):
     """Motions of the tip that go once round the unit circle in a second."""
 
@@ -94,14 +100,8 @@ def phases_of(degrees):
 def case_of(mechanism, motions, times=TIMES):
     points = [each.name for each in mechanism.points]
     outputs = tuple(Output(f"{name}_x", name, X, False, 1e-9, 0.0, "a test") for name in points)
-    return Case(
-        "case",
-        "made up",
-        Truth.CONSENSUS_ONLY,
-        mechanism,
-        Sweep("time", times, 1.0, 0.0, motions),
-        outputs,
-    )
+    sweep = Sweep("time", times, 1.0, 0.0, motions)
+    return Case("case", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
 def by_style(style):
@@ -122,10 +122,9 @@ def by_engine(engine):
     return lambda case: engine.solve(engine.build(case), case, 1e-12)
 
 
-STYLES = ("native", "paper", "conventional", "mixed", "relative")
 ENGINES = {"mujoco": MuJoCo, "pinocchio": Pinocchio, "exudyn": Exudyn}
 WAYS = [
-    *(pytest.param(by_style(style), id=style) for style in STYLES),
+    *(pytest.param(by_style(style.value), id=style.value) for style in Style),
     pytest.param(by_sparse, id="sparse"),
     *(
         pytest.param(
@@ -179,17 +178,11 @@ def test_typed_digits_start_at_design(solved, kind):
     )
 
 
-@pytest.mark.parametrize(
-    ("solved", "turns"),
-    [
-        pytest.param(*way.values, (1.0, 3.0)[k % 2], id=way.id, marks=way.marks)
-        for k, way in enumerate(WAYS)
-    ],
-)
-def test_relative_drivers_with_typed_phase(solved, turns):
+@pytest.mark.parametrize("solved", WAYS)
+def test_relative_drivers_with_typed_phase(solved):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    for phase in (turns * math.pi, six(turns * math.pi)):
+    mechanism = turned_arm()
+    for phase in (math.pi, six(3.0 * math.pi)):
         motions = {"u": Sine(-9.0, 0.5, phase), "v": Ramp(0.3)}
         found = solved(case_of(mechanism, motions))
         assert found.solved.all(), found.message
@@ -202,13 +195,9 @@ def test_relative_drivers_with_typed_phase(solved, turns):
 def test_rounded_design_value_is_zero():
     mechanism = arm(180.0)
     assert 0.0 < mechanism.design_value("y") < 1e-15
-    motions = {
-        "x": Absolute(Sine(1.0, 1.0, -math.pi / 2.0), mechanism.design_value("x")),
-        "y": Absolute(Ramp(0.0), 0.0),
-    }
-    start = start_of(
-        mechanism, Path({**motions, "y": Absolute(Ramp(0.0), mechanism.design_value("y"))}, TIMES)
-    )
+    motions = {"x": Sine(1.0, 1.0, -math.pi / 2.0), "y": Ramp(0.0)}
+    held = {name: Absolute(each, mechanism.design_value(name)) for name, each in motions.items()}
+    start = start_of(mechanism, Path(held, TIMES))
     assert (start.time, start.lead, start.starts_at_design) == (0.0, None, True)
 
 
@@ -225,7 +214,7 @@ def test_exact_start_is_design():
 
 def test_table_starts_at_first_sample():
     """Beyond its ends a line goes on through the design, and is not asked there."""
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+    mechanism = turned_arm()
     table = Table((1.0, 2.0, 3.0), (1.0, 2.0, 3.0))
     path = Path({"u": table, "v": table}, np.array([1.0, 1.5]))
     start = start_of(mechanism, path)
