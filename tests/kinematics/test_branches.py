@@ -21,7 +21,7 @@ from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
 from kincheck.core.primitives.dot12 import LockTest, PaperDot12
 
 from ..oracles import naive
-from ..support.mechanisms import ORIGIN
+from ..support.mechanisms import ORIGIN, solve_all
 from ..support.specimens import LANES, MAKERS, admissible, body, lanes, make, orientation, rotation
 
 
@@ -88,10 +88,10 @@ def test_branch_of_constant_velocity():
     half_turns = [
         rotation(axis, np.pi) for axis in (Z, Vec3(0.6, 0.0, 0.8), Vec3(0.0, -0.96, 0.28))
     ]
-    for turn, right in [*((turn, True) for turn in bends), *((turn, False) for turn in half_turns)]:
+    for turn in (*bends, *half_turns):
         over = Pose.of(ZERO, turn)
         assert abs(shafts.phi(GROUND_POSE, over)[0]) < 1e-15
-        assert (shafts.branch(GROUND_POSE, over)[0] > 0.0) == right
+        assert (shafts.branch(GROUND_POSE, over)[0] > 0.0) == (turn in bends)
 
 
 def test_constant_velocity_shaft_bends_to_fold():
@@ -110,8 +110,7 @@ def test_constant_velocity_shaft_bends_to_fold():
         "shafts", bodies, joints, [Point("rim", "second", (1.0, 0.0, 0.0))], drivers
     )
     fold = np.radians(np.linspace(0.0, 175.0, 36))
-    found = solve(mechanism, "fold", fold, motions={"turn": Ramp(0.7)})
-    assert found.solved.all(), found.message
+    found = solve_all(mechanism, "fold", fold, motions={"turn": Ramp(0.7)})
     s, c = np.sin(0.7 * fold), np.cos(0.7 * fold)
     expected = np.column_stack([c, s * np.cos(fold), s * np.sin(fold)])
     assert np.abs(found.points["rim"].position - expected).max() <= 1e-12
@@ -219,16 +218,14 @@ def test_branch_of_driven_angle(coupled):
         Revolute("first", "ground", "wheel", ORIGIN, (0.0, 0.0, 1.0)),
         Revolute("second", "ground", "other", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
     ]
-    bodies, couplers = [Body("wheel"), Body("other")], [Gear("gear", ("second", "first"), 0.5)]
-    used = slice(None) if coupled else slice(1)
-    point = Point("rim", "wheel", (1.0, 0.0, 0.0))
+    used, gear = 1 + coupled, Gear("gear", ("second", "first"), 0.5)
     mechanism = Mechanism(
         "wheels",
-        bodies[used],
-        joints[used],
-        [point],
+        [Body("wheel"), Body("other")][:used],
+        joints[:used],
+        [Point("rim", "wheel", (1.0, 0.0, 0.0))],
         [JointAngle("turn", "first")],
-        couplers if coupled else (),
+        [gear][: used - 1],
     )
     turn = np.linspace(-20.0, 20.0, 9)
     found = solve(mechanism, "turn", turn)

@@ -2,6 +2,8 @@
 where that fails, by their rates.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
@@ -20,7 +22,7 @@ from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, groups_behind, place_of
 
-from ..support.mechanisms import mcpherson, slider_crank, slider_crank_motion
+from ..support.mechanisms import errors, mcpherson, slider_crank, slider_crank_motion
 
 STROKES = np.linspace(-0.08, 0.08, 33)
 
@@ -47,20 +49,12 @@ def test_extrapolation_weights_are_fifth_order(lanes):
         ]
         assert of_samples[:, k] @ past == pytest.approx(values[k], rel=1e-11)
         groups = values[k // lanes * lanes - behind : k // lanes * lanes].reshape(-1, lanes)
-        assert of_groups[:, k] @ [
-            groups[place_of(j, lanes)] for j in range(NODES)
-        ] == pytest.approx(values[k], rel=1e-9)
-    for few in range(9):
-        assert (
-            weights_of_samples(times[:few]).shape
-            == weights_of_groups(times[:few], lanes).shape
-            == (NODES, few)
-        )
-    for weights in (
-        weights_of_samples(np.repeat(times, 2)),
-        weights_of_groups(np.repeat(times, 2), lanes),
-    ):
-        assert not np.isfinite(weights[:, 8:]).all(axis=0).any()
+        nodes = [groups[place_of(j, lanes)] for j in range(NODES)]
+        assert of_groups[:, k] @ nodes == pytest.approx(values[k], rel=1e-9)
+    for weights in (weights_of_samples, partial(weights_of_groups, lanes=lanes)):
+        for few in range(9):
+            assert weights(times[:few]).shape == (NODES, few)
+        assert not np.isfinite(weights(np.repeat(times, 2))[:, 8:]).all(axis=0).any()
 
 
 def positions(values, order=0, *, compiled=False):
@@ -71,6 +65,23 @@ def positions(values, order=0, *, compiled=False):
     found = sweep(model, Path({"stroke": Ramp(1.0)}, np.asarray(values)), 1e-12)
     assert found.solved.all(), found.message
     return found
+
+
+def assert_same(found, expected):
+    """Two motions of the wheel that differ by round-off."""
+    wheel = expected.points["wheel"]
+    off = errors(found.points["wheel"], [wheel.position, wheel.velocity, wheel.acceleration])
+    assert (off <= [4e-16, 4e-15, 4e-14][: len(off)]).all()
+
+
+def crank_motion(angles, order=2, *, compiled=True):
+    """The slider-crank at these angles, against its closed form; its iterations."""
+    request = Request(("turn",), ("end",), order=order, compiled=compiled)
+    path = Path({"turn": Ramp(1.0)}, angles)
+    found = sweep(compile_model(slider_crank(), request), path, 1e-12)
+    x = found.points["end"].position[:, 0]
+    assert np.abs(x - slider_crank_motion(angles).x).max() <= 1e-15
+    return found.iterations
 
 
 @pytest.fixture
@@ -90,10 +101,7 @@ def test_extrapolated_lanes_need_one_iteration(order):
     assert (found.iterations[later] == 1).all()
     by_rates = positions(fine[::8], order)  # all that is left of the lanes before are rates
     assert (by_rates.iterations[1:-1] > 1).any()
-    assert (
-        np.abs(found.points["wheel"].position[::8] - by_rates.points["wheel"].position).max()
-        <= 4e-16
-    )
+    assert errors(by_rates.points["wheel"], [found.points["wheel"].position[::8]])[0] <= 4e-16
 
 
 @pytest.mark.parametrize("interpreted", [False, True])
@@ -114,12 +122,7 @@ def test_extrapolation_by_several_vectors(lanes, order, interpreted, monkeypatch
         ]
     )
     found, first = positions(grid, order, compiled=True), groups_behind(lanes) * lanes
-    expected = positions(grid, order).points["wheel"]
-    assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
-    assert (
-        order == 0
-        or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
-    )
+    assert_same(found, positions(grid, order))
     below, above = found.iterations[78::-1], found.iterations[79:]  # the sides, from the start
     assert (below[:first] > 1).any()
     assert (below[first:] == 1).all()
@@ -171,13 +174,8 @@ def test_rates_replace_failed_extrapolation(values, order, monkeypatch):
     """
     both = [positions(values, order, compiled=compiled) for compiled in (False, True)]
     monkeypatch.setattr("kincheck.core.kinematics.compiled.routes.LANES", 1)
-    expected = positions(values, order, compiled=False).points["wheel"]
     for found in both:
-        assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16
-        assert (
-            order == 0
-            or np.abs(found.points["wheel"].acceleration - expected.acceleration).max() <= 4e-14
-        )
+        assert_same(found, positions(values, order))
     np.testing.assert_array_equal(*(found.iterations for found in both))  # predicted by the same
 
 
@@ -189,17 +187,9 @@ def test_extrapolation_after_long_step(lanes, monkeypatch):
     pytest.importorskip("llvmlite", reason="numpy takes as many lanes as there are samples")
     monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: lanes)
     angles = np.concatenate([0.002 * np.arange(21.0), 0.94 + 0.002 * np.arange(60.0)])
-    found = sweep(
-        compile_model(slider_crank(), Request(("turn",), ("end",))),
-        Path({"turn": Ramp(1.0)}, angles),
-        1e-12,
-    )
-    assert (
-        np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max()
-        <= 1e-15
-    )
-    assert (found.iterations[21:25] > 1).any()
-    assert (found.iterations[-40:] == 1).all()
+    iterations = crank_motion(angles)
+    assert (iterations[21:25] > 1).any()
+    assert (iterations[-40:] == 1).all()
 
 
 @pytest.mark.usefixtures("eight_lanes")
@@ -209,17 +199,7 @@ def test_extrapolation_where_grid_gets_fine(order):
     multiple of eight.
     """
     angles = np.concatenate([[0.5, 1.0, 1.5], 1.5 + 0.002 * np.arange(1.0, 62.0)])
-    taken = list[list[int]]()
-    for compiled in (False, True):
-        model = compile_model(
-            slider_crank(), Request(("turn",), ("end",), order=order, compiled=compiled)
-        )
-        found = sweep(model, Path({"turn": Ramp(1.0)}, angles), 1e-12)
-        assert (
-            np.abs(found.points["end"].position[:, 0] - slider_crank_motion(angles, 1.0).x).max()
-            <= 1e-15
-        )
-        taken.append(found.iterations.tolist())
-    assert taken[0] == taken[1]
-    assert taken[0][:3] == [3, 3, 3]
-    assert taken[0][-40:] == [1] * 40
+    numpy, machine = (crank_motion(angles, order, compiled=each).tolist() for each in (False, True))
+    assert numpy == machine
+    assert numpy[:3] == [3, 3, 3]
+    assert numpy[-40:] == [1] * 40

@@ -263,15 +263,20 @@ def test_replay_digits_match_changed_numbers(loop):
         assert found.allowed[quantity] == pytest.approx(total, rel=1e-4, abs=1e-12)
 
 
-def test_replay_refuses_bad_arguments(loop):
-    mechanism, poses, v, a = loop
-    with pytest.raises(SolveError, match="no pose"):
-        residuals(mechanism, {})
-    with pytest.raises(UnknownNameError, match="moving body"):
-        residuals(mechanism, {"nobody": np.zeros((2, 7))})
-    with pytest.raises(SolveError, match=r"poses of body .* have shape \(41, 6\), expected"):
-        residuals(mechanism, v)
-    with pytest.raises(SolveError, match="accelerations need velocities"):
-        residuals(mechanism, poses, None, a)
-    with pytest.raises(SolveError, match="digits of body"):
-        residuals(mechanism, poses, digits={mechanism.moving[0].name: np.zeros((41, 6))})
+SHORT = np.zeros((41, 6))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"poses": {}}, "no pose"),
+        ({"poses": {"nobody": np.zeros((2, 7))}}, "moving body"),
+        ({"poses": {"crank": SHORT}}, r"poses of body .* have shape \(41, 6\), expected"),
+        ({"accelerations": {"crank": SHORT}}, "accelerations need velocities"),
+        ({"digits": {"crank": SHORT}}, "digits of body"),
+    ],
+)
+def test_replay_refuses_bad_arguments(loop, arguments, message):
+    mechanism, poses, *_ = loop
+    with pytest.raises((SolveError, UnknownNameError), match=message):
+        residuals(mechanism, **({"poses": poses} | arguments))

@@ -32,7 +32,7 @@ from ..support.mechanisms import (
     pushed,
     solve_all,
 )
-from .test_continuation import LIMITS
+from .test_trace import LIMITS
 
 # In doubt
 

@@ -1,6 +1,8 @@
 """Marching over a sweep: grids of all kinds, closed forms over several turns."""
 
+import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,7 +16,12 @@ from kincheck.core import (
     Revolute,
     Spherical,
 )
-from kincheck.core.kinematics import solve
+from kincheck.core.kinematics import Method, NativeSolver, solve
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.continuation.sweep import sweep
+from kincheck.core.kinematics.continuation.walk import FINER, ROOM, SideWalk
+from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..support.mechanisms import (
     CRANK,
@@ -193,3 +200,152 @@ def test_arm_on_ball_and_rods():
     tip = solve(m, "lift", heights).points["tip"]
     assert tip.position[:, 0] == pytest.approx(np.sqrt(0.25 - heights**2), abs=1e-15)
     assert tip.velocity[:, 0] == pytest.approx(-heights / np.sqrt(0.25 - heights**2), abs=2e-14)
+
+
+# Sweeps to the ends of travel and beyond, and steps of many turns
+
+
+@pytest.mark.parametrize(
+    ("way", "turn", "solved"),
+    [
+        (Method.ONE_PROGRAM, 1000.0, True),
+        (Method.ONE_PROGRAM, 1e6, False),
+        (Method.BY_COMPONENTS, 1000.0, True),
+        (Method.BY_COMPONENTS, 1e6, False),
+        (Method.SPARSE, 100.0, True),  # a part takes it a hundred times as long
+    ],
+)
+def test_step_of_many_turns(way, turn, solved):
+    m = slider_crank()
+    path = Path({"turn": Ramp(1.0)}, np.array([0.0, turn]))
+    found = NativeSolver(method=way).prepare(m, path, ("end",))(1e-12)
+    assert found.solved.tolist() == [True, solved], found.message
+    assert ("give samples in between" in found.message) is not solved
+    assert "assembly" not in found.message
+    if solved:
+        x = slider_crank_motion(turn).x
+        # a thousand radians round at 1e-13
+        assert np.abs(found.points["end"].position[1, 0] - x) <= 1e-12
+
+
+@pytest.mark.parametrize(("far", "limit"), [(0.4, 0.29337), (-0.4, -0.31674)])
+@pytest.mark.parametrize("steps", [401, 9])
+def test_lock_up_of_strut(far, limit, steps):
+    """Formulation section 10: the first extrema of the wheel's height along the branch, to the
+    digits given there.
+    """
+    values = np.linspace(0.0, far, steps)
+    found = solve(mcpherson(), "stroke", values)
+    within = np.abs(values) < abs(limit)
+    assert (found.solved == within).all()
+    assert np.isnan(found.points["wheel"].position[~within]).all()
+    assert np.isfinite(found.points["wheel"].acceleration[within]).all()
+    pattern = (
+        r"cannot be followed beyond stroke = (\S+) \(wanted stroke = (\S+)\): .*; smallest singular"
+        r" value there about (\S+) .*lock-up.*last reachable sample at stroke = (\S+); shorten the"
+        " sweep"
+    )
+    beyond, wanted, pivot, last = map(float, re.match(pattern, found.message).groups())
+    assert beyond == pytest.approx(limit, abs=1e-4)
+    assert wanted == pytest.approx(values[~within][0], rel=1e-8)
+    assert last == pytest.approx(values[within][-1], rel=1e-8)
+    assert 0.0 < pivot < 0.02
+
+
+def test_end_before_first_sample():
+    found = solve(mcpherson(), "stroke", [0.4])
+    assert not found.solved.any()
+    assert "no sample reached on this side" in found.message
+    assert found.points["wheel"].position.shape == (1, 3)
+
+
+def test_samples_beyond_dead_centre():
+    """Past a dead centre the crank could be assembled again, but not without passing where it
+    cannot.
+    """
+    turn = np.linspace(0.0, np.pi, 61)
+    # shorter than the crank: the pin cannot pass overhead
+    found = solve(slider_crank(rod=0.1), "turn", turn)
+    assert (found.solved == (turn < np.arcsin(0.1 / CRANK))).all()
+    assert "cannot be followed" in found.message
+
+
+@pytest.mark.parametrize("samples", [3, 5, 9, 20])
+def test_both_directions_end(samples):
+    """Both fronts divide their steps at once, in one block of lanes."""
+    found = solve(mcpherson(), "stroke", np.linspace(-1.5, 1.5, samples))
+    assert found.message.count("cannot be followed beyond stroke = ") == 2
+    assert not found.solved.all()
+
+
+# Coarse sweeps are gone in parts of their steps: to the samples of a closed form, by whichever
+
+
+COARSE = {
+    "a turn in six": np.linspace(0.0, 2.0 * np.pi, 7),
+    "turns of three radians": np.linspace(-12.0, 12.0, 9),
+    "one step of six turns": np.array([12.0 * np.pi]),
+    "a step in parts of more than a radian": np.array([1.2 * FINER[1]]),
+    "in no order, and twice the same": np.array([5.0, -4.0, 0.0, 2.5, 5.0, -1.0]),
+    "small steps, then large": np.concatenate(
+        [np.linspace(0.0, 0.1, 40), np.linspace(2.0, 9.0, 5)]
+    ),
+}
+"""Angles of the crank, measured from the design position."""
+
+
+@cache
+def model(compiled):
+    return compile_model(slider_crank(), Request(("turn",), ("end",), compiled=compiled))
+
+
+def swept(values, *, compiled=True):
+    """Along a route of its own: what is made ready for one that was solved before is kept with
+    it.
+    """
+    return sweep(model(compiled), Path({"turn": Ramp(1.0)}, np.asarray(values)), 1e-12)
+
+
+def assert_right(found, values):
+    """Every sample is there, with position, velocity and acceleration of the closed form."""
+    assert found.solved.all()
+    assert not found.message
+    assert found.residual <= 1e-15
+    x = slider_crank_motion(values)
+    expected = [np.column_stack([each, 0.0 * x.x, 0.0 * x.x]) for each in (x.x, x.v, x.a)]
+    assert (errors(found.points["end"], expected) <= 1e-14).all()
+
+
+@pytest.fixture
+def divided(monkeypatch):
+    """The steps of which parts were looked for one by one."""
+    aims, divide = list[float](), SideWalk._divided
+    monkeypatch.setattr(
+        SideWalk,
+        "_divided",
+        lambda self, anchor, aim: aims.append(aim) or divide(self, anchor, aim),
+    )
+    return aims
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
+def test_coarse_sweep_in_equal_parts(values, compiled, divided):
+    assert_right(swept(values, compiled=compiled), values)
+    assert not divided
+
+
+@pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
+def test_coarse_sweep_in_searched_parts(values, divided):
+    """After so many samples that equal parts of all of them are not kept ready."""
+    values = np.append(np.linspace(0.0, 1e-3, 1 + ROOM // FINER[0]), values)
+    assert_right(swept(values), values)
+    assert divided
+
+
+def test_worst_sigma_is_of_samples():
+    """Not of the poses between, which are nearer to singular."""
+    whole, least = 2.0 * np.pi, "smallest_singular_value"
+    assert swept(np.linspace(0.0, whole, 41)).details[least] < 0.97
+    assert swept([0.0, whole]).details[least] == pytest.approx(1.0, abs=1e-12)
+    assert swept([0.0, 2.5 * np.pi]).details[least] < 0.97
