@@ -7,14 +7,23 @@ from kincheck.core import solve
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.routes import Route
+from kincheck.core.kinematics.compiled.routes import Route, start_of
 from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import follow_samples
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.bench.size import pivot, ring
 
 from ..support.block_structures import LEAN, assert_alike, solve_as, torus, with_one_program
-from ..support.mechanisms import BRANCH, chain, chain_end, crank_tip, errors, four_bar, slider_crank
+from ..support.mechanisms import (
+    BRANCH,
+    chain,
+    chain_end,
+    crank_tip,
+    errors,
+    four_bar,
+    mcpherson,
+    slider_crank,
+)
 from .test_sparse_choice import inside
 
 METHODS = Method.ONE_PROGRAM, Method.BY_COMPONENTS, Method.SPARSE
@@ -66,6 +75,61 @@ def test_blocks_with_unordered_samples(times, method):
 
 
 @pytest.mark.parametrize(
+    ("method", "mechanism", "point", "body"),
+    [
+        (Method.BY_COMPONENTS, chain(3), "end", "crank3"),
+        (Method.SPARSE, ring(12), "tip6", "plate5"),
+    ],
+)
+def test_blocks_by_numpy(method, mechanism, point, body):
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 9))
+    found = (
+        solve_as(method, mechanism, path, [point], [body], compiled=each) for each in (False, True)
+    )
+    assert_alike(*found)
+
+
+@IN_BLOCKS
+@pytest.mark.parametrize("times", [np.linspace(-7.0, -6.0, 5), np.linspace(1001.0, 1000.0, 4)])
+def test_blocks_start_away_from_design(times, method):
+    """The drivers go there in a second of their own; the path's own time may be any."""
+    for mechanism, point in ((chain(3), "end"), (four_bar(), "C")):
+        path = Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, times)
+        assert not start_of(mechanism, path).starts_at_design
+        assert_alike(*with_one_program(method, mechanism, path, (point,)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_limit_of_travel_has_one_verdict(method):
+    values = np.linspace(-0.04, 0.4, 23)
+    path = Path({"stroke": Ramp(1.0)}, values)
+    solver = NativeSolver(order=1, method=method).prepare(mcpherson(), path, ["wheel"], ["knuckle"])
+    found, again = solver(1e-12), solver(1e-12)
+    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
+    wheel, knuckle = found.points["wheel"], found.bodies["knuckle"]
+    assert np.isnan(wheel.position[~found.solved]).all()
+    assert (wheel.acceleration, knuckle.a) == (None, None)
+    assert np.array_equal(again.points["wheel"].position, wheel.position, equal_nan=True)
+    assert "cannot be followed beyond stroke = 0.293" in found.message
+    assert "last reachable sample at stroke = 0.28; shorten the sweep" in found.message
+    assert ("knuckle" in found.message) or method is Method.SPARSE
+    assert 0.0 < found.details["smallest_singular_value"] < 1e-1
+    far = solve_as(
+        method, mcpherson(), Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])), ["wheel"]
+    )
+    assert "no sample reached on this side" in far.message
+    assert not far.solved.any()
+    assert far.points["wheel"].position.shape == (2, 3)
+    # nothing was found, which is not zero
+    details = (
+        far.residual,
+        far.details["smallest_singular_value"],
+        far.details["redundant_residual"],
+    )
+    assert np.isnan(details).all()
+
+
+@pytest.mark.parametrize(
     ("rows", "columns", "crossed"), [(2, 2, 2), (2, 3, 1), (3, 3, 3)], ids=["2x2", "2x3", "3x3"]
 )
 def test_torus_has_one_verdict(rows, columns, crossed):
@@ -114,13 +178,14 @@ def test_parallelogram_in_ring_has_one_verdict(off, reached, ends):
         assert found.solved.sum() == reached
 
 
-@pytest.mark.parametrize("count", [3, 9, 65])
+@pytest.mark.parametrize("count", [1, 3, 9, 65])
 def test_links_in_line_have_one_verdict(count):
     """The middle sample is where all links are in line: what is known on both sides gives it."""
-    turn = BRANCH + np.linspace(-0.5, 0.5, count)
+    turn = BRANCH + (np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1))
     for found in in_every_way(chain(3), turn, ("end",)):
         assert found.solved.all(), found.message
         assert errors(found.points["end"], chain_end(3, turn))[0] <= 1e-11
+        assert any("interpolated there" in note for note in found.details["notes"])
 
 
 def test_component_rates_beside_singular_pose():

@@ -26,7 +26,6 @@ from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLane
 from kincheck.core.kinematics.blocks.sweep import WORST
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
-from kincheck.core.kinematics.compiled.routes import start_of
 from kincheck.core.kinematics.continuation.walk import HALVINGS, part_of_step
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
@@ -38,7 +37,6 @@ from ..support.block_structures import (
     with_one_program,
 )
 from ..support.mechanisms import (
-    BRANCH,
     LEAN,
     ORIGIN,
     Z,
@@ -46,24 +44,9 @@ from ..support.mechanisms import (
     chain_end,
     circles_meet,
     errors,
-    mcpherson,
     placed,
     solve_all,
 )
-
-
-def test_components_by_numpy():
-    path = Path({"turn": Ramp(1.0)}, np.linspace(-1.0, 1.0, 9))
-    given = chain(3), path, ("end",), ("crank3",)
-    assert_alike(*(solve_components(*given, compiled=each) for each in (False, True)))
-
-
-@pytest.mark.parametrize("first", [-7.0, 1000.0])
-def test_components_start_away_from_design(first):
-    """The drivers go there in a second of their own; the path's own time may be any."""
-    path = Path({"turn": Sine(1.2, 1e-2, np.pi / 2.0)}, np.linspace(first, first + 1.0, 5))
-    assert not start_of(chain(3), path).starts_at_design
-    assert_alike(*with_one_program(Method.BY_COMPONENTS, chain(3), path, ("end",)))
 
 
 def test_singular_pose_before_first_sample_is_reported():
@@ -309,22 +292,6 @@ def test_tilted_components_with_redundant_rows(seed):
 # Where a motion by components ends, what it passes, and the component that is named
 
 
-def test_component_limit_of_travel_is_reported():
-    mechanism = mcpherson()
-    values = np.linspace(0.0, 0.4, 41)
-    path = Path({"stroke": Ramp(1.0)}, values)
-    solve = NativeSolver(method=Method.BY_COMPONENTS).prepare(mechanism, path, ("wheel",))
-    found = solve(1e-12)
-    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
-    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
-    assert "cannot be followed beyond stroke = 0.293" in found.message
-    assert "knuckle" in found.message
-    assert "; last reachable sample at stroke = 0.29; shorten the sweep" in found.message
-    assert np.array_equal(
-        solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True
-    )
-
-
 def test_singular_component_is_named():
     """The second of two four-bars, which cannot turn on; the first one's crank can, and its
     residuals are no larger.
@@ -376,22 +343,6 @@ def test_chain_passes_links_in_line():
     assert (np.abs(found.points["end"].position - expected).max(axis=1) <= rounding).all()
     (note,) = found.details["notes"]
     assert "crosses a singular pose near turn = 1.870" in note
-
-
-def test_links_in_line_are_interpolated():
-    turn = np.array([0.0, 1.8, BRANCH, 1.9, 2.4])
-    for values in (turn, turn[2:3]):
-        found = solve_components(chain(3), Path({"turn": Ramp(1.0)}, values), ("end",))
-        assert found.solved.all(), found.message
-        assert any("interpolated there" in note for note in found.details["notes"])
-        assert errors(found.points["end"], chain_end(3, values))[0] <= 1e-12
-
-
-def test_components_without_solved_sample():
-    found = solve_components(mcpherson(), Path({"stroke": Ramp(1.0)}, np.array([0.4])), ("wheel",))
-    assert not found.solved.any()
-    # nothing was found, which is not zero
-    assert np.isnan([found.residual, found.details["smallest_singular_value"]]).all()
 
 
 @pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])

@@ -70,11 +70,6 @@ def test_sparse_couplers():
     )
 
 
-def test_sparse_start_away_from_design():
-    for times in (np.linspace(0.0, 2.0, 15), np.linspace(2.0, 1.0, 4)):
-        compared(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",))
-
-
 def test_sparse_start_beyond_travel():
     steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))
     assert solve_sparse(mcpherson(), steep).message.startswith(
@@ -140,16 +135,6 @@ def test_ring_factors_grow_linearly():
         SparseLanes(ring(n), Request(("turn",), ())).details["factor_entries"] for n in (40, 160)
     )
     assert large < 4.4 * small
-
-
-def test_sparse_by_numpy():
-    path = turning(*np.linspace(-0.5, 0.5, 5))
-    assert_alike(
-        *(
-            solve_sparse(ring(12), path, ["tip6"], ["plate5"], compiled=each)
-            for each in (True, False)
-        )
-    )
 
 
 def test_redundant_rows_of_many_loops():
@@ -223,24 +208,6 @@ def test_tilted_hinge_has_one_verdict():
     for method in (Method.ONE_PROGRAM, Method.SPARSE):
         with pytest.raises(SolveError, match=r"0 degrees of freedom .* but 1 driver"):
             solve_as(method, replace(mechanism, joints=joints), turning(0.5))
-
-
-def test_sparse_limit_of_travel():
-    values = np.linspace(-0.04, 0.4, 23)
-    found = solve_sparse(
-        mcpherson(), Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1
-    )
-    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
-    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
-    assert "cannot be followed beyond stroke = 0.293" in found.message
-    assert "last reachable sample at stroke = 0.28;" in found.message
-    assert 0.0 < found.details["smallest_singular_value"] < 1e-1
-    assert found.points["wheel"].acceleration is None
-    assert found.bodies["knuckle"].a is None
-    far = solve_sparse(mcpherson(), Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
-    assert "no sample reached on this side" in far.message
-    assert not far.solved.any()
-    assert np.isnan([far.residual, far.details["redundant_residual"]]).all()
 
 
 CHAIN, STRUT, STRETCHED = chain(40), mcpherson(), slider_crank()

@@ -252,13 +252,6 @@ def test_lock_up_of_strut(far, limit, steps):
     assert 0.0 < pivot < 0.02
 
 
-def test_end_before_first_sample():
-    found = solve(mcpherson(), "stroke", [0.4])
-    assert not found.solved.any()
-    assert "no sample reached on this side" in found.message
-    assert found.points["wheel"].position.shape == (1, 3)
-
-
 def test_samples_beyond_dead_centre():
     """Past a dead centre the crank could be assembled again, but not without passing where it
     cannot.
