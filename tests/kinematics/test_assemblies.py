@@ -191,6 +191,7 @@ UNKNOWN = r"there is no {} '{}'; did you mean '{}'\?"
             r"origin r of body 'crank': shape \(2, 3\), expected \(3,\)",
         ),
     ],
+    ids=lambda each: each if isinstance(each, str) else "",
 )
 def test_assembly_refuses_bad_estimates(close, arguments, message):
     mechanism = replace(four_bar(), bodies=[*four_bar().bodies, Body("wall", fixed=True)])
@@ -205,6 +206,7 @@ def test_assembly_refuses_bad_estimates(close, arguments, message):
         *((find_assemblies, {"tol": tol}) for tol in (np.inf, np.nan, 0.0, -1.0)),
         (find_assemblies, {"samples": -1}),
     ],
+    ids=lambda each: str(each) if isinstance(each, dict) else each.__name__,
 )
 def test_assembly_refuses_bad_numbers(close, number):
     """Of a tolerance all that is not closed would be, or nothing."""
@@ -428,6 +430,7 @@ def test_export_starts_in_chosen_assembly(to, tmp_path, monkeypatch):
         (["rssr", "--at", "nan"], "'nan' is not a number"),
         (["rssr", "--samples", "0"], "not a whole number of 1 or more"),
     ],
+    ids=str,
 )
 def test_assemblies_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

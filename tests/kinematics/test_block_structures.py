@@ -66,6 +66,7 @@ def test_blocks_match_one_program(name, method):
         np.zeros(1),
         np.array([0.5, 0.5, -0.5]),
     ],
+    ids=["beyond the design", "backwards", "at the design", "in no order"],
 )
 def test_blocks_with_unordered_samples(times, method):
     for mechanism in (slider_crank(1.01), four_bar()):
@@ -80,6 +81,7 @@ def test_blocks_with_unordered_samples(times, method):
         (Method.BY_COMPONENTS, chain(3), "end", "crank3"),
         (Method.SPARSE, ring(12), "tip6", "plate5"),
     ],
+    ids=METHODS[1:],
 )
 def test_blocks_by_numpy(method, mechanism, point, body):
     path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 9))
@@ -90,7 +92,11 @@ def test_blocks_by_numpy(method, mechanism, point, body):
 
 
 @IN_BLOCKS
-@pytest.mark.parametrize("times", [np.linspace(-7.0, -6.0, 5), np.linspace(1001.0, 1000.0, 4)])
+@pytest.mark.parametrize(
+    "times",
+    [np.linspace(-7.0, -6.0, 5), np.linspace(1001.0, 1000.0, 4)],
+    ids=["before", "long after"],
+)
 def test_blocks_start_away_from_design(times, method):
     """The drivers go there in a second of their own; the path's own time may be any."""
     for mechanism, point in ((chain(3), "end"), (four_bar(), "C")):

@@ -36,7 +36,7 @@ SPURIOUS = [rotation(axis, np.pi) for axis in (X, Y, Z)] + [
 ]
 
 
-@pytest.mark.parametrize("turn", SPURIOUS)
+@pytest.mark.parametrize("turn", SPURIOUS, ids=["x", "y", "z", "+++", "+--", "-+-", "--+"])
 def test_dot12_has_no_spurious_zeros(turn):
     """(17) vanishes at seven wrong rotations, of 180 and 120 degrees; the Euler parameters do not
     (formulation section 3).
@@ -50,7 +50,7 @@ def test_dot12_has_no_spurious_zeros(turn):
     assert np.linalg.norm(p.Dot12().phi(GROUND_POSE, Pose.of(ZERO, turn))) > 1.7
 
 
-@pytest.mark.parametrize("style", [PaperDot12(), LockTest(Y, Z)])
+@pytest.mark.parametrize("style", [PaperDot12(), LockTest(Y, Z)], ids=["paper", "lock"])
 def test_branch_of_spurious_zeros(style):
     assert all(style.branch(GROUND_POSE, Pose.of(ZERO, turn))[0] < 0.0 for turn in SPURIOUS)
     assert style.branch(GROUND_POSE, Pose.of(ZERO, rotation(X, 0.5)))[0] > 0.0

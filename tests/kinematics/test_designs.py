@@ -39,7 +39,7 @@ from ..support.mechanisms import (
 )
 
 
-@pytest.mark.parametrize("values", [[0.0], [0.1, 0.0, -0.1]])
+@pytest.mark.parametrize("values", [[0.0], [0.1, 0.0, -0.1]], ids=["design", "sweep"])
 def test_locked_variant_is_refused(values):
     """A four-bar of four hinges with the last one tilted: it closes where it is, and is a frame."""
     mechanism, tilts = four_bar(), np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-3], [0.1, 1.0, 0.0]])
@@ -86,6 +86,7 @@ def test_designs_match_single_solves(samples):
         ),
         ({}, "^solve_designs: geometry names no place to vary; known: joints.lca_pivot.point, "),
     ],
+    ids=["unknown place", "shape", "not finite", "numbers of designs", "no place"],
 )
 def test_designs_refuse_bad_geometry(geometry, message):
     with pytest.raises(SolveError, match=message):
@@ -276,6 +277,7 @@ def test_lanes_extrapolate_or_use_rates(values, compiled, order, monkeypatch):
 @pytest.mark.parametrize(
     "path",
     [PATHS["from design, both ways"], Path({"stroke": Ramp(1.0)}, np.linspace(-0.06, 0.06, 61))],
+    ids=["coarse", "fine"],
 )
 def test_lane_ignores_neighbours(path):
     mechanism, varied = strut()
@@ -310,7 +312,9 @@ def test_worst_sample_of_each_lane(compiled):
 
 
 @pytest.mark.parametrize(
-    "times", [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])]
+    "times",
+    [np.linspace(-0.25, 0.25, 11), np.array([0.1, -0.2, 0.25, 0.0, -0.25, 0.2, -0.1])],
+    ids=["in order", "in no order"],
 )
 def test_unsolved_variant_says_why(times):
     """A ball 0.28 m higher shortens the way of the arm; samples in no order find their places."""

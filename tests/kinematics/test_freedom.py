@@ -78,6 +78,7 @@ A, B, X = (0.1, -0.2, 0.3), (0.5, 0.4, 0.9), (1.0, 2.0, -0.5)
         (Fixed("j", "ground", "body", A), 0),
         (Distance("j", "ground", "body", (A, B)), 5),
     ],
+    ids=lambda each: str(getattr(each, "type", each)),
 )
 def test_freedom_of_joints(joint, dof):
     """Formulation section 6."""

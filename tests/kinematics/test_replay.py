@@ -229,6 +229,7 @@ def geared(coupler):
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [(GEAR, replace(GEAR, ratio=-0.41)), (CURVE, replace(CURVE, coefficients=(0.0, 0.5, 0.031)))],
+    ids=["gear", "polynomial"],
 )
 def test_replay_judges_coupler_ratio(right, wrong):
     mechanism = geared(right)
@@ -275,6 +276,7 @@ SHORT = np.zeros((41, 6))
         ({"accelerations": {"crank": SHORT}}, "accelerations need velocities"),
         ({"digits": {"crank": SHORT}}, "digits of body"),
     ],
+    ids=["no pose", "unknown body", "shape", "no velocities", "digits"],
 )
 def test_replay_refuses_bad_arguments(loop, arguments, message):
     mechanism, poses, *_ = loop

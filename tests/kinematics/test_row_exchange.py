@@ -101,7 +101,9 @@ def test_bifurcation_exchanges_no_rows():
 
 
 @pytest.mark.parametrize(
-    ("first", "turn"), [(1.0, np.linspace(0.0, 4.0, 41)), (1.8, np.array([0.0, 1.0, BRANCH, 4.0]))]
+    ("first", "turn"),
+    [(1.0, np.linspace(0.0, 4.0, 41)), (1.8, np.array([0.0, 1.0, BRANCH, 4.0]))],
+    ids=["before", "after"],
 )
 def test_bifurcation_after_row_exchange(first, turn):
     """A locomotive that turns over the dead points of its rods, and a chain that branches after the

@@ -10,7 +10,7 @@ from ..support.running import run_on
 # The signs of determinants
 
 
-@pytest.mark.parametrize("sizes", [[1], [2], [5], [11], [1, 3], [2, 2, 4]])
+@pytest.mark.parametrize("sizes", [[1], [2], [5], [11], [1, 3], [2, 2, 4]], ids=str)
 def test_orientation_of_every_block(sizes):
     """Of blocks solved one after the other, rows and columns mixed: of each that of its
     determinant, or always the other.

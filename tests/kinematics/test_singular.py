@@ -203,6 +203,7 @@ def test_accelerations_beside_singular_pose():
         ([-1.0, -1.0], None),
         ([-1.0, 1.0], None),
     ],
+    ids=str,
 )
 def test_part_of_step_needs_half(margins, part):
     assert longest(np.array(margins)) == part

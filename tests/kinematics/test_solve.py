@@ -327,6 +327,7 @@ def test_solve_without_samples(name):
             "there is no style 'dads'; known: native, paper, conventional, mixed, relative",
         ),
     ],
+    ids=str,
 )
 def test_solve_refuses_bad_arguments(arguments, message):
     with pytest.raises(SolveError, match=message):

@@ -250,7 +250,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("mechanism", "message"), REFUSED)
+@pytest.mark.parametrize(("mechanism", "message"), REFUSED, ids=lambda each: str(each)[:30])
 def test_sparse_refusals_name_cause(mechanism, message):
     with pytest.raises(SolveError, match=message):
         SparseLanes(mechanism, Request(tuple(each.name for each in mechanism.drivers), ()))

@@ -52,23 +52,25 @@ def four_bar(sizes, start, ends, cranks=CRANKS):
     )
 
 
-PLAIN, KITE, ASIDE = (0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.000001, 1.2)
+KITE = (1.25, 1.2, 0.7, 0.7)
+SHAPES = {"plain": (0.5, 1.5, 1.3, 1.2), "kite": KITE, "aside": (1.0, 1.2, 1.000001, 1.2)}
+"""Lengths of crank, ground, rod and rocker."""
 
 
 @pytest.mark.parametrize(
-    ("count", "sizes", "ends"),
+    ("count", "shape", "ends"),
     [
-        (9, PLAIN, "hinges"),
-        (9, PLAIN, "universals"),
-        (9, KITE, "hinges"),
-        (9, ASIDE, "universals"),
-        (65, KITE, "universals"),
-        (65, ASIDE, "hinges"),
+        (9, "plain", "hinges"),
+        (9, "plain", "universals"),
+        (9, "kite", "hinges"),
+        (9, "aside", "universals"),
+        (65, "kite", "universals"),
+        (65, "aside", "hinges"),
     ],
 )
-def test_sparse_rows_are_exchanged(sizes, ends, count):
+def test_sparse_rows_are_exchanged(shape, ends, count):
     """A plain four-bar, a kite off by a twentieth, and one on its side beside its corner."""
-    turn = np.linspace(0.0, 1.6, count)
+    turn, sizes = np.linspace(0.0, 1.6, count), SHAPES[shape]
     found = swept(four_bar(sizes, -1.1, ends), turn)
     assert found.solved.all(), found.message
     _, meet = pin_meeting(*sizes, turn - 1.1)
@@ -124,16 +126,20 @@ def inside(off, ends, crank=3, cranks=CRANKS, phase=0.7):
     return replace(whole, bodies=[*bodies, Body("rod")], joints=joints)
 
 
-COARSE, MIDDLE = np.linspace(0.0, -1.1, 3), np.linspace(0.0, -1.1, 9)
-FINE = np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.5014, -0.601, -5e-4)])
-"""Samples close to each other only where the motion ends."""
+GRIDS = {
+    "coarse": np.linspace(0.0, -1.1, 3),
+    "middle": np.linspace(0.0, -1.1, 9),
+    # samples close to each other only where the motion ends
+    "fine": np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.5014, -0.601, -5e-4)]),
+}
 
 
 @pytest.mark.parametrize(
-    ("turn", "ends"), [(COARSE, "distance"), (MIDDLE, "hinges"), (FINE, "distance")]
+    ("grid", "ends"), [("coarse", "distance"), ("middle", "hinges"), ("fine", "distance")]
 )
-def test_parallelogram_in_line_goes_on(ends, turn):
+def test_parallelogram_in_line_goes_on(ends, grid):
     """Where the rod's arms are in line with it the parallelogram may go on as another."""
+    turn = GRIDS[grid]
     found = swept(inside(0.0, ends), turn, order=0)
     assert found.solved.all(), found.message
     assert "crosses a singular pose near turn = -0.5707" in found.details["notes"][0]
@@ -143,16 +149,17 @@ def test_parallelogram_in_line_goes_on(ends, turn):
 
 # where the rod's arms are in line with it, what is nearly a parallelogram turns back
 @pytest.mark.parametrize(
-    ("turn", "ends", "off", "end"),
+    ("grid", "ends", "off", "end"),
     [
-        (COARSE, "hinges", 1e-6, 0.57053),
-        (MIDDLE, "distance", 1e-6, 0.57053),
-        (FINE, "hinges", 1e-6, 0.57053),
-        (COARSE, "distance", 1e-4, 0.56846),
-        (MIDDLE, "hinges", 1e-4, 0.56846),
+        ("coarse", "hinges", 1e-6, 0.57053),
+        ("middle", "distance", 1e-6, 0.57053),
+        ("fine", "hinges", 1e-6, 0.57053),
+        ("coarse", "distance", 1e-4, 0.56846),
+        ("middle", "hinges", 1e-4, 0.56846),
     ],
 )
-def test_sparse_gap_ends_motion(off, end, ends, turn):
+def test_sparse_gap_ends_motion(off, end, ends, grid):
+    turn = GRIDS[grid]
     found = swept(inside(off, ends), turn, order=0)
     assert found.solved.tolist() == (turn > -end).tolist()
     assert "cannot be followed beyond" in found.message

@@ -184,6 +184,7 @@ def test_trace_without_singular_poses():
         ({"style": "dads"}, "no style 'dads'; known: native, paper"),
         ({"points": ["hub"]}, "no point 'hub'; known: rod_end, wheel"),
     ],
+    ids=str,
 )
 def test_trace_refuses_bad_arguments(arguments, message):
     with pytest.raises(SolveError, match=message):
