@@ -146,6 +146,15 @@ def test_sparse_rates_beside_dead_centre(short, solved):
     )
 
 
+def test_refused_samples_name_worst():
+    mechanism, begin = stretched(0.5, 1.5, 0.3)
+    nearest, near = values = (2.0 - begin) * (1.0 - np.array([1e-9, 1e-7]))
+    message = solve(mechanism, "push", values).message
+    assert "refused at 2 samples" in message
+    assert f"(at push = {nearest:.9g})" in message
+    assert f"(at push = {near:.9g})" not in message
+
+
 def test_nan_error_bound_refuses_sample(monkeypatch):
     """Wherever it stands: Python's own maximum passes over what is no number."""
     mechanism, begin = stretched(0.5, 1.5, 0.3)
