@@ -25,9 +25,9 @@ from kincheck.core.joints import Joint, Revolute, Spherical
 from kincheck.core.mechanism.motions import Driver
 from kincheck.core.trajectory import Array
 
+from ..support.aborting_engine import GivingUp
 from ..support.engine_motion import ENGINES, TOL, TREES, assert_consistent, installed
 from ..support.fakes import Fake, crank
-from ..support.giving_up import GivingUp
 
 ROOT = Path(__file__).parents[2]
 # Round-off of the strut's coordinates, of about a metre, in each of the simulators [m, m/s, m/s^2].

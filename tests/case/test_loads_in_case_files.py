@@ -26,8 +26,6 @@ from kincheck.core.studies.diagnosis.diagnose import diagnose
 from kincheck.core.studies.diagnosis.text import print_diagnosis
 from kincheck.core.studies.verified_reference import prove_case
 
-from ..kinematics.test_chain import chain
-from ..kinematics.test_singular import BRANCH
 from ..oracles import naive
 from ..support.case_texts import complains, edited, write
 from ..support.engine_forces import Beside, every_force, force_case, values
@@ -35,6 +33,7 @@ from ..support.four_bar_within_digits import solved, truth, written
 from ..support.loaded import loaded
 from ..support.loads import loaded as with_loads
 from ..support.loads import six
+from ..support.mechanisms import BRANCH, chain
 from ..support.written_again import written_again
 
 PLAIN = """

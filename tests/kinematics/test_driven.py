@@ -22,8 +22,7 @@ from kincheck.core.kinematics.structure import degrees_of_freedom
 from kincheck.core.kinematics.structure.degrees_of_freedom import account
 
 from ..support.case_texts import write
-from ..support.mechanisms import slider_crank
-from .test_chain import chain
+from ..support.mechanisms import chain, slider_crank
 
 LOOPS = 14  # 29 bodies
 

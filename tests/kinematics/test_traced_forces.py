@@ -18,8 +18,7 @@ from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.program.llvm.compiler import available
 
 from ..support.loads import GRAVITY, loaded, six
-from .test_chain import chain
-from .test_singular import BRANCH
+from ..support.mechanisms import BRANCH, chain
 
 
 def both(mechanism, path, *, style="native", compiled=False):

@@ -19,8 +19,8 @@ from kincheck.core.report.sections import parted
 from kincheck.core.studies.bench.size import ring
 from msgspec.structs import replace
 
-from ..kinematics.test_chain import chain
 from ..support.made_up import GRID, record, results, series
+from ..support.mechanisms import chain
 from .page import report
 
 HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"

@@ -16,9 +16,9 @@ from kincheck.core.report.axis import Axis, driver_axis
 from kincheck.core.report.drawing import drawing
 from msgspec.structs import replace
 
-from ..kinematics.test_chain import chain
 from ..oracles.naive import A
 from ..support.made_up import GRID, record, series
+from ..support.mechanisms import chain
 from .test_report_scene import AXIS, STRUT, UP
 
 
