@@ -95,7 +95,7 @@ def case(request):
 
 
 @pytest.mark.parametrize("style", Style)
-def test_every_formulation_turns_it(case, style):
+def test_planar_turn_in_row_styles(case, style):
     found = solve(case.mechanism, "turn", TURNS, rate=RATE, style=style)
     assert found.solved.all(), found.message
     for output in case.outputs:
@@ -105,7 +105,7 @@ def test_every_formulation_turns_it(case, style):
             np.testing.assert_allclose(along, getattr(true, quantity), rtol=0, atol=atol)
 
 
-def test_every_engine_turns_it(case):
+def test_planar_turn_in_all_engines(case):
     engines = [
         each for each in map(adapters.engine, adapters.ENGINES) if each.version() is not None
     ]
@@ -114,7 +114,7 @@ def test_every_engine_turns_it(case):
 
 
 @pytest.mark.parametrize("name", ["mujoco-projecting", "pinocchio", "exudyn-static"])
-def test_the_simulators_own_solvers_turn_it_too(case, name):
+def test_planar_turn_by_simulation(case, name):
     """Of those with drift by what they drift; a turn lost, or of the other sense, is off by a
     metre.
     """
@@ -131,7 +131,7 @@ def test_the_simulators_own_solvers_turn_it_too(case, name):
         assert record.errors[name].position.within, record
 
 
-def test_its_translations_are_none_that_a_driver_names():
+def test_planar_translation_driver_is_refused():
     mechanism = ladder(("ground", "ladder"), Z)
     with pytest.raises(
         MechanismError,

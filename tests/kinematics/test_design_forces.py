@@ -31,7 +31,7 @@ def solved(case, *, least=None):
 
 
 @pytest.mark.parametrize("way", ["not traced", "singular"])
-def test_both_ways_give_the_same_forces(case, monkeypatch, way):
+def test_design_forces_agree_in_both_ways(case, monkeypatch, way):
     right = solved(case)
     assert right.decided.all()
     if way == "not traced":

@@ -35,7 +35,7 @@ def sparse(monkeypatch):
 
 
 @pytest.mark.parametrize("name", cases.names())
-def test_the_sparse_count_is_the_dense_one(name, sparse):
+def test_sparse_freedom_count_equals_dense(name, sparse):
     mechanism = cases.load(name).mechanism
     dof = account(mechanism, frames(mechanism)).dof
     undriven, twice = (
@@ -53,7 +53,7 @@ def again(mechanism):
 
 
 @pytest.mark.parametrize("count", [1, 4, 11])
-def test_many_freedoms_are_counted_one_by_one(count, sparse):
+def test_freedom_count_of_free_balls(count, sparse):
     bodies = [Body(f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
     balls = [Spherical(f"s{k}", "ground", f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
     free = Mechanism("loose", bodies, balls, [], [])
@@ -67,7 +67,7 @@ def test_many_freedoms_are_counted_one_by_one(count, sparse):
         degrees_of_freedom.require_driven(free)
 
 
-def test_what_only_couplers_tie_is_counted(sparse):
+def test_freedom_count_with_gear(sparse):
     axles = [
         Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
         for name, x in (("first", 0.0), ("second", 1.0))
@@ -84,14 +84,14 @@ def test_what_only_couplers_tie_is_counted(sparse):
     assert degrees_of_freedom.degrees_of_freedom(replace(wheels, couplers=())) == 2
 
 
-def test_a_driver_that_is_locked_at_the_design_is_left_to_the_solver(sparse):
+def test_driver_locked_at_design_is_accepted(sparse):
     stretched = slider_crank()
     degrees_of_freedom.require_driven(
         replace(stretched, drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
     )
 
 
-def test_a_large_mechanism_is_refused_with_names():
+def test_large_mechanism_driver_mismatch_names_parts():
     whole = chain(LOOPS)
     degrees_of_freedom.require_driven(whole)
     with pytest.raises(
@@ -158,7 +158,7 @@ def written(mechanism, drivers):
          "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
     ],
 )  # fmt: skip
-def test_exit_status_is_the_same_for_small_and_large(
+def test_driver_mismatch_exit_status_and_message(
     loops, drivers, left_out, status, said, tmp_path, capsys
 ):
     whole = chain(loops)

@@ -59,7 +59,7 @@ def proved(mechanism, driver, values, reading=as_double, exact=None, tol=1e-12):
 # What is proved is true
 
 
-def test_slider_crank_is_its_closed_form():
+def test_enclosure_holds_slider_crank_closed_form():
     angles = np.linspace(-2.5, 2.5, 7)
     found = proved(slider_crank(), "turn", angles)
     with precision(BITS):
@@ -78,7 +78,7 @@ def test_slider_crank_is_its_closed_form():
             assert all(x.contains(0) for x in moved[1:])
 
 
-def test_strut_agrees_with_its_printed_reference():
+def test_enclosure_agrees_with_printed_strut_reference():
     """Two independent 40-digit solutions, printed to 17 digits, of the geometry as its decimals
     say.
     """
@@ -112,14 +112,14 @@ def test_strut_agrees_with_its_printed_reference():
 PROVED = [case for case in probes() if case.name != "spline"]
 
 
-def test_splines_have_no_proofs_and_are_refused():
+def test_proof_of_spline_coupler_is_refused():
     (case,) = (case for case in probes() if case.name == "spline")
     with pytest.raises(SolveError, match="has pieces, and proofs know none"):
         proved(case.mechanism, case.sweep.driver, case.sweep.change[:1])
 
 
 @pytest.mark.parametrize("case", PROVED, ids=lambda case: case.name)
-def test_every_joint_type_is_proved(case):
+def test_enclosure_of_every_joint_type(case):
     """Velocities and accelerations here come from the residuals alone; the native ones from rows,
     nu and gamma.
     """
@@ -137,7 +137,7 @@ def test_every_joint_type_is_proved(case):
             assert np.abs(native.acceleration[k] - acceleration).max() < 1e-11
 
 
-def test_turns_of_coupled_joints_are_counted():
+def test_enclosure_of_worm_gear_turns():
     """A worm: twelve turns of the shaft are one of the wheel, and the samples are most of half a
     turn apart.
     """
@@ -160,7 +160,7 @@ def test_turns_of_coupled_joints_are_counted():
         assert abs(float(each.points["rim"][0][1]) - 0.1 * (math.cos(angle / 12.0) - 1.0)) < 1e-13
 
 
-def test_redundant_rows_are_zero_at_the_solution():
+def test_enclosure_has_zero_redundant_rows():
     found = proved(four_bar(), "turn", [0.5, 1.0])
     assert len(found.redundant) == 3
     for each in found.samples:
@@ -168,7 +168,7 @@ def test_redundant_rows_are_zero_at_the_solution():
         assert all(x.contains(0) and x.rad() < 1e-40 for x in each.left_out)
 
 
-def test_a_wrong_native_solution_is_measured_not_believed():
+def test_enclosure_measures_wrong_native_pose():
     """The pose of one mechanism, given as that of another whose rod is 1e-9 m longer."""
     right = proved(slider_crank(), "turn", [1.0]).samples[0].points["end"][0][0]
     longer, pose, drives = _setup(slider_crank(ROD + 1e-9), slider_crank(), 1.0)
@@ -199,13 +199,13 @@ def _setup(mechanism, native, angle):
 # What is not true, or singular, is not proved
 
 
-def test_a_solution_too_far_away_is_not_taken():
+def test_enclosure_refuses_distant_start():
     traced, pose, drives = _setup(slider_crank(), slider_crank(), 1.0)
     with precision(BITS), pytest.raises(UnprovedError, match=r"another one|no solution near"):
         krawczyk.enclose(traced, pose + 0.05, drives, BITS)
 
 
-def test_a_spurious_branch_is_not_proved():
+def test_enclosure_refuses_overturned_branch():
     """A crank turned over about an axis in its plane solves the residuals of its revolute, and its
     driver's at half a turn.
     """
@@ -225,7 +225,7 @@ def test_a_spurious_branch_is_not_proved():
             krawczyk.enclose(traced, turned_over, drives, BITS)
 
 
-def test_a_change_point_is_not_proved_and_says_so():
+def test_enclosure_refuses_change_point():
     """A parallelogram with all pivots on a line can go on as a parallelogram or as its crossed
     twin.
     """
@@ -251,7 +251,7 @@ def test_a_change_point_is_not_proved_and_says_so():
     )
 
 
-def test_a_dead_centre_is_not_proved_and_its_neighbours_are():
+def test_enclosure_near_and_at_dead_centre():
     bent = replace(slider_crank(), drivers=[JointDisplacement("push", "guide")])
     start, end = 2.0, CRANK + ROD
     turned = proved(slider_crank(), "turn", [start]).native

@@ -63,7 +63,7 @@ def skew(a):
     return np.cross(np.eye(3), a)
 
 
-def test_compliance_of_bushings_is_inverse_of_their_stiffness():
+def test_compliance_is_inverse_bushing_stiffness():
     """C = (sum S^T K S)^-1 at zero load."""
     facts = read("1_body_on_three_bushings.json")
     bushings = three(facts)
@@ -125,7 +125,7 @@ PROGRESSIVE = PchipInterpolator(*np.array(STOP).T)
     ],
     ids=["torsion", "side", "coil", "stop"],
 )
-def test_loaded_arm_turns_as_closed_form(element, load, angle):
+def test_equilibrium_angle_of_loaded_arm(element, load, angle):
     model = StaticModel(replace(ARM, forces=[element]), [LoadPoint("tip", "arm", (0.4, 0.0, 0.0))])
     found = model.solve({"tip": np.array([[0.0, load, 0.0, 0.0, 0.0, 0.0]])}, {})
     assert found.reached.all()
@@ -133,7 +133,7 @@ def test_loaded_arm_turns_as_closed_form(element, load, angle):
     assert math.atan2(y, x) == pytest.approx(angle, abs=1e-14)
 
 
-def test_load_at_elastic_centre_moves_without_turning():
+def test_load_at_elastic_centre_only_translates():
     places = [(0.3, 0.0, 0.0), (-0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0)]
     bushings = [
         Bushing(f"b{k}", GROUND, "block", place, stiffness=(1e5, 2e5, 3e5), turning_stiffness=10.0)
@@ -158,7 +158,7 @@ def snap():
     return StaticModel(mechanism, [LoadPoint("top", "slider", at)]), facts
 
 
-def test_snap_through_gives_last_reachable_load():
+def test_snap_through_reports_last_load():
     model, facts = snap()
     limit = facts["limit_load"]
     loads = np.zeros((8, 6))
@@ -182,7 +182,7 @@ def test_snap_through_gives_last_reachable_load():
     ],
     ids=["steep", "uneven", "flat"],
 )
-def test_load_far_beyond_snap_through_is_refused(a, h, stiffness, side):
+def test_load_beyond_snap_through_is_refused(a, h, stiffness, side):
     """The stiffness is as much before as behind, so its sign alone tells nothing. A second body
     on a soft spring, which moves more, bears the load.
     """
@@ -218,7 +218,7 @@ def test_load_far_beyond_snap_through_is_refused(a, h, stiffness, side):
         assert [force(z) for z in heights] == pytest.approx([0.3 * limit, 0.99 * limit], rel=1e-9)
 
 
-def test_torque_over_dead_centre_is_refused():
+def test_torque_beyond_dead_centre_is_refused():
     """A spring from an arm's end to a point of the base pulls at most k r d sin of an angle."""
     r, d, k = 0.2, 0.5, 4e3
     base = (0.6 * d, 0.8 * d, 0.0)
@@ -255,7 +255,7 @@ def strut(factor=1.0, turning=1.0, rigid=False):
     return StaticModel(mechanism, [LoadPoint("patch", "knuckle", patch)]), facts
 
 
-def test_strut_on_bushings_is_where_six_simulators_have_it():
+def test_strut_equilibrium_agrees_with_simulators():
     model, facts = strut()
     rows = facts["results"]
     loads = np.array([each["load_at_contact_patch"] for each in rows])
@@ -272,7 +272,7 @@ def test_strut_on_bushings_is_where_six_simulators_have_it():
         assert np.abs(C - given).max() <= 1e-14 * np.abs(given).max()
 
 
-def test_many_samples_are_as_one_by_one():
+def test_equilibrium_blocks_equal_single_samples():
     """Samples are solved in blocks, whose programs keep nothing of those before."""
     model, _ = strut()
     loads, travel = np.zeros((700, 6)), np.linspace(-0.05, 0.05, 700)
@@ -289,7 +289,7 @@ def test_many_samples_are_as_one_by_one():
     assert resting.efforts["stroke"][0] == pytest.approx(still.efforts["stroke"][0], abs=1e-10)
 
 
-def test_wheel_rate_is_derivative_of_wheel_load():
+def test_wheel_rate_is_wheel_load_derivative():
     model, _ = strut()
     travel, h = np.array([-0.03, 0.0, 0.04]), 1e-4
     loads = {"patch": np.zeros((3, 6))}
@@ -299,7 +299,7 @@ def test_wheel_rate_is_derivative_of_wheel_load():
     assert found.by_driver["stroke"][1][:, 0] == pytest.approx(expected, rel=1e-6)
 
 
-def test_stiff_bushings_tend_to_the_rigid_mechanism():
+def test_stiff_bushings_approach_rigid_mechanism():
     """The distance is of first order in the reciprocal stiffness."""
     facts = read("6_rigid_limit.json")
     load = {"patch": np.array([[500.0, 1000.0, 0.0, 0.0, 0.0, 0.0]])}
@@ -318,7 +318,7 @@ def test_stiff_bushings_tend_to_the_rigid_mechanism():
     assert scaled == pytest.approx(8.60778e-4, rel=1e-5)
 
 
-def test_work_of_a_load_is_stored():
+def test_load_work_is_stored_energy():
     """Gauss's rule over the ramp; the energy is written down in terms of places alone."""
     facts = read("1_body_on_three_bushings.json")
     bushings = three(facts)
@@ -337,7 +337,7 @@ def test_work_of_a_load_is_stored():
     assert work == pytest.approx(energy, rel=1e-13)
 
 
-def test_body_that_nothing_holds_is_named():
+def test_unheld_body_is_named():
     bushing = Bushing(
         "soft", GROUND, "arm", ORIGIN, stiffness=1e5, turning_stiffness=(9.0, 9.0, 0.0)
     )
@@ -346,7 +346,7 @@ def test_body_that_nothing_holds_is_named():
         StaticModel(mechanism)
 
 
-def test_upright_pendulum_on_soft_spring_is_unstable():
+def test_soft_upright_pendulum_is_unstable():
     def least(stiffness):
         mechanism = replace(
             ARM,
@@ -361,7 +361,7 @@ def test_upright_pendulum_on_soft_spring_is_unstable():
     assert least(9.5) == "body 'arm' turns about [0, 0, 1]"
 
 
-def test_driver_that_holds_nothing_is_refused():
+def test_driver_holding_nothing_is_refused():
     mechanism = replace(
         ARM,
         points=[Point("tip", "arm", (0.4, 0.0, 0.0))],
@@ -371,7 +371,7 @@ def test_driver_that_holds_nothing_is_refused():
         StaticModel(mechanism)
 
 
-def test_both_free_coordinates_of_a_joint_are_driven():
+def test_free_coordinates_of_cylindrical_become_drivers():
     rod = Cylindrical("rod", GROUND, "arm", ORIGIN, Z)
     found = with_free_coordinates(replace(ARM, joints=[rod], drivers=[]))
     assert [each.name for each in found.drivers] == ["rod.rotation", "rod.translation"]

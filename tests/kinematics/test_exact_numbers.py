@@ -23,7 +23,7 @@ from .test_enclosure import BITS, flint
 # Derivatives and balls
 
 
-def test_jacobian_of_a_tape_is_that_of_its_series():
+def test_tape_jacobian_equals_series_slopes():
     tape = Tape()
     inputs = [tape.input(slot) for slot in range(3)]
     x, y, z = inputs
@@ -47,14 +47,14 @@ def test_jacobian_of_a_tape_is_that_of_its_series():
                 assert abs(found.get(3 * row + k, flint.arb(0)) - expected) < 1e-50
 
 
-def test_kinks_have_no_derivative():
+def test_tape_jacobian_of_kink_is_refused():
     tape = Tape()
     x = tape.input(0)
     with pytest.raises(TypeError, match="'abs' has a kink"):
         jacobian(tape, [absolute(x)], [x])
 
 
-def test_balls_that_overlap_are_not_compared():
+def test_comparison_of_overlapping_balls_is_undecided():
     tape = Tape()
     x, y = tape.input(0), tape.input(1)
     larger = program("larger", tape, {0: where_larger(x, y, 1.0, 2.0)})
@@ -64,7 +64,7 @@ def test_balls_that_overlap_are_not_compared():
         evaluate(larger, [flint.arb(2, 0.1), flint.arb(-2)])
 
 
-def test_precision_is_put_back():
+def test_precision_context_is_restored():
     before = flint.ctx.prec
     with precision(BITS):
         assert before != flint.ctx.prec == BITS
@@ -74,7 +74,7 @@ def test_precision_is_put_back():
 # Exact numbers
 
 
-def test_exact_numbers():
+def test_exact_number_arithmetic():
     third = Exact.of(Fraction(1, 3))
     assert (third + 0.5 - Exact.of(Fraction(5, 6))).trivial == 0.0
     assert (Exact.of(Fraction(9, 16)).sqrt() - 0.75).trivial == 0.0
@@ -89,7 +89,7 @@ def test_exact_numbers():
 @pytest.mark.parametrize(
     "case", [case for case in probes() if case.name != "spline"], ids=lambda case: case.name
 )
-def test_no_joint_rounds(case, monkeypatch):
+def test_exact_joints_call_no_doubles(case, monkeypatch):
     """Nothing that reaches the primitives went through a function of doubles; checks and the choice
     of a length unit may.
     """

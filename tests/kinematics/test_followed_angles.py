@@ -75,7 +75,7 @@ def angles(sweep: Sweep, joint: str):
         [60.0],
     ],
 )
-def test_turns_are_counted_between_samples_far_apart(values):
+def test_angle_turns_between_distant_samples(values):
     found = angles(Sweep("turn", np.array(values)), "b")
     np.testing.assert_allclose(found, driven(values), rtol=0, atol=1e-9)
 
@@ -84,7 +84,7 @@ def test_turns_are_counted_between_samples_far_apart(values):
     "motion",
     [Sine(10.0, 1.0, math.pi / 2), Sine(-40.0, 0.3, 0.5)],
 )
-def test_turns_are_counted_from_the_design_where_the_motion_starts_elsewhere(motion):
+def test_angle_turns_from_offset_start(motion):
     times = np.array([0.0, 0.1, 0.2])
     values = motion.at(times)[0]
     sweep = Sweep("time", times, motions={"turn": motion})
@@ -92,7 +92,7 @@ def test_turns_are_counted_from_the_design_where_the_motion_starts_elsewhere(mot
     np.testing.assert_allclose(angles(sweep, "b"), driven(values), rtol=0, atol=1e-9)
 
 
-def test_torsional_springs_of_a_solved_motion_count_the_same_turns():
+def test_torsion_spring_counts_turns():
     mechanism, values = shafts(), np.array([0.0, 20.0, 60.0])
     path = Path({"turn": Ramp(1.0)}, values)
     motion = solve(mechanism, "turn", values, bodies=["first", "second"])
@@ -101,7 +101,7 @@ def test_torsional_springs_of_a_solved_motion_count_the_same_turns():
     np.testing.assert_allclose(found, -driven(values), rtol=0, atol=1e-9)
 
 
-def test_short_steps_from_the_design_need_no_further_samples():
+def test_short_steps_are_not_followed():
     mechanism = shafts()
     assert near_design(mechanism, Path({"turn": Ramp(1.0)}, np.linspace(0.0, 7.0, 36)))
     assert not near_design(mechanism, Path({"turn": Ramp(1.0)}, np.linspace(5.0, 7.0, 36)))
@@ -110,7 +110,7 @@ def test_short_steps_from_the_design_need_no_further_samples():
     assert in_doubt(driven(times) + 2 * math.pi * (times > 3), np.ones(36), times)
 
 
-def test_rates_without_bound_towards_a_fold_are_no_turns():
+def test_angle_at_fold_adds_no_turn():
     """A slider-crank driven by its slide, to the dead centre."""
     crank = Mechanism(
         "crank",
@@ -136,7 +136,7 @@ def test_rates_without_bound_towards_a_fold_are_no_turns():
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-4)
 
 
-def test_angles_of_a_path_are_followed_at_once(monkeypatch):
+def test_angles_share_one_followed_motion(monkeypatch):
     asked: list[int] = []
 
     def prepare(mechanism: Mechanism, request: Request, path: Path):

@@ -90,19 +90,19 @@ def tumbled(turn, bend):
         [4.0, 4.0 + 3 * math.pi],
     ],
 )
-def test_attitudes_are_followed_from_the_design(values):
+def test_orientation_is_followed_from_design(values):
     wanted = tumbled(values, RATIO * np.array(values))
     np.testing.assert_allclose(found(swept(values)), wanted, rtol=0, atol=1e-9)
 
 
-def test_a_coarse_and_a_fine_grid_give_the_same():
+def test_orientation_on_coarse_and_fine_grid():
     fine = np.linspace(0.0, 8.0, 81)
     np.testing.assert_allclose(
         found(swept(fine[::40])), found(swept(fine))[:, ::40], rtol=0, atol=1e-9
     )
 
 
-def test_engines_without_velocities_give_the_same():
+def test_orientation_without_velocities():
     values = np.array([0.0, 4.0, 8.0])
     wanted = tumbled(values, RATIO * values)
     np.testing.assert_allclose(found(swept(values), order=0), wanted, rtol=0, atol=1e-9)
@@ -122,7 +122,7 @@ QUARTER = np.array([0.0, 0.25])
         Sweep("time", QUARTER, motions={"turn": Sine(0.2, 1.0, -math.pi / 2)}),
     ],
 )
-def test_short_steps_of_the_driver_may_be_long_ones_of_the_body(sweep):
+def test_orientation_of_fast_geared_wheel(sweep):
     """A wheel that turns 32 times as fast as its driver, by the samples alone and followed."""
     output = Orientation("wheel", 1e-9, 0.0, "test", "wheel", Component.E0)
     mechanism = Mechanism(
@@ -142,7 +142,7 @@ def test_short_steps_of_the_driver_may_be_long_ones_of_the_body(sweep):
 
 
 @pytest.mark.parametrize("start", [4.0, -7.0, 11.0])
-def test_attitudes_are_followed_where_the_motion_starts_elsewhere(start):
+def test_orientation_from_offset_start(start):
     """The drivers go straight from the design to the start."""
     motions = {"turn": Sine(start, 1.0, math.pi / 2), "bend": Sine(-start, 0.5, math.pi / 2)}
     times = np.array([0.0, 0.1, 0.2])
@@ -153,7 +153,7 @@ def test_attitudes_are_followed_where_the_motion_starts_elsewhere(start):
 
 @pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
 @pytest.mark.parametrize("steps", [3, 4, 8, 25])
-def test_all_engines_have_the_same_orientations(steps, name):
+def test_orientations_agree_in_all_engines(steps, name):
     """Half and whole turns are among the samples."""
     tested = adapters.engine(name)
     if tested.version() is None:
@@ -166,7 +166,7 @@ def test_all_engines_have_the_same_orientations(steps, name):
         assert np.abs(vector).max() <= math.pi + 1e-9
 
 
-def test_proofs_follow_the_same_way():
+def test_proved_orientations_follow_turns():
     pytest.importorskip("flint")
     values = [0.5, 4.0, 8.0]
     of = replace(swept(values), outputs=tuple(OUTPUTS[7:14]))

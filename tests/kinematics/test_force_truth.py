@@ -38,7 +38,7 @@ ANDREWS = json.loads((DATA / "andrews_squeezer.json").read_text(encoding="utf-8"
 
 
 @pytest.mark.parametrize("name", sorted(REACTIONS))
-def test_reactions_of_adams(name):
+def test_reactions_agree_with_adams_records(name):
     """A body falls from one joint; the recorded motion gives the recorded reaction on the ground.
 
     The motion is printed with six digits, so reactions agree to a few parts in a million.
@@ -84,7 +84,7 @@ def pendulum(**options):
 ANGLES = np.linspace(-7.0, 7.0, 29)  # more than a turn to both sides
 
 
-def test_pendulum_by_hand():
+def test_pendulum_reactions_closed_form():
     mechanism = pendulum(gravity=(0.0, -9.81, 0.0))
     found = solve(mechanism, "turn", ANGLES, rate=3.0, forces=True).forces
     c, s = np.cos(ANGLES), np.sin(ANGLES)
@@ -95,7 +95,7 @@ def test_pendulum_by_hand():
     np.testing.assert_allclose(found.drivers["turn"], 9.81 * c, rtol=0, atol=1e-13)
 
 
-def test_the_second_body_may_be_the_ground():
+def test_reactions_of_reversed_joint_change_sign():
     """Then the reaction is what the arm exerts on the ground."""
     mechanism = pendulum(gravity=(0.0, -9.81, 0.0))
     reversed_ = replace(mechanism, joints=[mechanism.joints[0].reversed()])
@@ -109,7 +109,7 @@ def test_the_second_body_may_be_the_ground():
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
 
 
-def test_springs_and_loads_by_hand():
+def test_pendulum_forces_of_each_element():
     """Each element alone on the pendulum; its torque is what the driver works against."""
     c, s = np.cos(ANGLES), np.sin(ANGLES)
     anchor = np.array([0.0, 2.0, 0.0])
@@ -164,7 +164,7 @@ def sine_driven(mechanism, sine):
     return motion, forces_of(mechanism, path, motion), path.times
 
 
-def test_a_gear_loads_the_driven_shaft_and_not_the_hinges():
+def test_gear_effort_carries_geared_inertia():
     """Two shafts: the effort carries the second one's inertia by the ratio squared."""
     z = (0.0, 0.0, 1.0)
     bodies = [
@@ -193,7 +193,7 @@ def test_a_gear_loads_the_driven_shaft_and_not_the_hinges():
         np.testing.assert_allclose(reaction.moment, 0.0, rtol=0, atol=1e-12)
 
 
-def test_a_screw_does_no_work():
+def test_screw_reaction_does_no_work():
     """Its thrust and its torque, times their rates, cancel."""
     axis = np.array([0.6, 0.0, 0.8])
     nut = Body("nut", mass=2.0, inertia=(1.0, 1.0, 1.0, 0, 0, 0))
@@ -222,7 +222,7 @@ class Lifted(motions.Motion):
         return 0.5 * self.acceleration * t**2, self.acceleration * t, self.acceleration + 0.0 * t
 
 
-def test_andrews_published_start():
+def test_andrews_squeezer_published_start_forces():
     """The published accelerations as a driven motion give back the published drive torque.
 
     And the published multipliers, which are the components of the force at E of the triangle.

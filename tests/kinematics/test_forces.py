@@ -28,7 +28,7 @@ EQUILIBRIUM = [
 
 
 @pytest.mark.parametrize("name", EQUILIBRIUM)
-def test_every_body_is_in_equilibrium(name):
+def test_reactions_hold_bodies_in_equilibrium(name):
     """Newton and Euler, body by body: no row of the formulation is asked."""
     case = cases.load(name)
     mechanism = loaded(case.mechanism)
@@ -58,7 +58,7 @@ def test_every_row_style_gives_the_same_forces(style):
             assert np.abs(other.moment - reaction.moment).max() <= 1e-11 * largest
 
 
-def test_only_what_is_asked_for_is_given():
+def test_forces_of_named_members_only():
     case = cases.load("mcpherson_strut")
     mechanism = loaded(case.mechanism)
     found = solve(mechanism, "stroke", case.sweep.values, forces=["tie_rod"])
@@ -88,7 +88,7 @@ def test_only_what_is_asked_for_is_given():
         ("planar_slider_crank", "crank_pin", (2, 1, 3)),
     ],
 )
-def test_redundant_rows_leave_directions_undetermined(name, joint, expected):
+def test_determined_directions_of_redundant_joints(name, joint, expected):
     case = cases.load(name)
     mechanism = loaded(case.mechanism)
     found = solved(mechanism, case).forces
@@ -100,7 +100,7 @@ def test_redundant_rows_leave_directions_undetermined(name, joint, expected):
     assert all(np.isfinite(each).all() for each in found.drivers.values())
 
 
-def test_a_component_that_is_not_determined_is_no_number():
+def test_undetermined_force_component_is_nan():
     case = cases.load("planar_slider_crank")
     found = solved(loaded(case.mechanism), case).forces.joints["crank_pin"]
     assert np.isfinite(found.along((1.0, 0.0, 0.0))).all()
@@ -110,7 +110,7 @@ def test_a_component_that_is_not_determined_is_no_number():
     assert np.isnan(found.along((1.0, 0.0, 0.0), moment=True)).all()
 
 
-def test_directions_count_where_axes_do_not():
+def test_determined_directions_of_tilted_plane():
     """A tilted plane: no global component is determined, three directions of each joint are."""
     turn = naive.A(np.array([0.8, 0.36, 0.48, 0.0]))
     case = cases.load("planar_slider_crank")
@@ -131,7 +131,7 @@ def test_directions_count_where_axes_do_not():
 
 
 @pytest.mark.parametrize(("values", "tol"), [([], 1e-12), ([0.1, 0.2], 1e-18)])
-def test_a_motion_without_a_solved_sample_has_forces_without_values(values, tol):
+def test_forces_without_solved_sample_are_nan(values, tol):
     path = Path({"crank": Ramp(1.0)}, np.array(values))
     mechanism, solver = cases.load("four_bar").mechanism, NativeSolver(compiled=False)
     found = solver.prepare(mechanism, path, forces=["crank", "coupler_pin"])(tol)

@@ -50,7 +50,7 @@ STROKES = np.linspace(-0.08, 0.08, 161)
 
 
 @pytest.mark.parametrize("style", OTHERS)
-def test_the_strut_moves_alike_in_all_styles(style):
+def test_strut_motion_in_row_styles(style):
     """Round-off of metre-sized coordinates is 1e-16; each derivative passes the equations, of
     pivots about 0.3, once more.
     """
@@ -82,7 +82,7 @@ STYLES = {name: OTHERS if name in PROBES else [Style.RELATIVE] for name in CASES
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_all_cases_move_alike_in_all_styles(name):
+def test_case_motion_in_row_styles(name):
     reference = run(CASES[name], Style.NATIVE)
     # a hundred roundings, divided by the smallest singular value once for positions, and once more
     # for each derivative
@@ -99,7 +99,7 @@ def test_all_cases_move_alike_in_all_styles(name):
             )
 
 
-def test_a_primitive_without_other_forms_is_named():
+def test_primitive_without_paper_form_is_named():
     with pytest.raises(SolveError, match="NamedTurn has no rows in the styles paper"):
         NamedTurn(X).paper_form()
     with pytest.raises(SolveError, match="NamedTurn has no rows"):
@@ -140,7 +140,7 @@ def off_by(rng, angle, turn=None):
 SMALL = np.geomspace(1e-6, 1e-2, LANES)
 
 
-def test_parallel_axes_have_exact_rows_on_the_right_branch_only(rng):
+def test_simplified_parallel_rows_by_misalignment(rng):
     f, g, h = frame(rng)
     i = Pose.of(vector(rng), orientation(rng))
     spin = rotation(h, rng.uniform(-3.0, 3.0, LANES))
@@ -158,7 +158,7 @@ def test_parallel_axes_have_exact_rows_on_the_right_branch_only(rng):
     assert 0.1 < error.min() < error.max() < 2.0
 
 
-def test_a_lock_has_exact_rows_where_it_is_closed_only(rng):
+def test_simplified_lock_rows_by_misalignment(rng):
     simplified, exact = both(Dot12(), *off_by(rng, 0.0))
     assert np.abs(simplified - exact).max() < 1e-14
     simplified, exact = both(Dot12(), *off_by(rng, SMALL))
@@ -166,7 +166,7 @@ def test_a_lock_has_exact_rows_where_it_is_closed_only(rng):
     assert 0.1 < error.min() < error.max() < 2.0
 
 
-def test_simplified_lock_rows_are_never_singular(rng):
+def test_simplified_lock_rows_are_regular(rng):
     """Those by full products are, for one, at a right angle about a joint axis."""
     simplified, exact = both(Dot12(), *off_by(rng, 0.5 * np.pi, X))
     assert np.linalg.svd(exact, compute_uv=False).min() < 1e-15
@@ -180,7 +180,7 @@ def beyond(rows, others):
     return np.abs(rows - rows @ np.linalg.pinv(others) @ others).max(axis=(1, 2))
 
 
-def test_a_simplified_line_needs_the_lock_beside_it(rng):
+def test_simplified_line_rows_need_lock(rng):
     """dot21 leaves out what three rows of dot12 say; with them it spans the exact rows at any pose,
     without them it is wrong.
     """
@@ -241,7 +241,7 @@ def newton(primitives, i, j):
 
 
 @pytest.mark.parametrize("style", Style)
-def test_from_anywhere_to_the_right_branch(style, rng):
+def test_newton_branch_from_random_starts(style, rng):
     """Exact rows lead to the nearest zero; seven of the eight rotations that solve the conventional
     residual are spurious.
     """

@@ -27,7 +27,7 @@ def with_ground_rows(mechanism, drives):
     )
 
 
-def test_ground_rows_leave_the_rank():
+def test_ground_rows_keep_rank():
     """Formulation section 10: 30 columns, 29 rows and the driver, rank 29 without it."""
     formulation = with_ground_rows(mcpherson(), {})
     J = jacobian(formulation, formulation.configuration(formulation.design))
@@ -37,7 +37,7 @@ def test_ground_rows_leave_the_rank():
     assert len(independent_rows(J[:29], 0)) == 29
 
 
-def test_ground_rows_leave_the_solution():
+def test_ground_rows_keep_solution():
     """Newton's iteration on all 30 unknowns, dense and by numpy, against the sweep of 18."""
     stroke, mechanism = 0.05, mcpherson()
     unit = frames(mechanism).unit

@@ -44,7 +44,7 @@ def assert_same(found, expected, position=2e-16, velocity=2e-15, acceleration=2e
 
 
 @pytest.mark.parametrize("rate", [0.25, -2.0, 1e3])
-def test_rate_scales_velocities_and_accelerations(rate):
+def test_rate_scales_derivatives(rate):
     expected, found = wheel(), wheel(rate=rate)
     once, scaled = (
         solve(mcpherson(), "stroke", STROKES, rate=each).iterations for each in (1.0, rate)
@@ -61,7 +61,7 @@ def test_rate_scales_velocities_and_accelerations(rate):
 
 
 @pytest.mark.parametrize("number", range(6))
-def test_order_of_the_bodies_of_a_joint_does_not_matter(number):
+def test_motion_invariant_to_joint_reversal(number):
     """Each joint exchanged by itself, and all of them."""
     m = mcpherson()
     exchanged = [
@@ -70,7 +70,7 @@ def test_order_of_the_bodies_of_a_joint_does_not_matter(number):
     assert_same(wheel(replace(m, joints=exchanged)), wheel())
 
 
-def test_order_of_the_bodies_of_a_driven_joint_turns_its_sign():
+def test_reversed_driven_joint_changes_sign():
     forward, back = (
         solve(m, "turn", a) for m, a in ((slider_crank(), TURNS), (swapped(slider_crank()), -TURNS))
     )
@@ -79,7 +79,7 @@ def test_order_of_the_bodies_of_a_driven_joint_turns_its_sign():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_order_of_bodies_and_joints_does_not_matter(seed):
+def test_motion_invariant_to_member_order(seed):
     rng, m = np.random.default_rng(seed), mcpherson()
     bodies, joints = (
         [m.bodies[k] for k in rng.permutation(5)],
@@ -92,7 +92,7 @@ def test_order_of_bodies_and_joints_does_not_matter(seed):
     "name",
     ["andrews_squeezer", "bricard", "four_bar", "mcpherson_strut", "planar_slider_crank", "rssr"],
 )
-def test_joints_twice_are_the_same_joints(name):
+def test_motion_invariant_to_duplicate_joints(name):
     """Some again, hinges and slides elsewhere on their axes, all in another order: which rows are
     left out does not matter.
     """
@@ -120,12 +120,12 @@ def test_joints_twice_are_the_same_joints(name):
         )
 
 
-def test_fixed_bodies_or_ground():
+def test_motion_invariant_to_fixed_bodies():
     assert_same(wheel(without_fixed_bodies(mcpherson())), wheel(), 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 7.0, 1e3])
-def test_size_does_not_matter(factor):
+def test_motion_scales_with_size(factor):
     """All lengths, the stroke and the rate scaled: everything scales, to the same relative
     accuracy.
     """
@@ -145,7 +145,7 @@ def snapped(point):
 
 
 @pytest.mark.parametrize("offset", [(1e6, 0.0, 0.0), (-1e6, 1e6, 2e6)])
-def test_place_does_not_matter(offset):
+def test_motion_invariant_to_distant_place(offset):
     """A thousand kilometres away: only the sum with the position rounds, at 1e-10 m; the motion
     keeps all its digits.
     """
@@ -157,7 +157,7 @@ def test_place_does_not_matter(offset):
     assert (found.acceleration == expected.acceleration).all()
 
 
-def test_orientation_does_not_matter():
+def test_motion_invariant_to_orientation():
     """The strut turned in space, and the direction of its driver with it."""
     turn = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
@@ -174,7 +174,7 @@ def test_orientation_does_not_matter():
     assert found.acceleration @ turn == pytest.approx(expected.acceleration, abs=5e-14)
 
 
-def test_units_of_axes_do_not_matter():
+def test_motion_invariant_to_axis_length():
     m = mcpherson()
     long = placed(m, tuple, lambda axis: tuple(137.0 * np.array(axis)))
     assert_same(wheel(long), wheel())
@@ -190,7 +190,7 @@ def test_units_of_axes_do_not_matter():
         ParallelAxes("r", "ground", "a", Z),
     ],
 )
-def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, joint):
+def test_length_unit_of_single_joint(size, joint):
     """A single pivot, or axes that are nowhere: measured in metres, a point a micrometre away would
     be no way away.
     """
@@ -221,7 +221,7 @@ def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, j
     np.testing.assert_allclose(motion.acceleration[:, 0], -size / cosine**3, rtol=1e-13)
 
 
-def test_the_points_of_a_joint_are_known_by_their_kind():
+def test_length_unit_reads_position_fields():
     """Whatever a joint calls them, they are what the mechanism is measured by: a metre would be a
     million times its size.
     """
@@ -252,7 +252,7 @@ def test_the_points_of_a_joint_are_known_by_their_kind():
     assert places(mechanism)["joints.pin 2.pin"] == corners[2]
 
 
-def test_a_step_of_too_many_turns_is_not_called_singular():
+def test_step_of_many_turns_message():
     """A fine thread: its smallest singular value is small all along, and nothing is wrong with any
     pose.
     """

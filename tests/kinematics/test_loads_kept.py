@@ -18,7 +18,7 @@ from kincheck.core.mechanism.loads import Force, SpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism
 from kincheck.core.studies.stress.reduction import reduced, rounded
 
-from ..support.loaded import GRAVITY, loaded, pushed
+from ..support.loaded_slider_crank import GRAVITY, loaded, pushed
 
 
 def case_of(mechanism: Mechanism) -> Case:
@@ -45,12 +45,12 @@ def same_loads(a: Mechanism, b: Mechanism) -> None:
     ],
     ids=["replace", "placed", "jointed", "rounded"],
 )
-def test_loads_stay(other):
+def test_derived_mechanism_keeps_loads(other):
     mechanism = pushed()
     same_loads(other(mechanism), mechanism)
 
 
-def test_exact_numbers_are_those_of_the_loads():
+def test_exact_mechanism_keeps_loads():
     pytest.importorskip("flint")
     mechanism = pushed()
     found = exact_mechanism(mechanism, Fraction)
@@ -59,13 +59,13 @@ def test_exact_numbers_are_those_of_the_loads():
     assert [each.name for each in found.forces] == [each.name for each in mechanism.forces]
 
 
-def test_added_bodies_have_no_mass():
+def test_equivalent_joint_bodies_are_massless():
     added = {each.name: each.mass for each in jointed(pushed()).bodies}
     assert len(added) == 3 + 4  # of a rod, and three slides
     assert sum(added.values()) == 5.5
 
 
-def test_components_do_not_depend_on_masses():
+def test_component_programs_ignore_masses():
     """Two loops alike but for their masses are one program."""
     light = loaded()
     heavy = replace(light, bodies=[replace(each, mass=7.0) for each in light.bodies], forces=())
@@ -83,7 +83,7 @@ def test_components_do_not_depend_on_masses():
     assert programs(heavy) == programs(light)
 
 
-def test_loads_in_the_unit_of_a_small_mechanism():
+def test_loads_scale_with_length_unit():
     """A mechanism in another unit has forces in kg, s and that unit: Newton's law holds there."""
     case = case_of(loaded())
     frame, there = own_frame(case), in_own_frame(case).mechanism
@@ -104,14 +104,14 @@ def test_loads_in_the_unit_of_a_small_mechanism():
     assert twist.vector == (0.0, 0.0, 3.0 / u**2)
 
 
-def test_a_case_without_loads_is_in_its_own_frame_as_before():
+def test_own_frame_of_massless_case():
     for body in in_own_frame(cases.load("andrews_squeezer")).mechanism.bodies:
         assert isinstance(body, Body)
     plain = replace(loaded(), bodies=[Body("crank"), Body("slider"), Body("wall", fixed=True)])
     assert in_own_frame(case_of(plain)).mechanism.body("crank").center_of_mass is None
 
 
-def test_shrinking_drops_the_loads_of_parts_that_go():
+def test_reduction_drops_loads_of_removed_parts():
     """The two forces on the slider go; the others keep a case as it is."""
     case = case_of(loaded())
 
@@ -125,7 +125,7 @@ def test_shrinking_drops_the_loads_of_parts_that_go():
     assert small.mechanism.gravity == GRAVITY
 
 
-def test_places_of_force_elements_move_with_a_frame():
+def test_force_elements_move_with_frame():
     spring, _, push, _ = loaded().forces
     assert isinstance(spring, SpringDamper)
     assert isinstance(push, Force)

@@ -68,7 +68,7 @@ def few(case, samples=7):
 @pytest.mark.parametrize(
     "name", ["mcpherson_strut", "four_bar", "bricard", "planar_slider_crank", "rssr"]
 )
-def test_the_program_agrees_with_singular_values(name, compiled):
+def test_traced_forces_equal_svd_forces(name, compiled):
     if compiled and not available():
         pytest.skip("llvmlite is missing")
     case = cases.load(name)
@@ -79,7 +79,7 @@ def test_the_program_agrees_with_singular_values(name, compiled):
 
 @pytest.mark.parametrize("style", ["paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("name", ["mcpherson_strut", "four_bar"])
-def test_every_row_style_is_traced(style, name):
+def test_traced_forces_in_row_styles(style, name):
     case = cases.load(name)
     traced, expected = both(loaded(case.mechanism), few(case), style=style)
     assert by_program(traced)
@@ -113,7 +113,7 @@ def train():
 
 
 @pytest.mark.parametrize("style", ["native", "mixed", "relative"])
-def test_relations_and_every_element(style):
+def test_traced_forces_of_every_element(style):
     """Angles of torsional springs are followed through more than a turn."""
     path = motions.Path({"screw": motions.Sine(9.0, 0.3)}, np.linspace(-0.6, 0.9, 9))
     traced, expected = both(train(), path, style=style)
@@ -121,7 +121,7 @@ def test_relations_and_every_element(style):
     agree(traced, expected, 1e-12)
 
 
-def test_no_forces_at_a_singular_pose():
+def test_forces_at_singular_pose_are_nan():
     """The pose is interpolated there; its forces are not."""
     mechanism = loaded(chain(1))
     turn = np.array([0.0, 0.7, 1.4, BRANCH, 2.3, 3.0])
@@ -132,7 +132,7 @@ def test_no_forces_at_a_singular_pose():
     assert "no forces at 1 sample" in found.message
 
 
-def test_samples_beyond_a_lock_up_have_no_forces():
+def test_forces_beyond_lock_up_are_nan():
     case = cases.load("mcpherson_strut")
     mechanism = loaded(case.mechanism)
     values = np.array([0.0, 0.05, 5.0])
@@ -145,7 +145,7 @@ def test_samples_beyond_a_lock_up_have_no_forces():
     assert found.facts["forces"]["power_missing"] <= 1e-13
 
 
-def test_large_mechanisms_have_forces_by_their_motion(monkeypatch):
+def test_large_mechanism_forces_by_svd(monkeypatch):
     monkeypatch.setattr(motion_solver, "ONE_PROGRAM", 2)
     mechanism = loaded(chain(2, lean=0.31))  # known to no cache
     path = motions.Path({"turn": motions.Ramp(1.0)}, np.array([0.1, 0.2]))
@@ -156,7 +156,7 @@ def test_large_mechanisms_have_forces_by_their_motion(monkeypatch):
     assert np.abs(found.forces.power).max() <= 1e-12 * found.forces.largest_power.max()
 
 
-def test_a_case_is_asked_for_no_more_than_its_forces():
+def test_program_holds_requested_forces_only():
     case = cases.load("mcpherson_strut")
     mechanism = loaded(case.mechanism)
     found = solve(mechanism, "stroke", case.sweep.values[::40], forces=["ball"])
@@ -170,7 +170,7 @@ def test_a_case_is_asked_for_no_more_than_its_forces():
     assert without["outputs"]["flops"] < program < every["outputs"]["flops"]
 
 
-def test_rows_that_are_nearly_singular_leave_it_to_singular_values():
+def test_nearly_singular_rows_use_svd_forces():
     mechanism = loaded(cases.load("rssr").mechanism)
     wanted = wanted_forces(mechanism, [])
     power, own = {"power": slice(0, 2)}, {"force sigma": slice(2, 3)}

@@ -33,7 +33,7 @@ BALL = {"joints.ball.point": np.array([[1.0, 0.5, 0.1]])}
 
 
 @pytest.mark.parametrize("number", NO_NUMBERS, ids=repr)
-def test_one_number(number):
+def test_scalar_argument_of_wrong_kind(number):
     for who, argument, call in (
         ("solve", "rate", lambda: solve(mcpherson(), "stroke", VALUES, rate=number)),
         ("solve", "tol", lambda: solve(mcpherson(), "stroke", VALUES, tol=number)),
@@ -57,7 +57,7 @@ def test_one_number(number):
     [VALUES + 0j, "x", ["a"], [[1.0], [2.0, 3.0]]],
     ids=["complex", "text", "texts", "ragged"],
 )
-def test_several_numbers(numbers):
+def test_array_argument_of_wrong_kind(numbers):
     ball = {"joints.ball.point": numbers}
     poses = {mcpherson().moving[0].name: (numbers, np.array([1.0, 0.0, 0.0, 0.0]))}
     for message, call in (
@@ -77,7 +77,7 @@ def test_several_numbers(numbers):
             call()
 
 
-def test_an_order_is_a_whole_number_of_any_kind():
+def test_order_may_be_numpy_float():
     assert (
         solve(mcpherson(), "stroke", VALUES, order=np.float64(1.0)).points["wheel"].acceleration
         is None
@@ -90,7 +90,7 @@ def test_an_order_is_a_whole_number_of_any_kind():
     )
 
 
-def test_descriptions_of_complex_numbers():
+def test_complex_coordinates_are_refused():
     for call in (
         lambda: Body("a", origin=(0.0, 0.0, 1j)),
         lambda: Point("p", "a", (0.0, np.complex128(1.0), 0.0)),
@@ -101,7 +101,7 @@ def test_descriptions_of_complex_numbers():
             call()
 
 
-def test_no_values_beside_a_motion_that_does_not_begin_at_the_design():
+def test_values_and_offset_motion_are_exclusive():
     table = {"rack": Table((0.0, 1.0), (0.001, 0.002))}
     found = solve(cases.load("mcpherson_steered").mechanism, "stroke", [], motions=table)
     assert found.solved.shape == (0,)
@@ -134,7 +134,7 @@ def with_an_arm(loops):
 
 
 @pytest.mark.parametrize("loops", [1, 21], ids=["one program", "components"])
-def test_numbers_that_may_change_are_read_at_each_call(loops):
+def test_mutable_arguments_are_read_each_call(loops):
     mechanism, turn, rate, numbers = (
         with_an_arm(loops),
         np.linspace(0.0, 0.4, 5),
@@ -152,7 +152,7 @@ def test_numbers_that_may_change_are_read_at_each_call(loops):
         numbers[0] = 3.0
 
 
-def test_one_name_is_no_list_of_names():
+def test_name_argument_of_wrong_kind():
     for who, what, call in (
         ("solve", "points", lambda: solve(mcpherson(), "stroke", VALUES, points="ball")),
         ("solve", "bodies", lambda: solve(mcpherson(), "stroke", VALUES, bodies="lca")),
@@ -169,7 +169,7 @@ def test_one_name_is_no_list_of_names():
             call()
 
 
-def test_members_of_a_mechanism_are_of_their_kind():
+def test_mechanism_member_of_wrong_kind():
     body, hinge = Body("arm"), Revolute("hinge", "ground", "arm", (0, 0, 0), (0, 0, 1))
     for bodies, joints, found in (
         ([hinge], [body], "bodies has Revolute"),

@@ -47,7 +47,7 @@ def rssr(held=tuple):
 
 
 @pytest.mark.parametrize("held", [list, np.array])
-def test_points_may_be_lists_and_arrays(held):
+def test_mechanism_of_lists_and_arrays(held):
     assert rssr(held) == rssr()
     assert hash(rssr(held)) == hash(rssr())
     assert repr(rssr(held)) == repr(rssr())  # plain numbers all
@@ -66,7 +66,7 @@ def test_points_may_be_lists_and_arrays(held):
     )
 
 
-def test_what_changes_afterwards_changes_no_mechanism():
+def test_mechanism_copies_mutable_arrays():
     place = np.array([2.0, 4.9, 2.2])
     point = Point("end", "rocker", place)
     place[:] = 0.0
@@ -192,7 +192,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_no_point_is_told_so(name):
+def test_description_of_wrong_kind_is_refused(name):
     make, message = WRONG[name]
     with pytest.raises(MechanismError) as told:
         make()
@@ -200,12 +200,12 @@ def test_what_is_no_point_is_told_so(name):
 
 
 @pytest.mark.parametrize("given", [None, "abcd", 1.0, X, (float("nan"), 0.0, 0.0, 0.0)])
-def test_euler_parameters_that_are_none_are_told(given):
+def test_bad_euler_parameters_are_refused(given):
     with pytest.raises(MechanismError, match="body 'a': euler_parameters"):
         Body("a", euler_parameters=given)
 
 
-def test_an_array_that_is_a_number_is_one():
+def test_scalar_array_becomes_number():
     """It may change, and has no hash."""
     lead, ratio = np.array(0.5), np.array([2.0])
     screw, gear = (
@@ -233,7 +233,7 @@ def held(*joints, drivers=(), couplers=()):
         name for name, kind in Joint.registry.items() if kind.__module__.startswith("kincheck.")
     ),
 )
-def test_a_joint_between_fixed_bodies_is_left_out(name):
+def test_joint_between_fixed_bodies_is_grounded(name):
     (joint,) = (
         replace(each, i="bed", j="bench")
         for each in specimens_of(Joint.registry[name], np.random.default_rng(1), 1)
@@ -251,7 +251,7 @@ def test_a_joint_between_fixed_bodies_is_left_out(name):
     np.testing.assert_array_equal(found.position, expected.position)
 
 
-def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move():
+def test_grounded_joint_conflicts_are_refused():
     apart = (ORIGIN, (0.4, 0.0, 0.0))
     assert held(Distance("rod", "bed", "ground", apart, 0.4 + 1e-10)).grounded
     with pytest.raises(
@@ -277,7 +277,7 @@ def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move(
 
 
 @pytest.mark.parametrize("kind", ["body", "joint", "point", "driver", "force"])
-def test_a_look_up_of_an_unknown_name_suggests_another(kind: str):
+def test_unknown_name_suggests_similar(kind: str):
     """It is a KeyError too, as of any mapping."""
     mechanism = Mechanism(
         "arm",
@@ -303,7 +303,7 @@ def test_a_look_up_of_an_unknown_name_suggests_another(kind: str):
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
-def test_pickled_mechanism_has_its_fields_alone():
+def test_pickled_mechanism_holds_fields_only():
     bodies = [Body("turned")]
     mechanism = Mechanism(
         "arm", bodies, [Revolute("pivot", "ground", "turned", (0, 0, 0), (0, 0, 1))]
@@ -315,7 +315,7 @@ def test_pickled_mechanism_has_its_fields_alone():
     assert pickle.loads(packed) == mechanism != replace(mechanism, name="leg")
 
 
-def test_look_ups_through_a_mechanism_are_told_too():
+def test_unknown_name_in_mechanism_queries():
     mechanism = Mechanism("arm", [Body("turned")], [], [], [])
     for asked in (mechanism.is_fixed, mechanism.design_value):
         with pytest.raises(UnknownNameError, match="there is no"):
@@ -387,7 +387,7 @@ def scrambled(seed):
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_the_tree_is_that_of_a_full_search(seed):
+def test_spanning_tree_equals_full_search(seed):
     mechanism = scrambled(seed)
     tree = spanning_tree(mechanism)
     assert [(branch.parent, branch.child, branch.joint) for branch in tree.branches] == searched(
@@ -459,6 +459,6 @@ def test_formula_scales_value_and_time():
     + ["1/0", "9**9**9**9", "1E999", "STEP(TIME,1,0,1,1)", "SQRT(-1)", "(" * 60 + "1" + ")" * 60]
     + ["().__class__", "1;2", "a=3", "TIME if 1 else 2", "x" * 20_000, "2**" * 3000 + "2"],
 )
-def test_formula_of_another_language_is_refused(formula):
+def test_formula_in_bad_syntax_is_refused(formula):
     with pytest.raises(MechanismError, match="formula motion: "):
         Formula(formula)

@@ -99,7 +99,7 @@ def worst_defect(specimen, rng):
 
 
 @pytest.mark.parametrize("kind", [kind for kind in TYPES if kind.n > 1])
-def test_rows_are_steady_that_say_so(kind, rng):
+def test_primitive_steady_rows(kind, rng):
     """Global directions, of shifts or else of turns of body i, that are the same in all poses; and
     no other rows are.
     """
@@ -115,7 +115,7 @@ def test_rows_are_steady_that_say_so(kind, rng):
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_satisfied_on_the_manifold(kind, rng):
+def test_primitive_phi_vanishes_on_manifold(kind, rng):
     """The makers' manifold is where phi = 0, and its motions are those with rows . velocity =
     nu.
     """
@@ -138,7 +138,7 @@ def test_satisfied_on_the_manifold(kind, rng):
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_rows_are_the_derivative_of_phi(kind, rng):
+def test_primitive_rows_are_phi_derivative(kind, rng):
     """For any velocity: exact rows at any pose, simplified ones on their manifold."""
     specimen = make(kind, rng)
     i, j = admissible(specimen, rng)
@@ -147,7 +147,7 @@ def test_rows_are_the_derivative_of_phi(kind, rng):
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_gamma_is_the_rest_of_the_second_derivative(kind, rng):
+def test_primitive_gamma_completes_second_derivative(kind, rng):
     """For any acceleration: exact ones at any pose and velocity, simplified ones where both are
     admissible.
     """
@@ -162,7 +162,7 @@ def of_residual(primitive, *methods):
 
 
 @pytest.mark.parametrize("kind", [kind for kind in TYPES if kind in MAKERS])
-def test_residual_alone_gives_exact_equations(kind, rng):
+def test_primitive_of_phi_alone_is_exact(kind, rng):
     """At any pose and velocity, on the manifold or not."""
     specimen = make(kind, rng)
     derived = replace(specimen, primitive=of_residual(specimen.primitive))
@@ -172,14 +172,14 @@ def test_residual_alone_gives_exact_equations(kind, rng):
 
 
 @pytest.mark.parametrize("kind", [kind for kind in TYPES if kind in MAKERS])
-def test_own_rows_without_gamma_have_theirs(kind, rng):
+def test_primitive_of_rows_without_gamma(kind, rng):
     specimen = make(kind, rng)
     derived = replace(specimen, primitive=of_residual(specimen.primitive, "gamma"))
     assert acceleration_defect(derived, *admissible(specimen, rng)).max() <= ROUND_OFF
 
 
 @pytest.mark.parametrize("kind", SIMPLIFIED)
-def test_simplified_rows_are_off_by_the_misalignment(kind, rng):
+def test_simplified_rows_error_by_misalignment(kind, rng):
     """Off the manifold simplified rows are wrong, in proportion: why Newton converges, and why they
     need care.
     """
@@ -196,7 +196,7 @@ def test_simplified_rows_are_off_by_the_misalignment(kind, rng):
 
 
 @pytest.mark.parametrize("kind", [p.Dot11])
-def test_simplified_gamma_needs_admissible_velocities(kind, rng):
+def test_simplified_gamma_at_inadmissible_velocity(kind, rng):
     specimen = make(kind, rng)
     i, j = admissible(specimen, rng)
     assert acceleration_defect(specimen, i, replace(j, w=vector(rng))).max() > 0.1
@@ -228,7 +228,7 @@ def row_nudged(rows):
 @pytest.mark.parametrize(
     ("method", "change"), [("rows", row_nudged), ("gamma", nudged), ("nu", nudged)]
 )
-def test_battery_finds_a_mistake_of_1e_9(kind, method, change, rng):
+def test_battery_finds_small_mistake(kind, method, change, rng):
     specimen = make(kind, rng)
     assert worst_defect(specimen, rng) <= ROUND_OFF
     assert (
@@ -237,7 +237,7 @@ def test_battery_finds_a_mistake_of_1e_9(kind, method, change, rng):
     )
 
 
-def test_battery_finds_the_printed_gamma_of_dot11(rng):
+def test_battery_finds_printed_dot11_gamma(rng):
     """(16) as printed has wrong signs (formulation section 9); in native axes its second row comes
     out negated.
     """
@@ -246,7 +246,7 @@ def test_battery_finds_the_printed_gamma_of_dot11(rng):
     assert worst_defect(replace(specimen, primitive=printed), rng) > 0.1
 
 
-def test_an_unknown_primitive_is_pointed_out(rng):
+def test_battery_refuses_unknown_primitive(rng):
     """Neither a new type nor one that adds fields to a known one slips through."""
 
     @dataclass(frozen=True)

@@ -53,7 +53,7 @@ DELTA = cases.load("delta_robot").mechanism
     [*((mcpherson(), width) for width in (2, 4, 8)), (four_bar(), 4), (DELTA, 2)],
     ids=lambda each: getattr(each, "name", each),
 )
-def test_programs_of_models(mechanism, width, monkeypatch):
+def test_bytecode_of_models_equals_machine_code(mechanism, width, monkeypatch):
     if width > compiler.vector_width():
         pytest.skip("no such vectors here")
     monkeypatch.setattr(compiler, "vector_width", lambda: width)
@@ -65,7 +65,7 @@ def test_programs_of_models(mechanism, width, monkeypatch):
 
 
 @pytest.mark.parametrize("name", [*OPERATIONS, "before"])
-def test_operations(name):
+def test_bytecode_of_operations_equals_machine_code(name):
     tape = Tape()
     a, b = tape.input(0), tape.input(1)
     value = before(a, b) if name == "before" else OPERATIONS[name](a, b)
@@ -73,7 +73,7 @@ def test_operations(name):
     both(lambda made: every_slot(made, "f"), plan)
 
 
-def test_signs_of_zeros_are_the_same():
+def test_bytecode_signs_of_zeros():
     """LLVM may turn them in compiled programs only, if the flag nsz allows it."""
     tape = Tape()
     a, b, c, d = (tape.input(k) for k in range(4))
@@ -91,7 +91,7 @@ def test_signs_of_zeros_are_the_same():
     both(run, plan)
 
 
-def test_outputs_that_take_the_place_of_inputs():
+def test_bytecode_outputs_replace_inputs():
     tape = Tape()
     x = [tape.input(k) for k in range(6)]
     outputs = {
@@ -113,14 +113,14 @@ def test_outputs_that_take_the_place_of_inputs():
     both(lambda made: every_slot(made, "f"), plan)
 
 
-def test_a_program_that_is_run_several_times():
+def test_bytecode_of_repeated_program():
     tape = Tape()
     out = {9: absolute(tape.input(0) - tape.input(4)), 10: absolute(tape.input(0))}
     plan = Plan({"f": program("f", tape, out, times=3)}, {str(k): k for k in range(11)})
     both(lambda made: every_slot(made, "f"), plan)
 
 
-def test_a_product_is_part_of_the_only_sum_it_goes_into():
+def test_single_use_product_is_fused():
     tape = Tape()
     a, b, c, d = (tape.input(k) for k in range(4))
     once, twice = a * b, c * d
@@ -136,7 +136,7 @@ def test_a_product_is_part_of_the_only_sum_it_goes_into():
     assert kinds == ["*", "*", "+", "fma", "fma", "fms", "fnma"]
 
 
-def test_cells_are_used_again():
+def test_bytecode_cells_are_reused():
     tape = Tape()
     x = tape.input(0)
     for k in range(200):

@@ -26,7 +26,7 @@ from ..support.mechanisms import four_bar
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
 
-def test_code_in_use_stays_after_clearing_the_caches(tmp_path, monkeypatch):
+def test_code_in_use_survives_cleared_caches(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # no machine code of another test's
     mechanism, path = four_bar(), np.linspace(0.0, 1.0, 5)
     driver, point = mechanism.drivers[0].name, mechanism.points[0].name
@@ -51,7 +51,7 @@ CRANK = Mechanism(
 )
 
 
-def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
+def test_damaged_cache_entry_is_rebuilt(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     wanted = np.linspace(0.0, 1.0, 5)
 
@@ -102,7 +102,7 @@ class Planted:
         return Path.touch, (self.mark,)
 
 
-def test_planted_entries_are_not_run(tmp_path, monkeypatch):
+def test_planted_pickle_is_not_run(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
     def positions():
@@ -120,7 +120,7 @@ def test_planted_entries_are_not_run(tmp_path, monkeypatch):
     assert not mark.exists()
 
 
-def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
+def test_trace_cache_key_distinguishes_requests(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     times: list[str] = []
     trace = compiled_model._trace
@@ -145,7 +145,7 @@ def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
         assert times == ["traced"]
 
 
-def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
+def test_user_joint_traces_are_not_cached(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     known = four_bar()
     hinge = next(joint for joint in known.joints if isinstance(joint, Revolute))
@@ -162,7 +162,7 @@ def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
     assert not (tmp_path / "kincheck").exists()
 
 
-def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
+def test_unwritable_cache_is_ignored(tmp_path, monkeypatch):
     (tmp_path / "kincheck").write_text("a file where the folder should be")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     mechanism = four_bar()

@@ -30,7 +30,7 @@ def found():
     return disk_cache.find(b"asked", bytes)
 
 
-def test_what_was_made_is_found(here):
+def test_cache_entry_is_found(here):
     assert disk_cache.size() == 0
     assert kept() == b"made"
     assert kept(fail) == b"made"
@@ -42,7 +42,7 @@ def test_what_was_made_is_found(here):
     [lambda was: was[:-1], lambda was: was[::-1], lambda was: b""],
     ids=["short", "turned", "empty"],
 )
-def test_what_is_not_whole_is_made_again(here, spoil):
+def test_damaged_entry_is_remade(here, spoil):
     kept()
     (entry,) = here.iterdir()
     entry.write_bytes(spoil(entry.read_bytes()))
@@ -51,7 +51,7 @@ def test_what_is_not_whole_is_made_again(here, spoil):
     assert found() == b"made"
 
 
-def test_what_was_not_used_for_longest_goes(here, monkeypatch):
+def test_least_recently_used_entries_are_removed(here, monkeypatch):
     monkeypatch.setattr(disk_cache, "MOST", 1000)
     here.mkdir(mode=0o700)
     (here / "a folder").mkdir()
@@ -75,7 +75,7 @@ posix = pytest.mark.skipif(os.name == "nt", reason="Windows has no owners and mo
 
 
 @posix
-def test_folder_and_entries_are_closed_to_others(here):
+def test_cache_permissions_are_private(here):
     here.mkdir(mode=0o755)  # as older versions made it
     kept()
     (entry,) = here.iterdir()
@@ -111,7 +111,7 @@ SPOILT = opened, opened_as_tmp, opened_above, linked, linked_through_an_open_fol
 
 @posix
 @pytest.mark.parametrize("spoil", SPOILT)
-def test_a_folder_others_can_replace_is_not_used(here, spoil, capsys):
+def test_replaceable_cache_folder_is_unused(here, spoil, capsys):
     kept()
     disk_cache._usable.cache_clear()  # as another process
     spoil(here)
@@ -123,7 +123,7 @@ def test_a_folder_others_can_replace_is_not_used(here, spoil, capsys):
 
 
 @posix
-def test_a_folder_of_another_user_is_not_used(here, monkeypatch, capsys):
+def test_foreign_cache_folder_is_unused(here, monkeypatch, capsys):
     kept()
     disk_cache._usable.cache_clear()
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)  # as with sudo and the user's HOME
@@ -132,14 +132,14 @@ def test_a_folder_of_another_user_is_not_used(here, monkeypatch, capsys):
 
 
 @posix
-def test_a_cache_below_a_sticky_folder_is_used(here):
+def test_cache_below_sticky_folder_is_used(here):
     here.parent.chmod(0o1777)
     kept()
     assert kept(fail) == b"made"
 
 
 @posix
-def test_entries_others_may_have_written_are_made_again(here):
+def test_writable_or_foreign_entry_is_remade(here):
     kept()
     (entry,) = here.iterdir()
     entry.chmod(0o666)
@@ -156,7 +156,7 @@ def test_entries_others_may_have_written_are_made_again(here):
     assert found() is None
 
 
-def test_an_entry_that_cannot_be_read_is_made_again(here):
+def test_unreadable_entry_is_remade(here):
     kept()
     (entry,) = here.iterdir()
     entry.write_bytes(sha256(entry.name.encode() + b"forged").digest() + b"forged")
@@ -165,7 +165,7 @@ def test_an_entry_that_cannot_be_read_is_made_again(here):
 
 
 @pytest.mark.parametrize("home", ["", "relative"])
-def test_no_cache_is_kept_in_the_working_folder(home, tmp_path, monkeypatch):
+def test_relative_cache_folder_is_unused(home, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")
     monkeypatch.setenv("HOME", home)

@@ -25,7 +25,7 @@ def bound(traced, slots, lanes, compiled):
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
+def test_repeated_program_keeps_largest_value(compiled, lanes):
     """Blocks of five slots: x from 0 on, y from 5 on."""
     times, tape = 5, Tape()
     x, y = tape.input(0), tape.input(times)
@@ -46,7 +46,7 @@ def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
     np.testing.assert_array_equal(executor.get([10, 11]), wanted)
 
 
-def test_flops_of_a_program_are_those_of_all_its_runs():
+def test_flops_of_repeated_program():
     tape = Tape()
     x, y = tape.input(0), tape.input(5)
     once, five = (program("f", tape, {10: absolute(x - y)}, times=times) for times in (1, 5))
@@ -60,7 +60,7 @@ def after(moves):
     return slots
 
 
-def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written():
+def test_carried_slots_are_ordered():
     """Whatever the order: the same as taking all over one after the other."""
     pairs = [
         (5, 6),
@@ -76,7 +76,7 @@ def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written()
 
 
 @pytest.mark.parametrize("count", range(1, 10))
-def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
+def test_padding_of_carried_pairs_is_neutral(count):
     pairs, width = [(k, k + 1) for k in reversed(range(count))], 8
     table = PlanInMemory(Plan({}, {}, carried=pairs), width, 20)._tables["carried"]
     assert len(table) % TOGETHER == 0
@@ -84,7 +84,7 @@ def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
 
 
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")
-def test_tables_begin_with_a_cache_line():
+def test_tables_are_cache_aligned():
     mechanism = mcpherson()
     model = compile_model(
         mechanism, Request(("stroke",), ("wheel",), varied=("points.wheel.position",))
@@ -100,7 +100,7 @@ def test_tables_begin_with_a_cache_line():
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_window_of_slots_is_their_memory(compiled, lanes):
+def test_slot_window_shares_memory(compiled, lanes):
     tape = Tape()
     traced = program("f", tape, {3: tape.input(1) - tape.input(2)})
     executor = bound(traced, 4, lanes, compiled)
@@ -120,7 +120,7 @@ def test_window_of_slots_is_their_memory(compiled, lanes):
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, monkeypatch):
+def test_outputs_read_slots_before_overwriting(compiled, monkeypatch):
     """Lanes of a group: to slots that are read, that are put out elsewhere, and that nobody reads;
     and values used on the way.
     """

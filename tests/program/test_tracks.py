@@ -51,7 +51,7 @@ SWEEPS = {
 @pytest.mark.parametrize(
     ("sweep", "order"), [(name, (0, 2)[k % 2]) for k, name in enumerate(SWEEPS)]
 )
-def test_the_worst_is_that_of_the_samples_that_are_kept(compiled, sweep, order):
+def test_worst_values_of_kept_samples(compiled, sweep, order):
     make, driver, values = SWEEPS[sweep]
     route = route_of(make(), driver, values, compiled=compiled, order=order)
     for _ in range(2):
@@ -65,7 +65,7 @@ def test_the_worst_is_that_of_the_samples_that_are_kept(compiled, sweep, order):
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_the_worst_of_a_march_before_is_forgotten(compiled):
+def test_worst_values_of_shorter_march(compiled):
     route = route_of(mcpherson(), "stroke", np.linspace(0.0, 0.2, 41), compiled=compiled)
     whole, half = follow_samples(route, TOL), follow_samples(route, TOL, visit={20})
     sigma = half.kept[route.model.rows[SIGMA].start, :21]
@@ -73,7 +73,7 @@ def test_the_worst_of_a_march_before_is_forgotten(compiled):
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_sweeps_of_one_model_leave_each_other_alone(compiled):
+def test_sweeps_of_one_model_are_independent(compiled):
     """Whatever was swept in between, by whatever tolerance: the same bits, and what was given away
     stays as it was.
     """
@@ -91,7 +91,7 @@ def test_sweeps_of_one_model_leave_each_other_alone(compiled):
 
 
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")
-def test_a_route_keeps_no_results():
+def test_route_keeps_no_results():
     route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33))
     found = follow(route, TOL)
     table = weakref.ref(found.points["wheel"].position.base)
@@ -100,7 +100,7 @@ def test_a_route_keeps_no_results():
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_a_route_may_be_swept_by_several_threads(compiled):
+def test_route_swept_by_threads(compiled):
     route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled)
     alone = follow(route, TOL).points["wheel"].acceleration.copy()
     with ThreadPoolExecutor(4) as threads:
@@ -108,7 +108,7 @@ def test_a_route_may_be_swept_by_several_threads(compiled):
             np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
 
 
-def test_interrupted_march_is_made_again(monkeypatch):
+def test_interrupted_march_is_repeated(monkeypatch):
     route = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False)
     first = follow_samples(route, TOL)
     monkeypatch.setattr(NumpyExecutor, "run", Mock(side_effect=KeyboardInterrupt))
@@ -120,7 +120,7 @@ def test_interrupted_march_is_made_again(monkeypatch):
 
 @pytest.mark.parametrize("order", [0, 2])
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_at_its_end_a_side_stands_where_it_was_followed_to(compiled, order):
+def test_visited_samples_have_their_times(compiled, order):
     """A sweep leaves no anchors there; who follows a side by hand goes on from one."""
     route = route_of(
         mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled, order=order
@@ -136,7 +136,7 @@ def test_at_its_end_a_side_stands_where_it_was_followed_to(compiled, order):
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_a_group_that_is_accepted_in_part_is_followed_on(compiled):
+def test_partly_accepted_group_is_continued(compiled):
     """Without a word from whoever divides steps."""
     route = route_of(
         slider_crank(),
