@@ -36,11 +36,15 @@ def native(made, style="native"):
     return with_forces(mechanism, made.path, motion).forces
 
 
-@pytest.mark.parametrize("slow", [1.0, SLOW], ids=["moving", "at rest"])
+@pytest.mark.parametrize(
+    "motion",
+    [{}, {"slow": SLOW}, {"size": 6.0}],
+    ids=["moving", "at rest", "metres and more than a turn"],
+)
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_forces_of_driven_joint_on_ground(kind, flipped, slow):
-    made = chain([replace(KINDS[kind], flipped=flipped), HINGE], slow=slow)
+def test_forces_of_driven_joint_on_ground(kind, flipped, motion):
+    made = chain([replace(KINDS[kind], flipped=flipped), HINGE], **motion)
     assert deviation(made, native(made)) < ROUND_OFF
 
 
@@ -50,13 +54,6 @@ def test_forces_of_driven_joint_on_ground(kind, flipped, slow):
 def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
     link = replace(KINDS[kind], flipped=flipped)
     made = chain([replace(HINGE, flipped=not flipped), link, HINGE], slow=slow)
-    assert deviation(made, native(made)) < ROUND_OFF
-
-
-@pytest.mark.parametrize("kind", ["translational", "cylindrical", "screw, by its turn"])
-def test_forces_of_joint_driven_far(kind):
-    """By metres and more than a turn."""
-    made = chain([replace(KINDS[kind], flipped=True), HINGE], size=6.0)
     assert deviation(made, native(made)) < ROUND_OFF
 
 
