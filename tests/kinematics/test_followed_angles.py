@@ -77,7 +77,7 @@ def angles(sweep: Sweep, joint: str):
 )
 def test_angle_turns_between_distant_samples(values):
     found = angles(Sweep("turn", np.array(values)), "b")
-    np.testing.assert_allclose(found, driven(values), rtol=0, atol=1e-9)
+    assert found == pytest.approx(driven(values), abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -88,8 +88,8 @@ def test_angle_turns_from_offset_start(motion):
     times = np.array([0.0, 0.1, 0.2])
     values = motion.at(times)[0]
     sweep = Sweep("time", times, motions={"turn": motion})
-    np.testing.assert_allclose(angles(sweep, "a"), values, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(angles(sweep, "b"), driven(values), rtol=0, atol=1e-9)
+    assert angles(sweep, "a") == pytest.approx(values, abs=1e-9)
+    assert angles(sweep, "b") == pytest.approx(driven(values), abs=1e-9)
 
 
 def test_torsion_spring_counts_turns():
@@ -98,7 +98,7 @@ def test_torsion_spring_counts_turns():
     motion = solve(mechanism, "turn", values, bodies=["first", "second"])
     follow = follower(mechanism, path, motion.solved)
     found = forces_of(mechanism, path, motion, ["spring"], follow).elements["spring"]
-    np.testing.assert_allclose(found, -driven(values), rtol=0, atol=1e-9)
+    assert found == pytest.approx(-driven(values), abs=1e-9)
 
 
 def test_short_steps_are_not_followed():
@@ -133,7 +133,7 @@ def test_angle_at_fold_adds_no_turn():
     cosine = (1.0 + to_wrist**2 - 1.5**2) / (2 * to_wrist)
     first = math.atan2(0.8, 0.6)
     wanted = beside + np.arccos(np.clip(cosine, -1, 1)) - first
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-4)
+    assert found == pytest.approx(wanted, abs=1e-4)
 
 
 def test_angles_share_one_followed_motion(monkeypatch):

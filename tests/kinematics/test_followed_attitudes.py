@@ -93,7 +93,7 @@ def tumbled(turn, bend):
 @pytest.mark.parametrize("order", [0, 2])
 def test_orientation_is_followed_from_design(values, order):
     wanted = tumbled(values, RATIO * np.array(values))
-    np.testing.assert_allclose(found(swept(values), order), wanted, rtol=0, atol=1e-9)
+    assert found(swept(values), order) == pytest.approx(wanted, abs=1e-9)
 
 
 QUARTER = np.array([0.0, 0.25])
@@ -126,7 +126,7 @@ def test_orientation_of_fast_geared_wheel(sweep):
     )
     of = replace(case(sweep), mechanism=with_markers(mechanism, [output]), outputs=(output,))
     turned = sweep.motions["turn"].at(QUARTER)[0] if sweep.motions else sweep.values
-    np.testing.assert_allclose(found(of)[0], np.cos(16.0 * turned), rtol=0, atol=1e-9)
+    assert found(of)[0] == pytest.approx(np.cos(16.0 * turned), abs=1e-9)
 
 
 @pytest.mark.parametrize("start", [4.0, -7.0, 11.0])
@@ -136,7 +136,7 @@ def test_orientation_from_offset_start(start):
     times = np.array([0.0, 0.1, 0.2])
     turn, bend = (motion.at(times)[0] for motion in motions.values())
     of = case(Sweep("time", times, motions=motions))
-    np.testing.assert_allclose(found(of), tumbled(turn, bend), rtol=0, atol=1e-9)
+    assert found(of) == pytest.approx(tumbled(turn, bend), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
@@ -161,4 +161,4 @@ def test_proved_orientations_follow_turns():
     reference, _ = prove_case(of, digits=12, numbers="double", tol=1e-12)
     proved = [reference.outputs[output.name].position for output in of.outputs]
     wanted = tumbled(values, RATIO * np.array(values))[7:14]
-    np.testing.assert_allclose(np.array(proved, dtype=float), wanted, rtol=0, atol=1e-11)
+    assert np.array(proved, dtype=float) == pytest.approx(wanted, abs=1e-11)

@@ -90,9 +90,9 @@ def test_pendulum_reactions_closed_form():
     c, s = np.cos(ANGLES), np.sin(ANGLES)
     expected = np.stack([-2.0 * 0.5 * 9.0 * c, -2.0 * 0.5 * 9.0 * s + 2.0 * 9.81, 0 * c], axis=1)
     reaction = found.joints["hinge"]
-    np.testing.assert_allclose(reaction.force, expected, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(reaction.moment, 0.0, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(found.drivers["turn"], 9.81 * c, rtol=0, atol=1e-13)
+    assert reaction.force == pytest.approx(expected, abs=1e-13)
+    assert reaction.moment == pytest.approx(0.0, abs=1e-13)
+    assert found.drivers["turn"] == pytest.approx(9.81 * c, abs=1e-13)
 
 
 def test_reactions_of_reversed_joint_change_sign():
@@ -106,7 +106,7 @@ def test_reactions_of_reversed_joint_change_sign():
         (one.joints["hinge"].moment, -other.joints["hinge"].moment),
         (one.drivers["turn"], -other.drivers["turn"]),
     ):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
+        assert a == pytest.approx(b, abs=1e-13)
 
 
 def test_pendulum_forces_of_each_element():
@@ -149,8 +149,8 @@ def test_pendulum_forces_of_each_element():
     still = solve(pendulum(), "turn", ANGLES, rate=3.0, forces=True).forces
     for element, amount, torque, force in cases_of:
         found = solve(pendulum(forces=[element]), "turn", ANGLES, rate=3.0, forces=True).forces
-        np.testing.assert_allclose(found.elements["x"], amount, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(found.drivers["turn"], -torque, rtol=0, atol=1e-11)
+        assert found.elements["x"] == pytest.approx(amount, abs=1e-12)
+        assert found.drivers["turn"] == pytest.approx(-torque, abs=1e-11)
         reaction = found.joints["hinge"].force - still.joints["hinge"].force
         np.testing.assert_allclose(reaction, np.broadcast_to(-force, reaction.shape), atol=1e-11)
         assert np.abs(found.power).max() <= 1e-12 * max(found.largest_power.max(), 1.0)
@@ -188,9 +188,9 @@ def test_gear_effort_carries_geared_inertia():
     acceleration = sine.at(times)[2]
     ratio = motion.bodies["two"].a[:, 5] / acceleration
     expected = (0.3 + ratio**2 * 0.5) * acceleration
-    np.testing.assert_allclose(found.drivers["turn"], expected, rtol=0, atol=1e-12)
+    assert found.drivers["turn"] == pytest.approx(expected, abs=1e-12)
     for reaction in found.joints.values():
-        np.testing.assert_allclose(reaction.moment, 0.0, rtol=0, atol=1e-12)
+        assert reaction.moment == pytest.approx(0.0, abs=1e-12)
 
 
 def test_screw_reaction_does_no_work():

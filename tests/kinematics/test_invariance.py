@@ -191,7 +191,7 @@ def test_length_unit_of_single_joint(size, joint):
     x = motion.position[:, 0], motion.velocity[:, 0], motion.acceleration[:, 0]
     closed = cosine, -sine / cosine, -1.0 / cosine**3
     for one, expected, off in zip(x, closed, (2e-15, 2e-14, 1e-12), strict=True):
-        np.testing.assert_allclose(one / size, expected, rtol=0, atol=off)
+        assert one / size == pytest.approx(expected, abs=off)
 
 
 def test_length_unit_reads_position_fields():

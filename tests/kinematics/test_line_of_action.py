@@ -118,4 +118,4 @@ def test_slide_moment_of_offset_weight():
     for moment, shift in zip(found.moment, shifts, strict=True):
         weight = np.array([0.0, 0.0, -10.0])
         about = np.cross(shift * h - np.array(guide.point), weight)
-        np.testing.assert_allclose(moment, about, rtol=0, atol=1e-12)
+        assert moment == pytest.approx(about, abs=1e-12)

@@ -136,7 +136,7 @@ def test_mutable_arguments_are_read_each_call(loops):
         swing = numbers[0] * turn / rate
         expected = np.column_stack([np.cos(swing), np.sin(swing), np.ones(5)])
         # round-off of numbers of size one
-        np.testing.assert_allclose(found.points["hand"].position, expected, rtol=0.0, atol=1e-15)
+        assert found.points["hand"].position == pytest.approx(expected, abs=1e-15)
         rate *= 4.0
         numbers[0] = 3.0
 

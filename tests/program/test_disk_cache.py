@@ -51,24 +51,20 @@ def test_damaged_entry_is_remade(here, spoil):
     assert found() == b"made"
 
 
-def test_least_recently_used_entries_are_removed(here, monkeypatch):
-    monkeypatch.setattr(disk_cache, "MOST", 1000)
+def test_least_recently_used_entries_are_removed(here):
     here.mkdir(mode=0o700)
     (here / "a folder").mkdir()
-    for days, name in enumerate(["yesterday", "before", "long ago", "read since"], 1):
-        (here / name).write_bytes(bytes(300))
+    for name, days in {"yesterday": 1, "before": 2, "long ago": 3, "read since": 4}.items():
+        (here / name).touch()
+        os.truncate(here / name, disk_cache.MOST * 2 // 5)  # sparse: it takes no room
         entry = (here / name).stat()
-        os.utime(here / name, (entry.st_atime - days * DAY, entry.st_mtime - days * DAY))
-    read = (here / "read since").stat()
-    os.utime(here / "read since", (read.st_atime + 4 * DAY, read.st_mtime))
+        read = 0 if name == "read since" else days
+        os.utime(here / name, (entry.st_atime - read * DAY, entry.st_mtime - days * DAY))
     kept(lambda: bytes(200))
     assert found() == bytes(200)
-    assert {each.name for each in here.iterdir() if len(each.name) < 20} == {
-        "a folder",
-        "yesterday",
-        "read since",
-    }
-    assert disk_cache.size() <= 1000
+    left = {each.name for each in here.iterdir() if len(each.name) < 20}
+    assert left == {"a folder", "yesterday", "read since"}
+    assert disk_cache.size() <= disk_cache.MOST
 
 
 posix = pytest.mark.skipif(os.name == "nt", reason="Windows has no owners and modes of this kind")

@@ -11,16 +11,16 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
 from kincheck.core.program.llvm.compiler import available
 from kincheck.core.program.llvm.executor import LlvmExecutor
-from kincheck.core.program.llvm.jit import LlvmCode
+from kincheck.core.program.llvm.jit import OFTEN, LlvmCode
 from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory, in_order
 
 from ..support.mechanisms import mcpherson
 from .test_tracks import COMPILED
 
 
-def bound(traced, slots, lanes, compiled):
+def bound(traced, slots, lanes, compiled, often=OFTEN):
     plan = Plan({"f": traced}, {str(k): k for k in range(slots)})
-    return LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    return LlvmExecutor(LlvmCode(plan, often), lanes) if compiled else NumpyExecutor(plan, lanes)
 
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
@@ -120,11 +120,10 @@ def test_slot_window_shares_memory(compiled, lanes):
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_outputs_read_slots_before_overwriting(compiled, monkeypatch):
+def test_outputs_read_slots_before_overwriting(compiled):
     """Lanes of a group: to slots that are read, that are put out elsewhere, and that nobody reads;
     and values used on the way.
     """
-    monkeypatch.setattr("kincheck.core.program.llvm.jit.OFTEN", 0)
     tape = Tape()
     x, last, first, other = (
         tape.input(0),
@@ -148,7 +147,7 @@ def test_outputs_read_slots_before_overwriting(compiled, monkeypatch):
         7: head,
         8: late,
     }
-    executor = bound(program("f", tape, out), 9, 8, compiled)
+    executor = bound(program("f", tape, out), 9, 8, compiled, often=0)
     group = executor.margin if compiled else 8
     values = np.random.default_rng(5).uniform(0.2, 0.4, size=(9, 8))
     heads = np.arange(8) // group * group
