@@ -1,4 +1,4 @@
-"""Splines against the same conditions in truncated powers, and their refusals."""
+"""Splines against the same conditions for their slopes, in fractions, and their refusals."""
 
 import re
 

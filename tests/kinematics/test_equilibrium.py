@@ -21,10 +21,10 @@ from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, minimize_scalar
 
-from ..support.mechanisms import Z
+from ..oracles.naive import tilde
+from ..support.mechanisms import ORIGIN, Z
 
 DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
-ORIGIN = (0.0, 0.0, 0.0)
 
 
 def read(name):
@@ -59,10 +59,6 @@ def compliance(found, load="o", body="block", point=ORIGIN):
     return found.motion(found.by_load[load][0], body, point)
 
 
-def skew(a):
-    return np.cross(np.eye(3), a)
-
-
 def test_compliance_is_inverse_bushing_stiffness():
     """C = (sum S^T K S)^-1 at zero load."""
     facts = read("1_body_on_three_bushings.json")
@@ -70,7 +66,7 @@ def test_compliance_is_inverse_bushing_stiffness():
     stiffness = np.zeros((6, 6))
     for each in bushings:
         axes, S = np.array(each.triad), np.eye(6)
-        S[:3, 3:] = skew(each.point).T
+        S[:3, 3:] = tilde(each.point).T
         own = np.zeros((6, 6))
         own[:3, :3] = axes.T @ np.diag(each.stiffness) @ axes
         own[3:, 3:] = axes.T @ np.diag(each.turning_stiffness) @ axes

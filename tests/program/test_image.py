@@ -75,19 +75,16 @@ def positions() -> np.ndarray:
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 
 
-def test_object_files_where_images_cannot_run(tmp_path, monkeypatch):
+def test_object_files_where_images_cannot_run(cache_folder):
     expected = positions()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     loaded, load = list[str](), compiler.loaded
-    monkeypatch.setattr(compiler, "possible", lambda: False)
-    monkeypatch.setattr(compiler, "loaded", lambda file: loaded.append("once") or load(file))
-    for _ in range(2):  # compiled, then kept
-        with jit.compiled_at_once():
+    with pytest.MonkeyPatch.context() as patch, jit.compiled_at_once():
+        patch.setattr(compiler, "possible", lambda: False)
+        patch.setattr(compiler, "loaded", lambda file: loaded.append("once") or load(file))
+        for _ in range(2):  # compiled, then kept
             np.testing.assert_array_equal(positions(), expected)
-        assert loaded
-        loaded.clear()
-    monkeypatch.undo()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+            assert loaded
+            loaded.clear()
     np.testing.assert_array_equal(positions(), expected)  # an object file is not taken for an image
 
 
@@ -115,8 +112,7 @@ def test_second_process_imports_no_llvm(tmp_path):
 
 
 @images
-def test_processor_description_is_cached(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+def test_processor_description_is_cached(cache_folder, monkeypatch):
     expected, asked, ask = compiler.processor(), list[str](), compiler._ask_llvm
     monkeypatch.setattr(compiler, "_ask_llvm", lambda: asked.append("once") or ask())
 
@@ -126,7 +122,7 @@ def test_processor_description_is_cached(tmp_path, monkeypatch):
 
     assert [found() for _ in range(2)] == [expected] * 2
     assert len(asked) == 1
-    (entry,) = (tmp_path / "kincheck").iterdir()
+    (entry,) = cache_folder.iterdir()
     entry.write_bytes(entry.read_bytes()[:-1])
     assert found() == expected
     assert len(asked) == 2
