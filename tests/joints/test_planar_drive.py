@@ -64,7 +64,8 @@ def ladder(bodies, axis):
         (("ground", "ladder"), Z),
         (("ladder", "ground"), Z),
         (("ground", "ladder"), (0.0, 0.0, -2.0)),
-    ]
+    ],
+    ids=["", "reversed", "down"],
 )
 def case(request):
     """With the angle's sense by the order of bodies and by the axis."""

@@ -64,6 +64,7 @@ def test_spline_in_units_and_origin():
         (((0.0, 0.0), (5e-324, 1.0), (1.0, 0.0)), "too close or too large for a spline"),
         (((0.0, -1e308), (1.0, 1e308)), "too close or too large for a spline"),
     ],
+    ids=str,
 )
 def test_spline_of_bad_points_is_refused(points, message):
     with pytest.raises(MechanismError, match=re.escape(message)):

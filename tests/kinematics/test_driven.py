@@ -148,6 +148,7 @@ def written(mechanism, drivers):
         (2, {"turn": "pivot0"}, "cross1", 2,
          "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
     ],
+    ids=["large", "large, overdriven", "large, loose", "small, overdriven", "small, loose"],
 )  # fmt: skip
 def test_driver_mismatch_exit_status_and_message(
     loops, drivers, left_out, status, said, tmp_path, capsys

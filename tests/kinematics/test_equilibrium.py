@@ -22,7 +22,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, minimize_scalar
 
 from ..oracles.naive import tilde
-from ..support.mechanisms import ORIGIN, Z
+from ..support.mechanisms import ORIGIN, X, Z
 
 DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
 
@@ -82,50 +82,46 @@ def test_compliance_is_inverse_bushing_stiffness():
     assert found.bodies["block"].p[1] == pytest.approx(facts["euler_parameters"], abs=1e-15)
 
 
-ARM = Mechanism(
-    "arm",
-    [Body("arm")],
-    [Revolute("hinge", GROUND, "arm", point=ORIGIN, axis=Z)],
-)
+ARM = Mechanism("arm", [Body("arm")], [Revolute("hinge", GROUND, "arm", ORIGIN, Z)])
 STOP = ((-0.1, -100.0), (0.0, 0.0), (0.1, 100.0), (0.1001, 120.0), (0.2, 18100.0))
 PROGRESSIVE = PchipInterpolator(*np.array(STOP).T)
 
 
-@pytest.mark.parametrize(
-    ("element", "load", "angle"),
-    [
-        # k sin(th) = F a cos(th)
-        (
-            Bushing("t", GROUND, "arm", ORIGIN, turning_stiffness=(0.0, 0.0, 500.0)),
-            300.0,
-            math.atan(300.0 * 0.4 / 500.0),
-        ),
-        # k b sin(th) b cos(th) = F a cos(th)
-        (
-            Bushing("s", GROUND, "arm", (0.25, 0.0, 0.0), stiffness=(0.0, 2e5, 0.0)),
-            8000.0,
-            math.asin(8000.0 * 0.4 / (2e5 * 0.25**2)),
-        ),
-        # k th = F a cos(th)
-        (
-            TorsionSpringDamper("c", "hinge", 500.0),
-            900.0,
-            brentq(lambda x: 500.0 * x - 900.0 * 0.4 * math.cos(x), 0.0, 1.5, xtol=1e-15),
-        ),
-        # progressive(b sin(th)) b cos(th) = F a cos(th), beyond the stop at 0.1 m
-        (
-            Bushing("b", GROUND, "arm", (0.25, 0.0, 0.0), curve=((), STOP, ())),
-            400.0,
-            math.asin(brentq(lambda x: PROGRESSIVE(x) * 0.25 - 160.0, 0.0, 0.2, xtol=1e-16) / 0.25),
-        ),
-    ],
-    ids=["torsion", "side", "coil", "stop"],
-)
-def test_equilibrium_angle_of_loaded_arm(element, load, angle):
+ELEMENTS = {
+    # k sin(th) = F a cos(th)
+    "torsion": (
+        Bushing("t", GROUND, "arm", ORIGIN, turning_stiffness=(0.0, 0.0, 500.0)),
+        300.0,
+        math.atan(300.0 * 0.4 / 500.0),
+    ),
+    # k b sin(th) b cos(th) = F a cos(th)
+    "side": (
+        Bushing("s", GROUND, "arm", (0.25, 0.0, 0.0), stiffness=(0.0, 2e5, 0.0)),
+        8000.0,
+        math.asin(8000.0 * 0.4 / (2e5 * 0.25**2)),
+    ),
+    # k th = F a cos(th)
+    "coil": (
+        TorsionSpringDamper("c", "hinge", 500.0),
+        900.0,
+        brentq(lambda x: 500.0 * x - 900.0 * 0.4 * math.cos(x), 0.0, 1.5, xtol=1e-15),
+    ),
+    # progressive(b sin(th)) b cos(th) = F a cos(th), beyond the stop at 0.1 m
+    "stop": (
+        Bushing("b", GROUND, "arm", (0.25, 0.0, 0.0), curve=((), STOP, ())),
+        400.0,
+        math.asin(brentq(lambda x: PROGRESSIVE(x) * 0.25 - 160.0, 0.0, 0.2, xtol=1e-16) / 0.25),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_equilibrium_angle_of_loaded_arm(name):
+    element, load, angle = ELEMENTS[name]
     model = StaticModel(replace(ARM, forces=[element]), [LoadPoint("tip", "arm", (0.4, 0.0, 0.0))])
     found = model.solve({"tip": np.array([[0.0, load, 0.0, 0.0, 0.0, 0.0]])}, {})
     assert found.reached.all()
-    x, y, _ = found.turned("arm", (1.0, 0.0, 0.0))[0]
+    x, y, _ = found.turned("arm", X)[0]
     assert math.atan2(y, x) == pytest.approx(angle, abs=1e-14)
 
 
@@ -199,7 +195,7 @@ def test_torque_beyond_dead_centre_is_refused():
     loads[:, 5] = k * r * d * np.array([-0.7, 0.999, 1.001, 40.0])
     found = model.solve({"o": loads}, {})
     assert found.reached.tolist() == [True, True, False, False]
-    x, y, _ = found.turned("arm", (1.0, 0.0, 0.0))[:2].T
+    x, y, _ = found.turned("arm", X)[:2].T
     turns = np.arctan2(y, x) - math.atan2(0.8, 0.6)
     assert turns == pytest.approx([math.asin(-0.7), math.asin(0.999)], abs=1e-12)
     assert found.share[2:] == pytest.approx([1.0 / 1.001, 1.0 / 40.0], rel=1e-8)

@@ -215,7 +215,7 @@ def assert_same(found, expected, limits=NATIVE):
 
 
 @pytest.mark.parametrize("engine", adapters.ENGINES)
-@pytest.mark.parametrize("variant", [*STRUTS, ALL])
+@pytest.mark.parametrize("variant", [*STRUTS, ALL], ids=str)
 def test_strut_motion_of_equivalent_joints(variant, engine):
     mechanism = composed(*(variant if variant is ALL else [variant]))
     assert_same(motion(mechanism, STROKES, engine), motion(mcpherson(), STROKES), LIMITS[engine])

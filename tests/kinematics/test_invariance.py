@@ -135,7 +135,7 @@ def test_motion_scales_with_size(factor):
     assert_same(wheel(small, factor * STROKES, rate=factor) / factor, wheel(), ROUNDED)
 
 
-@pytest.mark.parametrize("offset", [(1e6, 0.0, 0.0), (-1e6, 1e6, 2e6)])
+@pytest.mark.parametrize("offset", [(1e6, 0.0, 0.0), (-1e6, 1e6, 2e6)], ids=str)
 def test_motion_invariant_to_distant_place(offset):
     """A thousand kilometres away: only the sum with the position rounds, at 1e-10 m; the motion
     keeps all its digits. Hardpoints are rounded to 2^-30 m, so that their sums are exact.

@@ -173,7 +173,7 @@ def test_description_of_wrong_kind_is_refused(make, message):
         make()
 
 
-@pytest.mark.parametrize("given", [None, "abcd", 1.0, X, (float("nan"), 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("given", [None, "abcd", 1.0, X, (float("nan"), 0.0, 0.0, 0.0)], ids=str)
 def test_bad_euler_parameters_are_refused(given):
     with pytest.raises(MechanismError, match="body 'a': euler_parameters"):
         Body("a", euler_parameters=given)
@@ -432,6 +432,7 @@ def test_formula_scales_value_and_time():
     ["", "TIME +", "(TIME", "TIME)", "2 TIME", "FOO(1)", "TIME(1)", "STEP(1,2)", "TIME**TIME"]
     + ["1/0", "9**9**9**9", "1E999", "STEP(TIME,1,0,1,1)", "SQRT(-1)", "(" * 60 + "1" + ")" * 60]
     + ["().__class__", "1;2", "a=3", "TIME if 1 else 2", "x" * 20_000, "2**" * 3000 + "2"],
+    ids=lambda text: text[:20] or "empty",
 )
 def test_formula_in_bad_syntax_is_refused(formula):
     with pytest.raises(MechanismError, match="formula motion: "):

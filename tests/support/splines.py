@@ -10,4 +10,4 @@ def through(points):
     Moler; straight beyond its ends.
     """
     law = Function.of(Spline("spline", ("driven", "driving"), points))
-    return lambda x: [float(each[0]) for each in law.at(np.array([x]))]
+    return lambda x: tuple(float(each[0]) for each in law.at(np.array([x])))
