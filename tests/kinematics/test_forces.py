@@ -22,6 +22,7 @@ from kincheck.core.program.llvm.compiler import available
 
 from ..oracles import naive, newton_euler
 from ..support.loads import GRAVITY, loaded, pushes, six, solved
+from ..support.mechanisms import X, Z
 from .test_chain import chain
 from .test_singular import BRANCH
 
@@ -142,24 +143,22 @@ def test_forces_without_solved_sample_are_nan(values, tol):
         assert np.isnan(each).all()
 
 
-def both(mechanism, path, *, style="native", compiled=False):
-    """The forces by the program, and by singular values over the motion of all bodies."""
-    names = tuple(body.name for body in mechanism.moving)
-    solver = NativeSolver(style=Style(style), compiled=compiled, method=Method.ONE_PROGRAM)
-    members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
-    traced = solver.prepare(mechanism, path, forces=[each.name for each in members])(1e-12)
-    motion = NativeSolver().prepare(mechanism, path, bodies=names)(1e-12)
-    return traced, with_forces(mechanism, path, motion)
-
-
 def by_program(trajectory):
     """Whether the program computed the forces, and they were not found anew."""
     return not isinstance(trajectory.forces.joints, dict)
 
 
-def agree(traced, expected, allowed=1e-13):
-    """All that both have is the same to round-off of the largest force."""
-    found, wanted = traced.forces, expected.forces
+def assert_traced(mechanism, path, allowed=1e-13, *, style="native", compiled=False):
+    """The program's forces are those by singular values over the motion of all bodies, to round-off
+    of the largest force.
+    """
+    names = tuple(body.name for body in mechanism.moving)
+    solver = NativeSolver(style=Style(style), compiled=compiled, method=Method.ONE_PROGRAM)
+    members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
+    traced = solver.prepare(mechanism, path, forces=[each.name for each in members])(1e-12)
+    assert by_program(traced)
+    motion = NativeSolver().prepare(mechanism, path, bodies=names)(1e-12)
+    found, wanted = traced.forces, with_forces(mechanism, path, motion).forces
     largest = max(np.nanmax(np.abs(each.force)) for each in wanted.joints.values())
     for name, reaction in wanted.joints.items():
         other = found.joints[name]
@@ -192,31 +191,26 @@ def test_traced_forces_equal_svd_forces(name, compiled):
     if compiled and not available():
         pytest.skip("llvmlite is missing")
     case = cases.load(name)
-    traced, expected = both(loaded(case.mechanism), few(case), compiled=compiled)
-    assert by_program(traced)
-    agree(traced, expected)
+    assert_traced(loaded(case.mechanism), few(case), compiled=compiled)
 
 
 @pytest.mark.parametrize("style", ["paper", "conventional", "mixed", "relative"])
 @pytest.mark.parametrize("name", ["mcpherson_strut", "four_bar"])
 def test_traced_forces_in_row_styles(style, name):
     case = cases.load(name)
-    traced, expected = both(loaded(case.mechanism), few(case), style=style)
-    assert by_program(traced)
-    agree(traced, expected)
+    assert_traced(loaded(case.mechanism), few(case), style=style)
 
 
 def train():
     """A screw that lifts a nut, geared to a shaft, with an element of every kind."""
-    z, tilted = (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)
-    moments = np.diag([0.3, 0.4, 0.5]) + 0.05
+    tilted, moments = (0.6, 0.0, 0.8), np.diag([0.3, 0.4, 0.5]) + 0.05
     bodies = [
         Body("nut", mass=2.0, center_of_mass=(0.2, 0.1, 0.3), inertia=six(moments)),
-        Body("shaft", (1.0, 0.0, 0.0), mass=1.0, inertia=six(moments)),
+        Body("shaft", X, mass=1.0, inertia=six(moments)),
     ]
     joints = [
         Screw("screw", "ground", "nut", (0.1, 0.2, 0.3), tilted, 0.05),
-        Revolute("hinge", "shaft", "ground", (1.0, 0.0, 0.0), z),
+        Revolute("hinge", "shaft", "ground", X, Z),
     ]
     elements = [
         SpringDamper("spring", "nut", "shaft", ((0.5, 0.0, 0.0), (1.0, 0.4, 0.0)), 40.0, 3.0),
@@ -236,9 +230,7 @@ def train():
 def test_traced_forces_of_every_element(style):
     """Angles of torsional springs are followed through more than a turn."""
     path = Path({"screw": Sine(9.0, 0.3)}, np.linspace(-0.6, 0.9, 9))
-    traced, expected = both(train(), path, style=style)
-    assert by_program(traced)
-    agree(traced, expected, 1e-12)
+    assert_traced(train(), path, 1e-12, style=style)
 
 
 def test_forces_at_singular_pose_are_nan():
@@ -253,10 +245,8 @@ def test_forces_at_singular_pose_are_nan():
 
 
 def test_forces_beyond_lock_up_are_nan():
-    case = cases.load("mcpherson_strut")
-    mechanism = loaded(case.mechanism)
-    values = np.array([0.0, 0.05, 5.0])
-    found = solve(mechanism, "stroke", values, forces=True)
+    mechanism = loaded(cases.load("mcpherson_strut").mechanism)
+    found = solve(mechanism, "stroke", [0.0, 0.05, 5.0], forces=True)
     assert found.solved.tolist() == [True, True, False]
     for each in found.forces.joints.values():
         assert np.isfinite(each.force).all(axis=1).tolist() == found.solved.tolist()
@@ -275,16 +265,17 @@ def test_large_mechanism_forces_by_svd():
 
 def test_program_holds_requested_forces_only():
     case = cases.load("mcpherson_strut")
-    mechanism = loaded(case.mechanism)
-    found = solve(mechanism, "stroke", case.sweep.values[::40], forces=["ball"])
+    mechanism, values = loaded(case.mechanism), case.sweep.values[::40]
+    found = solve(mechanism, "stroke", values, forces=["ball"])
     assert by_program(found)
     assert [*found.forces.joints] == ["ball"]
     with pytest.raises(KeyError):
         found.forces.joints["tie_rod"]
-    program = found.details["program"]["outputs"]["flops"]
-    every = solve(mechanism, "stroke", case.sweep.values[::40], forces=True).details["program"]
-    without = solve(mechanism, "stroke", case.sweep.values[::40]).details["program"]
-    assert without["outputs"]["flops"] < program < every["outputs"]["flops"]
+    none, one, every = (
+        solve(mechanism, "stroke", values, forces=names).details["program"]["outputs"]["flops"]
+        for names in (False, ["ball"], True)
+    )
+    assert none < one < every
 
 
 def test_nearly_singular_rows_use_svd_forces():

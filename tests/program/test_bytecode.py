@@ -35,11 +35,13 @@ def both(run: Callable[[LlvmCode], np.ndarray], plan: Plan) -> None:
     assert run(made).tobytes() == interpreted.tobytes()  # the sign of zeros too
 
 
-def every_slot(made: LlvmCode, name: str, lanes: int = 19) -> np.ndarray:
-    """All slots after a program was run on numbers."""
+def every_slot(made: LlvmCode, name: str = "f", values: np.ndarray | None = None) -> np.ndarray:
+    """All slots after a program was run on numbers, in the first slots."""
     slots = range(len(made.plan.slots))
-    executor = LlvmExecutor(made, lanes)
-    executor.put(slots, np.random.default_rng(1).normal(size=(len(slots), lanes)))
+    if values is None:
+        values = np.random.default_rng(1).normal(size=(len(slots), 19))
+    executor = LlvmExecutor(made, values.shape[1])
+    executor.put(slots[: len(values)], values)
     made._left = 10**9
     executor.run(name)
     return executor.get(slots)
@@ -70,7 +72,7 @@ def test_bytecode_of_operations_equals_machine_code(name):
     a, b = tape.input(0), tape.input(1)
     value = before(a, b) if name == "before" else OPERATIONS[name](a, b)
     plan = Plan({"f": program("f", tape, {2: value})}, {str(k): k for k in range(3)})
-    both(lambda made: every_slot(made, "f"), plan)
+    both(every_slot, plan)
 
 
 def test_bytecode_signs_of_zeros():
@@ -80,15 +82,7 @@ def test_bytecode_signs_of_zeros():
     nodes = program("f", tape, {4: -(a * b - c), 5: -(c * d + a), 6: d - (b * c - a)})
     plan = Plan({"f": nodes}, {str(k): k for k in range(7)})
     values = np.array(list(product([0.0, -0.0, 1.0, -1.0], repeat=4))).T
-
-    def run(made: LlvmCode) -> np.ndarray:
-        made._left = 10**9
-        executor = LlvmExecutor(made, values.shape[1])
-        executor.put(range(4), values)
-        executor.run("f")
-        return executor.get(range(4, 7))
-
-    both(run, plan)
+    both(lambda made: every_slot(made, values=values)[4:], plan)
 
 
 def test_bytecode_outputs_replace_inputs():
@@ -105,19 +99,16 @@ def test_bytecode_outputs_replace_inputs():
         7: x[4],
     }
     plan = Plan({"f": program("f", tape, outputs)}, {str(k): k for k in range(8)})
-    values = np.arange(1.0, 7.0)
-    executor = LlvmExecutor(LlvmCode(plan), 1)
-    executor.put(range(6), values[:, None])
-    executor.run("f")
-    assert executor.get(range(8))[:, 0].tolist() == [2.0, 1.0, 5.0, 4.0, 3.0, 2.0, 3.0, 5.0]
-    both(lambda made: every_slot(made, "f"), plan)
+    found = every_slot(LlvmCode(plan), values=np.arange(1.0, 7.0)[:, None])
+    assert found[:, 0].tolist() == [2.0, 1.0, 5.0, 4.0, 3.0, 2.0, 3.0, 5.0]
+    both(every_slot, plan)
 
 
 def test_bytecode_of_repeated_program():
     tape = Tape()
     out = {9: absolute(tape.input(0) - tape.input(4)), 10: absolute(tape.input(0))}
     plan = Plan({"f": program("f", tape, out, times=3)}, {str(k): k for k in range(11)})
-    both(lambda made: every_slot(made, "f"), plan)
+    both(every_slot, plan)
 
 
 def test_single_use_product_is_fused():
