@@ -5,6 +5,8 @@ are exact where the equations hold; away from there they are not, and that is wh
 the spurious zeros (formulation section 3).
 """
 
+from dataclasses import replace
+
 import kincheck.cases
 import numpy as np
 import pytest
@@ -14,6 +16,12 @@ from kincheck.core.case.joint_probe import probes
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
+from kincheck.core.kinematics.formulation.acceptance_criteria import (
+    Block,
+    Candidate,
+    Limits,
+    margins,
+)
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import Constraint, Style, constraints, frames
 from kincheck.core.kinematics.structure.redundancy import independent_rows
@@ -310,3 +318,36 @@ def test_ground_rows_keep_solution():
         assert found == pytest.approx(wanted, rel=1e-14, abs=1e-14)
     for fixed in ("chassis", "rack"):
         assert np.abs([*at.poses[fixed].u]).max() < 1e-15
+
+
+# Acceptance: each criterion fails alone
+
+BLOCKS = [Block(0.5, 0.5, 0.1)]
+POSE = Candidate(1.0, 1e-15, 1e-15, 1.0, 0.0, 0.1, 0.1, [0.1], 0.5, 0.5, 1.0, 0.0, BLOCKS)
+SPOILT = [
+    ("converged", {"done": 0.0}),
+    ("closed", {"closure": 2e-12}),
+    ("consistent", {"leftover": 2e-12}),
+    ("on the branch", {"branch": -0.1}),
+    ("continued", {"gap": 0.011}),
+    ("near", {"reach": 0.6}),
+    ("not turned round", {"turns": [0.1, -2.1]}),
+    ("as regular", {"blocks": [Block(0.5, 0.03, 0.1)]}),
+    ("as regular", {"blocks": [*BLOCKS, Block(0.03, 0.5, 0.1)]}),
+    ("on this side", {"reversal": -1.0}),
+    ("regular between", {"moved": 0.3, "blocks": [Block(0.5, 0.5, 1.0)]}),
+    ("certain", {"sigma": 1e-7}),
+    ("not turned by rounding", {"sigma": 2e-6, "before": 1e-6}),
+]
+
+
+@pytest.mark.parametrize(("criterion", "changes"), SPOILT, ids=str)
+def test_margins_of_spoilt_pose(criterion, changes):
+    def failed(pose, crossing):
+        found = margins(pose, Limits(1e-12, 1e-12, crossing))
+        return {name for name, margin in found.items() if margin <= 0.0}
+
+    assert failed(POSE, 0.0) == set()
+    assert failed(replace(POSE, **changes), 0.0) == {criterion}
+    passed = criterion in ("as regular", "on this side", "regular between")
+    assert failed(replace(POSE, **changes), 100.0) == (set() if passed else {criterion})
