@@ -39,11 +39,11 @@ class ConstantVelocity(Joint):
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P, (f, g, h) = vec(self.point), triad(self.axes[0])
         k = unit(self.axes[1])
-        twistless = (_carried(f, h, k), _carried(g, h, k))
+        twistless = (_carry(f, h, k), _carry(g, h, k))
         return p.Spherical(i.arm(P), j.arm(P)), p.ConstantVelocity(f, g, *twistless)
 
 
-def _carried(a: Vec3, h: Vec3, k: Vec3) -> Vec3:
+def _carry(a: Vec3, h: Vec3, k: Vec3) -> Vec3:
     """a turned by the shortest rotation that takes h to k (Rodrigues)."""
     n = cross(h, k)
     return a + cross(n, a) + (1.0 / (1.0 + h @ k)) * cross(n, cross(n, a))

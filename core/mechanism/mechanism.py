@@ -237,7 +237,7 @@ class Mechanism(ByContent):
         Raises:
             MechanismError: there is none.
         """
-        known = self._named["bodies" if what == "body" else f"{what}s"]
+        known = self._members["bodies" if what == "body" else f"{what}s"]
         if name in known:
             return known[name]
         names = [GROUND, *known] if what == "body" else known
@@ -368,7 +368,7 @@ class Mechanism(ByContent):
         return self._member("forces", "force element", name)
 
     def _member(self, kind: str, what: str, name: str) -> Any:
-        named = self._named[kind]
+        named = self._members[kind]
         try:
             return named[name]
         except (KeyError, TypeError):
@@ -468,7 +468,7 @@ class Mechanism(ByContent):
         return extent(self._places) or extent([*self._places, *points]) or 1.0
 
     @cached_property
-    def _named(self) -> Mapping[str, Mapping[str, Any]]:
+    def _members(self) -> Mapping[str, Mapping[str, Any]]:
         """Members by kind and name."""
         all_of = {
             "bodies": self.bodies,

@@ -14,7 +14,7 @@ from kincheck.core.program import Plan, Tape, absolute, before, program
 from kincheck.core.program.llvm import compiler
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import LlvmCode
-from kincheck.core.program.straight_line import bytecode, lowered
+from kincheck.core.program.straight_line import bytecode, lower
 
 from ..support.mechanisms import four_bar, mcpherson
 from .test_llvm import OPERATIONS
@@ -115,7 +115,7 @@ def test_single_use_product_is_fused():
     tape = Tape()
     a, b, c, d = (tape.input(k) for k in range(4))
     once, twice = a * b, c * d
-    found = lowered(
+    found = lower(
         program(
             "f",
             tape,

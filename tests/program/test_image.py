@@ -67,7 +67,7 @@ def test_image_with_external_call_is_refused():
         " @outside(double %x) ret double %y }"
     )
     with pytest.raises(ValueError, match="'outside'"):
-        compiler.joined(compiler.emitted(text))
+        compiler.image_of(compiler.emit(text))
 
 
 def positions() -> np.ndarray:
@@ -77,10 +77,10 @@ def positions() -> np.ndarray:
 
 def test_object_files_where_images_cannot_run(cache_folder):
     expected = positions()
-    loaded, load = list[str](), compiler.loaded
+    loaded, load = list[str](), compiler.load_object
     with pytest.MonkeyPatch.context() as patch, jit.compiled_at_once():
         patch.setattr(compiler, "possible", lambda: False)
-        patch.setattr(compiler, "loaded", lambda file: loaded.append("once") or load(file))
+        patch.setattr(compiler, "load_object", lambda file: loaded.append("once") or load(file))
         for _ in range(2):  # compiled, then kept
             np.testing.assert_array_equal(positions(), expected)
             assert loaded
@@ -126,18 +126,18 @@ def test_processor_description_is_cached(cache_folder, monkeypatch):
     entry.write_bytes(entry.read_bytes()[:-1])
     assert found() == expected
     assert len(asked) == 2
-    described = compiler._described()
+    described = compiler._describe()
     assert described is not None
-    monkeypatch.setattr(compiler, "_described", lambda: described.replace(b" sse2", b" no_sse2"))
+    monkeypatch.setattr(compiler, "_describe", lambda: described.replace(b" sse2", b" no_sse2"))
     assert found() == expected
-    monkeypatch.setattr(compiler, "_described", lambda: None)
+    monkeypatch.setattr(compiler, "_describe", lambda: None)
     assert found() == expected
     assert len(asked) == 4
 
 
 @images
 def test_processor_is_described_by_llvm_traits(monkeypatch):
-    described = compiler._described()
+    described = compiler._describe()
     assert described is not None
     assert {line.split(b"\t")[0] for line in described.splitlines() if b"\t" in line} == {
         *compiler.TRAITS

@@ -410,7 +410,7 @@ class ForceEquations:
         return found
 
     @cached_property
-    def _numbered(self) -> list[tuple[int, Constraint | Relation]]:
+    def _numbered_rows(self) -> list[tuple[int, Constraint | Relation]]:
         """Return the constraint and number of every row: joints, couplers, drivers, left out."""
         return [*enumerate((*self.formulation.of_rows, *self.left_out.of_rows))]
 
@@ -423,7 +423,7 @@ class ForceEquations:
         found: dict[str, list[tuple[int, Constraint | Relation]]] = {
             joint.name: [] for joint in mechanism.given_joints
         }
-        for k, c in self._numbered:
+        for k, c in self._numbered_rows:
             if id(c) in own:
                 found[mechanism.given_name(c.owner)].append((k, c))
         return found
@@ -475,7 +475,7 @@ class ForceEquations:
         """Return the effort of a driver [N or N m]."""
         drivers = self.mechanism.drivers
         c: Any = self.formulation.constraints[drivers.index(driver) - len(drivers)]
-        first = next(k for k, each in self._numbered if each is c)
+        first = next(k for k, each in self._numbered_rows if each is c)
         # nu is linear in the driver's rate: at rate one it is the power per unit multiplier
         at_rate_one = replace(c.primitive, drive=replace(c.primitive.drive, c_t=1.0))
         pair = (self.at.poses.get(b, GROUND_POSE) for b in (c.i, c.j))

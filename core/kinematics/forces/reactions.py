@@ -144,7 +144,7 @@ class ForceRows:
         The angle of a driven joint, or of a joint geared to one, is exact. Other angles follow the
         rates from the sample nearest to the design, and `follow` corrects their turns.
         """
-        known = self._driven.get((name, "rotation"))
+        known = self._driven_coordinates.get((name, "rotation"))
         if known is not None or not self.n:
             return np.zeros(0) if known is None else known
         angle, rate = (
@@ -159,7 +159,7 @@ class ForceRows:
         return self._follow(name, angle, rate) if self._follow else angle
 
     @cached_property
-    def _driven(self) -> Mapping[tuple[str, str], Array]:
+    def _driven_coordinates(self) -> Mapping[tuple[str, str], Array]:
         """Return coordinates given by drivers or their couplers: joint and freedom -> value."""
         found: dict[tuple[str, str], Array] = {
             (each.joint, each.freedom): self.values[each.name]

@@ -163,24 +163,24 @@ def constraints(
             fixed_last = mechanism.is_fixed(joint.j)
             found += _axial(joint, frame, coupled, mixed=mixed, fixed_last=fixed_last)
         else:
-            found += _composed(mechanism, joint, frame)
+            found += _compose(mechanism, joint, frame)
     for coupler in mechanism.couplers:
         weights = {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}
         found.append(_relation(coupler.name, weights, frame, coupler.curve))
     found += [
-        _driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
+        _driver_constraint(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
         for each in mechanism.drivers
     ]
-    return _restyled(found, style)
+    return _restyle(found, style)
 
 
 def constraints_left_out(mechanism: Mechanism, frame: Frames) -> list[Constraint]:
     """Return the constraints of reduced joints that are left out."""
     joints = (joint for each in mechanism.reduced for joint in each.left_out)
-    return [each for joint in joints for each in _composed(mechanism, joint, frame)]
+    return [each for joint in joints for each in _compose(mechanism, joint, frame)]
 
 
-def _composed(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Constraint]:
+def _compose(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Constraint]:
     # the ground as body i: its rows are constant and the simplified ones need nothing of body j
     backwards = original.symmetric and mechanism.is_fixed(original.j)
     joint = original.reversed() if backwards else original
@@ -245,7 +245,7 @@ def _relation(
     )
 
 
-def _driven(
+def _driver_constraint(
     mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool
 ) -> Constraint | Relation:
     """Return the constraint of a driver with the motion of its drive."""
@@ -274,7 +274,7 @@ def _driven(
     return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
 
 
-def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
+def _restyle(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
     """Return the constraints with every primitive replaced by its equivalents in the style."""
     if style not in (Style.PAPER, Style.CONVENTIONAL):
         return list(found)
