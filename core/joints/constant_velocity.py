@@ -31,8 +31,8 @@ class ConstantVelocity(Joint):
         # beyond a right angle no such joint transmits, and at 180 degrees it has no zero twist
         if cosine <= 0.0:
             raise MechanismError(
-                f"{self}: the shafts enclose {cosine:.3g} as cosine, expected it positive; let both"
-                " axes point the same way on, from the driving to the driven side",
+                f"{self}: the cosine of the angle between its axes is {cosine:.3g}, expected a"
+                " positive one; let both point from the driving to the driven side",
                 kind=FailureKind.WRONG_ANGLE,
             )
 

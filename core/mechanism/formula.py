@@ -140,7 +140,7 @@ class _Parser:
             try:
                 return number(token)
             except ValueError:
-                raise MechanismError(f"found {token!r}, expected a number of a size") from None
+                raise MechanismError(f"found {token!r}, expected a number below 1.8E308") from None
         name = token.upper()
         if not token[0].isalpha():
             raise MechanismError(f"found {token!r}, expected a number or a name")
@@ -161,8 +161,7 @@ class _Parser:
             raise
         except TypeError:
             raise MechanismError(
-                f"found {name} with {len(arguments)} arguments, of which some are no numbers or"
-                " too many or few; expected them as Adams has them"
+                f"found {name} with {len(arguments)} arguments that do not fit; give those of Adams"
             ) from None
         except (ArithmeticError, ValueError):
             raise MechanismError(f"found {name} of numbers that it is not defined for") from None
@@ -233,7 +232,9 @@ def step(x: Any, x0: Any, h0: Any, x1: Any, h1: Any) -> Any:
     if not (isinstance(x, Jet) and isinstance(x0, float) and isinstance(x1, float)):
         raise TypeError
     if not x1 > x0:
-        raise MechanismError(f"found a step from {x0:g} to {x1:g}, expected it to go on")
+        raise MechanismError(
+            f"found a step from {x0:g} to {x1:g}, expected its end beyond its start"
+        )
     width = x1 - x0
     s = np.clip((x.x - x0) / width, 0.0, 1.0)
     inside = (x.x >= x0) & (x.x <= x1)

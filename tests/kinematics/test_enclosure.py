@@ -118,7 +118,7 @@ PROVED = [case for case in probes() if case.name != "spline"]
 
 def test_proof_of_spline_coupler_is_refused():
     (case,) = (case for case in probes() if case.name == "spline")
-    with pytest.raises(SolveError, match="has pieces, and proofs know none"):
+    with pytest.raises(SolveError, match="is a spline, and proofs know none"):
         proved(case.mechanism, case.sweep.driver, case.sweep.change[:1])
 
 

@@ -103,8 +103,8 @@ class StaticEquations:
                 mechanism.joint(each.joint), AxialJoint
             ):
                 raise SolveError(
-                    f"{each}: statics follow the angle of hinges and of other joints about one"
-                    f" axis; {mechanism.joint(each.joint)} is none, give the spring another joint"
+                    f"{each}: {mechanism.joint(each.joint)} does not turn about one axis, and"
+                    " statics follow no other angle; give the spring another joint"
                 )
         self.mechanism, self.loads, self.frame = mechanism, tuple(loads), frames(mechanism)
         self._tape, self._layout = Tape(), Layout()

@@ -164,7 +164,7 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
     for coupler in mechanism.couplers:
         if isinstance(coupler, Spline):
             raise SolveError(
-                f"{coupler} has pieces, and proofs know none; give a polynomial in its place"
+                f"{coupler} is a spline, and proofs know none; give a polynomial in its place"
             )
 
     def number(value: Any) -> Any:
