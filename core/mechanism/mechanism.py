@@ -17,9 +17,8 @@ from ..caches import ByContent
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import finite_numbers, held
 from ..joints import Distance
-from ..joints.base import AxialJoint, Joint, Kind, unit
+from ..joints.base import AxialJoint, Joint, Kind, gap, unit
 from ..joints.coupler import Coupler
-from ..joints.gap import gap
 from ..trajectory import MARKER
 from .body import Body, Vector
 from .loads import Bushing, ForceElement, TorsionSpringDamper

@@ -34,15 +34,16 @@ from ...algebra import ZERO, Mat3, Quat, Scalar, Vec3, cross, is_literal_zero, r
 from ...errors import SolveError
 from ...joints.base import Joint, unit
 from ...mechanism.body import Body
-from ...mechanism.curves import Curve, pieces
 from ...mechanism.loads import (
     Axes,
     Bushing,
+    Curve,
     Force,
     Law,
     SpringDamper,
     Torque,
     TorsionSpringDamper,
+    pieces,
 )
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Driver
