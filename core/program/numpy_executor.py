@@ -234,7 +234,7 @@ class NumpyExecutor:
             self._worsen(worst)
             past[k % NODES] = block[remembered]
             if k + 1 < NODES:
-                for name in plan.remaining:
+                for name in plan.rest:
                     self.run(name)
                 self.carry()
             else:
@@ -272,7 +272,7 @@ class NumpyExecutor:
                 row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
                 self._worsen(parts.worst)
-                for slot, k in plan.left:
+                for slot, k in plan.fixed_targets:
                     parts.ahead[member, k] = block[slot, -1]
 
         return call
@@ -334,7 +334,7 @@ class NumpyTrack:
         extrapolates = plan.extrapolates(lanes)
         carried, moved = (
             np.array(each).T
-            for each in (plan.carried, plan.moved if extrapolates else plan.carried)
+            for each in (plan.carried, plan.moves if extrapolates else plan.carried)
         )
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
@@ -354,7 +354,7 @@ class NumpyTrack:
                 break
             whole = accepted == lanes
             smooth = extrapolates and whole and at % lanes == 0 and at + accepted < stop
-            for name in () if smooth or not accepted else plan.remaining:
+            for name in () if smooth or not accepted else plan.rest:
                 executor.run(name)
             source, target = moved if smooth else carried
             block[target] = block[source, max(accepted - 1, 0), None]
