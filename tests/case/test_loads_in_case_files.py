@@ -30,7 +30,7 @@ from ..oracles import naive
 from ..support.case_texts import complains, edited, write
 from ..support.engine_forces import Beside, every_force, force_case, values
 from ..support.four_bar_within_digits import solved, truth, written
-from ..support.loaded import loaded
+from ..support.loaded_slider_crank import loaded
 from ..support.loads import loaded as with_loads
 from ..support.loads import six
 from ..support.mechanisms import BRANCH, chain
