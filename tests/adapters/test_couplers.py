@@ -45,7 +45,7 @@ AXIS, TIP, Z = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4]), (0.0, 0.0, 1.0)
 
 
 @ENGINES
-def test_a_nut_that_a_guide_keeps_from_turning(engine):
+def test_screw_with_guided_nut_moves_exactly(engine):
     """A shaft in bearings drives a nut: of the 15 rows of the loop four say what others say."""
     joints = [
         Revolute("bearing", "ground", "shaft", (0.0, 0.0, 0.0), AXIS),
@@ -59,7 +59,7 @@ def test_a_nut_that_a_guide_keeps_from_turning(engine):
 
 
 @IN_TREE_OR_CUT
-def test_a_train_of_gears_with_a_rack(engine, closing):
+def test_gear_train_with_rack_moves_exactly(engine, closing):
     """A bearing that names its shaft first has the other sign of rotation. The last wheel slides
     too, as driven.
     """
@@ -96,7 +96,7 @@ def test_a_train_of_gears_with_a_rack(engine, closing):
 
 @ENGINES
 @pytest.mark.parametrize("ratio", [2.0, -0.3])
-def test_planetary_gear(ratio, engine):
+def test_planetary_gear_turns_exactly(ratio, engine):
     """The planet turns on its carrier, and rolls on a fixed sun: by the ratio more than it."""
     hub, tip = (0.3, 0.0, 0.0), (0.4, 0.0, 0.0)
     joints = [
@@ -115,7 +115,7 @@ def test_planetary_gear(ratio, engine):
 
 
 @IN_TREE_OR_CUT
-def test_a_steering_gear(engine, closing):
+def test_steering_gear_moves_as_native(engine, closing):
     """The pinion moves the rack, each end of which turns a wheel by a tie rod that cannot spin."""
     joints = [
         Revolute("column", "ground", "pinion", (0.2, 0.1, 0.3), (1.0, 0.2, 0.5)),
@@ -144,7 +144,7 @@ def test_a_steering_gear(engine, closing):
 
 @IN_TREE_OR_CUT
 @pytest.mark.parametrize("bodies", [("spindle", "nut"), ("nut", "spindle")])
-def test_a_spindle_lifts_a_lever(bodies, engine, closing):
+def test_screw_in_loop_moves_as_native(bodies, engine, closing):
     """A thread in a closed loop in space, between two Hooke's joints that let the spindle swing;
     over several turns.
 
@@ -196,7 +196,7 @@ def train(reverse):
 @ENGINES
 @pytest.mark.parametrize("reverse", [(), ("input",), ("middle", "guide")])
 @pytest.mark.parametrize("driver", ["in", "middle", "rack"])
-def test_gears_and_a_rack_on_a_carrier(driver, reverse, engine):
+def test_gears_and_rack_on_turning_carrier(driver, reverse, engine):
     """Driven at the input, in the middle and from the rack; the carrier turns with it, which adds
     to all wheels alike.
     """
@@ -239,7 +239,7 @@ def test_gears_and_a_rack_on_a_carrier(driver, reverse, engine):
 
 
 @ENGINES
-def test_coarse_steps_of_a_fast_pinion(engine):
+def test_rack_pinion_in_coarse_steps(engine):
     """A crank that pushes a rack, in steps of 30 degrees: the pinion turns by up to 10 rad a step,
     and its speed changes.
     """
@@ -341,7 +341,7 @@ def differential(folder):
 
 
 @pytest.mark.parametrize("engine", ["native", *SIMULATORS])
-def test_three_coupled_joints_keep_their_sum(engine, tmp_path):
+def test_linear_coupler_of_three_joints_passes(engine, tmp_path):
     case = differential(tmp_path)
     if engine != "native":
         installed(engine)
@@ -349,7 +349,7 @@ def test_three_coupled_joints_keep_their_sum(engine, tmp_path):
     assert found.outcome.value == "pass", found
 
 
-def test_linear_coupler_is_written_and_read_again(tmp_path):
+def test_linear_coupler_in_written_files(tmp_path):
     case = differential(tmp_path)
     (file := tmp_path / "again.toml").write_text(case_text(case))
     assert load_case(file).mechanism.couplers == case.mechanism.couplers
@@ -371,6 +371,6 @@ def test_linear_coupler_is_written_and_read_again(tmp_path):
         ((("a",), (1.0,)), "two names or more"),
     ],
 )
-def test_linear_coupler_without_sense_is_refused(given, said):
+def test_linear_coupler_bad_arguments_are_refused(given, said):
     with pytest.raises(MechanismError, match=said):
         LinearCoupler("sum", *given)

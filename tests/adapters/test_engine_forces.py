@@ -139,7 +139,7 @@ NIGHTLY = pytest.mark.nightly  # the other order of bodies, in the engines on th
     ],
 )
 @pytest.mark.parametrize("kind", TYPES)
-def test_reactions_of_every_joint_are_those_of_the_native_engine(kind, bodies, engine):
+def test_joint_reactions_equal_native(kind, bodies, engine):
     case, native = specimen(kind, bodies)
     found, solution = values(case, here(engine))
     compared = Beside(native, found)
@@ -151,7 +151,7 @@ def test_reactions_of_every_joint_are_those_of_the_native_engine(kind, bodies, e
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio"])
 @pytest.mark.parametrize("kind", TYPES)
-def test_cut_joints_have_the_reactions_of_tree_joints(kind, engine, monkeypatch):
+def test_reactions_of_cut_joints_equal_native(kind, engine, monkeypatch):
     monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", crank_only)
     case, native = specimen(kind, ("A", "B"))
     compared = Beside(native, values(case, here(engine))[0])
@@ -173,7 +173,7 @@ def pendulum(length=0.75, at=(0.0, 0.0, 0.0)):
 
 @pytest.mark.parametrize("engine", ["native", *ENGINES])
 @pytest.mark.parametrize(("length", "at"), [(0.75, (0.0, 0.0, 0.0)), (96.0, (1e3, 0.0, -5e2))])
-def test_pendulum(engine, length, at):
+def test_reactions_of_pendulum_are_exact(engine, length, at):
     """F = m (a - g); the torque lifts the mass."""
     angle, rate = np.array([-0.5, 0.0, 1.0]), 3.0
     case = force_case(pendulum(length, at), angle, rate)
@@ -222,7 +222,7 @@ def gear_train():
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_gears_racks_and_welds(engine):
+def test_reactions_of_gear_train_equal_native(engine):
     case, native = gear_train()
     compared = Beside(native, values(case, here(engine))[0])
     assert compared.same_missing
@@ -240,7 +240,7 @@ def few_samples(name):
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", ["four_bar", "bennett", "mcpherson_strut"])
-def test_redundant_rows_leave_the_same_undetermined(name, engine):
+def test_undetermined_reactions_equal_native(name, engine):
     case, native = few_samples(name)
     compared = Beside(native, values(case, here(engine))[0])
     assert compared.same_missing
@@ -258,7 +258,7 @@ def wound_up():
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_springs_on_cut_joints_count_turns(engine):
+def test_spring_on_cut_joint_counts_turns(engine):
     """The hinge that closes the loop turns round twice; its spring is wound up."""
     case, native = wound_up()
     compared = Beside(native, values(case, here(engine))[0])
@@ -267,7 +267,7 @@ def test_springs_on_cut_joints_count_turns(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_model_without_outputs_of_forces_has_none(engine):
+def test_forces_absent_without_force_outputs(engine):
     plain, given = cases.load("mcpherson_suspension"), adapters.engine(here(engine))
     case = replace(plain, mechanism=loaded(plain.mechanism))
     found = given.solve(given.build(case), case, 1e-12)
@@ -342,7 +342,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_planted_mistake_is_found(mistake, monkeypatch):
+def test_planted_force_mistake_is_found(mistake, monkeypatch):
     engine, (where, wrong) = here(mistake.split(", ")[1]), MISTAKES[mistake]
     case, native = specimen("universal", ("A", "B"))
     target = f"kincheck.adapters.{where}"
@@ -378,27 +378,27 @@ def forces(made, engine):
 @pytest.mark.parametrize("engine", AGREE_ACTION)
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
 @pytest.mark.parametrize("kind", DRIVEN)
-def test_a_driven_slide(kind, flipped, engine):
+def test_effort_of_driven_slide(kind, flipped, engine):
     made = chain([HINGE, replace(DRIVEN[kind], flipped=flipped), HINGE], size=2.0)
     assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
 
 
 @pytest.mark.parametrize("engine", AGREE_ACTION)
-def test_a_driven_turn_of_a_planar_joint(engine):
+def test_effort_of_driven_planar_joint(engine):
     made = chain([Link(Planar, flipped=True), HINGE])
     assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
 
 
 @pytest.mark.parametrize("engine", AGREE_ACTION)
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-def test_a_pushed_point(flipped, engine):
+def test_effort_of_pushed_point(flipped, engine):
     made = pushed_slide(Link(Translational, flipped=flipped))
     assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
 
 
 @pytest.mark.parametrize("engine", AGREE_ACTION)
 @pytest.mark.parametrize("name", COUPLINGS)
-def test_a_coupled_joint(name, engine):
+def test_effort_of_coupled_joint(name, engine):
     one, other, coupling = COUPLINGS[name]
     links = [HINGE, replace(one, flipped=True), other]
     made = chain(links, coupling, size=0.8)
@@ -422,7 +422,7 @@ def native(seed):
 
 @pytest.mark.parametrize("engine", AGREE_MECHANISMS)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_forces_are_those_of_the_native_engine(seed, engine):
+def test_forces_of_random_mechanisms_equal_native(seed, engine):
     case, expected = native(seed)
     compared = Beside(expected, values(case, here(engine))[0])
     assert np.isfinite(expected).all()

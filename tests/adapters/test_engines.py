@@ -43,7 +43,7 @@ def strut(values: Any = (), rate: float = 1.0) -> Case:
 
 
 @ENGINES
-def test_the_strut_is_the_truth_to_round_off(engine: str) -> None:
+def test_strut_solved_to_round_off(engine: str) -> None:
     (record,) = run([strut()], [installed(engine)], tol=TOL).records
     assert record.outcome is Outcome.PASS, record.message
     for errors in record.errors.values():
@@ -60,7 +60,7 @@ CLOSED_BY = {
 
 
 @pytest.mark.parametrize("engine", TREES)
-def test_the_record_says_what_closes_the_loops(engine: str) -> None:
+def test_details_name_loop_closures(engine: str) -> None:
     given, case = installed(engine), strut([0.0])
     details = given.solve(given.build(case), case, TOL).details
     assert details["closures"] == dict(
@@ -70,7 +70,7 @@ def test_the_record_says_what_closes_the_loops(engine: str) -> None:
 
 
 @ENGINES
-def test_rates_are_those_of_the_sweep(engine: str) -> None:
+def test_rates_scale_with_sweep_rate(engine: str) -> None:
     """Forty times as fast, and backwards; points of fixed bodies stay."""
     given, values = installed(engine), np.linspace(-0.08, 0.08, 41)
     slow, fast = (
@@ -84,7 +84,7 @@ def test_rates_are_those_of_the_sweep(engine: str) -> None:
 
 
 @ENGINES
-def test_solving_again_gives_the_same_numbers(engine: str) -> None:
+def test_repeated_solve_gives_equal_bits(engine: str) -> None:
     """Nothing is left in the model by what it solved before, reached or not."""
     given, case = installed(engine), strut(np.linspace(-0.08, 0.08, 9))
     model = given.build(case)
@@ -98,7 +98,7 @@ def test_solving_again_gives_the_same_numbers(engine: str) -> None:
 
 
 @ENGINES
-def test_an_end_of_motion_is_told_and_nothing_is_written(
+def test_end_of_motion_is_reported(
     engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     given, values = installed(engine), np.arange(-10, 601) * 1e-3
@@ -122,7 +122,7 @@ class Wind(Driver):
 
 
 @ENGINES
-def test_unknown_joints_and_drivers_are_named(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_joint_or_driver_is_refused(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A subclass of a known joint may mean something else."""
     monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
 
@@ -142,7 +142,7 @@ def test_unknown_joints_and_drivers_are_named(engine: str, monkeypatch: pytest.M
 
 
 @ENGINES
-def test_a_broken_simulator_has_no_version(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_broken_simulator_has_no_version(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     given = installed(engine)
     assert isinstance(given.version(), str)
 
@@ -157,14 +157,14 @@ def test_a_broken_simulator_has_no_version(engine: str, monkeypatch: pytest.Monk
         assert given.version() is None
 
 
-def test_another_package_of_the_name_is_no_pinocchio(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pinocchio_namesake_package_has_no_version(monkeypatch: pytest.MonkeyPatch) -> None:
     engine, other = installed("pinocchio"), SimpleNamespace(__version__="0.4")
     monkeypatch.setattr(importlib, "import_module", lambda name: other)
     assert engine.version() is None
 
 
 @pytest.mark.parametrize("engine", TREES)
-def test_balls_turn_by_small_angles(engine: str) -> None:
+def test_spherical_joint_at_small_angles(engine: str) -> None:
     """By a ten-thousandth of a radian, where a simulator's rotations may be those of a series."""
     case = probe(Spherical)
     case = replace(case, sweep=replace(case.sweep, values=np.linspace(-2e-3, 2e-3, 9)))
@@ -177,9 +177,7 @@ def test_balls_turn_by_small_angles(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", TREES[1:])
-def test_a_wrong_axis_is_found_and_named_by_comparison(
-    engine: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tilted_axis_is_found_by_comparison(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """As by a wrong convention: the arm's hinge is tilted by a tenth of a radian, and the loops
     close all the same.
     """
@@ -208,9 +206,7 @@ def test_a_wrong_axis_is_found_and_named_by_comparison(
 
 
 @pytest.mark.parametrize("name", ["drake", "simbody"])
-def test_a_simulator_that_gives_up_costs_its_pair_only(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_simulator_abort_costs_one_pair(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Drake's checks raise SystemExit, OpenSim ends the process at a name with a blank."""
     installed(name)
     monkeypatch.syspath_prepend(str(ROOT))

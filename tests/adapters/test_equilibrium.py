@@ -92,7 +92,7 @@ def held_in(mechanism, place, force):
     ],
     ids=["torsion", "cardan", "side", "coil", "coil stop", "stop"],
 )
-def test_loaded_arm_turns_as_closed_form(name, element, load, angle):
+def test_equilibrium_of_loaded_arm(name, element, load, angle):
     arm = Mechanism(
         "arm",
         [Body("arm")],
@@ -109,7 +109,7 @@ def test_loaded_arm_turns_as_closed_form(name, element, load, angle):
 
 
 @pytest.mark.parametrize("name", SIMULATORS)
-def test_snap_through_is_no_equilibrium(name):
+def test_equilibrium_beyond_snap_through(name):
     """Beyond the limit load plain Newton lands at the far side, its residual zero."""
     engine, at, limit = engine_of(name), (0.0, 0.0, 0.06), 90.57442209975467
     springs = [
@@ -128,7 +128,7 @@ def test_snap_through_is_no_equilibrium(name):
     assert (z > 0.0344).all()
 
 
-def test_body_that_nothing_holds_is_an_error():
+def test_equilibrium_of_loose_body_fails():
     loose = Mechanism(
         "loose",
         [Body("arm", mass=1.0)],

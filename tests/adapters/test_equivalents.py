@@ -87,7 +87,7 @@ def solved(engine, case):
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
-def test_a_joint_of_one_file_is_solved_by_every_engine(name):
+def test_user_joint_solved_by_every_engine(name):
     found, series = solved(adapters.engine(name), quick_return())
     for values, right, atol in zip(series, motion(), (1e-12, 1e-11, 1e-10), strict=True):
         np.testing.assert_allclose(values, right, atol=atol)
@@ -96,17 +96,17 @@ def test_a_joint_of_one_file_is_solved_by_every_engine(name):
 
 
 @pytest.mark.parametrize(("name", "atol"), [("mujoco", 1e-4), ("exudyn-static", 1e-9)])
-def test_a_simulator_simulates_the_equivalent(name, atol):
+def test_user_joint_equivalent_is_simulated(name, atol):
     _, series = solved(adapters.engine(name, "simulate"), quick_return())
     np.testing.assert_allclose(series[0], motion()[0], atol=atol)
 
 
 @pytest.mark.parametrize("name", adapters.WRITERS)
-def test_a_written_model_has_the_equivalent(name):
+def test_written_model_holds_joint_equivalent(name):
     assert "slot_block" in "".join(written(quick_return(), adapters.writer(name)).values())
 
 
-def test_a_subclass_with_other_primitives_inherits_no_equivalent():
+def test_subclass_with_other_primitives_is_refused():
     class Narrow(Slotted):
         """A pin that does not turn in the slot."""
 
@@ -121,7 +121,7 @@ def test_a_subclass_with_other_primitives_inherits_no_equivalent():
     assert engine.unsupported(quick_return(Renamed)) is None
 
 
-def test_equivalents_have_equivalents():
+def test_nested_equivalents_are_expanded():
     class Nested(Slotted):
         """A slot whose equivalent is a slot."""
 
@@ -142,7 +142,7 @@ def test_equivalents_have_equivalents():
     assert types == [["translational", "revolute"], ["slotted"]]
 
 
-def test_known_joints_stay():
+def test_known_joints_keep_their_type():
     mechanism = quick_return().mechanism
     assert with_equivalents(mechanism, {Slotted, Revolute}) is mechanism
     unlike = quick_return(lambda *given: Planar(*given[:4], UP)).mechanism

@@ -40,7 +40,7 @@ from ..support.written_mechanisms import CASES, Z, assert_read, case, coupled_lo
 
 
 @pytest.mark.parametrize("to", adapters.WRITERS)
-def test_a_joint_without_counterpart_is_named(to):
+def test_export_names_joint_without_counterpart(to):
     class Mine(Spherical):
         pass
 
@@ -55,7 +55,7 @@ def test_a_joint_without_counterpart_is_named(to):
         adapters.writer(to)(mine, way("mcpherson", False), {})
 
 
-def test_names_that_a_format_keeps_or_needs_twice_are_refused():
+def test_export_refuses_taken_names():
     mechanism, path = slider_crank(), dict(way("slider_crank", False))
     world = replace(
         mechanism,
@@ -79,7 +79,7 @@ def test_names_that_a_format_keeps_or_needs_twice_are_refused():
         adapters.writer("mjcf")(twice, path, {})
 
 
-def test_names_with_blanks_are_read_by_simulators_that_have_none(tmp_path):
+def test_export_of_names_with_blanks(tmp_path):
     """OpenSim ends the process at a name with a blank."""
     one = slider_crank()
     names = {"crank": "left crank", "rod": "rod/2"}
@@ -98,7 +98,7 @@ def test_names_with_blanks_are_read_by_simulators_that_have_none(tmp_path):
         assert_read(found, other, path, True)
 
 
-def test_a_joint_of_sdf_that_would_mimic_two_others_is_refused():
+def test_sdf_export_refuses_two_mimics():
     mechanism = coupled_loop()
     third = Gear("third", ("A", "A2"), 1.0)
     fourth = Gear("fourth", ("A", "A2"), 1.0)
@@ -107,7 +107,7 @@ def test_a_joint_of_sdf_that_would_mimic_two_others_is_refused():
         adapters.writer("sdf")(mechanism, way("coupled_loop", False), {})
 
 
-def test_a_start_that_cannot_be_reached_says_how_far_it_goes():
+def test_export_start_out_of_reach_fails():
     with pytest.raises(
         SolveError, match=r"no way from the design to stroke = 0\.5: .*beyond stroke = 0\.29"
     ):
@@ -127,7 +127,7 @@ def test_a_start_that_cannot_be_reached_says_how_far_it_goes():
         ("osim", [".osim"]),
     ],
 )
-def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch, capsys):
+def test_export_command_writes_files(to, endings, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main.main(["export", "mcpherson_strut", "--to", to, "--at", "30mm"]) == 0
     names = [f"mcpherson_strut{ending}" for ending in endings]
@@ -153,7 +153,7 @@ def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch
         ),
     ],
 )
-def test_what_cannot_be_exported_is_said(argv, said, tmp_path, monkeypatch, capsys):
+def test_export_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mcpherson_strut.xml").write_text("mine")
     assert main.main(["export", "mcpherson_strut", *argv]) == 2
@@ -161,7 +161,7 @@ def test_what_cannot_be_exported_is_said(argv, said, tmp_path, monkeypatch, caps
     assert (tmp_path / "mcpherson_strut.xml").read_text() == "mine"
 
 
-def test_help_names_the_formats_that_there_are(capsys):
+def test_export_help_lists_formats(capsys):
     assert tuple(FORMATS) == adapters.WRITERS
     for command in ("export", "assemblies"):
         assert main.main([command, "--help"]) == 0
@@ -184,7 +184,7 @@ NOT_WRITTEN = {"polynomial": NO_CURVE, "spline": NO_CURVE | {"mjcf": "MJCF"}}
 @pytest.mark.parametrize("elsewhere", [False, True], ids=["design", "elsewhere"])
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("to", READERS)
-def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere, tmp_path):
+def test_written_model_closes_at_native_pose(to, name, elsewhere, tmp_path):
     if refused := NOT_WRITTEN.get(name, {}).get(to):
         with pytest.raises(KincheckError, match=f"has no counterpart in {refused}"):
             reading(to, name, tmp_path, elsewhere)
@@ -193,7 +193,7 @@ def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere
     assert_read(found, CASES[name].mechanism, path, elsewhere)
 
 
-def test_polynomials_count_from_the_start():
+def test_polynomial_coupler_shifted_to_start():
     """With y = x + 0.2 x^2, and x = 0.5 at the start."""
     hinges = [
         Revolute(name, "ground", name.upper(), (k, 0.0, 0.0), Z) for k, name in enumerate("ab")
@@ -223,7 +223,7 @@ def cut_elsewhere(mechanism, first=()):
 
 @pytest.mark.parametrize("name", [each.name for each in probes()])
 @pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf", "osim"])
-def test_a_joint_closes_a_loop_as_it_carries_a_body(to, name, tmp_path, monkeypatch):
+def test_written_joint_closes_loop(to, name, tmp_path, monkeypatch):
     if to in NOT_WRITTEN.get(name, ()):
         return  # refused above
     monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", cut_elsewhere)
@@ -231,7 +231,7 @@ def test_a_joint_closes_a_loop_as_it_carries_a_body(to, name, tmp_path, monkeypa
     assert_read(found, CASES[name].mechanism, path, True)
 
 
-def test_the_cases_move_and_count_turns():
+def test_written_cases_move_over_turns():
     for name in CASES:
         assert (
             max(
@@ -245,7 +245,7 @@ def test_the_cases_move_and_count_turns():
 
 
 @pytest.mark.parametrize("to", READERS)
-def test_a_start_of_another_mechanism_is_seen(to, tmp_path):
+def test_written_model_shows_wrong_start(to, tmp_path):
     """The tie rod a millimetre longer than where the poses are from."""
     mechanism = mcpherson()
     rod = mechanism.joint("tie_rod")
@@ -314,7 +314,7 @@ def carried(case: Case, again: Case) -> dict[str, BodyMotion]:
 
 
 @pytest.mark.parametrize(("name", "kind"), PAIRS)
-def test_an_export_is_read_and_moves_alike(name: str, kind: str, tmp_path: Path):
+def test_export_read_again_moves_alike(name: str, kind: str, tmp_path: Path):
     case = cases.load(name)
     again = read_again(case, exported(case, kind, tmp_path))
     motions = carried(case, again)

@@ -29,7 +29,7 @@ def installed(name):
 
 
 @pytest.mark.parametrize("name", ["native", *SIMULATORS])
-def test_a_fold_just_after_a_sample_ends_the_motion(name):
+def test_fold_after_sample_ends_motion(name):
     """The rates beside the fold are so large that they seem to lead to another assembly."""
     engine, case = installed(name), load_case(BEYOND)
     found = engine.solve(engine.build(case), case, 1e-12)
@@ -39,7 +39,7 @@ def test_a_fold_just_after_a_sample_ends_the_motion(name):
     assert np.isnan(found.points["P"].position[2]).all()
 
 
-def test_two_continuations_find_the_same_fold():
+def test_fold_by_two_continuations_agrees():
     """By arclength, and by steps of the driver in extended precision."""
     case = load_case(BEYOND)
     assert followed(case).reach.tolist() == [Reach.REACHED, Reach.REACHED, Reach.BEYOND]
@@ -47,7 +47,7 @@ def test_two_continuations_find_the_same_fold():
     assert first_fold(case, 0.053) is None
 
 
-def test_the_end_of_a_stroke_is_a_fold():
+def test_fold_at_end_of_stroke():
     """A slider-crank driven at its slider, where the rod is stretched and where it is folded."""
     crank, rod = 0.3, 1.0
     b = polar(crank, 0.4)
@@ -69,7 +69,7 @@ def past_folds():
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", SIMULATORS)
-def test_no_simulator_steps_over_a_fold(name, past_folds):
+def test_simulator_steps_over_no_fold(name, past_folds):
     """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples
     15000`. In this process, because workers take longer to begin than to solve.
     """
@@ -105,11 +105,11 @@ def turned(angle):
         (np.diag([1.0, 1e300]), False),
     ],
 )
-def test_a_jacobian_stays_regular_where_it_changes_by_less_than_half_of_itself(ratio, regular):
+def test_regular_between_small_jacobian_changes(ratio, regular):
     assert regular_between(ratio) == regular
 
 
-def test_a_step_is_compared_with_itself_and_not_with_its_rates():
+def test_continuation_criterion_beside_fold():
     """Beside a fold the rates are very large: half their sum over the step may be any change."""
     dt, before, now = 0.02, np.array([60.0]), np.array([2.0])
     assert continuous(np.array([0.49]), now, before, dt, 1.0)
@@ -120,7 +120,7 @@ def test_a_step_is_compared_with_itself_and_not_with_its_rates():
 
 
 @pytest.mark.parametrize(("seed", "number", "passed"), [(101, 364, 0), (109, 192, 2)])
-def test_a_singular_pose_that_the_motion_passes_is_no_fold(seed, number, passed):
+def test_passed_singular_pose_is_no_fold(seed, number, passed):
     """Rates stay finite there, and `trace` goes on through a branch point or without an event."""
     truth = specimen(FAMILIES["folds"], seed, number, 4).truth
     assert truth.reach[passed] == Reach.UNKNOWN

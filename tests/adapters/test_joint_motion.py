@@ -68,7 +68,7 @@ def all_loops():
 
 
 @pytest.mark.parametrize(("engine", "kind", "bodies", "closing"), all_loops())
-def test_joint_in_a_loop_moves_natively(engine, kind, bodies, closing):
+def test_joint_in_loop_moves_as_native(engine, kind, bodies, closing):
     mechanism = on_crank(kind, *bodies)
     found = solved(engine, mechanism, TURN, RATE, ["tested"] if closing else [])
     assert_moves_natively(found, kind, tuple(bodies), tolerances(engine))
@@ -82,7 +82,7 @@ def test_joint_in_a_loop_moves_natively(engine, kind, bodies, closing):
         assert found.details["unknowns"] == 7 - mechanism.joint("tested").rows + spare
 
 
-def test_every_joint_type_has_a_closure():
+def test_every_joint_type_has_closure():
     assert {each.type for each in CLOSURES} == set(TYPES)
 
 
@@ -105,7 +105,7 @@ def on_screw(theta, axis, point, lead, rate):
 @BOTH_ORDERS
 @pytest.mark.parametrize("lead", [0.05, -9.0])
 @pytest.mark.parametrize("driver", [JointAngle, JointDisplacement, PointCoordinate])
-def test_screw_over_turns_is_a_helix(driver, lead, mirrored, engine, closing):
+def test_screw_over_turns_is_helix(driver, lead, mirrored, engine, closing):
     """By either of its coordinates or a point, with a lead above and below one radian a metre."""
     thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), AXIS, lead)
     by_point = driver is PointCoordinate
@@ -126,7 +126,7 @@ def test_screw_over_turns_is_a_helix(driver, lead, mirrored, engine, closing):
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("swept", ["turn", "push"])
-def test_both_coordinates_of_a_sleeve(swept, mirrored, engine, closing):
+def test_cylindrical_joint_with_two_drivers(swept, mirrored, engine, closing):
     sleeve = Cylindrical("sleeve", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
     drivers = [JointAngle("turn", "sleeve"), JointDisplacement("push", "sleeve")]
     mechanism = mechanism_of(
@@ -152,7 +152,7 @@ CLOSED_BY = {
 
 @ENGINES
 @BOTH_ORDERS
-def test_driven_joint_that_closes_a_loop(mirrored, engine):
+def test_driven_joint_closes_loop(mirrored, engine):
     """Two sleeves on one axis, the angle of one and the displacement of the other driven; a hinge
     that a screw without lead repeats.
     """
@@ -180,7 +180,7 @@ def test_driven_joint_that_closes_a_loop(mirrored, engine):
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
-def test_constant_velocity_of_two_shafts(bend, mirrored, engine, closing):
+def test_constant_velocity_joint_over_turns(bend, mirrored, engine, closing):
     """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no
     universal joint does.
     """
@@ -204,7 +204,7 @@ def test_constant_velocity_of_two_shafts(bend, mirrored, engine, closing):
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("rounding", [0.0, 8e-3])
-def test_universal_joint_turns_as_hooke_found(rounding, mirrored, engine, closing):
+def test_universal_joint_follows_hooke(rounding, mirrored, engine, closing):
     """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or
     not. With the second bearing cut, a body that turns about two moving axes carries a closure: the
     only place where a direction has a bias from the angular acceleration.
@@ -234,7 +234,7 @@ def test_universal_joint_turns_as_hooke_found(rounding, mirrored, engine, closin
 
 @ENGINES
 @pytest.mark.parametrize("second", [Distance, Fixed, Revolute, Spherical, Universal])
-def test_second_joint_between_the_same_bodies(second, engine):
+def test_second_joint_between_same_bodies(second, engine):
     """Rows of a constraint within one rigid body, or on an axis that is there already: zeros, which
     OpenSim and MuJoCo treat apart.
     """

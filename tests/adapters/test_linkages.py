@@ -54,7 +54,7 @@ def four_bar(angle):
 
 @ENGINES
 @BOTH_ORDERS
-def test_four_bar_of_spatial_revolutes_in_a_tilted_plane(mirrored, engine):
+def test_four_bar_in_tilted_plane(mirrored, engine):
     """Three of the rows are too many."""
     R = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
     (B,), (C,) = (x @ R for x in four_bar(np.array([0.6])))
@@ -80,7 +80,7 @@ def test_four_bar_of_spatial_revolutes_in_a_tilted_plane(mirrored, engine):
 
 @ENGINES
 @pytest.mark.parametrize("length", [None, 0.78])
-def test_rssr_with_a_rod_of_any_length(length, engine):
+def test_rssr_with_given_rod_length(length, engine):
     """A rod of another length than at design moves the rocker before the sweep starts."""
     joints = [*RSSR[:2], replace(RSSR[2], length=length)]
     mechanism = mechanism_of(joints, {"C": ("rocker", C0)}, [JointAngle("crank", "a")])
@@ -97,7 +97,7 @@ def peg():
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("name", ["pivot", "pin", "gudgeon", "guide", "glue"])
-def test_any_joint_can_be_mirrored_and_cut(name, closing, mirrored, engine, peg):
+def test_slider_crank_joint_mirrored_or_cut(name, closing, mirrored, engine, peg):
     """The driven joint among them; its value keeps its sign when both the bodies and the axis are
     exchanged.
     """
@@ -113,7 +113,7 @@ def test_any_joint_can_be_mirrored_and_cut(name, closing, mirrored, engine, peg)
 
 
 @ENGINES
-def test_a_body_on_rods_is_a_body_on_arms(engine):
+def test_rods_move_body_as_arms(engine):
     """Two rods to one ball do what an arm on a revolute does."""
     balls = {
         "upper": ((-0.1, 0.4, 0.3), (0.2, 0.4, 0.3), (0.0, 0.7, 0.3)),
@@ -140,7 +140,7 @@ def test_a_body_on_rods_is_a_body_on_arms(engine):
 
 
 @ENGINES
-def test_a_free_body_on_five_rods_keeps_their_lengths(engine):
+def test_five_rods_keep_lengths(engine):
     """One rod is longer than the distance of its points at design."""
     ends = [
         ((0.1, 0.8, 0.25), (0.0, 0.4, 0.3)),
@@ -166,7 +166,7 @@ def test_a_free_body_on_five_rods_keeps_their_lengths(engine):
 
 @ENGINES
 @BOTH_ORDERS
-def test_angle_of_a_hinge_over_turns(mirrored, engine):
+def test_joint_angle_over_turns(mirrored, engine):
     """Of the second body, about an axis that is not a unit vector; an obliquely held forearm with
     a plate goes round.
     """
@@ -193,7 +193,7 @@ def test_angle_of_a_hinge_over_turns(mirrored, engine):
 
 
 @ENGINES
-def test_a_point_holds_its_height(engine):
+def test_point_coordinate_held_constant(engine):
     """Two arms in a row: with the tip's height held, the tip describes a circle."""
     joints = [
         Revolute("shoulder", "ground", "upper", (0.0, 0.0, 0.0), Z),
@@ -206,7 +206,7 @@ def test_a_point_holds_its_height(engine):
 
 
 @ENGINES
-def test_drivers_without_a_sweep_hold(engine):
+def test_unswept_driver_holds_joint(engine):
     """The RSSR's rocker on a slide that is held."""
     slide = Translational("slide", "carriage", "ground", (0.0, 0.0, 0.0), (1.0, 1.0, 0.0))
     drivers = [JointAngle("crank", "a"), JointDisplacement("hold", "slide")]
@@ -217,7 +217,7 @@ def test_drivers_without_a_sweep_hold(engine):
 
 
 @ENGINES
-def test_a_point_driven_along_an_oblique_direction(engine):
+def test_point_coordinate_along_oblique_direction(engine):
     """r cos(t - t_d) = c: a pendulum of radius r pulled along the direction t_d in its plane; a
     slider pushed along another direction k moves by c / (k . axis).
     """
@@ -243,7 +243,7 @@ def test_a_point_driven_along_an_oblique_direction(engine):
 
 @ENGINES
 @BOTH_ORDERS
-def test_displacement_of_a_slider(mirrored, engine):
+def test_joint_displacement_drives_rssr(mirrored, engine):
     """A slider, named second or first of its joint, pushes the rocker of the RSSR by the rod."""
     h, values, rate = np.array([2.0, 1.0, -2.0]) / 3.0, np.linspace(-0.05, 0.05, 9), 0.5
     guide = Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), tuple(3.0 * h))
@@ -263,7 +263,7 @@ def test_displacement_of_a_slider(mirrored, engine):
 
 @ENGINES
 @BOTH_ORDERS
-def test_displacement_of_a_cylinder_that_turns(mirrored, engine):
+def test_joint_displacement_of_turning_cylinder(mirrored, engine):
     """An arm on a hinge at the origin, pushed by a cylinder hinged at D: the law of cosines gives
     the arm's angle.
     """

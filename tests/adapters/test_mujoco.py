@@ -30,7 +30,7 @@ from ..support.engine_motion import (
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
 
-def test_rows_are_the_derivatives_of_one_another():
+def test_mujoco_rows_are_consistent_derivatives():
     """Off the solution too, for connects, a weld, a tendon, a joint equality and a point driver."""
     brace = Distance("brace", "ground", "slider", ((0.5, 0.4, 0.3), (0.2, 0.0, 0.0)))
     extra = Spherical("extra", "peg", "ground", (0.1, 0.3, 0.3))
@@ -62,7 +62,7 @@ def test_rows_are_the_derivatives_of_one_another():
     )
 
 
-def test_closures_that_mujoco_leaves_out():
+def test_mujoco_degenerate_closures_are_solved():
     """A weld inside one rigid body, a rod between fixed bodies, and a bearing on the crank's axis:
     rows of zeros or nearly so.
     """
@@ -81,7 +81,7 @@ def test_closures_that_mujoco_leaves_out():
     assert "no assembly at the design position" in failed.message
 
 
-def test_a_rod_square_to_a_slider():
+def test_mujoco_rod_at_dead_centre():
     """At its dead centre MuJoCo leaves the rod's row out; the row is zero there, its rate v^2 /
     span.
     """

@@ -72,7 +72,7 @@ def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
 @pytest.mark.parametrize("exponent", [-40, -20, 20])
-def test_size_does_not_matter(engine, exponent):
+def test_simulator_motion_scales_with_size(engine, exponent):
     """To the last bit: from a picometre to a thousand kilometres, by powers of two."""
     factor = 2.0**exponent
     for mechanism, values, scale in ((mcpherson(), STROKES, factor), (jack(), TURNS, 1.0)):
@@ -86,7 +86,7 @@ def test_size_does_not_matter(engine, exponent):
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
-def test_place_does_not_matter(engine):
+def test_simulator_motion_at_far_place(engine):
     """Four thousand kilometres away: only the sum with the position rounds."""
     offset = np.array((2.0**22, -(2.0**21), 0.0))
     for mechanism, values in ((mcpherson(), STROKES), (jack(), TURNS)):
@@ -98,7 +98,7 @@ def test_place_does_not_matter(engine):
         assert (there[1:] == here[1:]).all()
 
 
-def test_residuals_are_in_metres():
+def test_residual_is_in_metres():
     for engine in (
         Native(),
         *filter(
@@ -112,7 +112,7 @@ def test_residuals_are_in_metres():
         assert 0.0 < residuals[0] == residuals[1] < 1e-12
 
 
-def test_a_mechanism_in_its_own_frame_is_as_large_as_one_and_there():
+def test_own_frame_has_unit_size():
     case = case_of(moved(jack(), 2.0**-30, (2.0**-9, 0.0, 2.0**-8)), TURNS)
     frame, own = own_frame(case), in_own_frame(case)
     assert frame.unit == 2.0**-30
@@ -135,7 +135,7 @@ def test_a_mechanism_in_its_own_frame_is_as_large_as_one_and_there():
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
-def test_a_model_of_another_mechanism_is_refused(engine):
+def test_model_of_other_mechanism_is_refused(engine):
     """The numbers of a model have no names: those of another length of the sweep were wrong."""
     chosen = adapters.engine(engine)
     if not chosen.version():

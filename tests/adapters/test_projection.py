@@ -69,26 +69,26 @@ class Crank:
         ]
 
 
-def test_a_steady_motion_is_followed_to_its_end():
+def test_projection_follows_steady_motion():
     found = solve_by_projection(Crank(lambda c: 1.0), CASE, 1e-12)
     assert found.solved.all()
     assert found.message == ""
     assert np.abs(found.points["pin"].position[:, 0] - np.cos(CASE.sweep.values)).max() <= 1e-15
 
 
-def test_a_jump_that_no_output_sees_ends_the_motion():
+def test_hidden_jump_ends_projection():
     found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else -1.0), CASE, 1e-12)
     assert found.solved.tolist() == [value < 0.52 for value in CASE.sweep.values]
     assert "jumps to another assembly; last reachable sample at turn = 0.5" in found.message
     assert np.isnan(found.points["pin"].position[~found.solved]).all()
 
 
-def test_residuals_that_are_not_numbers_end_the_motion():
+def test_nan_residual_ends_projection():
     found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else np.nan), CASE, 1e-12)
     assert found.solved.sum() == 11
 
 
-def test_freedom_that_is_left_is_refused():
+def test_undriven_freedom_is_refused():
     class Loose(Crank):
         def jacobian(self):
             return np.diag([1.0, 0.0])
@@ -97,7 +97,7 @@ def test_freedom_that_is_left_is_refused():
         solve_by_projection(Loose(lambda c: 1.0), CASE, 1e-12)
 
 
-def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
+def test_repeated_sample_out_of_reach():
     """No step between samples says how small a part of one may be."""
     case = replace(CASE, sweep=Sweep("turn", np.array([0.5, 0.5])))
     found = solve_by_projection(Crank(lambda c: 1.0), case, 1e-12)
@@ -109,7 +109,7 @@ def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
     assert np.isnan(jumps.residual)
 
 
-def test_a_first_sample_whose_rates_cannot_be_met_is_told():
+def test_unreachable_rates_at_first_sample():
     """The pose is reached on the way there, where the drivers move otherwise."""
 
     class Stuck(Crank):
@@ -131,7 +131,7 @@ def test_a_first_sample_whose_rates_cannot_be_met_is_told():
 @pytest.mark.parametrize("defect", [1e-4, 1e-9])
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
+def test_near_parallelogram_keeps_its_branch(name, loops, defect):
     """Nearly a parallelogram: beside its change points, within parts of a step, the crossed linkage
     goes straight on.
 
@@ -232,7 +232,7 @@ class Doubled(Crank):
         (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),
     ],
 )
-def test_why_there_is_no_pose_is_told(gap, push, tol, message):
+def test_missing_design_pose_is_explained(gap, push, tol, message):
     found = solve_by_projection(Doubled(gap, push), CASE, tol)
     assert found.solved.all() == (not message)
     assert found.message.startswith(message)

@@ -19,7 +19,7 @@ from kincheck.adapters.simbody.simbody import turned
 ENGINE = adapters.engine("simbody")
 
 
-def test_a_ball_passes_the_angles_where_euler_angles_lock():
+def test_spherical_joint_passes_gimbal_lock():
     """A body on a ball stops where its turn about y is a right angle: OpenSim's second angle."""
     corner = (0.8, 0.1, 0.5)
     joints = [
@@ -46,7 +46,7 @@ def matrix(p):
     return (e0**2 - e @ e) * np.eye(3) + 2.0 * np.outer(e, e) + 2.0 * e0 * skew
 
 
-def test_euler_angles_give_the_rotation_back_at_any_angle():
+def test_euler_angles_restore_any_rotation():
     rng = np.random.default_rng(0)
     lock = math.sqrt(0.5)
     poses = [*rng.normal(size=(50, 4)), [lock, 0.0, lock, 0.0], [lock, 0.0, -lock, 0.0]]
@@ -59,7 +59,7 @@ def test_euler_angles_give_the_rotation_back_at_any_angle():
         np.testing.assert_allclose(R, matrix(p), rtol=0, atol=2e-15)
 
 
-def test_turning_is_by_the_axes_of_the_parent():
+def test_turn_by_parent_axes():
     p, turn = np.array([0.5, 0.5, -0.5, 0.5]), np.array([0.4, -0.2, 0.9])
     angle = np.linalg.norm(turn)
     step = [math.cos(angle / 2), *(math.sin(angle / 2) / angle * turn)]
@@ -68,7 +68,7 @@ def test_turning_is_by_the_axes_of_the_parent():
     assert turned(p.tolist(), [0.0, 0.0, 0.0]) == tuple(p)
 
 
-def test_settings_and_floor_say_what_is_simbody_s_own():
+def test_simbody_settings_and_floor():
     case = cases.load("mcpherson_strut")
     assert ENGINE.settings["residual"].startswith("getQErr")
     floor = ENGINE.floor(replace(case, sweep=Sweep("stroke", np.linspace(-0.02, 0.02, 5))))

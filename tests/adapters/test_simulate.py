@@ -80,7 +80,7 @@ STRUT = {
 
 
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
-def test_the_strut_is_simulated_as_well_as_the_simulator_can(name):
+def test_simulated_strut_errors_within_limits(name):
     engine = simulation(name)
     found = record(cases.load("mcpherson_strut"), engine)
     assert (found.engine, found.mode, found.solved) == (name, "simulate", 161)
@@ -93,7 +93,7 @@ def test_the_strut_is_simulated_as_well_as_the_simulator_can(name):
 
 
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
-def test_masses_and_gravity_change_no_motion(name):
+def test_loads_leave_simulated_motion_unchanged(name):
     """The motion is prescribed, so its outputs have the same bits with force outputs and without:
     no acceleration has gravity subtracted.
     """
@@ -111,7 +111,7 @@ def test_masses_and_gravity_change_no_motion(name):
 
 
 @pytest.mark.parametrize("name", [name for name in adapters.SIMULATIONS if name != "exudyn-alpha"])
-def test_a_stroke_out_of_reach_ends_and_says_so(name):
+def test_simulation_out_of_reach_ends(name):
     case = strut()
     case = replace(case, sweep=replace(case.sweep, values=np.linspace(0.0, 0.6, 61)))
     found = record(case, simulation(name))
@@ -131,7 +131,7 @@ def test_a_stroke_out_of_reach_ends_and_says_so(name):
     "name",
     ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static", "drake", "dart"],
 )
-def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
+def test_simulated_redundant_loop_with_sine_drivers(name):
     """Two drivers, neither steady, and a planar loop of revolutes, whose rows are redundant."""
     z, corners = (
         (0.0, 0.0, 1.0),
@@ -173,7 +173,7 @@ def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
         *("drake", "dart"),
     ],
 )
-def test_more_effort_is_more_precise(name):
+def test_higher_effort_is_more_precise(name):
     efforts = simulation(name).efforts()
     assert len({str(engine.settings) for engine in efforts.values()}) == len(efforts)
     coarse, fine = [worst(record(strut(), efforts[label])) for label in list(efforts)[:3:2]]
@@ -181,7 +181,7 @@ def test_more_effort_is_more_precise(name):
     assert fine[k] < 0.3 * coarse[k]
 
 
-def test_default_constraints_of_mujoco_stay_soft_whatever_the_step():
+def test_mujoco_default_constraints_stay_soft():
     coarse, *_, fine = [
         worst(record(strut(), engine))[0]
         for engine in simulation("mujoco-default").efforts().values()
@@ -200,7 +200,7 @@ def coarse_strut(every):
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
-def test_projection_efforts_share_a_second_order_predictor(name):
+def test_projection_predictor_is_second_order(name):
     engine = adapters.engine(name)
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
@@ -217,7 +217,7 @@ def test_projection_efforts_share_a_second_order_predictor(name):
 
 
 @pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
-def test_a_floor_says_what_was_counted(name):
+def test_floor_sums_counted_calls(name):
     engine = adapters.engine(name)
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
@@ -228,7 +228,7 @@ def test_a_floor_says_what_was_counted(name):
     assert adapters.engine(name, "simulate").floor(strut()) is None
 
 
-def test_pinocchio_numbers_every_subtree_without_a_gap():
+def test_pinocchio_subtrees_have_no_gap():
     """Else its constraintDynamics is wrong without a word: positions of this case were off by a
     millimetre.
     """
@@ -237,7 +237,7 @@ def test_pinocchio_numbers_every_subtree_without_a_gap():
         assert joint == 0 or [*subtree] == [*range(joint, joint + len(subtree))]
 
 
-def test_jointed_moves_as_the_mechanism_does():
+def test_jointed_mechanism_moves_alike():
     plain, made = mcpherson(), jointed(mcpherson())
     assert not any(isinstance(joint, Distance) for joint in made.joints)
     values = np.linspace(-0.08, 0.08, 9)
@@ -248,7 +248,7 @@ def test_jointed_moves_as_the_mechanism_does():
 
 
 @pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0)])
-def test_jointed_rod_of_a_crank_turns_all_round(along):
+def test_jointed_rod_turns_all_round(along):
     """Its cross hinges about the crank's axis, since any other lies along the rod once a turn; but
     about another where the rod lies along that axis.
     """
@@ -301,14 +301,14 @@ def slide(values, motion=None):
 
 @pytest.mark.parametrize("values", [[0.0, -0.1, -0.2], [-0.1, -0.15, -0.2], [0.0], [-0.1]], ids=str)
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
-def test_sweeps_to_one_side_only_or_of_one_sample(name, values):
+def test_simulated_one_sided_sweep(name, values):
     found = record(slide(values), simulation(name))
     assert found.solved == len(values), found.message
     assert worst(found)[0] <= 1e-6
 
 
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
-def test_samples_may_be_repeated(name):
+def test_simulated_repeated_samples(name):
     case = slide([0.0, -0.1, -0.1, -0.2])
     if "not equidistant" in (simulation(name).unsupported(case) or ""):
         return
@@ -317,7 +317,7 @@ def test_samples_may_be_repeated(name):
 
 
 @pytest.mark.parametrize("name", ["exudyn", "exudyn-alpha"])
-def test_a_motion_may_begin_with_an_acceleration(name):
+def test_exudyn_starts_with_acceleration(name):
     """The sine of 90 degrees: 0.5 (2 pi)^2 m/s^2 at once; an integrator that begins without is off
     by as much.
     """
@@ -328,7 +328,7 @@ def test_a_motion_may_begin_with_an_acceleration(name):
 @pytest.mark.parametrize(
     "name", ["mujoco-projecting", "pinocchio", "exudyn", "exudyn-static", "drake", "dart"]
 )
-def test_where_the_nearest_sample_cannot_be_reached_the_other_side_is(name):
+def test_simulation_reaches_other_side(name):
     """An arm whose tip is at 0.6 m and gets to 1 m."""
     hinge = Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     lift = PointCoordinate("y", "tip", (0.0, 1.0, 0.0))
@@ -353,7 +353,7 @@ def test_where_the_nearest_sample_cannot_be_reached_the_other_side_is(name):
 # What the simulators' own solvers cannot express, and the command line that keeps modes apart
 
 
-def test_a_rod_of_another_length_stays_a_distance():
+def test_rod_of_given_length_stays_distance():
     plain = mcpherson()
     joints = [
         replace(joint, length=joint.rod_length + 1e-3) if isinstance(joint, Distance) else joint
@@ -388,12 +388,12 @@ def gears():
 
 
 @pytest.mark.parametrize("name", ["exudyn", "drake"])
-def test_steps_of_equal_length_need_equal_samples(name):
+def test_uneven_samples_are_refused(name):
     uneven = replace(gears(), sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
     assert "equidistant" in adapters.engine(name, "simulate").unsupported(uneven)
 
 
-def test_gears_turn_more_than_once():
+def test_simulated_gears_over_turns():
     assert record(gears(), simulation("exudyn-static")).outcome is Outcome.PASS
 
 
@@ -409,7 +409,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
-def test_joints_of_simulators_are_those_of_the_table(name):
+def test_simulated_joint_types_match_table(name):
     engine = adapters.engine(name, "simulate")
     found = {case.name: engine.unsupported(case) for case in probes()}
     refused = {kind: message for kind, message in found.items() if message is not None}
@@ -417,7 +417,7 @@ def test_joints_of_simulators_are_those_of_the_table(name):
     assert all(f"'tested' ({kind})" in message for kind, message in refused.items())
 
 
-def test_gears_of_drake_turn_with_a_motion_that_is_not_steady():
+def test_drake_gears_with_sine_motion():
     motion = {"turn": Sine(0.5, 1.0)}
     case = replace(gears(), sweep=Sweep("time", np.linspace(0.0, 0.4, 41), motions=motion))
     assert worst(record(case, simulation("drake")))[0] <= 1e-8  # nearly rigid
@@ -430,7 +430,7 @@ def simulated(tmp_path, *options):
     return status, [(each.engine, each.mode) for each in from_json(file.read_bytes()).records]
 
 
-def test_the_command_line_keeps_modes_apart(tmp_path, capsys, monkeypatch):
+def test_command_line_separates_modes(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(
         adapters, "ENGINES", {name: adapters.ENGINES[name] for name in ("native", "mujoco")}
     )

@@ -97,13 +97,13 @@ def error(text, mechanism, dt=1e-3):
     return apart
 
 
-def test_written_hinge_loop_moves_as_plain_connect():
+def test_written_hinge_loop_moves_freely():
     mechanism = four_bar()
     assert error(text_of(mechanism), mechanism) < 1.05 * error(PLAIN, mechanism)
 
 
 @pytest.mark.parametrize("last", ["slope", "up"])
-def test_written_weld_shares_mass_and_moves_alike(last):
+def test_written_weld_loop_moves_freely(last):
     """With a link of 1e-6 kg under the weld the error is 2e-3 m."""
     mechanism = wedges(last)
     text = text_of(mechanism)
@@ -112,14 +112,14 @@ def test_written_weld_shares_mass_and_moves_alike(last):
 
 
 @pytest.mark.parametrize("build", [four_bar, lambda: wedges("slope"), lambda: wedges("up")])
-def test_whole_masses_need_no_armature(build):
+def test_written_mjcf_has_no_armature(build):
     root = ET.fromstring(text_of(build()))
     assert "armature" not in {key for each in root.iter() for key in each.attrib}
     masses = [float(each.get("mass")) for each in root.iter("inertial")]
     assert sum(masses) == pytest.approx(4.5, abs=1e-15)
 
 
-def test_urdf_leaves_no_mass_to_simulators():
+def test_written_urdf_gives_every_mass():
     """Some take 1 kg for a link without a mass: points and links between freedoms too."""
     joint = Cylindrical("guide", "ground", "crank", (0.0, 0.0, 0.0), Z)
     mechanism = Mechanism("one", bodies("crank"), [joint], [Point("P", "crank", Z)], [])

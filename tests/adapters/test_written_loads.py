@@ -154,7 +154,7 @@ def started(text):
     return model, data
 
 
-def test_mujoco_begins_to_turn():
+def test_written_mjcf_loads_accelerate_arm():
     text = texts("mjcf", arm(forces=[*SPRINGS, *LOADS]))[".xml"]
     model, data = started(text)
     assert data.qacc[0] == pytest.approx(start(springs=True, loads=False), rel=STOOD_IN)
@@ -170,7 +170,7 @@ def test_mujoco_begins_to_turn():
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
 @pytest.mark.parametrize("law", ["euler_parameters", "cardan"])
-def test_exudyn_begins_to_turn(tmp_path, law, bodies):
+def test_written_exudyn_loads_accelerate_arm(tmp_path, law, bodies):
     exu = pytest.importorskip("exudyn")
     exu.config.printToConsole = False
     script = tmp_path / "model.py"
@@ -209,7 +209,7 @@ def test_exudyn_begins_to_turn(tmp_path, law, bodies):
     assert (spring["damping"], clock["damping"]) == (5.0, 0.25)
 
 
-def test_pinocchio_begins_to_turn():
+def test_written_urdf_inertia_accelerates_arm():
     pin = pytest.importorskip("pinocchio")
     found = texts("urdf", arm(forces=[*SPRINGS, *LOADS]))
     model = pin.buildModelFromXML(found[".urdf"])
@@ -225,7 +225,7 @@ def test_pinocchio_begins_to_turn():
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
 @pytest.mark.parametrize("to", ["sdf", "urdf"])
-def test_drake_begins_to_turn(to, bodies):
+def test_written_drake_loads_accelerate_arm(to, bodies):
     """URDF has no springs at hinges."""
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
     still = (0.0, 0.0, 0.0), (200.0, 200.0, 200.0)  # the same in any law
@@ -258,7 +258,7 @@ def test_drake_begins_to_turn(to, bodies):
 
 
 @pytest.mark.parametrize("turning", [0.0, 30.0])
-def test_written_urdf_has_the_same_bushing(tmp_path, turning):
+def test_written_urdf_bushing_is_kept(tmp_path, turning):
     """Its axes are oblique; the point and the numbers are as written, to the last digits."""
     soft = rubber("euler_parameters", (turning, 0.0, 5.0))
     mechanism = arm(forces=[*SPRINGS[:1], replace(soft, damping=(1.0, 2.0, 3.0))])
@@ -277,7 +277,7 @@ def test_written_urdf_has_the_same_bushing(tmp_path, turning):
 
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
-def test_simbody_begins_to_turn(tmp_path, bodies):
+def test_written_osim_loads_accelerate_arm(tmp_path, bodies):
     o = pytest.importorskip("opensim", reason="opensim is not installed")
     o.Logger.setLevelString("Off")
     soft = rubber("cardan", bodies=bodies)
@@ -306,7 +306,7 @@ def test_simbody_begins_to_turn(tmp_path, bodies):
 @pytest.mark.parametrize(
     ("to", "names"), [("mjcf", "dead second"), ("sdf", "dead second short"), ("osim", "dead")]
 )
-def test_springs_without_a_place_are_named(to, names):
+def test_written_model_names_omitted_springs(to, names):
     """Between fixed bodies; a second one of a joint; of no free length, which Drake refuses."""
     forces = [
         TorsionSpringDamper("dead", "bolt", 1.0),
@@ -326,7 +326,7 @@ def test_springs_without_a_place_are_named(to, names):
 
 
 @pytest.mark.parametrize("to", adapters.WRITERS)
-def test_the_file_of_a_case_without_masses_has_none(to):
+def test_written_model_without_masses(to):
     """Gravity alone moves nothing: the file is that of the mechanism without."""
     plain = replace(arm(), bodies=[Body("arm", ORIGIN, TURNED)], gravity=(0.0, 0.0, 0.0))
     falling = replace(plain, gravity=(0.0, 0.0, -9.8))
@@ -335,7 +335,7 @@ def test_the_file_of_a_case_without_masses_has_none(to):
         assert "Left out" not in text
 
 
-def test_joints_that_carry_backwards_have_springs_of_the_same_sign():
+def test_written_spring_sign_in_reversed_joint():
     """The tree goes from ground to the joint's first body."""
     mechanism = arm()
     pin = replace(mechanism.joint("pin"), i="arm", j="ground")
@@ -502,7 +502,7 @@ SIMULATORS = {
 @pytest.mark.parametrize("swapped", [False, True], ids=["second", "first"])
 @pytest.mark.parametrize("kind", JOINTS)
 @pytest.mark.parametrize("to", SIMULATORS)
-def test_written_joint_is_driven_as_in_case(to, kind, swapped, carried, tmp_path):
+def test_written_joint_coordinate_drives_body(to, kind, swapped, carried, tmp_path):
     name, read = SIMULATORS[to]
     pytest.importorskip(name, reason=f"{name} is not installed")
     _, values, moved = JOINTS[kind]
@@ -523,7 +523,7 @@ STARTS = {"revolute": {"joint": 0.7}, "translational": {"joint": -0.3}}
 @pytest.mark.parametrize("swapped", [False, True], ids=["second", "first"])
 @pytest.mark.parametrize("kind", STARTS)
 @pytest.mark.parametrize("to", ["mjcf", "osim"])
-def test_start_elsewhere_keeps_the_zeros(to, kind, swapped, tmp_path):
+def test_written_start_keeps_coordinate_zeros(to, kind, swapped, tmp_path):
     """Driven to zero, the model is in the design pose; driven on, where the case is."""
     name, read = SIMULATORS[to]
     pytest.importorskip(name, reason=f"{name} is not installed")
