@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.harness.execution import Pair
 from kincheck.core.kinematics import continuous, is_continuation, regular_between
@@ -17,15 +16,9 @@ from kincheck.core.studies.stress.verdicts import Verdict, judged, once
 from kincheck.core.studies.truth.fold import first_fold
 from kincheck.core.studies.truth.motion import Reach, followed
 
+from ..support.engine_motion import SIMULATORS, installed, rotation
+
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
-SIMULATORS = ["mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody"]
-
-
-def installed(name):
-    engine = adapters.engine(name)
-    if engine.version() is None:
-        pytest.skip(f"{name} is not installed")
-    return engine
 
 
 @pytest.mark.parametrize("name", ["native", *SIMULATORS])
@@ -83,10 +76,6 @@ def test_simulator_steps_over_no_fold(name, past_folds):
 # What is asked of a step
 
 
-def turned(angle):
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
 @pytest.mark.parametrize(
     ("ratio", "regular"),
     [
@@ -95,8 +84,8 @@ def turned(angle):
         (np.diag([1.0, 1.0, 0.4]), False),
         (np.diag([1.0, 1.0, -1.0]), False),  # one that passed zero
         (-np.eye(2), False),  # two, and the sign of the determinant is as it was
-        (turned(0.3), True),
-        (turned(2.0), False),  # no eigenvalue is near the negative axis
+        (rotation((0, 0, 1), 0.3), True),
+        (rotation((0, 0, 1), 2.0), False),  # no eigenvalue is near the negative axis
         (np.array([[1.1, 1e6], [1e-7, 0.9]]), True),  # unknowns of very different units
         (np.array([[1.1, 1e6], [1e-5, 0.9]]), False),
         (np.array([[1.1, 1e9], [0.0, 0.9]]), True),  # blocks: one is solved after the other

@@ -4,25 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.adapters.shared.projection import solve_by_projection
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, SolveError
-from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core import JointAngle, Revolute, SolveError
+from kincheck.core.case.case import Sweep
 from kincheck.core.mechanism.motions import Sine
 
-CASE = Case(
-    name="crank",
-    source="made up",
-    truth=Truth.CONSENSUS_ONLY,
-    mechanism=Mechanism(
-        "crank",
-        [Body("crank")],
-        [Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
-        [Point("pin", "crank", (1.0, 0.0, 0.0))],
+from ..support.engine_motion import installed, mechanism_of, motion_case
+from ..support.mechanisms import ORIGIN, X, Z
+
+CASE = motion_case(
+    mechanism_of(
+        [Revolute("pivot", "ground", "crank", ORIGIN, Z)],
+        {"pin": ("crank", X)},
         [JointAngle("turn", "pivot")],
     ),
-    sweep=Sweep("turn", np.linspace(0.0, 1.0, 21)),
-    outputs=(Output("x", "pin", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "made up"),),
+    np.linspace(0.0, 1.0, 21),
 )
 
 
@@ -69,23 +65,24 @@ class Crank:
         ]
 
 
-def test_projection_follows_steady_motion():
-    found = solve_by_projection(Crank(lambda c: 1.0), CASE, 1e-12)
-    assert found.solved.all()
-    assert found.message == ""
-    assert np.abs(found.points["pin"].position[:, 0] - np.cos(CASE.sweep.values)).max() <= 1e-15
-
-
-def test_hidden_jump_ends_projection():
-    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else -1.0), CASE, 1e-12)
-    assert found.solved.tolist() == [value < 0.52 for value in CASE.sweep.values]
-    assert "jumps to another assembly; last reachable sample at turn = 0.5" in found.message
-    assert np.isnan(found.points["pin"].position[~found.solved]).all()
-
-
-def test_nan_residual_ends_projection():
-    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else np.nan), CASE, 1e-12)
-    assert found.solved.sum() == 11
+@pytest.mark.parametrize(
+    ("beyond", "message"),
+    [
+        (1.0, ""),
+        (-1.0, "jumps to another assembly; last reachable sample at turn = 0.5"),
+        (np.nan, "last reachable sample at turn = 0.5"),
+    ],
+    ids=["steady", "jump", "nan"],
+)
+def test_projection_ends_at_hidden_jump(beyond, message):
+    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else beyond), CASE, 1e-12)
+    reached = CASE.sweep.values < (0.52 if message else 2.0)
+    assert found.solved.tolist() == reached.tolist()
+    assert message in found.message
+    assert bool(message) == bool(found.message)
+    x = found.points["pin"].position[:, 0]
+    assert np.abs(x - np.cos(CASE.sweep.values))[reached].max() <= 1e-15
+    assert np.isnan(x[~reached]).all()
 
 
 def test_undriven_freedom_is_refused():
@@ -139,51 +136,29 @@ def test_near_parallelogram_keeps_its_branch(name, loops, defect):
     side of the line between theirs. Of two on one crank, both fold at once, and the determinant of
     all rows keeps its sign.
     """
-    engine = adapters.engine(name)
-    if engine.version() is None:
-        pytest.skip(f"{name} is not installed")
-    axis, ground, coupler, rocker = (0.0, 0.0, 1.0), np.array([3.0, 0.0]), 3.0, 1.0 + defect
+    engine, ground, coupler, rocker = installed(name), 3.0, 3.0, 1.0 + defect
     turns = np.linspace(0.0, 3.2, 17)
-    pin = np.column_stack([np.cos(0.7 + turns), np.sin(0.7 + turns)])
+    pin = np.exp(1j * (0.7 + turns))
     apart = ground - pin
-    along = 0.5 * (1.0 + (coupler**2 - rocker**2) / (apart * apart).sum(axis=1))
-    off = -np.sqrt(coupler**2 / (apart * apart).sum(axis=1) - along**2)
-    truth = (
-        pin + along[:, None] * apart + off[:, None] * np.column_stack([-apart[:, 1], apart[:, 0]])
-    )
+    along = 0.5 * (1.0 + (coupler**2 - rocker**2) / abs(apart) ** 2)
+    truth = pin + (along - 1j * np.sqrt(coupler**2 / abs(apart) ** 2 - along**2)) * apart
 
-    def place(x):
-        return (*map(float, x), 0.0)
+    def place(z):
+        return z.real, z.imag, 0.0
 
-    mechanism = Mechanism(
-        "nearly a parallelogram",
-        [
-            Body("crank"),
-            *(Body(f"{name} {k}") for k in range(loops) for name in ("coupler", "rocker")),
-        ],
-        [
-            Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), axis),
-            *(
-                Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), axis)
-                for k in range(loops)
-            ),
-            *(
-                Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), axis)
-                for k in range(loops)
-            ),
-            *(
-                Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), axis)
-                for k in range(loops)
-            ),
-        ],
-        [Point("P", "coupler 0", place(truth[0]))],
-        [JointAngle("turn", "A")],
-    )
-    output = Output("y", "P", (0.0, 1.0, 0.0), False, 1e-9, 0.0, "made up")
-    case = replace(CASE, mechanism=mechanism, sweep=Sweep("turn", turns), outputs=(output,))
+    joints = [Revolute("A", "ground", "crank", ORIGIN, Z)]
+    for k in range(loops):
+        joints += [
+            Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), Z),
+            Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), Z),
+            Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), Z),
+        ]
+    points = {"P": ("coupler 0", place(truth[0]))}
+    case = motion_case(mechanism_of(joints, points, [JointAngle("turn", "A")]), turns)
     found = engine.solve(engine.build(case), case, 1e-12)
     assert found.solved.all(), found.message
-    np.testing.assert_allclose(found.points["P"].position[:, :2], truth, rtol=0, atol=1e-11)
+    P = found.points["P"].position
+    np.testing.assert_allclose(P[:, 0] + 1j * P[:, 1], truth, rtol=0, atol=1e-11)
 
 
 class Doubled(Crank):
