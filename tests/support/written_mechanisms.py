@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 from kincheck.core import (
     Body,
-    ConstantVelocity,
     Cylindrical,
     Distance,
     Gear,
@@ -102,24 +101,6 @@ def gear_train():
     )
 
 
-def shafts():
-    """Two shafts, the bearing of one of them long, joined by a constant-velocity joint that closes
-    the loop.
-    """
-    across = (0.2, 0.3, 1.0)
-    return Mechanism(
-        "shafts",
-        [Body("first", (0.1, 0.2, 0.0), (0.6, 0.0, 0.0, 0.8)), Body("second")],
-        [
-            Revolute("left", "ground", "first", (0.0, 0.0, -0.5), Z),
-            Revolute("right", "second", "ground", tuple(np.multiply(0.3, across)), across),
-            ConstantVelocity("joint", "first", "second", ORIGIN, (Z, across)),
-        ],
-        [Point("mark", "second", (0.1, 0.0, 0.3))],
-        [JointAngle("turn", "left")],
-    )
-
-
 def coupled_loop():
     """Two four-bars whose coupled joints close their loops, so that their coordinates are not those
     of a tree.
@@ -154,7 +135,6 @@ CASES = {
         case(rssr(), 2.5),
         case(gear_train(), 150.0),
         case(coupled_loop(), 5.0),
-        case(shafts(), 3.0),
         case(ladder(("ladder", "ground"), Z), 8.0),
         *probes(),
     )
