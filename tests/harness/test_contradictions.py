@@ -83,7 +83,7 @@ def test_different_ends_name_longer_motion():
     assert alike.message == "6 of 9 samples solved: ends here"
 
 
-def test_contradiction_and_deviation_are_both_told():
+def test_contradiction_and_deviation_share_message():
     _, fake = pair(reaching(range(7)), off("position", at(2, 1, 9.0)))
     assert "that native cannot reach" in fake.message
     assert "y: position is off by" in fake.message
@@ -94,7 +94,7 @@ def test_native_reaching_nothing_contradicts_every_value():
     assert (fake.outcome, fake.errors["x"].contradicted) == (Outcome.FAIL, SAMPLES)
 
 
-def test_a_reference_without_a_value_says_nothing():
+def test_reference_gap_leaves_native_judge():
     case = crank()
     short = np.where(np.arange(SAMPLES) < 7, 1.0, np.nan)
     for name, series in case.reference.items():
@@ -116,7 +116,7 @@ def test_a_reference_without_a_value_says_nothing():
     assert alone.outcome is Outcome.FAIL
 
 
-def test_a_reference_is_believed_before_native():
+def test_reference_overrules_native_refusal():
     """Native refuses samples that the closed form has: native is wrong there, and the others are
     not.
     """
@@ -185,7 +185,7 @@ def test_residual_fails_uncompared_pair():
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_simulators_keep_their_promise_at_any_size(name):
+def test_simulators_keep_residual_promise(name):
     engine = adapters.engine(name)
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
@@ -196,7 +196,7 @@ def test_simulators_keep_their_promise_at_any_size(name):
 # What native says of samples beside singular poses
 
 
-def test_uncertain_samples_contradict_nobody():
+def test_uncertain_samples_contradict_no_engine():
     others = [k for k in range(SAMPLES) if k != 4]
     uncertain = reaching(
         others, "refused at angle = 0: so near a singular pose", details={"uncertain_samples": [4]}
@@ -360,7 +360,7 @@ def test_derivatives_by_travel_at_every_sample(tmp_path, kind):
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_in_every_engine(tmp_path, name):
+def test_derivatives_by_travel_in_engines(tmp_path, name):
     pytest.importorskip(name)
     case = case_of(tmp_path, SWEEPS["sine"])
     found, native = answer(case, name), answer(case, "native")
@@ -369,7 +369,7 @@ def test_in_every_engine(tmp_path, name):
         assert np.abs(off).max() < 1e-11
 
 
-def test_a_slope_of_a_quotient(tmp_path):
+def test_roll_centre_slope_equals_difference(tmp_path):
     """The roll centre by travel, against its difference over two wheel heights."""
     case = case_of(tmp_path, SWEEPS["both"])
     slope = answer(case, "native").outputs["rc.per_travel"].position
@@ -387,7 +387,7 @@ def test_slope_without_travel_driver(tmp_path):
     assert alone.outputs[0].vehicle.travel == ()
 
 
-def test_unsolved_samples_say_so(tmp_path):
+def test_missing_derivative_has_reason(tmp_path):
     """A pose that the other path does not find has no derivative, and the reason is given."""
     case = case_of(tmp_path, SWEEPS["both"])
 
@@ -414,7 +414,7 @@ def test_no_tolerance_study_of_held_derivatives(tmp_path):
         Study(case, None, 10, 1)
 
 
-def test_waypoints_are_a_smooth_motion():
+def test_waypoints_interpolate_smoothly():
     motion = Waypoints((0.0, 1.0, 1.5), (0.2, -0.3, 0.4), 0.05)
     assert np.array_equal(motion.at(np.array(motion.times)), [motion.values, [0.05] * 3, [0.0] * 3])
     t, h = np.array([-0.5, 0.0, 0.3, 0.999999, 1.0, 1.3, 1.5, 2.0]), 1e-6
@@ -424,7 +424,7 @@ def test_waypoints_are_a_smooth_motion():
     assert x[0] == 0.2 - 0.025
 
 
-def test_the_held_path_has_the_values_of_the_sweep(tmp_path):
+def test_held_path_keeps_sweep_values(tmp_path):
     case = case_of(tmp_path, SWEEPS["sine"])
     path, again = case.sweep.path, held_case(case, ["stroke"]).sweep.path
     names = ["rack", "stroke"]

@@ -159,7 +159,7 @@ def forbid_clients(monkeypatch):
     monkeypatch.setattr(importlib.import_module("distributed"), "Client", client)
 
 
-def test_no_scheduler_is_a_message(monkeypatch):
+def test_silent_scheduler_is_reported(monkeypatch):
     """Where nobody listens, and where somebody does who is none and says nothing."""
     monkeypatch.setattr(ours, "ANSWER", 0.25)
     with pytest.raises(
@@ -220,7 +220,7 @@ def test_commands_refuse_invalid_scheduler(kincheck_main, capsys, tmp_path, monk
     assert not (tmp_path / "h.db").exists()
 
 
-def test_without_dask_there_is_a_message(monkeypatch):
+def test_missing_dask_names_package(monkeypatch):
     def absent(name):
         raise ImportError(name)
 
@@ -229,7 +229,7 @@ def test_without_dask_there_is_a_message(monkeypatch):
         run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
 
 
-def test_another_kincheck_on_the_cluster_is_an_error():
+def test_cluster_version_mismatch_is_error():
     from kincheck.core.harness.execution import Pair
 
     found = ours.solve_there(pack(Pair(crank(), Fake(), TOL)), "fake", LIMITS, "0.0.1")

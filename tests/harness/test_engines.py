@@ -46,7 +46,7 @@ def record(case, name):
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
 @pytest.mark.parametrize("case", ["four_bar", "rssr", "spatial_slider_crank"])
-def test_closed_forms_hold_over_a_full_turn(case, name):
+def test_closed_forms_over_full_turn(case, name):
     found = record(built_in(case), name)
     assert found.outcome is Outcome.PASS
     assert np.ptp(next(iter(found.driver.values()))) == pytest.approx(2.0 * np.pi)
@@ -132,12 +132,12 @@ def test_versions_keep_order_of_engines(monkeypatch):
     assert found == ["1.2", "3", *[None] * 5]
 
 
-def test_an_engine_that_hangs_has_no_version(monkeypatch):
+def test_hanging_engine_has_no_version(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     assert versions([Loading("hangs")], patience=1.0) == [None]
 
 
-def test_version_is_read_in_process_on_request(monkeypatch):
+def test_version_read_in_process(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     ours, foreign = versions([Ours("any"), Foreign("native")])
     assert ours == str(os.getpid())

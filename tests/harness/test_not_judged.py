@@ -45,7 +45,7 @@ def unjudged():
     return run([crank(reference=False)], [RIGHT, Fake()], tol=TOL)
 
 
-def test_many_cases_are_named_by_the_first(kincheck_main, capsys, monkeypatch, tmp_path):
+def test_many_unjudged_cases_are_summarised(kincheck_main, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     cases = {f"c{k:03}": crank(f"c{k:03}", reference=False) for k in range(30)}
     engines = [RIGHT, UNABLE]
@@ -63,7 +63,7 @@ def test_many_cases_are_named_by_the_first(kincheck_main, capsys, monkeypatch, t
     assert max(map(len, titles)) < 250
 
 
-def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):
+def test_not_judged_wording_in_every_format(tmp_path, kincheck_main, capsys):
     results = unjudged()
     assert kincheck_main("run", engines=[RIGHT, Fake()], cases=UNREFERENCED) == 0
     told = capsys.readouterr()
@@ -108,7 +108,7 @@ def test_unjudged_output_is_skipped_in_junit():
     assert [tag for tag, _ in tests["crank.wrong.projection", "x"]] == ["failure"]
 
 
-def test_a_fault_of_the_whole_pair_fails_every_output():
+def test_large_residual_fails_every_output():
     def answer(case):
         found = RIGHT.answer(case)
         found.__dict__["residual"] = 1e-3
@@ -159,7 +159,7 @@ def test_unjudged_case_keeps_status_0(kincheck_main, capsys):
         ("--engine native missing --require missing", [RIGHT, MISSING], 2),  # told once
     ],
 )
-def test_an_engine_that_is_named_is_required(kincheck_main, capsys, named, engines, status):
+def test_named_engine_is_required(kincheck_main, capsys, named, engines, status):
     assert kincheck_main("run", *named.split(), engines=engines) == status
     lines = capsys.readouterr().err.splitlines()
     told = [line for line in lines if "missing is not installed" in line and "engine '" in line]
@@ -167,7 +167,7 @@ def test_an_engine_that_is_named_is_required(kincheck_main, capsys, named, engin
     assert all(line.startswith("kincheck: ") for line in told)
 
 
-def test_broken_native_leaves_others_unjudged(kincheck_main, capsys):
+def test_broken_native_leaves_engines_unjudged(kincheck_main, capsys):
     def broken(case):
         raise ValueError("no")
 
@@ -181,7 +181,7 @@ def test_broken_native_leaves_others_unjudged(kincheck_main, capsys):
 # Series with holes
 
 
-def test_a_reference_without_any_value_judges_nothing():
+def test_reference_without_values_is_unjudged():
     case = crank()
     unknown = np.full(len(case.sweep.values), np.nan)
     case.reference.update(dict.fromkeys(("x", "y"), Series(unknown, unknown, unknown)))
@@ -243,7 +243,7 @@ def test_old_history_is_read_as_unjudged(path, capsys):
     assert "not judged" in capsys.readouterr().out
 
 
-def test_names_that_look_like_deviations_are_none(path):
+def test_output_named_max_abs_is_unjudged(path):
     nothing = {"position": None, "velocity": None, "acceleration": None}
     odd = msgspec.structs.replace(
         next(iter(records()[0].errors.values())), **nothing, reason='"max_abs":1'
@@ -257,7 +257,7 @@ def test_names_that_look_like_deviations_are_none(path):
     assert outcomes["first", "native"] == "pass"
 
 
-def test_runs_of_unjudged_pairs_alone_are_not_green(path):
+def test_unjudged_run_is_not_green(path):
     all_bare = bare(records(), "native")
     keep(path, [each for each in all_bare if each.outcome is Outcome.UNJUDGED])
     with Store(path) as store:
@@ -270,7 +270,7 @@ def test_runs_of_unjudged_pairs_alone_are_not_green(path):
 # Reports
 
 
-def test_a_pair_that_is_no_longer_judged_is_a_regression(path):
+def test_pair_losing_judgement_is_regression(path):
     keep(path, records())
     keep(path, bare(records()))
     found = reported(path)
@@ -290,7 +290,7 @@ def test_a_pair_that_is_no_longer_judged_is_a_regression(path):
     assert [each.kind for each in reported(path).findings] == [Kind.UNJUDGED]
 
 
-def test_a_failure_that_is_no_longer_judged_is_not_fixed(path):
+def test_unjudged_failure_is_not_fixed(path):
     keep(path, changed(records(), outcome=Outcome.FAIL, message="off"))
     keep(path, bare(records()))
     found = reported(path, against="1")
@@ -298,7 +298,7 @@ def test_a_failure_that_is_no_longer_judged_is_not_fixed(path):
     assert not found.steps or all(step.quantity != "outcome" or step.worse for step in found.steps)
 
 
-def test_judged_again_is_no_regression(path):
+def test_regained_judgement_is_no_regression(path):
     keep(path, bare(records()))
     keep(path, records())
     found = reported(path, against="1")
@@ -313,14 +313,14 @@ def test_judged_again_is_no_regression(path):
     ]
 
 
-def test_an_upgrade_is_no_regression(path):
+def test_old_unjudged_pass_is_no_regression(path):
     """The native pair was a pass in the older version, and is not judged today."""
     keep(path, bare(records(), outcome=Outcome.PASS))
     keep(path, bare(records()))
     assert (reported(path).findings, reported(path).regressed) == ([], False)
 
 
-def test_a_first_report_counts_only_what_was_judged(path, capsys):
+def test_first_report_counts_judged_pairs(path, capsys):
     keep(path, bare(records()))
     assert main.main(["report", "--history", str(path)]) == 0
     assert "all 3 right, 1 not judged; nothing to compare with" in capsys.readouterr().out

@@ -132,7 +132,7 @@ def test_static_case_is_written_as_read(tmp_path):
     assert values(load_case(again))["lift"] == pytest.approx(values(case)["lift"], rel=1e-15)
 
 
-def test_rates_are_not_results_at_rest(tmp_path):
+def test_static_results_have_no_rates(tmp_path):
     case = read(tmp_path, ARM + SWEEP + '[outputs.x]\npoint = "tip"\ncomponent = "x"\n')
     engine = adapters.engine("pinocchio")
     (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
@@ -186,7 +186,7 @@ def test_resting_pose_needs_no_drivers(tmp_path):
         assert found[f"{name}.effort"] == pytest.approx([0.0], abs=1e-11)
 
 
-def test_driver_may_have_the_name_of_a_sprung_joint(tmp_path):
+def test_driver_named_as_sprung_joint(tmp_path):
     """A single joint; its row had been left out with the driver's."""
     alone = ARM.partition("[bodies.hand]")[0] + ARM[ARM.index("[forces.coil]") :]
     alone += TURNED[TURNED.index("[joints.pin]") : TURNED.index("[points.post]")]
@@ -199,7 +199,7 @@ def test_driver_may_have_the_name_of_a_sprung_joint(tmp_path):
     assert values(read(tmp_path, alone))["effort"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_effort_at_a_dead_centre_says_why_it_has_none(tmp_path):
+def test_missing_effort_at_dead_centre(tmp_path):
     """A straight slider crank: no force on the slider holds it."""
     text = ARM.partition("[bodies.arm]")[0] + TURNED[TURNED.index("[drivers.turn]") :]
     for body, x in (("crank", 0.5), ("rod", 2.0), ("slider", 3.0)):
@@ -230,7 +230,7 @@ class Heavy(NativeEngine):
         return super().build(replace(case, mechanism=replace(case.mechanism, gravity=gravity)))
 
 
-def test_equilibrium_without_outputs_of_efforts_is_judged(tmp_path):
+def test_equilibrium_without_effort_outputs_is_judged(tmp_path):
     """The efforts of free drivers vanish; bushings of joints wait for a compliance study."""
     text = ARM + "[equilibrium]\n" + ANGLE + WRIST
     text += "[joints.shoulder.bushings.rubber]\nstiffness = 1e5\nturning_stiffness = 90.0\n"
@@ -242,7 +242,7 @@ def test_equilibrium_without_outputs_of_efforts_is_judged(tmp_path):
     assert "lift.effort" in record.message
 
 
-def test_resting_pose_follows_a_held_driver(tmp_path):
+def test_resting_pose_follows_held_driver(tmp_path):
     text = ARM + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS + ANGLE
     text += '[sweep]\ndriver = "bend"\nstart = -0.5\nstop = 0.5\nsteps = 3\n'
     case = read(tmp_path, text)
@@ -281,7 +281,7 @@ def test_pose_without_equilibrium_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["rssr", "four_bar"])
-def test_effort_at_another_joint_is_by_virtual_work(name):
+def test_effort_at_joint_by_virtual_work(name):
     """An actuator there holds the same mechanism: found by driving that joint instead."""
     case = cases.load("four_bar")
     mechanism = case.mechanism
@@ -316,7 +316,7 @@ def test_effort_at_another_joint_is_by_virtual_work(name):
     assert found == pytest.approx(effort / slope, rel=1e-8)
 
 
-def test_reactions_turn_with_frame_and_move_with_point(tmp_path):
+def test_reaction_frames_and_moment_points(tmp_path):
     case = read(tmp_path, ARM + SWEEP + EFFORTS)
     mechanism = case.mechanism
     common = (1e-9, 0.0, "")
@@ -374,7 +374,7 @@ rate = 0
 
 
 @pytest.mark.parametrize("engine", ["native", "mujoco", "exudyn"])
-def test_reactions_about_a_point_in_turned_frames(tmp_path, engine):
+def test_moments_about_point_in_frames(tmp_path, engine):
     """The beam's own y is up at design, its z forward; the joint's z is its axis."""
     head = ARM.partition("[bodies.arm]")[0]
     about = 'about = "post"\n'

@@ -77,7 +77,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("words", CHANGES)
-def test_slip_of_reference_is_named(words):
+def test_reference_slip_is_named(words):
     results, found = suspected(CHANGES[words])
     assert found is not None
     assert found.engines == ["native", "other", "third"]
@@ -164,7 +164,7 @@ def test_one_wrong_engine_suspects_nobody():
     assert run([crank(reference=False)], ENGINES, tol=1e-12).suspects == {}
 
 
-def test_one_engine_alone_agrees_with_nobody():
+def test_lone_engine_suspects_explained_slips():
     """It is told only what a slip explains wholly."""
     _, found = suspected(CHANGES["times 1000"], [Fake("native")])
     assert "native is the only engine that solved it" in found.message
@@ -209,7 +209,7 @@ def test_slip_is_found_alone(slip):
     assert words(WAVY, SLIPS[slip], {"z": held(OTHER)}) == [slip]
 
 
-def test_other_output_is_tried_with_signs():
+def test_slip_by_definition_and_sign():
     toe = 0.3 * S
     seen = np.arctan(np.tan(WAVY) / np.cos(toe))
     definitions = [("taken as another", lambda x: camber_of_front_view(x, toe))]
@@ -246,11 +246,11 @@ def test_other_output_is_tried_with_signs():
         "another factor",
     ],
 )
-def test_nothing_is_invented(values, reference):
+def test_slip_needs_exact_fit(values, reference):
     assert words(values, reference) == []
 
 
-def test_samples_that_are_not_known_do_not_count():
+def test_slip_ignores_missing_samples():
     values = np.where(np.arange(24) == 5, np.nan, WAVY)
     assert words(values, -np.where(np.arange(24) == 7, np.nan, WAVY)) == ["with the other sign"]
 
@@ -273,7 +273,7 @@ def found_by(engines, case=None):
     return results, results.suspects.get("crank")
 
 
-def test_native_against_all_others_is_suspected():
+def test_native_against_engines_is_suspected():
     results, found = found_by([WRONG, *OTHERS])
     assert found is not None
     assert (found.subject, found.engines) == ("native", ["one", "two", "three"])
@@ -297,7 +297,7 @@ def test_native_against_all_others_is_suspected():
         ("native", "3 of 3 other engines agree with each other", "; suspect native in crank"),
     ],
 )
-def test_suspicion_is_told_once_on_every_surface(subject, who, said, tmp_path):
+def test_suspicion_appears_once_per_format(subject, who, said, tmp_path):
     by_reference = subject == "reference"
     results, _ = suspected(CHANGES[OTHER_SIGN]) if by_reference else found_by([WRONG, *OTHERS])
     left = [] if by_reference else [Outcome.UNJUDGED]  # native itself
@@ -315,7 +315,7 @@ def test_suspicion_is_told_once_on_every_surface(subject, who, said, tmp_path):
     assert junit.count(f"suspect {rather} rather than the engine") == 6
 
 
-def test_native_outside_the_run_is_suspected():
+def test_suspected_native_outside_run():
     """It is the standard without a record."""
     results = run([crank(reference=False)], OTHERS, tol=1e-12, baseline=WRONG)
     assert results.suspects["crank"].subject == "native"
@@ -333,7 +333,7 @@ def test_native_outside_the_run_is_suspected():
     ],
     ids=["one other", "three answers", "two against two", "variants", "one astray"],
 )
-def test_without_a_majority_nobody_is_suspected(engines):
+def test_suspicion_needs_majority(engines):
     results, found = found_by(engines)
     assert found is None
     assert any(outcome is Outcome.FAIL for _, outcome, _ in messages(results))
@@ -353,7 +353,7 @@ def test_modes_of_one_simulator_count_once():
     assert found_by([WRONG, *twice, OTHERS[1]])[1].engines == ["one", "two"]
 
 
-def test_agreement_is_within_the_sum_of_tolerances():
+def test_agreement_within_sum_of_tolerances():
     """Engines at three and at less than five tolerances from native agree; at six they do not."""
     native = Fake("native")
     assert found_by([native, shifted("one", 3.0), shifted("two", 4.9)])[1] is not None
@@ -361,7 +361,7 @@ def test_agreement_is_within_the_sum_of_tolerances():
     assert found_by([native, shifted("one", 0.9), shifted("two", 0.8)])[1] is None
 
 
-def test_suspect_keeps_other_faults_of_engines():
+def test_suspicion_keeps_engine_faults():
     """Its residual, or another output, is no fault of native."""
 
     def unconverged(case):
@@ -435,7 +435,7 @@ def results_of(tmp_path, text, *engines):
 
 @pytest.mark.parametrize("truth", ["closed_form", "third_party_data"])
 @pytest.mark.parametrize("cited", [True, False])
-def test_validation_needs_a_citation(tmp_path, capsys, truth, cited):
+def test_validation_needs_citation(tmp_path, capsys, truth, cited):
     text = BASE.replace('"closed_form"', f'"{truth}"') + INLINE + (CITED if cited else "")
     status, results = results_of(tmp_path, text, "mujoco")
     (record,) = results.records
@@ -449,7 +449,7 @@ def test_validation_needs_a_citation(tmp_path, capsys, truth, cited):
     assert record.evidence.sha256 == digest(load_case(tmp_path / "case.toml").reference)
 
 
-def test_the_digest_of_a_file_is_that_of_its_bytes(tmp_path):
+def test_reference_file_digest_is_of_bytes(tmp_path):
     (tmp_path / "x.csv").write_bytes(b"\xef\xbb\xbf" + CSV.encode())
     _, results = results_of(tmp_path, BASE + f'[reference]\nfile = "x.csv"{CITED}')
     evidence = results.records[0].evidence
@@ -478,14 +478,14 @@ def test_pinned_reference_digest_must_match(tmp_path):
 
 
 @pytest.mark.parametrize("citation", ['""', '"  "', "3"])
-def test_a_citation_says_something(tmp_path, citation):
+def test_empty_citation_is_refused(tmp_path, citation):
     complains(
         write(tmp_path, BASE + INLINE + f"citation = {citation}"),
         "reference.citation ... where the true values come from",
     )
 
 
-def test_the_digest_tells_values_apart():
+def test_reference_digest_depends_on_values():
     one, other = crank().reference, crank(rate=2.5).reference
     assert digest(one) == digest(dict(reversed(one.items())))
     assert digest(one) != digest(other)
@@ -493,7 +493,7 @@ def test_the_digest_tells_values_apart():
     assert digest({"x": one["x"]}) != digest({"y": one["x"]})
 
 
-def test_the_built_in_closed_forms_cite_their_modules():
+def test_built_in_closed_forms_cite_modules():
     for name in cases.names():
         case = cases.load(name)
         assert case.origin is not None
@@ -536,7 +536,7 @@ def test_own_result_is_recognised_by_baseline():
     assert record.validated  # nobody can tell
 
 
-def test_one_bit_makes_it_another_result():
+def test_reference_one_bit_off_validates():
     def bump(series):
         moved = series.position.copy()
         moved[3] = np.nextafter(moved[3], 9.0)
@@ -545,12 +545,12 @@ def test_one_bit_makes_it_another_result():
     assert all(record.validated for record in run([third_party(bump)], OWN, tol=1e-12).records)
 
 
-def test_closed_forms_may_be_met_in_every_bit():
+def test_closed_form_met_exactly_validates():
     assert all(record.validated for record in run([crank()], OWN, tol=1e-12).records)
 
 
 @pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)])
-def test_few_samples_tell_nothing(taken):
+def test_few_equal_samples_prove_nothing(taken):
     case = third_party()
     case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[taken]))
     p, v, a = exact(case)
@@ -558,7 +558,7 @@ def test_few_samples_tell_nothing(taken):
     assert not any(record.evidence.own for record in run([case], OWN, tol=1e-12).records)
 
 
-def test_a_driven_coordinate_tells_nothing(tmp_path):
+def test_equal_driven_coordinate_proves_nothing(tmp_path):
     """The slide's tip is where its driver puts it: everybody's data are the same."""
     _, results = results_of(tmp_path, THIRD_PARTY + INLINE + CITED)
     assert results.records[0].validated

@@ -46,7 +46,7 @@ def test_times_are_of_warm_solves():
     assert record_of(stale).outcome is Outcome.FAIL
 
 
-def test_an_interruption_moves_no_time(monkeypatch):
+def test_interruption_changes_no_time(monkeypatch):
     engine, record = timed(monkeypatch, 0.5, 0.25, 0.001, 0.009, 0.002, 0.002, 0.002)
     assert engine.solves == 6
     seconds = record.seconds
@@ -62,7 +62,7 @@ def test_waiting_time_is_reported(monkeypatch):
 
 
 @pytest.mark.parametrize("solves", [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)])
-def test_the_compiler_is_in_no_time(solves, monkeypatch):
+def test_compilation_is_not_timed(solves, monkeypatch):
     """It has come to work in one of the warm solves."""
     _, record = timed(monkeypatch, 0.1, 0.002, *solves, *[0.001] * 4)
     assert record.seconds.warm == pytest.approx(0.001)

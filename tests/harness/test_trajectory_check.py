@@ -114,12 +114,12 @@ def refused(answer):
 
 
 @pytest.mark.parametrize("breach", FORMS)
-def test_a_breach_of_the_form_is_one_message(breach):
+def test_malformed_trajectory_is_reported(breach):
     part, said = FORMS[breach]
     assert said in refused(lambda case: altered(solution(case), *part))
 
 
-def test_another_thing_than_a_trajectory_is_refused():
+def test_answer_of_wrong_type_is_refused():
     assert "returned tuple" in refused(lambda case: (1, 2))
 
 
@@ -188,7 +188,7 @@ def found(case):
 
 
 @pytest.mark.parametrize("breach", FORCES)
-def test_a_breach_of_forces_and_bodies_is_one_message(breach, case, found):
+def test_malformed_forces_and_bodies_are_reported(breach, case, found):
     part, said = FORCES[breach]
     check(case, "fake", found)
     with pytest.raises(BadTrajectoryError, match=r"^fake: ") as told:
@@ -208,14 +208,14 @@ def unbalanced(found, watts, sample=1):
 
 
 @pytest.mark.parametrize("watts", [100.0, -100.0, 1e-3])
-def test_a_missing_balance_of_power_fails_with_its_sample(watts, case, found):
+def test_unbalanced_power_fails_with_sample(watts, case, found):
     case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
     result, message = outcome(case, unbalanced(found, watts))
     assert result is Outcome.FAIL
     assert f"the balance of power is off by {abs(watts):.3g} W at sample 1 (turn = 0.25)" in message
 
 
-def test_a_balance_within_round_off_or_tolerance_passes(case, found):
+def test_power_balance_within_tolerance_passes(case, found):
     assert outcome(case, found)[0] is Outcome.UNJUDGED
     assert outcome(case, unbalanced(found, 1e-9))[0] is Outcome.UNJUDGED
     # a force within its own tolerance of 1 N may leave as much at the driver's pace
@@ -271,7 +271,7 @@ def test_points_off_their_bodies_fail(case, found):
     assert "position of points on" in message
 
 
-def test_bodies_without_rates_are_judged_by_positions(case, found):
+def test_bodies_without_rates_judged_by_position(case, found):
     still = {name: replace(each, v=None, a=None) for name, each in found.bodies.items()}
     found = changed(found, bodies=still)
     assert outcome(case, found)[0] is Outcome.UNJUDGED
@@ -285,7 +285,7 @@ def test_engine_with_points_alone_passes():
     assert record.outcome is Outcome.PASS
 
 
-def test_another_number_of_freedoms_than_native_fails():
+def test_freedoms_unlike_native_fail():
     def two(case):
         found = solution(case)
         return changed(found, details={**found.details, "dof": 2})

@@ -224,13 +224,13 @@ def test_unwritable_history_is_read_whole(path, merged):
                     Store(there, writable=False)
 
 
-def test_a_history_without_any_run_is_a_message(path):
+def test_report_of_empty_history(path):
     Store(path).close()
     with pytest.raises(KincheckError, match="no run to report; `kincheck run --history"):
         reported(path)
 
 
-def test_a_step_has_the_unit_of_its_output(path, capsys):
+def test_step_has_unit_of_output(path, capsys):
     facts = {"first": {"outputs": {"x": {"unit": "deg"}}}}
     nights(path, 2)
     grown = {"errors": lambda errors: errors | {"x": _grown(errors["x"])}}

@@ -86,7 +86,7 @@ def test_flood_of_output_is_discarded():
     assert "printed" not in record.details
 
 
-def test_an_engine_that_cannot_be_imported_errs():
+def test_unimportable_engine_is_error():
     results = run([crank()], [Unimportable(), Fake("good")], tol=TOL, solver=in_workers(1, PATIENT))
     assert [each.outcome for each in results.records] == [Outcome.ERROR, Outcome.PASS]
     assert "No module named 'no_such_simulator_anywhere'" in results.records[0].message
@@ -121,7 +121,7 @@ def test_workers_use_one_algebra_thread(monkeypatch, given):
     assert started == [given or "1"] * len(THREADS)
 
 
-def test_leaked_memory_costs_no_other_pair():
+def test_memory_leak_costs_no_pair():
     """Each pair keeps 0.3 GB of the half that there is: the second fails in the process of the
     first, and passes in its own.
     """
@@ -134,7 +134,7 @@ def test_leaked_memory_costs_no_other_pair():
     assert [each.message for each in results.records] == ["", ""]
 
 
-def test_records_are_the_same_however_many_jobs():
+def test_records_do_not_depend_on_jobs():
     """Without a reference the others wait for the native engine, which is the last to be
     through.
     """
@@ -190,7 +190,7 @@ def until(condition):
     return condition()
 
 
-def test_an_interrupt_ends_the_workers_at_once(deaf):
+def test_interrupt_ends_workers(deaf):
     def interrupt(record, done, total):
         assert deaf()
         raise KeyboardInterrupt
@@ -210,7 +210,7 @@ def test_an_interrupt_ends_the_workers_at_once(deaf):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere only between pairs")
-def test_a_worker_that_hangs_dies_with_its_parent(deaf):
+def test_hanging_worker_dies_with_parent(deaf):
     marker = mark()
     code = (
         "from tests.harness.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL,"

@@ -39,7 +39,7 @@ FIRST = ("first", "mujoco")
 # False alarms
 
 
-def test_quiet_and_noisy_nights_are_not_reported(path):
+def test_noise_is_no_regression(path):
     noise = random.Random(943745)
     for _ in range(20):
         keep(path, records(noise=noise), calibration_seconds=0.02 * noise.uniform(0.8, 1.25))
@@ -49,7 +49,7 @@ def test_quiet_and_noisy_nights_are_not_reported(path):
             assert (found.findings, found.steps, found.regressed) == ([], [], False)
 
 
-def test_one_slow_machine_is_no_slow_engine(path):
+def test_slow_machine_is_no_regression(path):
     nights(path, 8)
     slow = [replace(each, seconds=replace(each.seconds, warm=0.04)) for each in records()]
     keep(path, slow, calibration_seconds=0.08)
@@ -61,7 +61,7 @@ def test_one_slow_machine_is_no_slow_engine(path):
     assert kinds(reported(path)) == []
 
 
-def test_scattered_times_widen_the_limit(path):
+def test_scattered_times_widen_limit(path):
     noise = random.Random(1)
     for _ in range(10):
         keep(
@@ -92,14 +92,14 @@ def test_microseconds_are_no_regression(path, warm):
     assert kinds(reported(path)) == ([] if warm < 7e-5 else [(Kind.SLOWER, *FIRST)])
 
 
-def test_round_off_that_grows_is_no_drift(path):
+def test_growing_round_off_is_no_drift(path):
     nights(path, 3)
     keep_changed(path, **worse(1e-4))
     keep_changed(path, **worse(1.8e-3))  # from 5e-17 to 9e-16 m
     assert kinds(reported(path)) == []
 
 
-def test_other_processor_compares_calibrated_times(path):
+def test_calibrated_times_on_changed_processor(path):
     nights(path, 6)
     keep(path, changed(records(), **times(3.0)), processor="another", calibration_seconds=0.06)
     slower = [each.engine + each.case for each in reported(path).findings]
@@ -167,7 +167,7 @@ def test_planted_regressions_are_reported(path, what):
     assert {(each.case, each.engine) for each in found.findings} == {FIRST}
 
 
-def test_a_changed_engine_version_is_named(path):
+def test_changed_engine_version_is_named(path):
     nights(path, 2)
     newer = [
         replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in records()
@@ -200,7 +200,7 @@ def test_fixed_added_absent_are_no_regressions(path):
     assert not found.regressed
 
 
-def test_a_changed_tolerance_is_said(path):
+def test_changed_tolerance_is_reported(path):
     nights(path, 1)
 
     def loosened(errors):
@@ -258,7 +258,7 @@ def test_loose_tolerances_are_named(path):
 # What a regression report is written as: Markdown, JSON, JUnit and a page, from one comparison
 
 
-def test_the_command_writes_every_format(path, tmp_path, capsys):
+def test_report_writes_every_format(path, tmp_path, capsys):
     nights(path, 6)
     keep_changed(path, **worse(20.0), message="<script>alert(1)</script> | *x*")
     out = tmp_path / "report"
@@ -324,14 +324,14 @@ def test_regression_markdown_escapes_and_folds(path):
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")
 
 
-def test_pairs_that_no_engine_can_solve_are_not_right(path):
+def test_unavailable_pairs_are_not_right(path):
     first, *others = records()
     gone = [replace(each, outcome=Outcome.UNAVAILABLE) for each in others]
     keep(path, [first, *gone])
     assert f": all 1 right, {len(others)} unavailable or unsupported;" in headline(reported(path))
 
 
-def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
+def test_terminal_report_has_no_markup(path, capsys, monkeypatch):
     nights(path, 6)
     keep(path, changed(records(), **worse(20.0), message="<script> | *x*")[:-1])
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
@@ -386,7 +386,7 @@ def found_after(path, **now):
 @pytest.mark.parametrize(
     "values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}]
 )
-def test_other_values_at_the_same_samples(path, values):
+def test_changed_values_are_reported_moved(path, values):
     kinds, messages, found = found_after(path, **values)
     assert kinds == [(Kind.MOVED, *FIRST)]
     assert found.regressed
@@ -397,7 +397,7 @@ def test_other_values_at_the_same_samples(path, values):
 
 
 @pytest.mark.parametrize(("off", "kinds"), [(1e-6, [Kind.MOVED]), (0.0, [])])
-def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
+def test_large_forces_hide_no_motion(path, off, kinds):
     """Of an output without a standard, the scale is that of the outputs of its unit."""
     for moved in (0.0, off):
         force = OutputSeries(position=[9e5, 1e6, 0.0], velocity=None, acceleration=None, unit="N")
@@ -407,7 +407,7 @@ def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
     assert [each.kind for each in reported(path, against="1").findings] == kinds
 
 
-def test_round_off_is_no_other_motion(path):
+def test_round_off_is_no_motion(path):
     kinds, messages, _ = found_after(
         path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]
     )
@@ -423,17 +423,17 @@ def test_values_within_tolerances_are_no_motion(path, off, kinds):
     assert found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])[0] == kinds
 
 
-def test_another_sweep_is_said(path):
+def test_changed_sweep_is_reported(path):
     kinds, messages, _ = found_after(path, driver={"turn": [0.0, 0.25, 0.5]})
     assert kinds == [(Kind.MOVED, *FIRST)]
     assert messages == ["solved at other values of the drivers than before"]
 
 
-def test_the_last_digit_of_a_driver_is_no_other_sweep(path):
+def test_last_digit_is_same_sweep(path):
     assert found_after(path, driver={"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]})[0] == []
 
 
-def test_another_driver_is_another_sweep(path):
+def test_changed_driver_is_reported(path):
     assert found_after(path, driver={"push": DRIVER["turn"]})[0] == [(Kind.MOVED, *FIRST)]
 
 

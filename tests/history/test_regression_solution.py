@@ -176,7 +176,7 @@ def test_pair_of_last_run_is_missing(path, capsys):
     capsys.readouterr()
 
 
-def test_other_command_has_no_missing_pairs(path, capsys):
+def test_changed_command_has_no_missing_pairs(path, capsys):
     keep(path, records()[:2])
     keep(
         path,
@@ -188,7 +188,7 @@ def test_other_command_has_no_missing_pairs(path, capsys):
     assert "not in this run" not in capsys.readouterr().out
 
 
-def test_missing_pairs_count_with_nothing_to_compare_with(path, capsys):
+def test_missing_pairs_without_baseline(path, capsys):
     keep_changed(path, outcome=Outcome.FAIL)
     keep(path, records()[:2])
     assert main(["report", "--history", str(path)]) == 0

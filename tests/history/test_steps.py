@@ -28,7 +28,7 @@ def noisy(levels, spread=0.05, seed=3):
     return np.array([level + noise.gauss(0.0, spread) for level in levels])
 
 
-def test_a_slow_drift_is_no_step():
+def test_slow_drift_is_no_step():
     drift = np.linspace(0.0, math.log(4.0), 60)
     for seed in range(20):
         assert change_points(noisy(drift, seed=seed), least=math.log(1.5), lasting=3) == []
@@ -55,7 +55,7 @@ def test_alternating_values_are_no_steps():
     ],
     ids=["quiet", "step", "two", "at the end", "too short", "outlier", "too small"],
 )
-def test_levels_are_found_where_they_change(levels, expected):
+def test_change_points_of_levels(levels, expected):
     for seed in range(5):
         assert change_points(noisy(levels, seed=seed), least=math.log(1.5), lasting=3) == expected
 
@@ -121,7 +121,7 @@ def test_outcome_step_ends_with_repair(path):
     assert [(each.first, each.worse) for each in found(path)] == [(5, False), (3, True)]
 
 
-def test_slow_nights_are_no_step_of_time(path):
+def test_slow_nights_are_no_step(path):
     noise = random.Random(5)
     for night in range(12):
         keep(path, changed(records(noise=noise), **times(3.0 if night in (5, 10, 11) else 1.0)))
@@ -160,7 +160,7 @@ def test_partly_repaired_step_stands(path):
     assert [each.first for each in found(path, standing=True)] == [9]
 
 
-def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
+def test_one_bad_night_is_repaired_step(path):
     for night in range(12):
         keep_changed(path, **worse(100.0 if night == 5 else 1.0))
     assert [(each.first, each.repaired) for each in found(path) if each.worse] == [(6, 7)]
@@ -179,7 +179,7 @@ def test_successive_error_steps_both_stand(path):
     ]
 
 
-def test_a_missing_engine_repairs_nothing(path):
+def test_missing_engine_repairs_nothing(path):
     nights(path, 2)
     keep_changed(path, outcome=Outcome.FAIL)
     for _ in range(2):

@@ -69,7 +69,7 @@ def drag(browser, by):
     return [b - a for a, b in zip(before, after, strict=True)]
 
 
-def test_dragged_point_gives_what_run_gives(opened, car):
+def test_dragged_point_equals_run(opened, car):
     before = toe(opened)
     moved = drag(opened, (9.0, -3.0))
     assert moved[0] == 0.0
@@ -83,7 +83,7 @@ def test_dragged_point_gives_what_run_gives(opened, car):
     assert car.read_text("utf-8") == CAR
 
 
-def test_ball_joint_dragged_ten_millimetres(opened, car):
+def test_ball_joint_dragged_by_millimetres(opened, car):
     """What the page shows, and what `run` gives for the saved table, agree in all digits but the
     last three, which the order of sums decides.
     """
@@ -99,7 +99,7 @@ def test_ball_joint_dragged_ten_millimetres(opened, car):
     assert shown == pytest.approx(record.outputs["toe"].position, rel=1e-13, abs=1e-15)
 
 
-def test_locked_axis_stays_under_drag_and_keys(opened):
+def test_locked_axis_is_kept(opened):
     opened.click("[aria-label='lock y of all points']")
     moved = drag(opened, (9.0, -3.0))
     assert moved[1] == 0.0 != moved[2]
@@ -108,7 +108,7 @@ def test_locked_axis_stays_under_drag_and_keys(opened):
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
 
 
-def test_numbers_survive_a_reload(opened):
+def test_reload_keeps_numbers(opened):
     opened.click(FIELD)
     opened.key("ArrowUp")
     answered(opened)
@@ -121,7 +121,7 @@ def test_numbers_survive_a_reload(opened):
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
 
 
-def test_page_is_used_by_keys_alone(opened, car):
+def test_live_page_by_keys_alone(opened, car):
     """Every control has a name and a mark of its focus, in the order of the page."""
     seen = []
     for _ in range(100):
@@ -151,12 +151,12 @@ def test_page_is_used_by_keys_alone(opened, car):
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="axe is not installed: npm install axe-core")
-def test_axe_finds_nothing_on_the_live_page(opened):
+def test_live_page_passes_axe(opened):
     opened.run("for (const each of document.querySelectorAll('[data-layer]')) each.checked = true")
     assert opened.violations() == []
 
 
-def test_figures_out_of_view_follow_at_rest(opened):
+def test_hidden_figures_are_drawn_later(opened):
     last = "[...document.querySelectorAll('#figures .curve')].at(-1).getAttribute('d')"
     before = opened.run(f"return {last}")
     opened.click(FIELD)
@@ -164,7 +164,7 @@ def test_figures_out_of_view_follow_at_rest(opened):
     opened.until(f"{last} !== {before!r}")
 
 
-def test_gesture_is_undone_and_redone_whole(opened):
+def test_gesture_is_undone_whole(opened):
     before = toe(opened)
     drag(opened, (9.0, -3.0))
     moved = toe(opened)
@@ -176,7 +176,7 @@ def test_gesture_is_undone_and_redone_whole(opened):
     assert toe(opened) == moved
 
 
-def test_arrow_keys_step_a_number(opened):
+def test_arrow_keys_step_number(opened):
     opened.click(FIELD)
     for how in ({}, {"shift": True}, {"alt": True}):
         opened.key("ArrowUp", **how)
@@ -184,7 +184,7 @@ def test_arrow_keys_step_a_number(opened):
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == pytest.approx(551.1)
 
 
-def test_typed_number_may_have_a_decimal_comma(opened):
+def test_typed_number_with_decimal_comma(opened):
     opened.click(FIELD)
     opened.run("document.activeElement.select()")
     opened.write("541,5")
@@ -193,7 +193,7 @@ def test_typed_number_may_have_a_decimal_comma(opened):
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541.5
 
 
-def test_typed_word_is_refused_and_the_number_stays(opened):
+def test_typed_word_is_refused(opened):
     opened.click(FIELD)
     opened.run("document.activeElement.select()")
     opened.write("54o")
@@ -202,7 +202,7 @@ def test_typed_word_is_refused_and_the_number_stays(opened):
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
 
 
-def test_design_that_the_reader_refuses_marks_its_row(opened):
+def test_refused_design_marks_row(opened):
     before = toe(opened)
     opened.click("[aria-label='uca_outer z [mm]']")
     opened.run("document.activeElement.select()")
@@ -216,7 +216,7 @@ def test_design_that_the_reader_refuses_marks_its_row(opened):
     opened.until("!document.querySelector('tr.wrong')")
 
 
-def test_check_shows_a_verdict_that_an_edit_removes(opened):
+def test_edit_removes_verdict(opened):
     opened.click("#check")
     opened.until("document.querySelector('#state').textContent === 'checked'")
     assert "native" in text(opened, "#verdicts")
@@ -225,7 +225,7 @@ def test_check_shows_a_verdict_that_an_edit_removes(opened):
     assert text(opened, "#verdicts") == ""
 
 
-def test_limit_marks_the_numbers_beyond(opened):
+def test_limit_marks_exceeding_numbers(opened):
     opened.click("[aria-label='high limit of toe [°]']")
     opened.write("0.1")
     opened.key("Tab")
@@ -234,13 +234,13 @@ def test_limit_marks_the_numbers_beyond(opened):
     assert opened.run("return document.querySelectorAll('.limit').length") == 1
 
 
-def test_lost_server_is_told_and_numbers_stay(opened, served):
+def test_lost_server_keeps_numbers(opened, served):
     served.close()
     opened.until("document.querySelector('#state').textContent.startsWith('connection lost')")
     assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
 
 
-def test_page_fits_a_narrow_window(served, browser):
+def test_live_page_fits_narrow_window(served, browser):
     browser("Emulation.setDeviceMetricsOverride", width=900, height=900, deviceScaleFactor=1,
             mobile=False)  # fmt: skip
     browser.visit(served.address)
@@ -248,14 +248,14 @@ def test_page_fits_a_narrow_window(served, browser):
     assert browser.run("return document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_page_measures_its_edits(served, browser):
+def test_live_page_measures_edits(served, browser):
     browser.visit(f"{served.address}&measure=3")
     assert served.ended.wait(60)
     assert len(served.measured) == 3
     assert min(served.measured) > 0.0
 
 
-def test_point_of_both_sides_moves_its_mirror(browser, tmp_path):
+def test_mirrored_point_moves_along(browser, tmp_path):
     head, _, rows = CAR.partition("name,x,y,z,meaning\n")
     fields = [row.split(",") for row in rows.splitlines()]
     sides = (("FL", 1.0), ("FR", -1.0))
@@ -280,7 +280,7 @@ def test_point_of_both_sides_moves_its_mirror(browser, tmp_path):
     server.close()
 
 
-def test_unreached_travel_is_marked_in_curve_and_scene(browser, car):
+def test_unreached_travel_is_marked(browser, car):
     server = kincheck.live(car, kincheck.Supplied(travel="0.06:21", axle="steer"))
     browser.visit(server.address)
     answered(browser)
@@ -292,7 +292,7 @@ def test_unreached_travel_is_marked_in_curve_and_scene(browser, car):
 
 
 @pytest.mark.parametrize("framed", [True, False])
-def test_page_stands_in_frames_of_notebooks_alone(browser, car, framed):
+def test_live_page_in_notebook_frame(browser, car, framed):
     known = registry()
     server = LiveServer(
         car, lambda: LiveTable(car, TRAVEL), known.engines, judge_by(known), framed=framed
@@ -323,7 +323,7 @@ def test_page_stands_in_frames_of_notebooks_alone(browser, car, framed):
     server.close()
 
 
-def test_scene_shows_the_roll_centre_of_the_outputs(opened):
+def test_live_scene_shows_roll_centre(opened):
     """The construction is from differences of poses a few millimetres apart."""
     opened.click("[data-layer=centres]")
     drawn, expected = opened.run(
@@ -335,7 +335,7 @@ def test_scene_shows_the_roll_centre_of_the_outputs(opened):
     assert drawn == pytest.approx(expected, abs=1e-4)
 
 
-def test_scene_is_saved_as_picture_and_film(opened):
+def test_scene_saved_as_picture_and_film(opened):
     opened.run(
         "window.files = []; const made = URL.createObjectURL;"
         "URL.createObjectURL = (blob) => (files.push(blob), made.call(URL, blob));"
@@ -355,7 +355,7 @@ def test_scene_is_saved_as_picture_and_film(opened):
     assert opened.run("return (await files[2].arrayBuffer()).byteLength") > 10_000
 
 
-def test_scene_turns_moves_and_enlarges(opened):
+def test_live_scene_turns_and_enlarges(opened):
     look = "return document.querySelector('#scene canvas').toDataURL()"
     seen = [opened.run(look)]
     x, y = opened.middle("#scene canvas")
@@ -369,7 +369,7 @@ def test_scene_turns_moves_and_enlarges(opened):
     assert len({*seen}) == len(seen)
 
 
-def test_slider_moves_a_mechanism(tmp_path, browser):
+def test_slider_moves_mechanism(tmp_path, browser):
     known = registry()
     file = tmp_path / "rssr"
     server = LiveServer(file, lambda: LiveModel(file, load("rssr")), known.engines, judge_by(known))

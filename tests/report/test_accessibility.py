@@ -42,7 +42,7 @@ def bench_page(file):
 
 
 @pytest.mark.parametrize("written", [run_page, many_cases_page, bench_page])
-def test_axe_finds_nothing(written, tmp_path):
+def test_report_pages_pass_axe(written, tmp_path):
     written(file := tmp_path / "page.html")
     act = """
       all("details").forEach((each) => { each.open = true; });

@@ -55,7 +55,7 @@ ENGINES = (
 )
 
 
-def test_cells_say_how_far_off_or_why_not(run):
+def test_matrix_cells_have_errors_or_reasons(run):
     status, _, markdown = run(engines=ENGINES, cases=[crank(reference=False)])
     assert status == 1
     head, _, row = (
@@ -111,19 +111,19 @@ def test_narrow_matrix_is_split_by_engines(
     assert sum(line.startswith("with_a_longer_name ") for line in lines) == len(heads)
 
 
-def test_without_anything_to_compare_with_there_are_no_errors(run):
+def test_matrix_without_comparison(run):
     _, _, markdown = run(engines=[Fake("native")], cases=[crank(reference=False)])
     assert "No errors: nothing was compared with anything" in markdown
     assert "Largest errors" not in markdown
 
 
-def test_joints_and_cases_can_be_run_together(run):
+def test_run_joints_with_case(run):
     _, _, markdown = run("--joints", "crank", engines=[Fake("native")], cases=[crank()])
     assert "| `crank` |" in markdown
     assert "| `revolute` |" in markdown
 
 
-def test_every_joint_type_is_in_the_documentation():
+def test_documentation_lists_joint_types():
     """`kincheck run --joints --markdown FILE` makes the table anew."""
     if not ENGINES_PAGE.exists():
         pytest.skip("the documentation is not here")

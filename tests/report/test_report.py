@@ -44,7 +44,7 @@ def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
     assert details["dof_account"]["paper"].replace("-", "−") in page.text
 
 
-def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path):
+def test_page_starts_with_worst_deviation(tmp_path):
     run = results()
     page = report(run, tmp_path)
     words = re.sub(r"\s+", " ", page.text)
@@ -79,7 +79,7 @@ def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path):
         assert told in words, told
 
 
-def test_the_worst_case_leads(tmp_path):
+def test_page_names_worst_case(tmp_path):
     cases = [("good", 1e-11), ("bad", 5e-9), ("better", 1e-15)]
     records = [record(case, "closed_form", "one", error, GRID) for case, error in cases]
     page = report(Results(run={}, records=records), tmp_path)
@@ -100,7 +100,7 @@ def test_page_says_validated_positions_only(tmp_path):
     assert "validated, positions only" in report(results("closed_form"), tmp_path).text
 
 
-def test_text_from_files_is_escaped(tmp_path):
+def test_page_escapes_text_of_files(tmp_path):
     run = results(case=HOSTILE)
     strange = replace(
         run.records[1],
@@ -139,7 +139,7 @@ def test_text_from_files_is_escaped(tmp_path):
     assert HOSTILE in shown  # as text, which the script puts into text nodes
 
 
-def test_nothing_is_fetched(tmp_path):
+def test_page_fetches_nothing(tmp_path):
     page = report(results(), tmp_path)
     assert not [
         tag for tag, _ in page.tags if tag in ("link", "img", "iframe", "object", "embed", "base")
@@ -186,7 +186,7 @@ def test_page_order_of_sections(tmp_path):
     assert places == sorted(places)
 
 
-def test_an_empty_run_says_so(tmp_path):
+def test_page_of_empty_run(tmp_path):
     empty = Results(run={}, records=[])
     assert headline(empty) == "Nothing was compared"
     assert "Nothing was compared" in report(empty, tmp_path).text
@@ -201,7 +201,7 @@ def test_an_empty_run_says_so(tmp_path):
         ("x" * 500, "x" * 500),  # no place to part it
     ],
 )
-def test_long_messages_unfold_and_lose_nothing(message, head, tmp_path):
+def test_page_folds_long_messages(message, head, tmp_path):
     shown, rest = parted(message)
     assert (shown, shown + rest) == (head, message)
     run = results()

@@ -35,7 +35,7 @@ def test_figures_hold_outputs_in_millimetres(tmp_path):
     assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
 
 
-def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path):
+def test_driver_angle_axis_is_in_degrees(tmp_path):
     page = report(results(driver=CRANK | {"name": "stroke"}), tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert curve["x"] == "driver"
@@ -44,7 +44,7 @@ def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path):
     )
 
 
-def test_forces_come_first_and_constant_outputs_are_folded(tmp_path):
+def test_page_order_of_outputs(tmp_path):
     """A constant output that is wrong is not folded."""
 
     def with_more(record):
@@ -80,7 +80,7 @@ def in_unit(found, unit):
 
 @pytest.mark.parametrize("unit", ["m", "rad", "N"])
 @pytest.mark.parametrize("motion", ["position", "velocity"])
-def test_error_figures_hold_the_distances_from_the_reference(tmp_path, motion, unit):
+def test_error_figures_have_distances_from_reference(tmp_path, motion, unit):
     made = results()
     run = replace(made, records=[in_unit(record, unit) for record in made.records])
     page = report(run, tmp_path)
@@ -157,7 +157,7 @@ def test_missing_values_leave_gaps(tmp_path):
     assert "µs" not in overview
 
 
-def test_zero_errors_have_a_floor(tmp_path):
+def test_zero_errors_have_floor(tmp_path):
     figure = report(results(), tmp_path).data["figures"]["case-0-0-position"]
     errors = [e for trace in figure["data"] if trace["mode"] == "lines+markers" for e in trace["y"]]
     assert 0 in errors
@@ -165,7 +165,7 @@ def test_zero_errors_have_a_floor(tmp_path):
     assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
 
 
-def test_long_series_are_thinned_and_said_to_be(tmp_path):
+def test_long_series_are_thinned(tmp_path):
     driver = [1e-4 * k for k in range(3 * SAMPLES)]
     spike = 1234
     found = series(driver)
@@ -197,7 +197,7 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path):
     assert "Thinned figures: strut" in page.text
 
 
-def test_earlier_runs_are_drawn_where_there_are_any(tmp_path):
+def test_figures_of_earlier_runs(tmp_path):
     runs = [
         Past(run=str(k), engine="one", errors={"position": 1.0}, us_per_step=2.0) for k in range(2)
     ]
@@ -210,7 +210,7 @@ def test_earlier_runs_are_drawn_where_there_are_any(tmp_path):
         )
 
 
-def test_every_symbol_has_a_swatch_of_its_own(tmp_path):
+def test_legend_swatches_differ(tmp_path):
     """What the legend shows is what is drawn: symbols without one would all be told by the same
     cross.
     """
@@ -225,7 +225,7 @@ def test_every_symbol_has_a_swatch_of_its_own(tmp_path):
     assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
 
 
-def test_differences_of_round_off_are_drawn_within_the_tolerance(tmp_path):
+def test_round_off_is_drawn_within_tolerance(tmp_path):
     """Else the round-off of an output that stays where it is looks like a motion."""
     still = replace(series(GRID), position=[1e-17 * (k % 3) for k in range(21)])
     errors = {"x": judged(still, replace(still, position=[0.0] * 21), 1e-9, "native")}

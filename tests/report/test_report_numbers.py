@@ -124,7 +124,7 @@ def test_page_engines_equal_json(shown):
         assert_row(cells, [*values, record["us_per_step"]])
 
 
-def test_overview_has_the_worst_errors_of_json(shown):
+def test_overview_errors_equal_json(shown):
     found, _, page = shown
     ((_, *cells),) = page.rows("Overview")
     for text, record in zip(cells, answered(found), strict=False):

@@ -10,7 +10,7 @@ from ..support.made_up import results
 from .test_report_browser import strut
 
 
-def test_the_mechanism_is_drawn_turned_and_moved(visit):
+def test_scene_turns_and_plays_in_browser(visit):
     told = visit(
         strut(),
         """

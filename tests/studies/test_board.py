@@ -59,14 +59,14 @@ def errors(row):
     return [run["error"] for run in row["runs"]]
 
 
-def test_runge_kutta_of_stiff_mujoco_is_of_second_order(rows):
+def test_mujoco_runge_kutta_is_second_order(rows):
     # four-bar of the study: 7.8e-6, 1.9e-6, 4.5e-7
     row = rows["mujoco", "RK4", "best"]
     assert row["order"] == pytest.approx(2.0, abs=0.15)
     assert errors(row)[-1] < 1e-4
 
 
-def test_default_softness_is_a_floor(rows):
+def test_mujoco_softness_sets_floor(rows):
     row = rows["mujoco", "RK4", "default"]
     assert row["floor"] == min(errors(row))
     assert errors(row)[-1] > 30 * errors(rows["mujoco", "RK4", "best"])[-1]
@@ -114,7 +114,7 @@ def welded(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["exudyn", "drake"])
-def test_welded_body_of_the_tree_is_stepped(engine, tmp_path):
+def test_welded_body_is_stepped(engine, tmp_path):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine), exc_type=ImportError)
     given = ["--engine", engine, "--case", str(welded(tmp_path))]
     row = [each for each in measured(tmp_path, *given) if each["case"] == "welded_four_bar"][-1]
@@ -123,7 +123,7 @@ def test_welded_body_of_the_tree_is_stepped(engine, tmp_path):
         assert shorter[key] <= 0.6 * longer[key]
 
 
-def test_tree_of_the_board_hangs_on_fixed_bodies(tmp_path):
+def test_board_tree_merges_fixed_bodies(tmp_path):
     """The strut's chassis is fixed, and has a name of its own."""
     truth = truth_of(kincheck.load(short_strut(tmp_path)))
     files = adapters.stepper_files("drake", truth.case.mechanism, truth.twists)
@@ -131,7 +131,7 @@ def test_tree_of_the_board_hangs_on_fixed_bodies(tmp_path):
     assert found == {"lca": "ground", "knuckle": "lca", "strut": "knuckle"}
 
 
-def test_urdf_of_the_board_has_welded_bodies(tmp_path):
+def test_board_urdf_has_welded_bodies(tmp_path):
     truth = truth_of(kincheck.load(welded(tmp_path)))
     text = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)["model.urdf"]
     assert re.search(r'<joint name="plate joint" type="fixed">', text)
@@ -146,7 +146,7 @@ def short_strut(tmp_path):  # rod, spring, damper; a ball in the tree
     return strut
 
 
-def test_joint_forces_of_drake_leave_balls_out(tmp_path):
+def test_drake_forces_leave_balls_out(tmp_path):
     pytest.importorskip("pydrake.multibody.plant", exc_type=ImportError)
     *_, row = measured(tmp_path, "--engine", "drake", "--case", str(short_strut(tmp_path)))
     *_, longer, shorter = (run["reaction"] for run in row["runs"])
@@ -176,13 +176,13 @@ def test_pinocchio_needs_its_proximal_setting(rows):
     assert best["loop"] == "Python"
 
 
-def test_energy_and_gap_follow_the_error(rows):
+def test_energy_and_gap_follow_error(rows):
     last = rows["exudyn", "GeneralizedAlpha", "best"]["runs"][-1]
     assert last["gap"] < 1e-10
     assert 0.1 * last["error"] < last["energy"] < 1e3 * last["error"]
 
 
-def test_joint_forces_of_engines_are_the_truths(rows):
+def test_stepper_forces_equal_truth(rows):
     def last(*key):
         return rows[key]["runs"][-1]["reaction"]
 
@@ -193,7 +193,7 @@ def test_joint_forces_of_engines_are_the_truths(rows):
     assert last("mujoco", "RK4", "default") > 0.1
 
 
-def test_undetermined_joint_forces_are_left_open():
+def test_undetermined_forces_are_left_open():
     truth = truth_of(replace(kincheck.load("bricard"), free=Free(0.01, 2)))
     assert np.isfinite(truth.reactions).all()
     assert truth.facts.forces
@@ -204,7 +204,7 @@ def test_undetermined_joint_forces_are_left_open():
     assert head.count(",") == 6 * len(truth.case.mechanism.joints) - 1
 
 
-def test_site_has_every_row_and_its_reproducer(site, rows):
+def test_board_site_has_every_row(site, rows):
     page = (site / "index.html").read_text("utf-8")
     for row in rows.values():
         folder = site / row["folder"]
@@ -215,7 +215,7 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
-def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
+def test_board_keeps_row_history(tmp_path, capsys):
     given = ["--engine", "mujoco", "--case", str(short(tmp_path, 0.02, 3)), "--steps", "2"]
     file = tmp_path / "site" / "board.json"
     assert main(["board", *given, "--out", str(file.parent)]) == 0
@@ -255,7 +255,7 @@ def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("engine", "integrator"), [("mujoco", "RK4"), ("exudyn", "GeneralizedAlpha")]
 )
-def test_reproducer_runs_alone_and_repeats_the_row(site, rows, engine, integrator):
+def test_board_reproducer_repeats_row(site, rows, engine, integrator):
     row = rows[engine, integrator, "best"]
     folder = site / row["folder"]
     command = [sys.executable, "-P", "-S", "-c", ALONE, str(folder / "run.py")]
@@ -278,7 +278,7 @@ assert not any(name.startswith("kincheck") for name in sys.modules)
 """
 
 
-def test_truth_of_the_site_is_that_of_kincheck_free(site, rows):
+def test_board_truth_equals_free(site, rows):
     folder = site / rows["mujoco", "RK4", "best"]["folder"]
     with (folder / "truth.csv").open(encoding="utf-8") as file:
         table = list(csv.DictReader(file))
@@ -290,7 +290,7 @@ def test_truth_of_the_site_is_that_of_kincheck_free(site, rows):
     assert np.ptp(energy) < 1e-12  # of motion and weight, which nothing else works on
 
 
-def test_truth_of_a_turned_body_follows_its_points():
+def test_board_truth_of_turned_body():
     case = replace(kincheck.load("mcpherson_strut_loaded"), free=Free(0.05, 3))
     truth, found = truth_of(case), kincheck.free(case)
     place, _ = truth.frames["knuckle"].at([0.975, 0.715, 0.101])
@@ -313,7 +313,7 @@ def page_of(rows, **truth):
     return {section.title: section for section in report(board).sections}
 
 
-def test_page_groups_rows_and_says_messages_once():
+def test_board_page_groups_rows():
     reason = "no rods; pip install it"
     bad = Row(**GIVEN, column="default", state="unsupported", message=reason, folder="f")
     good = Row(**GIVEN, column="best", state="measured", runs=[Run(error=1.0)])
@@ -324,21 +324,21 @@ def test_page_groups_rows_and_says_messages_once():
 
 
 @pytest.mark.parametrize(("forces", "cell"), [(True, "not given"), (False, "open")])
-def test_page_says_why_forces_are_missing(forces, cell):
+def test_board_page_explains_missing_forces(forces, cell):
     row = Row(**GIVEN, column="best", state="measured", runs=[Run(error=1.0)])
     section = page_of([row], forces=forces)["a"]
     assert section.rows[1][section.columns.index("reaction [N]")] == cell
     assert forces != any("forces are compared" in each for each in section.verdict)
 
 
-def test_page_keeps_best_settings_where_defaults_are_nearer():
+def test_board_page_keeps_best_settings():
     row = Row(**GIVEN, column="best", state="measured", settings={"mu": 0.1}, by="me", on="today")
     nearer = replace_row(row, settings={}, case="other")
     ((*_, best, by),) = page_of([row, nearer])["Settings and measures"].rows
     assert (best, by) == ("mu 0.1", "me today")
 
 
-def test_best_is_best_by_error():
+def test_board_best_is_by_error():
     default = Row(**GIVEN, column="default", state="measured", runs=[Run(error=3e-4)])
     row = replace_row(default, column="best", settings={"mu": 0.1})
     worse, nearer = (replace_row(row, runs=[Run(error=each)]) for each in (4e-4, 2e-4))
@@ -349,7 +349,7 @@ def test_best_is_best_by_error():
     assert better(replace_row(default, runs=[]), worse) is worse
 
 
-def test_order_and_floor_of_halved_steps():
+def test_board_order_and_floor():
     def runs(*found):
         return [Run(step=0.5**k, error=error) for k, error in enumerate(found)]
 
@@ -368,7 +368,7 @@ FAKES = {
 }
 
 
-def test_fault_of_an_engine_costs_only_its_rows(tmp_path, monkeypatch):
+def test_engine_fault_costs_own_rows(tmp_path, monkeypatch):
     for name, (_, text) in FAKES.items():
         (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -394,14 +394,14 @@ def pybullet_row(tmp_path):
     return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"][0]
 
 
-def test_engine_runs_in_its_own_environment(tmp_path, monkeypatch):
+def test_board_engine_in_own_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("KINCHECK_ENVIRONMENTS", own_python(tmp_path, "echo own >&2\nexit 5"))
     row = pybullet_row(tmp_path)
     assert row["state"] == "crashed"
     assert row["message"].endswith("status 5; own")
 
 
-def test_missing_environment_is_told_with_its_remedy(tmp_path, monkeypatch, capsys):
+def test_missing_environment_names_remedy(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path))
     row = pybullet_row(tmp_path)
     remedy = f"python -m venv {tmp_path}/pybullet && {tmp_path}/pybullet/bin/pip install"
@@ -414,7 +414,7 @@ def test_missing_environment_is_told_with_its_remedy(tmp_path, monkeypatch, caps
 
 
 @pytest.mark.parametrize("engine", ["pybullet", "mjx", "mujoco-warp"])
-def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
+def test_environment_engines_share_error(engine, rows, tmp_path):
     if python_of(engine) == sys.executable:
         pytest.skip(f"KINCHECK_ENVIRONMENTS has no {engine}")
     (*_, best) = measured(tmp_path, "--engine", engine, "--timeout", "600")
@@ -427,7 +427,7 @@ def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
         assert shorter == pytest.approx(0.5 * longer, rel=0.1)
 
 
-def test_urdf_of_the_board_is_the_model(site):
+def test_board_urdf_equals_model(site):
     pin = pytest.importorskip("pinocchio")
     truth = truth_of(kincheck.load(FOUR_BAR))
     files = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)
@@ -442,7 +442,7 @@ def test_urdf_of_the_board_is_the_model(site):
         assert inertia.inertia == pytest.approx(np.array(body["inertia"]), abs=1e-15)
 
 
-def test_missing_constraint_is_a_row_with_its_reason(tmp_path):
+def test_unsupported_constraint_is_board_row(tmp_path):
     case = tmp_path / "rssr.toml"
     text = (Path(kincheck.__path__[0]) / "cases" / "rssr.toml").read_text("utf-8")
     text = text.replace("duration = 2.0", "duration = 0.02").replace("samples = 201", "samples = 3")
@@ -463,6 +463,6 @@ def test_missing_constraint_is_a_row_with_its_reason(tmp_path):
         (["--case", "four_bra"], "four_bar"),
     ],
 )
-def test_wrong_options_are_told(options, message, tmp_path, capsys):
+def test_board_refuses_wrong_options(options, message, tmp_path, capsys):
     assert main(["board", "--out", str(tmp_path / "site"), *options]) == 2
     assert message in capsys.readouterr().err
