@@ -11,7 +11,7 @@ from kincheck.core.history.database import MIGRATIONS
 from kincheck.core.history.store import Store
 
 from ..support.fakes import crank
-from ..support.nights import nights
+from ..support.history_runs import nights
 
 NO_TRENDS = "The history cannot be read, so this page shows no earlier runs."
 

@@ -14,7 +14,7 @@ from kincheck.core.report.junit import to_regression_junit
 from kincheck.core.report.regressions import headline, print_regressions, rows, to_markdown
 from msgspec.structs import replace
 
-from ..support.nights import (
+from ..support.history_runs import (
     FACTS,
     RESULTS,
     changed,

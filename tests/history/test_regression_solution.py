@@ -10,7 +10,7 @@ from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import WHY, Kind
 from msgspec.structs import replace
 
-from ..support.nights import keep, keep_changed, nights, records, reported
+from ..support.history_runs import keep, keep_changed, nights, records, reported
 
 FIRST = ("first", "mujoco")
 

@@ -6,7 +6,7 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.store import Store
 
 from ..support.fakes import Fake, crank, off
-from ..support.nights import changed, keep, records, reported, worse
+from ..support.history_runs import changed, keep, records, reported, worse
 
 # untimed: a busy machine is slower, which a report names too
 RIGHT = Fake("native", untimed=True)

@@ -14,7 +14,7 @@ from kincheck.core.history.steps import change_points, lasting, steps
 from kincheck.core.history.store import Store
 from msgspec.structs import replace
 
-from ..support.nights import changed, keep, keep_changed, nights, records, times, worse
+from ..support.history_runs import changed, keep, keep_changed, nights, records, times, worse
 
 
 def found(path, standing=False):

@@ -352,7 +352,7 @@ MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
 
 
 def kincheck(*arguments, limit=None, **environment):
-    """The command line with made-up cases and engines: see drill.py. limit: on the size of files
+    """The command line of fake_command_line.py. limit: on the size of files
     [bytes].
     """
     restrict = (
@@ -364,7 +364,7 @@ def kincheck(*arguments, limit=None, **environment):
         sys.executable,
         "-B",  # a limit would cut files of bytecode
         "-c",
-        f"{restrict}import sys; from tests.support.drill import main; sys.exit(main())",
+        f"{restrict}import sys; from tests.support.fake_command_line import main; sys.exit(main())",
         *map(str, arguments),
     ]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -14,8 +14,8 @@ from kincheck.core.joints import Coupler, Joint
 from kincheck.core.report.table import print_matrix
 
 from ..support.fakes import Fake, crank, off, raising
-from ..support.made_up import GRID, record
 from ..support.printed import Terminal
+from ..support.strut_results import GRID, record
 
 ENGINES_PAGE = Path(__file__).parents[2] / "docs" / "pages" / "reference" / "engines.md"
 BUILT_IN = [

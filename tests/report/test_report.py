@@ -20,7 +20,7 @@ from kincheck.core.studies.bench.size import ring
 from msgspec.structs import replace
 
 from ..kinematics.test_chain import chain
-from ..support.made_up import GRID, record, results, series
+from ..support.strut_results import GRID, record, results, series
 from .page import report
 
 HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"

@@ -15,7 +15,7 @@ from kincheck.core.harness.scene import scene
 from kincheck.core.report.figures import Effort, Past
 from msgspec.structs import replace as replaced
 
-from ..support.made_up import GRID, distances, record, results, series
+from ..support.strut_results import GRID, distances, record, results, series
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 

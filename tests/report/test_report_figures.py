@@ -13,7 +13,7 @@ from kincheck.core.report.figures import SYMBOLS, Past
 from kincheck.core.report.report import write_report
 from msgspec.structs import replace
 
-from ..support.made_up import CRANK, GRID, distances, judged, record, results, series
+from ..support.strut_results import CRANK, GRID, distances, judged, record, results, series
 from .page import report, traces
 
 

@@ -9,8 +9,8 @@ from kincheck.core.harness.record import Deviations, Results, Seconds, to_json
 from kincheck.core.report.table import print_outputs
 from msgspec.structs import replace
 
-from ..support.made_up import ACCOUNT, GRID, results, series
 from ..support.printed import Terminal, assert_printed, assert_row, blocks, cells_of, coloured
+from ..support.strut_results import ACCOUNT, GRID, results, series
 from .page import report
 
 MOTIONS = ("position", "velocity", "acceleration")

@@ -22,7 +22,7 @@ from kincheck.core.report.drawing import drawing
 from msgspec.structs import replace as replaced
 
 from ..oracles.naive import A
-from ..support.made_up import GRID, STROKE, record
+from ..support.strut_results import GRID, STROKE, record
 
 STRUT = cases.load("mcpherson_strut")
 AXIS = driver_axis(

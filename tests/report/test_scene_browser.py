@@ -6,7 +6,7 @@ from kincheck import cases
 from kincheck.core.harness.scene import FRAMES, scene
 from msgspec.structs import replace
 
-from ..support.made_up import results
+from ..support.strut_results import results
 from .test_report_browser import strut
 
 

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from ..kinematics.test_chain import chain
 from ..oracles.naive import A
-from ..support.made_up import GRID, record, series
+from ..support.strut_results import GRID, record, series
 from .test_report_scene import AXIS, STRUT, UP
 
 

@@ -24,7 +24,7 @@ from kincheck.core.report.regressions import to_markdown
 from kincheck.core.report.report import caveats, headline
 
 from ..history.test_regression import kinds, reported
-from ..support.nights import FACTS, changed, keep, nights, records
+from ..support.history_runs import FACTS, changed, keep, nights, records
 
 GONE = {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": None, "errors": {}}
 UNMADE = "not run: the run ended before this pair"

@@ -15,9 +15,9 @@ from kincheck.core.history.runs import keep as begin
 from kincheck.core.history.store import Store
 from msgspec.structs import replace
 
-from ..harness.test_unfinished import killed
+from ..harness.test_unfinished_runs import killed
 from ..support.fakes import Fake, crank
-from ..support.nights import changed, keep, keep_changed, nights, records, worse
+from ..support.history_runs import changed, keep, keep_changed, nights, records, worse
 from .test_regression import reported
 
 FIRST = ("first", "mujoco")

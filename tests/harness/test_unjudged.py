@@ -29,7 +29,7 @@ from kincheck.core.report.report import caveats, headline, write_report
 from msgspec import UNSET
 
 from ..support.fakes import SAMPLES, Fake, crank, off, partial, solution
-from ..support.nights import changed, keep, records, reported
+from ..support.history_runs import changed, keep, records, reported
 
 TOL = 1e-12
 RIGHT, MISSING = Fake("native"), Fake("missing", installed=None)
