@@ -26,7 +26,7 @@ from kincheck.core.mechanism.motions import Driver
 from kincheck.core.trajectory import Array
 
 from ..support.engine_motion import ENGINES, TOL, TREES, assert_consistent, installed
-from ..support.fakes import Fake, crank
+from ..support.fakes import Fake, crank, record_of, run_case
 from ..support.giving_up import GivingUp
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +44,7 @@ def strut(values: Any = (), rate: float = 1.0) -> Case:
 
 @ENGINES
 def test_the_strut_is_the_truth_to_round_off(engine: str) -> None:
-    (record,) = run([strut()], [installed(engine)], tol=TOL).records
+    record = record_of(installed(engine), strut())
     assert record.outcome is Outcome.PASS, record.message
     for errors in record.errors.values():
         for quantity, each in errors.items():
@@ -197,7 +197,7 @@ def test_a_wrong_axis_is_found_and_named_by_comparison(
         adapters.engine("native"),
         *(e for e in map(adapters.engine, ("mujoco", "exudyn")) if e.version()),
     ]
-    results = run([case], [*others, given], tol=TOL)
+    results = run_case(case, *others, given)
     wrong = next(each for each in results.records if each.engine == engine)
     assert wrong.residual_max is not None
     assert wrong.residual_max <= TOL  # its own rows tell nothing

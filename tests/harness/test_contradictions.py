@@ -19,7 +19,19 @@ from kincheck.core.report.report import headline
 from kincheck.core.studies.tolerance.study import Study
 
 from ..oracles.rods import Carrier
-from ..support.fakes import RADIUS, SAMPLES, Fake, at, crank, exact, off, raising, solution
+from ..support.fakes import (
+    RADIUS,
+    SAMPLES,
+    Fake,
+    at,
+    crank,
+    exact,
+    off,
+    raising,
+    record_of,
+    run_case,
+    solution,
+)
 
 TOL = 1e-12
 ENDS = "cannot be followed beyond here: there is a singular pose ahead"
@@ -41,10 +53,8 @@ def reaching(samples, message=ENDS, **changed):
 
 def pair(native, engine, case=None):
     """Records of the native engine and another."""
-    return run(
-        [case or crank(reference=False)],
-        [Fake("native", answer=native), Fake(answer=engine)],
-        tol=TOL,
+    return run_case(
+        case or crank(reference=False), Fake("native", answer=native), Fake(answer=engine)
     ).records
 
 
@@ -65,7 +75,7 @@ def test_engine_values_beyond_native_reach_fail():
 
 def test_baseline_contradicts_engine_values():
     native = Fake("native", answer=reaching(range(7)))
-    (fake,) = run([crank(reference=False)], [Fake()], tol=TOL, baseline=native).records
+    fake = record_of(Fake(), crank(reference=False), baseline=native)
     assert (fake.outcome, "that native cannot reach" in fake.message) == (Outcome.FAIL, True)
 
 
@@ -110,9 +120,7 @@ def test_reference_gap_leaves_native_judge():
         Outcome.FAIL,
         True,
     )
-    (alone,) = run(
-        [case], [Fake()], tol=TOL, baseline=Fake("native", answer=reaching(range(7)))
-    ).records
+    alone = record_of(Fake(), case, baseline=Fake("native", answer=reaching(range(7))))
     assert alone.outcome is Outcome.FAIL
 
 
@@ -136,9 +144,7 @@ def test_failed_native_judges_nothing(outcome):
             else:
                 yield index, attempt(each)
 
-    native, fake = run(
-        [crank(reference=False)], [Fake("native"), Fake()], tol=TOL, solver=solver
-    ).records
+    native, fake = run_case(crank(reference=False), Fake("native"), Fake(), solver=solver).records
     assert native.outcome is outcome
     why = (
         f"the case has no reference, and the native engine has no answer ({outcome}: it went down)"
@@ -154,13 +160,13 @@ def leaving(residual, **changed):
 
 
 def test_residual_above_tolerance_fails():
-    (fake,) = run([crank()], [leaving(1e-6)], tol=TOL).records
+    fake = record_of(leaving(1e-6))
     assert fake.outcome is Outcome.FAIL
     assert fake.message.startswith(
         "the residual of samples that the engine calls solved is 1e-06, tolerance 1e-12"
     )
     assert "1 of 1 comparisons has a residual above the tolerance" in headline(
-        run([crank()], [leaving(1e-6)], tol=TOL)
+        run_case(crank(), leaving(1e-6))
     )
 
 
@@ -180,7 +186,7 @@ def test_residual_within_tolerance_passes(residual, options, engine):
 
 
 def test_residual_fails_uncompared_pair():
-    (fake,) = run([crank(reference=False)], [leaving(1e-6)], tol=TOL).records
+    fake = record_of(leaving(1e-6), crank(reference=False))
     assert fake.outcome is Outcome.FAIL
 
 
@@ -189,7 +195,7 @@ def test_simulators_keep_residual_promise(name):
     engine = adapters.engine(name)
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
-    (record,) = run([cases.load("chrono_macpherson")], [engine], tol=1e-9).records
+    record = record_of(engine, cases.load("chrono_macpherson"), tol=1e-9)
     assert record.outcome is Outcome.PASS, record.message
 
 
@@ -210,14 +216,12 @@ def test_uncertain_samples_contradict_no_engine():
 
 
 def test_contradictions_are_written_read_and_resumed():
-    results = run(
-        [crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL
-    )
+    results = run_case(crank(reference=False), Fake("native", answer=reaching(range(7))), Fake())
     read = from_json(to_json(results))
     assert read == results
     assert "contradict" in headline(results)
     engines = [Fake("native", answer=raising(AssertionError("not again"))), Fake()]
-    again = run([crank(reference=False)], engines, tol=TOL, made=read.records[:1])
+    again = run_case(crank(reference=False), *engines, made=read.records[:1])
     assert again.records[1].message == results.records[1].message
 
 

@@ -21,7 +21,7 @@ from kincheck.core.harness.workers.serve import pack
 
 from ..support.bad_engine import Bad
 from ..support.fake_command_line import Slow
-from ..support.fakes import Fake, crank, raising
+from ..support.fakes import Fake, crank, raising, run_case
 from .test_workers import timeless
 
 TOL = 1e-12
@@ -165,13 +165,13 @@ def test_silent_scheduler_is_reported(monkeypatch):
     with pytest.raises(
         ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\). Start one with"
     ):
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
+        run_case(crank(), Fake(), solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(
             ClusterError, match=rf"scheduler {address}: does not answer \(TimeoutError"
         ):
-            run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
+            run_case(crank(), Fake(), solver=on_cluster(address, LIMITS))
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_invalid_scheduler_address_is_refused(address, monkeypatch):
     """Who had waited in vain would be told that nobody answers."""
     forbid_clients(monkeypatch)
     with pytest.raises(ClusterError) as caught:
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
+        run_case(crank(), Fake(), solver=on_cluster(address, LIMITS))
     message = str(caught.value)
     assert message.startswith(f"scheduler {address}: found no address (")
     assert message.endswith(
@@ -226,7 +226,7 @@ def test_missing_dask_names_package(monkeypatch):
 
     monkeypatch.setattr(importlib, "import_module", absent)
     with pytest.raises(ClusterError, match="pip install 'distributed>="):
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
+        run_case(crank(), Fake(), solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
 
 
 def test_cluster_version_mismatch_is_error():

@@ -16,9 +16,9 @@ from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine import Unloadable, versions
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 
 from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
+from ..support.fakes import record_of, run_case
 from ..support.mechanisms import placed
 
 # Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in
@@ -40,8 +40,7 @@ def engine(name):
 
 
 def record(case, name):
-    (found,) = run([case], [engine(name)], tol=1e-12).records
-    return found
+    return record_of(engine(name), case)
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
@@ -112,7 +111,7 @@ def test_round_off_near_singular_pose_passes(name):
     times as fast there, and so does the round-off.
     """
     case = load_case(Path(__file__).parents[1] / "data" / "fast_loop.toml")
-    native, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
+    native, found = run_case(case, engine("native"), engine(name)).records
     fastest = max(np.max(np.abs(each.acceleration)) for each in native.outputs.values())
     assert fastest > 5000 * case.sweep.rate**2
     worst = max(

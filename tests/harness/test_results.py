@@ -27,17 +27,29 @@ from kincheck.core.mechanism.motions import PointCoordinate
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.table import print_table
 
-from ..support.fakes import RADIUS, SAMPLES, Fake, crank, exact, off, partial, raising, solution
+from ..support.fakes import (
+    RADIUS,
+    SAMPLES,
+    Fake,
+    crank,
+    exact,
+    off,
+    partial,
+    raising,
+    run_case,
+    solution,
+)
 
 TOL = 1e-12
 
 
 def test_json_has_schema_and_digits():
     p = exact(crank())[0]
-    results = run(
-        [crank()],
-        [Fake(), Fake("partial", answer=partial), Fake("missing", installed=None)],
-        tol=TOL,
+    results = run_case(
+        crank(),
+        Fake(),
+        Fake("partial", answer=partial),
+        Fake("missing", installed=None),
         command="kincheck run",
     )
     text = to_json(results)
@@ -58,11 +70,11 @@ def test_json_has_schema_and_digits():
 
 def test_json_keeps_lists_on_lines():
     message = 'list [1,2,\t3] of "quoted, [4,5]" numbers'
-    results = run([crank()], [Fake(answer=raising(ValueError(message)))], tol=TOL)
+    results = run_case(crank(), Fake(answer=raising(ValueError(message))))
     text = to_json(results)
     assert from_json(text).records[0].message == f"ValueError: {message}"
     assert b'"angle": [' not in text
-    lines = to_json(run([crank()], [Fake()], tol=TOL)).decode().splitlines()
+    lines = to_json(run_case(crank(), Fake())).decode().splitlines()
     assert any(line.strip().startswith('"angle": [-1.0, ') and line.endswith("]") for line in lines)
 
 
@@ -72,11 +84,8 @@ def test_foreign_results_are_refused():
 
 
 def test_undecodable_message_in_json_and_junit():
-    results = run(
-        [crank()],
-        [Fake(answer=raising(ValueError("bad \udcff and \x00")))],
-        tol=TOL,
-        command="kincheck \udcff",
+    results = run_case(
+        crank(), Fake(answer=raising(ValueError("bad \udcff and \x00"))), command="kincheck \udcff"
     )
     assert from_json(to_json(results)) == results
     ET.fromstring(to_junit(results))
@@ -135,7 +144,7 @@ def test_junit_has_testcase_per_output():
 
 def test_table_keeps_long_message_whole(capsys):
     message = "row " * 200
-    print_table(run([crank()], [Fake(answer=raising(ValueError(message)))], tol=1e-12), sys.stdout)
+    print_table(run_case(crank(), Fake(answer=raising(ValueError(message)))), sys.stdout)
     assert message.strip() in capsys.readouterr().out
 
 
@@ -149,9 +158,9 @@ def test_table_sums_up_missing_engines(capsys):
 
 
 def test_table_names_modes_if_several(capsys):
-    print_table(run([crank()], [Fake("one"), Fake("two")], tol=TOL), sys.stdout)
+    print_table(run_case(crank(), Fake("one"), Fake("two")), sys.stdout)
     assert "projection" not in capsys.readouterr().out
-    print_table(run([crank()], [Fake("one"), Fake("two", mode="simulate")], tol=TOL), sys.stdout)
+    print_table(run_case(crank(), Fake("one"), Fake("two", mode="simulate")), sys.stdout)
     assert "two · simulate" in capsys.readouterr().out
 
 

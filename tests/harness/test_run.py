@@ -11,14 +11,21 @@ from kincheck.core.harness import execution
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import NULL_REASONS, run
 
-from ..support.fakes import SAMPLES, Fake, at, crank, exact, off, partial, raising, solution
+from ..support.fakes import (
+    SAMPLES,
+    Fake,
+    at,
+    crank,
+    exact,
+    off,
+    partial,
+    raising,
+    record_of,
+    run_case,
+    solution,
+)
 
 TOL = 1e-12
-
-
-def record_of(engine, case=None):
-    (record,) = run([crank() if case is None else case], [engine], tol=TOL).records
-    return record
 
 
 def fail_after(count, error):
@@ -58,7 +65,7 @@ def test_duplicate_names_are_refused():
     with pytest.raises(CaseError, match="two cases named 'crank'"):
         run([crank(), crank()], [Fake()], tol=TOL)
     with pytest.raises(CaseError, match=r"two engines named 'fake \(projection\)'"):
-        run([crank()], [Fake(), Fake()], tol=TOL)
+        run_case(crank(), Fake(), Fake())
 
 
 def test_wrong_sign_fails():
@@ -217,7 +224,7 @@ def test_unsolved_answer_fails_without_numbers():
 def test_case_without_reference_uses_native():
     case = crank(truth=Truth.CLOSED_FORM, reference=False)
     wrong = Fake("wrong", answer=off("acceleration", lambda a: a * (1 + 1e-6)))
-    results = run([case], [Fake(), wrong, Fake("native")], tol=TOL)
+    results = run_case(case, Fake(), wrong, Fake("native"))
     native, fake, bad = results.records  # the native engine comes first: the others need it
     assert [native.engine, fake.engine, bad.engine] == ["native", "fake", "wrong"]
     assert (native.outcome, native.message) == (Outcome.UNJUDGED, "the case has no reference")
@@ -242,21 +249,18 @@ def test_case_without_any_standard_is_unjudged():
 def test_baseline_is_not_recorded():
     native = Fake("native")
     wrong = Fake(answer=off("position", lambda p: 1.001 * p))
-    (record,) = run([crank(reference=False)], [wrong], tol=TOL, baseline=native).records
+    record = record_of(wrong, crank(reference=False), baseline=native)
     assert (record.engine, record.outcome) == ("fake", Outcome.FAIL)
     assert "against native" in record.message
     native.solves = 0
-    run([crank()], [wrong], tol=TOL, baseline=native)
+    run_case(crank(), wrong, baseline=native)
     assert native.solves == 0  # the reference has it all
     for lacking in ("velocity", "acceleration"):
         case = crank()
         case.reference["y"] = replace(case.reference["y"], **{lacking: None})
-        (record,) = run(
-            [case],
-            [Fake(answer=off(lacking, lambda values: 1.001 * values))],
-            tol=TOL,
-            baseline=native,
-        ).records
+        record = record_of(
+            Fake(answer=off(lacking, lambda values: 1.001 * values)), case, baseline=native
+        )
         assert getattr(record.errors["y"], lacking).against == "native"
         assert not getattr(record.errors["y"], lacking).within
 
@@ -265,7 +269,7 @@ def test_native_completes_reference():
     case = crank()
     case.reference.pop("y")
     case.reference["x"] = Series(case.reference["x"].position)
-    native, fake = run([case], [Fake("native"), Fake()], tol=TOL).records
+    native, fake = run_case(case, Fake("native"), Fake()).records
     assert [each.against for _, each in fake.errors["x"].items()] == [
         "closed_form",
         "native",

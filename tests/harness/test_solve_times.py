@@ -5,9 +5,8 @@ from itertools import accumulate, chain
 import pytest
 from kincheck.core.harness import execution
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 
-from ..support.fakes import SAMPLES, Fake, crank, off, solution
+from ..support.fakes import SAMPLES, Fake, off, record_of, solution
 
 TOL = 1e-12
 WARM_SOLVES = execution.WARM_SOLVES
@@ -16,11 +15,6 @@ WARM_SOLVES = execution.WARM_SOLVES
 @pytest.fixture(autouse=True)
 def as_users_solve(monkeypatch):
     monkeypatch.setattr(execution, "WARM_SOLVES", WARM_SOLVES)
-
-
-def record_of(engine):
-    (record,) = run([crank()], [engine], tol=TOL).records
-    return record
 
 
 def timed(monkeypatch, build, *solves, waits=()):

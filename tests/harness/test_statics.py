@@ -14,8 +14,9 @@ from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 from scipy.optimize import brentq
+
+from ..support.fakes import record_of
 
 G = 9.81
 ARM = """
@@ -87,7 +88,7 @@ def read(tmp_path, text):
 def values(case, engine="native"):
     """Return the outputs of a case by an engine."""
     engine = adapters.engine(engine)
-    (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    record = record_of(engine, case, baseline=adapters.engine("native"))
     assert not record.outcome.bad, record.message
     return {name: np.array(each.position, float) for name, each in record.outputs.items()}
 
@@ -135,7 +136,7 @@ def test_static_case_is_written_as_read(tmp_path):
 def test_static_results_have_no_rates(tmp_path):
     case = read(tmp_path, ARM + SWEEP + '[outputs.x]\npoint = "tip"\ncomponent = "x"\n')
     engine = adapters.engine("pinocchio")
-    (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    record = record_of(engine, case, baseline=adapters.engine("native"))
     assert (record.outcome.value, record.message) == ("pass", "")
     assert record.outputs["x"].velocity is None
 
@@ -214,7 +215,7 @@ def test_missing_effort_at_dead_centre(tmp_path):
     text += '[joints.slide]\ntype = "translational"\nbodies = ["ground", "slider"]\n'
     text += "point = [3.0, 0.0, 0.0]\naxis = [1.0, 0.0, 0.0]\n"
     text += '[outputs.e]\ntype = "driver_effort"\ndriver = "turn"\nat = "slide"\n'
-    (record,) = run([read(tmp_path, text)], [NativeEngine()], tol=1e-12).records
+    record = record_of(NativeEngine(), read(tmp_path, text))
     assert record.outputs["e"].position[0] is None
     assert "at 1 of 3 samples joint 'slide' is at a dead centre" in record.outputs["e"].reason
 
@@ -237,7 +238,7 @@ def test_equilibrium_without_effort_outputs_is_judged(tmp_path):
     case = read(tmp_path, text)
     found = values(case, "native")
     assert [found[f"{name}.effort"][0] for name in ("lift", "bend")] == pytest.approx([0.0] * 2)
-    (record,) = run([case], [Heavy()], tol=1e-12, baseline=NativeEngine()).records
+    record = record_of(Heavy(), case, baseline=NativeEngine())
     assert record.outcome is Outcome.FAIL
     assert "lift.effort" in record.message
 

@@ -17,7 +17,6 @@ from kincheck.core.cli import main
 from kincheck.core.harness.evidence import digest
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
-from kincheck.core.harness.run import run
 from kincheck.core.harness.suspects import FACTORS, Held, slips
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
@@ -28,7 +27,7 @@ from kincheck.core.trajectory import Trajectory
 from ..support.case_texts import BASE, CSV, INLINE, complains, write
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
-from ..support.fakes import Fake, crank, exact, off
+from ..support.fakes import Fake, crank, exact, off, record_of, run_case
 from ..support.loaded import loaded
 
 ENGINES = [Fake("native"), Fake("other"), Fake("third")]
@@ -57,7 +56,7 @@ def every(series, change):
 
 
 def suspected(change, engines=ENGINES):
-    results = run([with_reference(change)], engines, tol=1e-12)
+    results = run_case(with_reference(change), *engines)
     return results, results.suspects.get("crank")
 
 
@@ -102,7 +101,7 @@ def test_suspected_sample_has_unit_of_file(driver, unit, written):
     sweep = replace(case.sweep, driver=driver)
     if driver == "time":
         sweep = replace(sweep, rate=1.0, motions={"angle": Ramp(2.0)})
-    suspects = run([replace(case, sweep=sweep, angle_unit=unit)], ENGINES, tol=1e-12).suspects
+    suspects = run_case(replace(case, sweep=sweep, angle_unit=unit), *ENGINES).suspects
     assert f"at sample 6 ({written}) of output" in suspects["crank"].message
 
 
@@ -155,13 +154,11 @@ def test_disagreeing_engines_suspect_nobody():
 
 def test_one_wrong_engine_suspects_nobody():
     assert (
-        run(
-            [crank()], [Fake("native"), Fake("wrong", off("position", lambda p: -p))], tol=1e-12
-        ).suspects
+        run_case(crank(), Fake("native"), Fake("wrong", off("position", lambda p: -p))).suspects
         == {}
     )
-    assert run([crank()], ENGINES, tol=1e-12).suspects == {}
-    assert run([crank(reference=False)], ENGINES, tol=1e-12).suspects == {}
+    assert run_case(crank(), *ENGINES).suspects == {}
+    assert run_case(crank(reference=False), *ENGINES).suspects == {}
 
 
 def test_lone_engine_suspects_explained_slips():
@@ -269,7 +266,7 @@ def shifted(name, part):
 
 
 def found_by(engines, case=None):
-    results = run([case or crank(reference=False)], engines, tol=1e-12)
+    results = run_case(case or crank(reference=False), *engines)
     return results, results.suspects.get("crank")
 
 
@@ -317,7 +314,7 @@ def test_suspicion_appears_once_per_format(subject, who, said, tmp_path):
 
 def test_suspected_native_outside_run():
     """It is the standard without a record."""
-    results = run([crank(reference=False)], OTHERS, tol=1e-12, baseline=WRONG)
+    results = run_case(crank(reference=False), *OTHERS, baseline=WRONG)
     assert results.suspects["crank"].subject == "native"
     assert "with the other sign" in results.suspects["crank"].message
 
@@ -410,7 +407,7 @@ def test_simulators_suspect_native_moments():
     case = force_case(loaded(), [0.0, 0.25, 0.5])
     case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
     simulators = [engine(name) for name in ("mujoco", "pinocchio", "exudyn")]
-    results = run([case], [OtherMoments(), *simulators], tol=1e-12)
+    results = run_case(case, OtherMoments(), *simulators)
     found = results.suspects[case.name]
     assert found.engines == ["mujoco", "pinocchio", "exudyn"]
     assert all(" joint_moment " in name for name in found.outputs)
@@ -500,7 +497,7 @@ def test_built_in_closed_forms_cite_modules():
         if case.truth is Truth.CLOSED_FORM:
             assert "kincheck.cases." in case.origin.citation
         assert not [note for note in notes(case) if "uncited" in note]
-    (record,) = run([cases.load("rssr")], [adapters.engine("native")], tol=1e-12).records
+    record = record_of(adapters.engine("native"), cases.load("rssr"))
     assert record.validated
 
 
@@ -520,7 +517,7 @@ def third_party(change=lambda series: series, **changes):
 
 @pytest.mark.parametrize("engines", [OWN, OWN[::-1]])
 def test_own_result_as_reference_is_recognised(engines):
-    results = run([third_party()], engines, tol=1e-12)
+    results = run_case(third_party(), *engines)
     assert [record.outcome for record in results.records] == [Outcome.PASS] * 2
     assert not any(record.validated for record in results.records)
     assert all(record.evidence.own for record in results.records)
@@ -530,9 +527,9 @@ def test_own_result_as_reference_is_recognised(engines):
 
 
 def test_own_result_is_recognised_by_baseline():
-    (record,) = run([third_party()], [Fake("other")], tol=1e-12, baseline=Fake("native")).records
+    record = record_of(Fake("other"), third_party(), baseline=Fake("native"))
     assert not record.validated
-    (record,) = run([third_party()], [Fake("other")], tol=1e-12).records
+    record = record_of(Fake("other"), third_party())
     assert record.validated  # nobody can tell
 
 
@@ -542,11 +539,11 @@ def test_reference_one_bit_off_validates():
         moved[3] = np.nextafter(moved[3], 9.0)
         return Series(moved, series.velocity, series.acceleration)
 
-    assert all(record.validated for record in run([third_party(bump)], OWN, tol=1e-12).records)
+    assert all(record.validated for record in run_case(third_party(bump), *OWN).records)
 
 
 def test_closed_form_met_exactly_validates():
-    assert all(record.validated for record in run([crank()], OWN, tol=1e-12).records)
+    assert all(record.validated for record in run_case(crank(), *OWN).records)
 
 
 @pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)])
@@ -555,7 +552,7 @@ def test_few_equal_samples_prove_nothing(taken):
     case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[taken]))
     p, v, a = exact(case)
     case = replace(case, reference={"y": Series(p[:, 1].copy(), v[:, 1].copy(), a[:, 1].copy())})
-    assert not any(record.evidence.own for record in run([case], OWN, tol=1e-12).records)
+    assert not any(record.evidence.own for record in run_case(case, *OWN).records)
 
 
 def test_equal_driven_coordinate_proves_nothing(tmp_path):

@@ -9,13 +9,12 @@ import pytest
 from kincheck.core.forces import Forces
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
 from kincheck.core.trajectory import Trajectory
 
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
-from ..support.fakes import SAMPLES, Fake, at, crank, solution
+from ..support.fakes import SAMPLES, Fake, at, crank, record_of, run_case, solution
 from ..support.loaded import loaded
 
 NATIVE = NativeEngine(every_body=True)
@@ -107,7 +106,7 @@ FORMS = {
 
 
 def refused(answer):
-    (record,) = run([crank()], [Fake(answer=answer)], tol=1e-12).records
+    record = record_of(Fake(answer=answer))
     assert record.outcome is Outcome.ERROR
     assert record.message.startswith("BadTrajectoryError: fake: ")
     return record.message
@@ -199,7 +198,7 @@ def test_malformed_forces_and_bodies_are_reported(breach, case, found):
 def outcome(case, found, mode="projection"):
     """Outcome and message of a trajectory in a run, judged by itself alone."""
     engine = Fake("native", answer=lambda case: found, mode=mode)
-    (record,) = run([case], [engine], tol=1e-12).records
+    record = record_of(engine, case)
     return record.outcome, record.message
 
 
@@ -281,7 +280,7 @@ def test_bodies_without_rates_judged_by_position(case, found):
 def test_engine_with_points_alone_passes():
     free = Forces({}, {}, {}, np.zeros(SAMPLES), np.zeros(SAMPLES))
     engine = Fake(answer=lambda case: changed(solution(case), forces=free, residual=0))
-    (record,) = run([crank()], [engine], tol=1e-12).records
+    record = record_of(engine)
     assert record.outcome is Outcome.PASS
 
 
@@ -290,7 +289,7 @@ def test_freedoms_unlike_native_fail():
         found = solution(case)
         return changed(found, details={**found.details, "dof": 2})
 
-    native, other = run([crank()], [Fake("native"), Fake("other", two)], tol=1e-12).records
+    native, other = run_case(crank(), Fake("native"), Fake("other", two)).records
     assert native.outcome is Outcome.PASS
     assert other.outcome is Outcome.FAIL
     assert other.message == "counts 2 degrees of freedom without drivers, native 1"

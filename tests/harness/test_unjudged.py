@@ -18,7 +18,6 @@ from kincheck.core.cli import main
 from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.harness.run import run
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
@@ -28,7 +27,7 @@ from kincheck.core.report.regressions import to_markdown
 from kincheck.core.report.report import caveats, headline, write_report
 from msgspec import UNSET
 
-from ..support.fakes import SAMPLES, Fake, crank, off, partial, solution
+from ..support.fakes import SAMPLES, Fake, crank, off, partial, record_of, run_case, solution
 from ..support.history_runs import changed, keep, records, reported
 
 TOL = 1e-12
@@ -42,7 +41,7 @@ UNREFERENCED = {"crank": crank(reference=False)}
 
 
 def unjudged():
-    return run([crank(reference=False)], [RIGHT, Fake()], tol=TOL)
+    return run_case(crank(reference=False), RIGHT, Fake())
 
 
 def test_many_unjudged_cases_are_summarised(kincheck_main, capsys, monkeypatch, tmp_path):
@@ -89,12 +88,12 @@ def test_not_judged_wording_in_every_format(tmp_path, kincheck_main, capsys):
 def test_unjudged_output_is_skipped_in_junit():
     case = crank()
     del case.reference["y"]
-    (record,) = run([case], [RIGHT], tol=TOL).records
+    record = record_of(RIGHT, case)
     assert (record.outcome, record.message) == (
         Outcome.PASS,
         "not judged: y: the reference does not have it",
     )
-    results = run([case], [RIGHT, WRONG], tol=TOL)
+    results = run_case(case, RIGHT, WRONG)
     tests = {
         (test.get("classname"), test.get("name")): [
             (child.tag, child.get("message")) for child in test
@@ -114,7 +113,7 @@ def test_large_residual_fails_every_output():
         found.__dict__["residual"] = 1e-3
         return found
 
-    root = ET.fromstring(junit.to_junit(run([crank()], [Fake(answer=answer)], tol=TOL)))
+    root = ET.fromstring(junit.to_junit(run_case(crank(), Fake(answer=answer))))
     assert [failure.get("message", "")[:12] for failure in root.iter("failure")] == [
         "the residual"
     ] * 2
@@ -185,7 +184,7 @@ def test_reference_without_values_is_unjudged():
     case = crank()
     unknown = np.full(len(case.sweep.values), np.nan)
     case.reference.update(dict.fromkeys(("x", "y"), Series(unknown, unknown, unknown)))
-    (record,) = run([case], [RIGHT], tol=TOL).records
+    record = record_of(RIGHT, case)
     assert record.outcome is Outcome.UNJUDGED
     assert "position: no sample is known to both the engine and closed form" in record.message
 
@@ -356,7 +355,7 @@ class UndefinedRate(Rate):
 def test_output_without_values_fails(complete):
     x, y = crank().outputs
     case = replace(crank(), outputs=(Undefined(**vars(x)), y))
-    results = run([case], [Fake(answer=solution if complete else partial)], tol=1e-12)
+    results = run_case(case, Fake(answer=solution if complete else partial))
     (record,) = results.records
     assert record.outcome is Outcome.FAIL
     assert record.errors["x"].position is None
@@ -379,7 +378,7 @@ def test_engine_without_samples_in_headline(tmp_path):
             case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan)
         )
 
-    results = run([crank()], [Fake("native"), Fake("none", answer=nothing)], tol=1e-12)
+    results = run_case(crank(), Fake("native"), Fake("none", answer=nothing))
     assert headline(results) == "1 of 2 comparisons lacks samples"
     write_report(results, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text("utf-8")
@@ -421,5 +420,5 @@ def test_complete_reference_needs_no_native():
     """Of outputs that are derivatives there is no acceleration."""
     case, native = cases.load("mcpherson_suspension"), Fake("native")
     assert any(output.orders < ORDERS for output in case.outputs)
-    run([case], [Fake("mujoco", refusal="no")], tol=1e-12, baseline=native)
+    run_case(case, Fake("mujoco", refusal="no"), baseline=native)
     assert native.solves == 0
