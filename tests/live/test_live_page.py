@@ -43,6 +43,32 @@ def toe(browser):
     return float(browser.run("return kincheckLive.answer.outputs.toe.at(-1)"))
 
 
+def height(browser):
+    """The y of the ball joint [mm]."""
+    return browser.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]")
+
+
+def type_in(browser, field, text):
+    """Type a text in place of what a field has, and leave it."""
+    browser.click(field)
+    browser.run("document.activeElement.select()")
+    browser.write(text)
+    browser.key("Tab")
+
+
+def until_state(browser, text):
+    """Wait for the line of state to begin with a text."""
+    browser.until(f"document.querySelector('#state').textContent.startsWith({text!r})")
+
+
+def saved_toe(browser, car):
+    """Save the table; the toe that `run` gives for the new file."""
+    browser.click("#saving button")
+    until_state(browser, "saved as")
+    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
+    return record.outputs["toe"].position
+
+
 def text(browser, selector):
     return browser.run(f"return document.querySelector({selector!r}).textContent")
 
@@ -75,11 +101,7 @@ def test_dragged_point_equals_run(opened, car):
     assert moved[0] == 0.0
     assert moved[1] != 0.0 != moved[2]
     assert toe(opened) != before
-    opened.click("#saving button")
-    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
-    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
-    expected = record.outputs["toe"].position[-1]
-    assert toe(opened) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    assert toe(opened) == pytest.approx(saved_toe(opened, car)[-1], rel=1e-12, abs=1e-15)
     assert car.read_text("utf-8") == CAR
 
 
@@ -92,11 +114,8 @@ def test_ball_joint_dragged_by_millimetres(opened, car):
     millimetre = (outer - inner) / (612 - 210)
     moved = drag(opened, (10.0 * millimetre, 0.0))
     assert moved == pytest.approx([0.0, 10.0, 0.0], abs=0.051)  # tenths of millimetres
-    opened.click("#saving button")
-    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
-    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
     shown = opened.run("return kincheckLive.answer.outputs.toe")
-    assert shown == pytest.approx(record.outputs["toe"].position, rel=1e-13, abs=1e-15)
+    assert shown == pytest.approx(saved_toe(opened, car), rel=1e-13, abs=1e-15)
 
 
 def test_locked_axis_is_kept(opened):
@@ -105,7 +124,7 @@ def test_locked_axis_is_kept(opened):
     assert moved[1] == 0.0 != moved[2]
     opened.click(FIELD)
     opened.key("ArrowUp")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    assert height(opened) == 540
 
 
 def test_reload_keeps_numbers(opened):
@@ -115,10 +134,10 @@ def test_reload_keeps_numbers(opened):
     moved = toe(opened)
     opened("Page.reload")
     opened.until("'ready' in document.documentElement.dataset && !kincheckLive.isDue()")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541
+    assert height(opened) == 541
     assert toe(opened) == moved
     opened.key("z", ctrl=True)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    assert height(opened) == 540
 
 
 def test_live_page_by_keys_alone(opened, car):
@@ -140,13 +159,13 @@ def test_live_page_by_keys_alone(opened, car):
         if name == "uca_outer y [mm]":
             opened.key("ArrowUp")
     answered(opened)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541
+    assert height(opened) == 541
     order = ["CSV", "save", "play", "front", "centres", "film", "uca_front x [mm]", "check"]
     assert [name for name in seen if name in order] == order
     opened.run("document.querySelector('#name').focus()")
     opened.key("Tab")
     opened.key("Enter")
-    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
+    until_state(opened, "saved as")
     assert "uca_outer,-15,541,312" in car.with_name("car_2.csv").read_text("utf-8")
 
 
@@ -181,33 +200,24 @@ def test_arrow_keys_step_number(opened):
     for how in ({}, {"shift": True}, {"alt": True}):
         opened.key("ArrowUp", **how)
     answered(opened)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == pytest.approx(551.1)
+    assert height(opened) == pytest.approx(551.1)
 
 
 def test_typed_number_with_decimal_comma(opened):
-    opened.click(FIELD)
-    opened.run("document.activeElement.select()")
-    opened.write("541,5")
-    opened.key("Tab")
+    type_in(opened, FIELD, "541,5")
     answered(opened)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541.5
+    assert height(opened) == 541.5
 
 
 def test_typed_word_is_refused(opened):
-    opened.click(FIELD)
-    opened.run("document.activeElement.select()")
-    opened.write("54o")
-    opened.key("Tab")
+    type_in(opened, FIELD, "54o")
     opened.until("document.querySelector('#trouble').textContent.includes('coordinate')")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    assert height(opened) == 540
 
 
 def test_refused_design_marks_row(opened):
     before = toe(opened)
-    opened.click("[aria-label='uca_outer z [mm]']")
-    opened.run("document.activeElement.select()")
-    opened.write("12")
-    opened.key("Tab")
+    type_in(opened, "[aria-label='uca_outer z [mm]']", "12")
     opened.until("document.querySelector('tr.wrong th')")
     assert text(opened, "tr.wrong th") == "uca_outer"
     assert "uca_outer" in text(opened, "#trouble")
@@ -218,7 +228,7 @@ def test_refused_design_marks_row(opened):
 
 def test_edit_removes_verdict(opened):
     opened.click("#check")
-    opened.until("document.querySelector('#state').textContent === 'checked'")
+    until_state(opened, "checked")
     assert "native" in text(opened, "#verdicts")
     opened.click(FIELD)
     opened.key("ArrowUp")
@@ -226,9 +236,7 @@ def test_edit_removes_verdict(opened):
 
 
 def test_limit_marks_exceeding_numbers(opened):
-    opened.click("[aria-label='high limit of toe [°]']")
-    opened.write("0.1")
-    opened.key("Tab")
+    type_in(opened, "[aria-label='high limit of toe [°]']", "0.1")
     over = "return [...document.querySelectorAll('tr[data-output=toe] .over')].length"
     assert opened.run(over) == 1
     assert opened.run("return document.querySelectorAll('.limit').length") == 1
@@ -236,8 +244,8 @@ def test_limit_marks_exceeding_numbers(opened):
 
 def test_lost_server_keeps_numbers(opened, served):
     served.close()
-    opened.until("document.querySelector('#state').textContent.startsWith('connection lost')")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    until_state(opened, "connection lost")
+    assert height(opened) == 540
 
 
 def test_live_page_fits_narrow_window(served, browser):
@@ -376,8 +384,8 @@ def test_slider_moves_mechanism(tmp_path, browser):
     browser.visit(server.address)
     x, y = browser.middle("#sliders input[type=range]")
     browser.drag((x, y), (25.0, 0.0))
-    browser.until("document.querySelector('#state').textContent === 'all loops closed'")
+    until_state(browser, "all loops closed")
     assert "pose of the sliders" in text(browser, "#scene output")
     browser.until("document.querySelector('#sliders .row .quiet').textContent")
     server.close()
-    browser.until("document.querySelector('#state').textContent.startsWith('connection lost')")
+    until_state(browser, "connection lost")
