@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.case.measures import DriverEffort, JointForce, JointMoment
+from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError, KincheckError
@@ -284,7 +284,7 @@ def test_pose_without_equilibrium_is_refused(tmp_path):
 @pytest.mark.parametrize("name", ["rssr", "four_bar"])
 def test_effort_at_joint_by_virtual_work(name):
     """An actuator there holds the same mechanism: found by driving that joint instead."""
-    case = cases.load("four_bar")
+    case = cases.load(name)
     mechanism = case.mechanism
     driver = mechanism.drivers[0]
     other = "rocker_pivot"
@@ -318,35 +318,25 @@ def test_effort_at_joint_by_virtual_work(name):
 
 
 def test_reaction_frames_and_moment_points(tmp_path):
-    case = read(tmp_path, ARM + SWEEP + EFFORTS)
-    mechanism = case.mechanism
-    common = (1e-9, 0.0, "")
-    every = [
-        *(JointForce(f"g{x}", *common, joint="elbow", component=x) for x in "xyz"),
-        *(JointForce(f"b{x}", *common, joint="elbow", component=x, frame="body") for x in "xyz"),
-        *(
-            JointForce(f"j{x}", *common, joint="shoulder", component=x, frame="joint")
-            for x in "xyz"
-        ),
-        *(JointForce(f"s{x}", *common, joint="shoulder", component=x) for x in "xyz"),
-        JointMoment("m", *common, joint="elbow", component="y", about="tip"),
-        JointMoment("o", *common, joint="elbow", component="y"),
-    ]
-    bound = tuple(each.bound(mechanism) for each in every)
-    case = replace(case, mechanism=with_markers(mechanism, bound), outputs=bound)
+    outputs = components("global", "force", "elbow") + components("body", "force", "elbow")
+    outputs += components("joint", "force", "shoulder")
+    for name, about in (("tip", 'about = "tip"\n'), ("elbow", "")):
+        outputs += f'[outputs.{name}]\ntype = "joint_moment"\njoint = "elbow"\n'
+        outputs += f'component = "y"\n{about}'
+    case = read(tmp_path, ARM + SWEEP + outputs)
+    # the hand weighs 9.81 N, and hangs on the elbow: it is turned by 1.5 times the driver
+    turn = 1.5 * np.linspace(-0.4, 0.4, 5)
     for engine in ("native", "pinocchio"):
         found = values(case, engine)
-        # the hand weighs 9.81 N, and hangs on the elbow: it is turned by 1.5 times the driver
-        turn = 1.5 * np.linspace(-0.4, 0.4, 5)
-        assert found["gz"] == pytest.approx(np.full(5, G), abs=1e-11)
-        assert found["bx"] == pytest.approx(-G * np.sin(turn), abs=1e-11)
-        assert found["bz"] == pytest.approx(G * np.cos(turn), abs=1e-11)
+        assert found["global_z"] == pytest.approx(np.full(5, G), abs=1e-11)
+        assert found["body_x"] == pytest.approx(-G * np.sin(turn), abs=1e-11)
+        assert found["body_z"] == pytest.approx(G * np.cos(turn), abs=1e-11)
         # z of the joint's frame is its axis, y of the global one
-        size = np.hypot(found["jx"], found["jy"])
+        size = np.hypot(found["joint_x"], found["joint_y"])
         assert size == pytest.approx(np.full(5, 3.0 * G), abs=1e-11)
-        assert found["jz"] == pytest.approx(np.zeros(5), abs=1e-11)
+        assert found["joint_z"] == pytest.approx(np.zeros(5), abs=1e-11)
         # the tip is 0.2 m beyond the elbow
-        assert found["m"] == pytest.approx(found["o"] + G * 0.2 * np.cos(turn), abs=1e-11)
+        assert found["tip"] == pytest.approx(found["elbow"] + G * 0.2 * np.cos(turn), abs=1e-11)
 
 
 TURNED = """
