@@ -22,8 +22,17 @@ from kincheck.core.report.junit import to_junit, to_regression_junit
 from kincheck.core.report.regressions import to_markdown
 from kincheck.core.report.report import caveats, headline
 
-from ..history.test_regression import kinds, reported
-from ..support.history_runs import FACTS, changed, keep, nights, records
+from ..support.history_runs import (
+    FACTS,
+    changed,
+    history,
+    keep,
+    kinds,
+    nights,
+    records,
+    report,
+    reported,
+)
 from ..support.printed import junit_tests
 
 GONE = {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": None, "errors": {}}
@@ -56,7 +65,7 @@ def test_killed_run_is_reported(path, capsys):
     assert [(each.kind, each.case, each.engine, each.message) for each in found.findings] == [
         (Kind.LOST, "second", "mujoco", UNMADE)
     ]
-    assert main.main(["report", "--history", str(path)]) == 1
+    assert report(path) == 1
     assert (
         "run 3, without an end against run 2 (last green): 1 with something lost"
         in capsys.readouterr().out
@@ -81,7 +90,7 @@ def test_killed_run_without_records_is_reported(path):
 
 def test_missing_pairs_without_earlier_run(path, capsys):
     killed(path, 1)
-    assert main.main(["report", "--history", str(path)]) == 1
+    assert report(path) == 1
     assert "all 1 right, 3 not run; nothing to compare with" in capsys.readouterr().out
 
 
@@ -227,7 +236,7 @@ def test_step_has_unit_of_output(path, capsys):
     nights(path, 2)
     grown = {"errors": lambda errors: errors | {"x": _grown(errors["x"])}}
     keep(path, changed(records(), **grown), cases=facts)
-    assert main.main(f"history --history {path} --case first".split()) == 0
+    assert history(path, "--case", "first") == 0
     assert " → 1e-10 deg/s² since run 3" in capsys.readouterr().out
 
 

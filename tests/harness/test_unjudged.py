@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.case.case import ORDERS, Output, Series
-from kincheck.core.cli import main
 from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.results_file import read_results
@@ -27,7 +26,7 @@ from kincheck.core.report.report import caveats, headline, write_report
 from msgspec import UNSET
 
 from ..support.fakes import SAMPLES, Fake, crank, off, partial, record_of, run_case, solution
-from ..support.history_runs import changed, keep, records, reported
+from ..support.history_runs import changed, history, keep, records, report, reported
 from ..support.printed import junit_messages, junit_tests
 
 TOL = 1e-12
@@ -229,9 +228,9 @@ def test_old_history_is_read_as_unjudged(path, capsys):
             "unjudged"
         ]
         assert faultless(store) == set()
-    assert main.main(["history", "--history", str(path)]) == 0
+    assert history(path) == 0
     assert "1 not judged" in capsys.readouterr().out
-    assert main.main(f"history --history {path} --case first".split()) == 0
+    assert history(path, "--case", "first") == 0
     assert "not judged" in capsys.readouterr().out
 
 
@@ -312,7 +311,7 @@ def test_old_unjudged_pass_is_no_regression(path):
 
 def test_first_report_counts_judged_pairs(path, capsys):
     keep(path, bare(records()))
-    assert main.main(["report", "--history", str(path)]) == 0
+    assert report(path) == 0
     assert "all 3 right, 1 not judged; nothing to compare with" in capsys.readouterr().out
 
 

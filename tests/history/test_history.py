@@ -20,14 +20,19 @@ from kincheck.core.report.figures import Past, trend_figures
 from kincheck.core.report.trends import trends
 from msgspec.structs import replace
 
-from ..support.history_runs import changed, keep, keep_changed, nights, records, reported, times
+from ..support.history_runs import (
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    reported,
+    times,
+)
 
 FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
 """Two runs of a crank in three and four engines, made by schema 1."""
-
-
-def history(path, *argv):
-    return main(["history", "--history", str(path), *map(str, argv)])
 
 
 # Files of another time

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from kincheck.core.case.io.atomic_files import written
-from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.runs import find, find_against
@@ -17,10 +16,18 @@ from msgspec.structs import replace
 
 from ..harness.test_unfinished_runs import killed
 from ..support.fakes import Fake, crank
-from ..support.history_runs import changed, keep, keep_changed, nights, records, worse
-from .test_regression import reported
-
-FIRST = ("first", "mujoco")
+from ..support.history_runs import (
+    FIRST,
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    report,
+    reported,
+    worse,
+)
 
 
 def held_to(factor):
@@ -170,17 +177,17 @@ def test_first_bad_run_may_be_killed(path, capsys):
     keep(path, bad)
     (finding,) = reported(path).regressions
     assert finding.since == run
-    assert main(["history", "--history", str(path)]) == 0
+    assert history(path) == 0
     assert " killed " in capsys.readouterr().out
     export = path.with_suffix(".csv")
-    assert main(f"history --history {path} --export {export}".split()) == 0
+    assert history(path, "--export", export) == 0
     assert ",killed," in export.read_text("utf-8")
 
 
 def test_report_refuses_running_run(path, capsys):
     nights(path, 1)
     killed(path, 3, owner=None)
-    assert main(f"report 2 --history {path}".split()) == 2
+    assert report(path, "2") == 2
     assert "run 2 is still running. Report it when it has ended" in capsys.readouterr().err
 
 
@@ -200,7 +207,7 @@ def test_killed_run_page_names_missing_pairs(path, tmp_path):
     kept.store.close()
     with Store(path, writable=False) as store:
         assert store.results(1).references["first"].keys() == case.reference.keys()
-    assert main(f"report --history {path} --out {tmp_path}".split()) == 1
+    assert report(path, "--out", tmp_path) == 1
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "not run" in page
     assert "not requested" not in page

@@ -15,25 +15,20 @@ from msgspec.structs import replace
 
 from ..support.history_runs import (
     FACTS,
+    FIRST,
     RESULTS,
     changed,
     keep,
     keep_changed,
+    kinds,
     nights,
     records,
+    report,
     reported,
     times,
     worse,
 )
 from ..support.printed import Terminal, coloured, junit_tests
-
-
-def kinds(found):
-    return [(each.kind, each.case, each.engine) for each in found.findings]
-
-
-FIRST = ("first", "mujoco")
-
 
 # False alarms
 
@@ -261,7 +256,7 @@ def test_report_writes_every_format(path, tmp_path, capsys):
     nights(path, 6)
     keep_changed(path, **worse(20.0), message="<script>alert(1)</script> | *x*")
     out = tmp_path / "report"
-    assert main(f"report --history {path} --out {out}".split()) == 1
+    assert report(path, "--out", out) == 1
     text = (out / "regressions.md").read_text()
     assert capsys.readouterr().out == text
     found = msgspec.json.decode((out / "regressions.json").read_bytes(), type=Regressions)
@@ -329,7 +324,7 @@ def test_terminal_report_has_no_markup(path, capsys, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")  # no colours
     monkeypatch.setenv("COLUMNS", "200")
-    assert main(["report", "--history", str(path)]) == 1
+    assert report(path) == 1
     shown = capsys.readouterr().out
     for mark in ("<details>", "<summary>", "## ", "| ", "**", "&lt;"):
         assert mark not in shown

@@ -5,15 +5,12 @@ now, pairs that are missing.
 import re
 
 import pytest
-from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import WHY, Kind
 from msgspec.structs import replace
 
-from ..support.history_runs import keep, keep_changed, nights, records, reported
+from ..support.history_runs import FIRST, keep, keep_changed, nights, records, report, reported
 from ..support.printed import junit_messages
-
-FIRST = ("first", "mujoco")
 
 
 def of_output(output="x", **changes):
@@ -88,7 +85,7 @@ def test_solution_changes_are_in_every_format(path, tmp_path, capsys, what):
     assert (finding.kind, finding.case, finding.engine) == (kind, *FIRST)
     assert finding.message.startswith(message)
     assert found.regressed is kind.regression is (kind is not Kind.RANK)
-    assert main(f"report --history {path} --out {tmp_path}".split()) == kind.regression
+    assert report(path, "--out", tmp_path) == kind.regression
     capsys.readouterr()
     title = f"{kind.capitalize()} (1): {WHY[kind]}"
     assert title in (tmp_path / "regressions.md").read_text("utf-8")
@@ -145,11 +142,11 @@ def test_lost_samples_are_reported_once(path):
 def test_missing_pairs_are_failures_on_request(path, tmp_path, capsys):
     nights(path, 2)
     keep(path, [each for each in records() if each.case == "first" and each.engine == "native"])
-    assert main(["report", "--history", str(path)]) == 0
+    assert report(path) == 0
     said = capsys.readouterr().out
     assert "nothing regressed; 3 not in this run" in said
     assert "| mujoco | first, second | pass there |" in said
-    assert main(f"report --history {path} --missing-is-failure --out {tmp_path}".split()) == 1
+    assert report(path, "--missing-is-failure", "--out", tmp_path) == 1
     said = capsys.readouterr().out
     assert said.startswith("## run 3 against run 2 (last green): 3 not in this run")
     assert "**Not in this run (3): " in said
@@ -170,8 +167,8 @@ def test_pair_of_last_run_is_missing(path, capsys):
     assert [(each.kind, each.case, each.message) for each in found.findings] == [
         (Kind.ABSENT, "second", "in run 2, by the same command")
     ] * 2
-    assert main(["report", "--history", str(path)]) == 0
-    assert main(f"report --history {path} --missing-is-failure".split()) == 1
+    assert report(path) == 0
+    assert report(path, "--missing-is-failure") == 1
     capsys.readouterr()
 
 
@@ -183,13 +180,13 @@ def test_changed_command_has_no_missing_pairs(path, capsys):
         command="kincheck run mine.toml",
     )
     keep(path, records()[:2])
-    assert main(f"report --history {path} --missing-is-failure".split()) == 0
+    assert report(path, "--missing-is-failure") == 0
     assert "not in this run" not in capsys.readouterr().out
 
 
 def test_missing_pairs_without_baseline(path, capsys):
     keep_changed(path, outcome=Outcome.FAIL)
     keep(path, records()[:2])
-    assert main(["report", "--history", str(path)]) == 0
+    assert report(path) == 0
     assert "2 not in this run; nothing to compare with" in capsys.readouterr().out
-    assert main(f"report --history {path} --missing-is-failure".split()) == 1
+    assert report(path, "--missing-is-failure") == 1

@@ -7,14 +7,23 @@ import random
 
 import numpy as np
 import pytest
-from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
 from kincheck.core.history.steps import change_points, lasting, steps
 from kincheck.core.history.store import Store
 from msgspec.structs import replace
 
-from ..support.history_runs import changed, keep, keep_changed, nights, records, times, worse
+from ..support.history_runs import (
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    report,
+    times,
+    worse,
+)
 
 
 def found(path, standing=False):
@@ -138,13 +147,13 @@ def test_repeated_slow_stretches_are_separate(path, capsys):
         (9, True, 17),
     ]
     assert [(each.first, each.last) for each in found(path, standing=True)] == [(25, 24)]
-    assert main(f"report --against 20 --history {path}".split()) == 1
+    assert report(path, "--against", "20") == 1
     said = capsys.readouterr().out
     assert " · since run 25 |" in said
     assert "ms a sweep since run 25 (" in said
     assert "steps that came and went" in said.lower()
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
-    assert main(f"history --case first --engine mujoco --last 0 --history {path}".split()) == 0
+    assert history(path, "--case", "first", "--engine", "mujoco", "--last", "0") == 0
     said = capsys.readouterr().out
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
 

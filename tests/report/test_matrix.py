@@ -5,10 +5,7 @@ the documentation.
 import re
 from pathlib import Path
 
-import kincheck.adapters
-import kincheck.cases
 import pytest
-from kincheck.core.cli import main as cli
 from kincheck.core.harness.record import Results
 from kincheck.core.joints import Coupler, Joint
 from kincheck.core.report.table import print_matrix
@@ -27,22 +24,18 @@ BUILT_IN = [
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path, capsys):
+def run(kincheck_main, tmp_path, capsys):
     """Runs the command line with fake engines; (exit status, what it printed, the Markdown it
     wrote).
     """
 
-    def main(*argv, engines, cases=()):
-        by_name = {engine.name: engine for engine in engines}
-        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
-        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
-        monkeypatch.setattr(kincheck.adapters, "engine", by_name.get)
-        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(case.name for case in cases))
-        monkeypatch.setattr(kincheck.cases, "load", {case.name: case for case in cases}.get)
-        status = cli.main(["run", *argv, "--jobs", "0", "--markdown", str(tmp_path / "matrix.md")])
-        return status, capsys.readouterr().out, (tmp_path / "matrix.md").read_text("utf-8")
+    def run(*argv, engines, case):
+        file = tmp_path / "matrix.md"
+        cases = {case.name: case}
+        status = kincheck_main("run", *argv, "--markdown", file, engines=engines, cases=cases)
+        return status, capsys.readouterr().out, file.read_text("utf-8")
 
-    return main
+    return run
 
 
 ENGINES = (
@@ -56,7 +49,7 @@ ENGINES = (
 
 
 def test_matrix_cells_have_errors_or_reasons(run):
-    status, _, markdown = run(engines=ENGINES, cases=[crank(reference=False)])
+    status, _, markdown = run(engines=ENGINES, case=crank(reference=False))
     assert status == 1
     head, _, row = (
         [cell.strip() for cell in line.split("|")[1:-1]] for line in markdown.splitlines()[:3]
@@ -82,7 +75,7 @@ def test_run_joints_prints_matrix(run):
     """A fake engine has no such points, so every cell is an error; what counts here is which cells
     there are.
     """
-    _, printed, markdown = run("--joints", engines=[Fake("native"), Fake("other")], cases=[crank()])
+    _, printed, markdown = run("--joints", engines=[Fake("native"), Fake("other")], case=crank())
     found = re.findall(r"^\| `(\w+)` \|", markdown, re.MULTILINE)
     assert sorted(found) == sorted([*Joint.registry, *Coupler.registry])
     lines = [line.split() for line in printed.splitlines()]
@@ -90,9 +83,7 @@ def test_run_joints_prints_matrix(run):
     assert [line[0] for line in lines[1 : len(found) + 1]] == found
 
 
-def test_narrow_matrix_is_split_by_engines(
-    monkeypatch,
-):
+def test_narrow_matrix_is_split_by_engines(monkeypatch):
     names = ("native", "mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody", "my_engine")
     records = [
         record(case, "closed_form", name, 1e-12, GRID)
@@ -112,13 +103,13 @@ def test_narrow_matrix_is_split_by_engines(
 
 
 def test_matrix_without_comparison(run):
-    _, _, markdown = run(engines=[Fake("native")], cases=[crank(reference=False)])
+    _, _, markdown = run(engines=[Fake("native")], case=crank(reference=False))
     assert "No errors: nothing was compared with anything" in markdown
     assert "Largest errors" not in markdown
 
 
 def test_run_joints_with_case(run):
-    _, _, markdown = run("--joints", "crank", engines=[Fake("native")], cases=[crank()])
+    _, _, markdown = run("--joints", "crank", engines=[Fake("native")], case=crank())
     assert "| `crank` |" in markdown
     assert "| `revolute` |" in markdown
 
