@@ -30,6 +30,12 @@ from ..support.history_runs import (
 )
 from ..support.printed import Terminal, coloured, junit_tests
 
+
+def timed(record, factor):
+    """The record with a time so many times as long."""
+    return replace(record, seconds=times(factor)["seconds"](record.seconds))
+
+
 # False alarms
 
 
@@ -45,8 +51,7 @@ def test_noise_is_no_regression(path):
 
 def test_slow_machine_is_no_regression(path):
     nights(path, 8)
-    slow = [replace(each, seconds=replace(each.seconds, warm=0.04)) for each in records()]
-    keep(path, slow, calibration_seconds=0.08)
+    keep(path, [timed(each, 4.0) for each in records()], calibration_seconds=0.08)
     assert kinds(reported(path)) == []
     waiting = [
         replace(each, seconds=replace(each.seconds, warm=0.04, waited=0.03)) for each in records()
@@ -58,15 +63,7 @@ def test_slow_machine_is_no_regression(path):
 def test_scattered_times_widen_limit(path):
     noise = random.Random(1)
     for _ in range(10):
-        keep(
-            path,
-            [
-                changed(
-                    [each], case=each.case, engine=each.engine, **times(noise.choice((1.0, 2.0)))
-                )[0]
-                for each in records()
-            ],
-        )
+        keep(path, [timed(each, noise.choice((1.0, 2.0))) for each in records()])
     keep_changed(path, **times(3.0))
     found = reported(path)
     assert found.time_limit > 3.0
@@ -98,9 +95,7 @@ def test_calibrated_times_on_changed_processor(path):
     keep(path, changed(records(), **times(3.0)), processor="another", calibration_seconds=0.06)
     slower = [each.engine + each.case for each in reported(path).findings]
     assert slower == []
-    quick = [
-        changed([each], case=each.case, engine=each.engine, **times(0.25))[0] for each in records()
-    ]
+    quick = [timed(each, 0.25) for each in records()]
     keep(path, changed(quick, **times(4.0)), processor="another", calibration_seconds=0.005)
     assert kinds(reported(path, against="6")) == [(Kind.SLOWER, *FIRST)]  # 10 ms, as before
 

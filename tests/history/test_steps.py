@@ -32,6 +32,13 @@ def found(path, standing=False):
     return lasting(every) if standing else every
 
 
+def slow_nights(path, factors, seed=3):
+    """Nights whose time in the first case is so many times as long."""
+    noise = random.Random(seed)
+    for factor in factors:
+        keep(path, changed(records(noise=noise), **times(factor)))
+
+
 def noisy(levels, spread=0.05, seed=3):
     noise = random.Random(seed)
     return np.array([level + noise.gauss(0.0, spread) for level in levels])
@@ -131,16 +138,12 @@ def test_outcome_step_ends_with_repair(path):
 
 
 def test_slow_nights_are_no_step(path):
-    noise = random.Random(5)
-    for night in range(12):
-        keep(path, changed(records(noise=noise), **times(3.0 if night in (5, 10, 11) else 1.0)))
+    slow_nights(path, [3.0 if night in (5, 10, 11) else 1.0 for night in range(12)], seed=5)
     assert found(path) == []
 
 
 def test_repeated_slow_stretches_are_separate(path, capsys):
-    noise = random.Random(3)
-    for night in range(32):
-        keep(path, changed(records(noise=noise), **times(2.0 if night // 8 % 2 else 1.0)))
+    slow_nights(path, 2 * ([1.0] * 8 + [2.0] * 8))
     assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
         (25, True, None),
         (17, False, None),
@@ -159,9 +162,7 @@ def test_repeated_slow_stretches_are_separate(path, capsys):
 
 
 def test_partly_repaired_step_stands(path):
-    noise = random.Random(3)
-    for night in range(24):
-        keep(path, changed(records(noise=noise), **times((1.0, 8.0, 3.0)[night // 8])))
+    slow_nights(path, [1.0] * 8 + [8.0] * 8 + [3.0] * 8)
     assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
         (17, False, None),
         (9, True, None),

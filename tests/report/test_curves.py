@@ -12,9 +12,12 @@ from contextlib import redirect_stdout
 
 import pytest
 from kincheck.core.cli.main import main
-from kincheck.core.harness.record import from_json
+from kincheck.core.harness.record import Results, from_json
 from kincheck.core.report import curves
 from kincheck.core.report.report import write_report
+
+from ..support import strut_results
+from ..support.strut_results import GRID
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +88,7 @@ def offered(page):
     return json.loads(zlib.decompress(base64.b64decode(packed)))
 
 
-def test_page_offers_curves_per_case(made, tmp_path, monkeypatch):
+def test_page_offers_curves_per_case(made, tmp_path):
     _, results = made
     write_report(results, file := tmp_path / "page.html")
     page = file.read_text()
@@ -94,9 +97,14 @@ def test_page_offers_curves_per_case(made, tmp_path, monkeypatch):
     for anchor, record in zip(found, results.records, strict=True):
         assert {row["case"] for row in rows(found[anchor])} == {record.case}
         assert found[anchor] == curves.csv_of(results, record.case)
-    # with room for one case only, the page says where the other curves are
-    monkeypatch.setattr(curves, "MOST", len(found["case-0"]) + 1)
-    write_report(results, file)
+
+
+def test_page_leaves_large_curves_out(tmp_path):
+    grids = {"small": GRID, "large": [0.01 * k for k in range(20_000)]}
+    records = [
+        strut_results.record(case, "closed_form", "one", 0.0, grid) for case, grid in grids.items()
+    ]
+    write_report(Results(run={}, records=records), file := tmp_path / "page.html")
     assert [*offered(file.read_text())] == ["case-0"]
     assert file.read_text().count("too many for this page") == 1
 
