@@ -34,24 +34,33 @@ def short(tmp_path, duration=0.3, samples=16):
     return file
 
 
-def measured(tmp_path, *options):
-    given = ["--case", str(short(tmp_path)), "--out", str(tmp_path / "site")]
-    assert main(["board", *given, "--steps", "60", *options]) == 0
-    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"]
+def board(folder, *options):
+    """Status of a board in `folder / "site"`."""
+    return main(["board", "--out", str(folder / "site"), *map(str, options)])
+
+
+def rows_of(folder):
+    return json.loads((folder / "site" / "board.json").read_text("utf-8"))["rows"]
+
+
+def measured(folder, *options, steps=60):
+    """The rows of a board of the four-bar and further cases."""
+    if not (folder / "four_bar.toml").exists():
+        short(folder)
+    assert board(folder, "--case", folder / "four_bar.toml", "--steps", steps, *options) == 0
+    return rows_of(folder)
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("the board")
-    given = ["--engine", "mujoco", "exudyn", "pinocchio", "--steps", "60"]
-    status = main(["board", *given, "--case", str(short(folder)), "--out", str(folder / "site")])
-    assert status == 0
+    measured(folder, "--engine", "mujoco", "exudyn", "pinocchio")
     return folder / "site"
 
 
 @pytest.fixture(scope="module")
 def rows(site):
-    found = json.loads((site / "board.json").read_text("utf-8"))["rows"]
+    found = rows_of(site.parent)
     return {(row["engine"], row["integrator"], row["column"]): row for row in found}
 
 
@@ -94,7 +103,7 @@ def test_drake_without_loops_is_also_continuous(tmp_path):
     case.write_text(re.sub(r"\[joints\.D\]\n(.+\n)*", "", text).replace('"free_', '"chain_'))
     found = {
         (row["case"], row["integrator"]): row
-        for row in measured(tmp_path, "--engine", "drake", "--case", str(case))
+        for row in measured(tmp_path, "--engine", "drake", "--case", case)
     }
     chain = found["chain_four_bar", "runge_kutta3"]
     assert errors(chain)[-1] < 1e-9
@@ -116,8 +125,8 @@ def welded(tmp_path):
 @pytest.mark.parametrize("engine", ["exudyn", "drake"])
 def test_welded_body_is_stepped(engine, tmp_path):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine), exc_type=ImportError)
-    given = ["--engine", engine, "--case", str(welded(tmp_path))]
-    row = [each for each in measured(tmp_path, *given) if each["case"] == "welded_four_bar"][-1]
+    found = measured(tmp_path, "--engine", engine, "--case", welded(tmp_path))
+    row = [each for each in found if each["case"] == "welded_four_bar"][-1]
     *_, longer, shorter = row["runs"]
     for key in ("error", "reaction"):
         assert shorter[key] <= 0.6 * longer[key]
@@ -148,14 +157,14 @@ def short_strut(tmp_path):  # rod, spring, damper; a ball in the tree
 
 def test_drake_forces_leave_balls_out(tmp_path):
     pytest.importorskip("pydrake.multibody.plant", exc_type=ImportError)
-    *_, row = measured(tmp_path, "--engine", "drake", "--case", str(short_strut(tmp_path)))
+    *_, row = measured(tmp_path, "--engine", "drake", "--case", short_strut(tmp_path))
     *_, longer, shorter = (run["reaction"] for run in row["runs"])
     assert shorter == pytest.approx(0.5 * longer, rel=0.1)
 
 
 def test_error_of_simbody_follows_its_accuracy(tmp_path):
     pytest.importorskip("opensim", exc_type=ImportError)
-    row, other = measured(tmp_path, "--engine", "simbody", "--case", str(short_strut(tmp_path)))
+    row, other = measured(tmp_path, "--engine", "simbody", "--case", short_strut(tmp_path))
     assert errors(other)[-1] < 1e-8
     found = errors(row)
     assert found == sorted(found, reverse=True)
@@ -216,9 +225,9 @@ def test_board_site_has_every_row(site, rows):
 
 
 def test_board_keeps_row_history(tmp_path, capsys):
-    given = ["--engine", "mujoco", "--case", str(short(tmp_path, 0.02, 3)), "--steps", "2"]
+    given = ["--engine", "mujoco", "--case", short(tmp_path, 0.02, 3)]
     file = tmp_path / "site" / "board.json"
-    assert main(["board", *given, "--out", str(file.parent)]) == 0
+    assert board(tmp_path, *given, "--steps", 2) == 0
     page = file.parent / "index.html"
     assert "History" not in page.read_text("utf-8")
     found = json.loads(file.read_text("utf-8"))
@@ -230,9 +239,9 @@ def test_board_keeps_row_history(tmp_path, capsys):
     wrong = third["runs"][-1]["error"]
     old = tmp_path / "the old one.json"
     old.write_text(json.dumps(found), "utf-8")
-    assert main(["board", *given, "--out", str(file.parent), "--against", str(old)]) == 1
+    assert board(tmp_path, *given, "--steps", 2, "--against", old) == 1
     assert "mujoco implicitfast, default: measured, worse" in capsys.readouterr().err
-    one, two, three, *_ = json.loads(file.read_text("utf-8"))["rows"]
+    one, two, three, *_ = rows_of(tmp_path)
     assert one["since"] == "2025-01-01" < two["since"] == three["since"]
     assert not one["past"]
     assert [each["version"] for each in two["past"]] == ["3.9"]
@@ -243,13 +252,12 @@ def test_board_keeps_row_history(tmp_path, capsys):
     for change in ("version 3.9 → ", "error alone", '<td class="number">2</td>'):
         assert change in text
     # the same again, and a board with other steps
-    assert main(["board", *given, "--out", str(file.parent)]) == 0
-    assert len(json.loads(file.read_text("utf-8"))["rows"][2]["past"]) == 1
-    more = [*given[:-1], "4", "--out", str(file.parent), "--against", str(old)]
-    assert main(["board", *more]) == 0
+    assert board(tmp_path, *given, "--steps", 2) == 0
+    assert len(rows_of(tmp_path)[2]["past"]) == 1
+    assert board(tmp_path, *given, "--steps", 4, "--against", old) == 0
     file.write_text("{}", "utf-8")
-    assert main(["board", *given, "--out", str(file.parent)]) == 2
-    assert main(["board", *given, "--out", str(file.parent), "--against", "none.json"]) == 2
+    assert board(tmp_path, *given) == 2
+    assert board(tmp_path, *given, "--against", "none.json") == 2
 
 
 @pytest.mark.parametrize(
@@ -372,10 +380,8 @@ def test_engine_fault_costs_own_rows(tmp_path, monkeypatch):
     for name, (_, text) in FAKES.items():
         (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    file, out = short(tmp_path, 0.02, 3), tmp_path / "site"
-    given = ["--case", str(file), "--engine", *FAKES, "--timeout", "2"]
-    assert main(["board", *given, "--out", str(out)]) == 0
-    for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
+    short(tmp_path, 0.02, 3)
+    for row in measured(tmp_path, "--engine", *FAKES, "--timeout", 2, steps=1):
         assert row["state"] == FAKES[row["engine"]][0]
         assert row["message"]
 
@@ -389,9 +395,8 @@ def own_python(folder, text):
 
 
 def pybullet_row(tmp_path):
-    given = ["--case", str(short(tmp_path, 0.02, 3)), "--engine", "pybullet", "--steps", "2"]
-    assert main(["board", *given, "--out", str(tmp_path / "site")]) == 0
-    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"][0]
+    short(tmp_path, 0.02, 3)
+    return measured(tmp_path, "--engine", "pybullet", steps=2)[0]
 
 
 def test_board_engine_in_own_environment(tmp_path, monkeypatch):
@@ -409,7 +414,7 @@ def test_missing_environment_names_remedy(tmp_path, monkeypatch, capsys):
     assert remedy in row["message"]
     assert remedy in (tmp_path / "site" / "index.html").read_text("utf-8").replace("&amp;", "&")
     monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path / "none"))
-    assert main(["board", "--out", str(tmp_path / "site")]) == 2
+    assert board(tmp_path) == 2
     assert "KINCHECK_ENVIRONMENTS: there is no folder" in capsys.readouterr().err
 
 
@@ -447,10 +452,8 @@ def test_unsupported_constraint_is_board_row(tmp_path):
     text = (Path(kincheck.__path__[0]) / "cases" / "rssr.toml").read_text("utf-8")
     text = text.replace("duration = 2.0", "duration = 0.02").replace("samples = 201", "samples = 3")
     case.write_text(text, "utf-8")
-    out = tmp_path / "site"
-    given = ["--engine", "pinocchio", "--case", str(case), "--out", str(out), "--steps", "1"]
-    assert main(["board", *given]) == 0
-    for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
+    assert board(tmp_path, "--engine", "pinocchio", "--case", case, "--steps", 1) == 0
+    for row in rows_of(tmp_path):
         assert row["state"] == "unsupported"
         assert "distance" in row["message"]
 
@@ -464,5 +467,5 @@ def test_unsupported_constraint_is_board_row(tmp_path):
     ],
 )
 def test_board_refuses_wrong_options(options, message, tmp_path, capsys):
-    assert main(["board", "--out", str(tmp_path / "site"), *options]) == 2
+    assert board(tmp_path, *options) == 2
     assert message in capsys.readouterr().err
