@@ -358,19 +358,15 @@ def found_after(path, **now):
     night(path, unjudged=now.get("unjudged", True))
     night(path, **now)
     found = reported(path, against="1")
-    return (
-        [(each.kind, each.case, each.engine) for each in found.findings],
-        [each.message for each in found.findings],
-        found,
-    )
+    return kinds(found), [each.message for each in found.findings], found
 
 
 @pytest.mark.parametrize(
     "values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}]
 )
 def test_changed_values_are_reported_moved(path, values):
-    kinds, messages, found = found_after(path, **values)
-    assert kinds == [(Kind.MOVED, *FIRST)]
+    moved, messages, found = found_after(path, **values)
+    assert moved == [(Kind.MOVED, *FIRST)]
     assert found.regressed
     assert (
         f"y {next(iter(values))} differs by up to {'1 m ' if 'position' in values else '1e-3 m/s '}"
@@ -390,10 +386,10 @@ def test_large_forces_hide_no_motion(path, off, kinds):
 
 
 def test_round_off_is_no_motion(path):
-    kinds, messages, _ = found_after(
+    moved, messages, _ = found_after(
         path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]
     )
-    assert kinds == [(Kind.GONE, *FIRST)]
+    assert moved == [(Kind.GONE, *FIRST)]
     assert messages == [
         "y velocity has no value at 1 of 2 samples that had one, first at turn = 0.5: no reason is"
         " given"
@@ -405,18 +401,19 @@ def test_values_within_tolerances_are_no_motion(path, off, kinds):
     assert found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])[0] == kinds
 
 
-def test_changed_sweep_is_reported(path):
-    kinds, messages, _ = found_after(path, driver={"turn": [0.0, 0.25, 0.5]})
-    assert kinds == [(Kind.MOVED, *FIRST)]
-    assert messages == ["solved at other values of the drivers than before"]
-
-
-def test_last_digit_is_same_sweep(path):
-    assert found_after(path, driver={"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]})[0] == []
-
-
-def test_changed_driver_is_reported(path):
-    assert found_after(path, driver={"push": DRIVER["turn"]})[0] == [(Kind.MOVED, *FIRST)]
+@pytest.mark.parametrize(
+    ("driver", "count"),
+    [
+        ({"turn": [0.0, 0.25, 0.5]}, 1),
+        ({"push": DRIVER["turn"]}, 1),
+        ({"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]}, 0),
+    ],
+    ids=["values", "name", "last digit"],
+)
+def test_changed_sweep_is_reported(path, driver, count):
+    moved, messages, _ = found_after(path, driver=driver)
+    assert moved == [(Kind.MOVED, *FIRST)] * count
+    assert messages == ["solved at other values of the drivers than before"] * count
 
 
 def test_fewer_samples_are_reported_lost(path):

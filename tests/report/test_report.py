@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from kincheck.core import solve
-from kincheck.core.harness.labels import number
 from kincheck.core.harness.record import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
@@ -44,46 +43,21 @@ def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
     assert details["dof_account"]["paper"].replace("-", "−") in page.text
 
 
-def test_page_starts_with_worst_deviation(tmp_path):
-    run = results()
-    page = report(run, tmp_path)
-    words = re.sub(r"\s+", " ", page.text)
-    worst = run.records[1].errors["half_track_change"].position
-    assert worst is not None
+def test_page_starts_with_outcomes(tmp_path):
+    words = report(results(), tmp_path).words
     head = words[: words.index("Overview")]
     assert "1 of 2 comparisons is outside tolerance" in head
-    travel = f"{1000 * GRID[worst.worst_step]:+.4g}".replace("-", "−")
-    assert (
-        "Worst: engine one on case strut, output half-track change (position), at wheel travel"
-        in head
-    )
-    assert (
-        f"at wheel travel {travel} mm (sample {worst.worst_step} of 0…20):"
-        f" {number(worst.max_abs / 1e-9)} × tolerance" in head
-    )
-    assert f"Error {number(worst.max_abs)} m, tolerance 1e-9 m, against in-house oracle" in head
     assert "✗ fail one on strut: half_track_change: too far off" in head
-    assert "○ unavailable two on strut: two is not installed" in words
-    for told in (
-        "35 − 34 = 1",
-        "18 − 17 = 1",
-        "7231",
-        "6702",
-        "3.21e-14",
-        "321",
-        "21/21",
-        "12.5 µs",
-        "iterations 20",
-        "a book",
-    ):
-        assert told in words, told
+    for text in ("○ unavailable two on strut: two is not installed", "iterations 20", "a book"):
+        assert text in words
 
 
 def test_page_names_worst_case(tmp_path):
     cases = [("good", 1e-11), ("bad", 5e-9), ("better", 1e-15)]
     records = [record(case, "closed_form", "one", error, GRID) for case, error in cases]
-    page = report(Results(run={}, records=records), tmp_path)
-    assert "Worst: engine one on case bad" in re.sub(r"\s+", " ", page.text)
+    assert (
+        "Worst: engine one on case bad" in report(Results(run={}, records=records), tmp_path).words
+    )
 
 
 @pytest.mark.parametrize(
@@ -94,10 +68,6 @@ def test_page_says_validated_for_foreign_truth(tmp_path, truth, said):
     page = report(results(truth), tmp_path)
     assert len(re.findall("validated", page.text)) == said
     assert ("our own oracle is not validation" in page.text) == (truth == "in_house_oracle")
-
-
-def test_page_says_validated_positions_only(tmp_path):
-    assert "validated, positions only" in report(results("closed_form"), tmp_path).text
 
 
 def test_page_escapes_text_of_files(tmp_path):

@@ -130,7 +130,7 @@ def test_page_numbers(run, tmp_path, heading):
 
 
 def test_page_headline_numbers(run, tmp_path):
-    head = " ".join(report(run, tmp_path).text.partition("Overview")[0].split())
+    head = report(run, tmp_path).words.partition("Overview")[0]
     assert (
         "Worst: engine one on case strut, output wheel-base change (velocity), at wheel travel"
         " −10 mm (sample 9 of 0…20): 1.23e11 × tolerance. Error 1234 m/s, tolerance 1e-8 m/s,"
