@@ -179,6 +179,7 @@ def test_residual_above_tolerance_fails():
         (1e-6, {}, {"mode": "simulate"}),
         (1e-6, {"residuals": False}, {}),
     ],
+    ids=["tolerance", "round-off", "simulation", "effort"],
 )
 def test_residual_within_tolerance_passes(residual, options, engine):
     given = {"tol": TOL, **options}

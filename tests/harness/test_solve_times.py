@@ -55,7 +55,11 @@ def test_waiting_time_is_reported(monkeypatch):
     assert record.us_per_step == pytest.approx(1000.0 / SAMPLES)
 
 
-@pytest.mark.parametrize("solves", [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)])
+@pytest.mark.parametrize(
+    "solves",
+    [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)],
+    ids=["first", "second", "second and slow", "first and slow"],
+)
 def test_compilation_is_not_timed(solves, monkeypatch):
     """It has come to work in one of the warm solves."""
     _, record = timed(monkeypatch, 0.1, 0.002, *solves, *[0.001] * 4)

@@ -516,7 +516,7 @@ def third_party(change=lambda series: series, **changes):
     )
 
 
-@pytest.mark.parametrize("engines", [OWN, OWN[::-1]])
+@pytest.mark.parametrize("engines", [OWN, OWN[::-1]], ids=["native first", "native last"])
 def test_own_result_as_reference_is_recognised(engines):
     results = run_case(third_party(), *engines)
     assert [record.outcome for record in results.records] == [Outcome.PASS] * 2
@@ -547,7 +547,7 @@ def test_closed_form_met_exactly_validates():
     assert all(record.validated for record in run_case(crank(), *OWN).records)
 
 
-@pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)])
+@pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)], ids=["two", "one"])
 def test_few_equal_samples_prove_nothing(taken):
     case = third_party()
     case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[taken]))

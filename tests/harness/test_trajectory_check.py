@@ -95,7 +95,7 @@ def refused(answer):
     return record.message
 
 
-@pytest.mark.parametrize(("part", "value", "said"), FORMS)
+@pytest.mark.parametrize(("part", "value", "said"), FORMS, ids=[said for *_, said in FORMS])
 def test_malformed_trajectory_is_reported(part, value, said):
     assert said in refused(lambda case: altered(solution(case), part, value))
 
@@ -148,7 +148,7 @@ def found(case):
     return NATIVE.solve(NATIVE.build(case), case, 1e-12)
 
 
-@pytest.mark.parametrize(("part", "value", "said"), FORCES)
+@pytest.mark.parametrize(("part", "value", "said"), FORCES, ids=[said for *_, said in FORCES])
 def test_malformed_forces_and_bodies_are_reported(part, value, said, case, found):
     check(case, "fake", found)
     with pytest.raises(BadTrajectoryError, match=r"^fake: ") as caught:

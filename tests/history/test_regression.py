@@ -362,27 +362,28 @@ def found_after(path, **now):
 
 
 @pytest.mark.parametrize(
-    "values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}]
+    ("motion", "values", "size"),
+    [
+        ("position", [0.0, -0.5, None], "1 m "),
+        ("velocity", [1.0, 1.001, None], "1e-3 m/s "),
+    ],
 )
-def test_changed_values_are_reported_moved(path, values):
-    moved, messages, found = found_after(path, **values)
+def test_changed_values_are_reported_moved(path, motion, values, size):
+    moved, messages, found = found_after(path, **{motion: values})
     assert moved == [(Kind.MOVED, *FIRST)]
     assert found.regressed
-    assert (
-        f"y {next(iter(values))} differs by up to {'1 m ' if 'position' in values else '1e-3 m/s '}"
-        in messages[0]
-    )
+    assert f"y {motion} differs by up to {size}" in messages[0]
 
 
-@pytest.mark.parametrize(("off", "kinds"), [(1e-6, [Kind.MOVED]), (0.0, [])])
-def test_large_forces_hide_no_motion(path, off, kinds):
+@pytest.mark.parametrize("off", [1e-6, 0.0])
+def test_large_forces_hide_no_motion(path, off):
     """Of an output without a standard, the scale is that of the outputs of its unit."""
     for moved in (0.0, off):
         force = OutputSeries(position=[9e5, 1e6, 0.0], velocity=None, acceleration=None, unit="N")
         y = replace(SERIES, position=[0.0, 0.5 + moved, None])
         outputs = {"y": y, "load": force}
         keep_changed(path, driver=DRIVER, outputs=outputs, errors={})
-    assert [each.kind for each in reported(path, against="1").findings] == kinds
+    assert kinds(reported(path, against="1")) == [(Kind.MOVED, *FIRST)] * (off > 0.0)
 
 
 def test_round_off_is_no_motion(path):
@@ -396,9 +397,10 @@ def test_round_off_is_no_motion(path):
     ]
 
 
-@pytest.mark.parametrize(("off", "kinds"), [(1.9e-9, []), (2.1e-9, [(Kind.MOVED, *FIRST)])])
-def test_values_within_tolerances_are_no_motion(path, off, kinds):
-    assert found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])[0] == kinds
+@pytest.mark.parametrize(("off", "count"), [(1.9e-9, 0), (2.1e-9, 1)])
+def test_values_within_tolerances_are_no_motion(path, off, count):
+    moved, *_ = found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])
+    assert moved == [(Kind.MOVED, *FIRST)] * count
 
 
 @pytest.mark.parametrize(

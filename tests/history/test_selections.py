@@ -139,7 +139,9 @@ def test_same_name_in_folders(run, report, monkeypatch, tmp_path, again, status)
 
 
 @pytest.mark.parametrize(
-    "more", [("--static",), ("--engine-command", "true {case} {samples} {out}")]
+    "more",
+    [("--static",), ("--engine-command", "true {case} {samples} {out}")],
+    ids=["static", "engine command"],
 )
 def test_task_options_change_selection(run, tmp_path, more):
     run(*NIGHT)

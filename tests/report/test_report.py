@@ -170,6 +170,7 @@ def test_page_of_empty_run(tmp_path):
         (f"one line\n\n{'b' * 400}", "one line\n\n"),
         ("x" * 500, "x" * 500),  # no place to part it
     ],
+    ids=["short", "sentences", "lines", "word"],
 )
 def test_page_folds_long_messages(message, head, tmp_path):
     shown, rest = parted(message)

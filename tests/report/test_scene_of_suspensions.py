@@ -34,6 +34,7 @@ from .test_report_scene import AXIS, STRUT, UP
         ({"name": "lift", "type": "joint_displacement"}, 0, "lift"),
         ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
     ],
+    ids=["up", "down", "point", "absolute", "aslant", "level", "slide", "angle"],
 )
 def test_travel_axis_of_vertical_driver(driver, up, name):
     made = record(

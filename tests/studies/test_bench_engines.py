@@ -117,6 +117,7 @@ def test_precision_entry_has_error():
         (Fake(answer=raising(RuntimeError("broken"))), Outcome.ERROR),
         (Fake(answer=partial), Outcome.FAIL),
     ],
+    ids=["missing", "unable", "broken", "partial"],
 )
 def test_unsolved_effort_is_untimed(engine, outcome):
     found = precision.contestants(crank(), {"one": engine}, TOL)

@@ -63,6 +63,7 @@ def found(case):
         (lambda a, M: 1.0 * a, 0),
         (lambda a, M: 2.0 * a, 3),
     ],
+    ids=["dot", "turn", "matrices", "cross", "chain", "sums", "by one", "by two"],
 )
 def test_executed_operations_are_all_counted(work, operations):
     tally = [0]

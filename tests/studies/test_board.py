@@ -461,11 +461,11 @@ def test_unsupported_constraint_is_board_row(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--engine", "mujco"], "did you mean 'mujoco'"),
-        (["--case", "delta_robot"], "add [free] with duration"),
-        (["--case", "four_bra"], "four_bar"),
+        ("--engine mujco", "did you mean 'mujoco'"),
+        ("--case delta_robot", "add [free] with duration"),
+        ("--case four_bra", "four_bar"),
     ],
 )
 def test_board_refuses_wrong_options(options, message, tmp_path, capsys):
-    assert board(tmp_path, *options) == 2
+    assert board(tmp_path, *options.split()) == 2
     assert message in capsys.readouterr().err
