@@ -13,7 +13,7 @@ from kincheck.core.program.straight_line import lower
 from kincheck.core.program.tape import LEAVES, operands
 
 from ..support.mechanisms import mcpherson
-from ..support.running import run_on
+from ..support.program_blocks import run_on
 
 
 def cycles(found):
