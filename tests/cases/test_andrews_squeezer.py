@@ -72,7 +72,7 @@ def test_andrews_published_start_closes():
         assert np.abs(found.points[point.name].position[0] - point.position).max() <= 1e-17
 
 
-def test_andrews_published_acceleration_at_the_start():
+def test_andrews_published_start_acceleration():
     """The crank starts from rest with 14222.44 rad/s^2, the rod on it with -10666.83, and all else
     stays: E and D do not move.
     """
@@ -87,7 +87,7 @@ def test_andrews_published_acceleration_at_the_start():
         assert max(np.abs(jet.a).max() for jet in points[name]) < 1e-8
 
 
-def test_andrews_published_state_after_two_and_a_half_turns():
+def test_andrews_published_state_after_turns():
     """t = 0.03 s, computed by others to 1e-14: the constraints hold, and the crank alone leads to
     the rest, rates included.
     """

@@ -54,7 +54,7 @@ def off(case, name, found, reference):
 
 
 @pytest.mark.parametrize("name", COORDINATES)
-def test_the_native_engine_finds_the_truth_to_round_off(name):
+def test_native_engine_equals_case_truth(name):
     case, found = solved(name)
     assert found.solved.all(), found.message
     for output in case.outputs:
@@ -68,7 +68,7 @@ def test_the_native_engine_finds_the_truth_to_round_off(name):
 
 
 @pytest.mark.parametrize("name", COORDINATES)
-def test_a_truth_that_is_off_by_twice_the_tolerance_fails(name):
+def test_shifted_truth_fails(name):
     case, found = solved(name)
     for output in case.outputs:
         series = case.reference[output.name]
@@ -79,7 +79,7 @@ def test_a_truth_that_is_off_by_twice_the_tolerance_fails(name):
         )
 
 
-def test_the_truth_of_the_other_branch_fails():
+def test_truth_of_other_branch_fails():
     """Both assemblies of one linkage meet no tolerance of each other, though each meets its own."""
     for one, other in (("rssr", "rssr_other_branch"), ("rssr_other_branch", "rssr")):
         (case, found), (there, _) = solved(one), solved(other)
@@ -91,7 +91,7 @@ def test_the_truth_of_the_other_branch_fails():
 
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_closed_forms_are_differentiated_rightly(name):
+def test_closed_form_rates_equal_complex_step(name):
     """By the complex step, exact to round-off: an imaginary time of 1e-30 s leaves the derivative
     in the imaginary part.
     """
@@ -121,7 +121,7 @@ def test_closed_forms_are_differentiated_rightly(name):
         ("gough_platform", 0),
     ],
 )
-def test_redundant_rows_are_found_and_held(name, redundant):
+def test_case_redundant_rows_are_counted(name, redundant):
     _, found = solved(name)
     assert len(found.details["dof_account"]["redundant_rows"]) == redundant
     assert found.details["redundant_residual"] <= ROUND_OFF
@@ -134,7 +134,7 @@ def angles(*degrees):
     return steady(np.radians(degrees), 1.0)
 
 
-def test_hooke_joint_by_the_book():
+def test_hooke_joint_published_values():
     """tan t2 = tan t1 / cos b and the ratio of the rates, cos b / (1 - sin^2 b cos^2 t1), for b of
     30 and 60 degrees.
     """
@@ -147,7 +147,7 @@ def test_hooke_joint_by_the_book():
         assert c.x * s.v - s.x * c.v == pytest.approx([ratio], abs=1e-14)
 
 
-def test_slider_cranks_by_the_book():
+def test_slider_cranks_published_values():
     """Modelica's displacement s and its rate (Modelica Standard Library, Fourbar1), and the planar
     slider; 20 digits by mpmath.
     """
@@ -164,7 +164,7 @@ def test_slider_cranks_by_the_book():
     )
 
 
-def test_bricard_closes():
+def test_bricard_loop_closes():
     """Its last link comes back to the grounded one: P5 is a link from the origin; at the start the
     points are the cube's edges.
     """
@@ -177,7 +177,7 @@ def test_bricard_closes():
     assert {name: tuple(np.round(xyz[0], 15)) for name, xyz in points.items()} == start
 
 
-def test_bennett_closes():
+def test_bennett_loop_closes():
     """The follower's pin stays a link's length from the hinge on the ground, and square to it; at
     the design it is rational.
     """
@@ -195,7 +195,7 @@ def test_bennett_closes():
     assert pins["follower_pin"][0] * 130.0 == pytest.approx([9.0, 16.0, -12.0], abs=1e-13)
 
 
-def test_rssr_does_not_reach_what_cannot_be_assembled():
+def test_rssr_reach_ends_where_assembly_ends():
     """a = 2, b = 4, L = 7, O = (6, 1, 0.5): the crank only rocks; of the angles tried it reaches 75
     and 90 degrees (mpmath).
     """

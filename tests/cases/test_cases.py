@@ -35,7 +35,7 @@ IN_HOUSE |= {
 }
 
 
-def test_names_and_truths():
+def test_case_names_and_truths():
     """Nobody publishes curves of suspensions: what the project computed for them must never read as
     validated.
     """
@@ -44,7 +44,7 @@ def test_names_and_truths():
     assert {truth for name, truth in found.items() if name not in IN_HOUSE} == {Truth.CLOSED_FORM}
 
 
-def test_unknown_names_get_a_suggestion():
+def test_unknown_case_name_gets_suggestion():
     with pytest.raises(CaseError, match="did you mean 'four_bar'"):
         cases.load("fourbar")
     with pytest.raises(CaseError, match="not a built-in case"):
@@ -52,7 +52,7 @@ def test_unknown_names_get_a_suggestion():
 
 
 @pytest.mark.parametrize("name", cases.names())
-def test_every_output_has_a_full_reference(name):
+def test_case_outputs_have_full_reference(name):
     case = cases.load(name)
     assert case.name == name
     assert list(case.reference) == [output.name for output in case.outputs]
@@ -65,7 +65,7 @@ def test_every_output_has_a_full_reference(name):
 
 
 @pytest.mark.parametrize("name", cases.names())
-def test_at_design_the_reference_is_the_case_file(name):
+def test_case_reference_at_design(name):
     case = cases.load(name)
     (design,) = np.flatnonzero(np.abs(case.sweep.change) < 1e-15)
     for output in (each for each in case.outputs if isinstance(each, Output)):
@@ -79,7 +79,7 @@ def test_at_design_the_reference_is_the_case_file(name):
 
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_a_full_turn_comes_back(name):
+def test_closed_form_of_full_turn_closes(name):
     case = cases.load(name)
     assert case.sweep.change[[0, -1]].tolist() == pytest.approx([0.0, 2 * np.pi], abs=0)
     assert len(case.sweep.values) == 181
@@ -215,7 +215,7 @@ SOLVERS: dict[str, Callable[[Case, mp.mpf, Points], Points]] = {
 
 @pytest.mark.parametrize("angle", ANGLES)
 @pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_closed_forms_solve_the_constraints(name, angle):
+def test_closed_forms_satisfy_constraints(name, angle):
     case, rate = cases.load(name), 1.7
     motion = CLOSED_FORMS[name].motion(jet.steady(np.array([angle]), rate))
     near = {point: [mp.mpf(each.x[0]) for each in xyz] for point, xyz in motion.items()}

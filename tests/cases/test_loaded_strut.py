@@ -8,7 +8,7 @@ from kincheck.core.studies.truth.forces import known_forces
 from kincheck.core.studies.truth.motion import followed
 
 
-def test_the_file_has_the_forces_of_the_truth():
+def test_loaded_strut_file_equals_force_truth():
     case = cases.load("mcpherson_strut_loaded")
     case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[::8]))
     known = known_forces(case, followed(case))
@@ -19,7 +19,7 @@ def test_the_file_has_the_forces_of_the_truth():
         assert abs(printed - each.values).max() <= 1e-12 * abs(printed).max()
 
 
-def test_its_motion_is_that_of_the_strut():
+def test_loaded_strut_moves_as_strut():
     def rows(name):
         lines = (cases.FOLDER / f"{name}.csv").read_text().splitlines()
         return [*csv.DictReader(line for line in lines if not line.startswith("#"))]

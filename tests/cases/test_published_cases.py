@@ -15,7 +15,7 @@ ROUND_OFF = 1e-13
 # Published values
 
 
-def test_spatial_slider_crank_against_the_benchmark():
+def test_spatial_slider_crank_iftomm_benchmark():
     """IFToMM benchmark 'Spatial rigid slider-crank mechanism' (Masoudi and McPhee), at the start,
     with the crank at 6 rad/s.
     """
@@ -36,7 +36,7 @@ def test_spatial_slider_crank_against_the_benchmark():
     )
 
 
-def test_spatial_slider_crank_through_the_turn():
+def test_spatial_slider_crank_full_turn():
     """Slider x [m] and its derivatives at crank angles [deg], 6 rad/s: the closed form evaluated to
     50 digits with mpmath.
     """
@@ -51,7 +51,7 @@ def test_spatial_slider_crank_through_the_turn():
     )
 
 
-def test_rssr_against_a_table():
+def test_rssr_published_table():
     """Rocker angle [deg] at crank angles [deg], a = 1, b = 4, L = 5.5, O = (2, 1, 3).
 
     Formula of Hartenberg and Denavit (1964, ch. 12) in its arctangent form, evaluated to 50 digits
@@ -73,7 +73,7 @@ def slope(x, h):
     return (-x[:-6] + 9 * x[1:-5] - 45 * x[2:-4] + 45 * x[4:-2] - 9 * x[5:-1] + x[6:]) / (60 * h)
 
 
-def test_mcpherson_derivatives_are_those_of_its_positions():
+def test_mcpherson_derivatives_equal_differences():
     for series in cases.load("mcpherson_strut").reference.values():
         assert series.velocity is not None
         assert series.acceleration is not None

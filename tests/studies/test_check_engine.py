@@ -41,7 +41,7 @@ def failures(report):
     return {each.check for each in report.findings if each.verdict is Verdict.FAIL}
 
 
-def test_a_sound_engine_passes(few, monkeypatch):
+def test_check_engine_of_sound_engine_passes(few, monkeypatch):
     """Without worker processes: the checks that a faulty engine passes have them."""
     monkeypatch.setattr(checking, "in_workers", lambda *_: solve_in_process)
     report = kincheck.check_engine(Sound())
@@ -69,7 +69,7 @@ def test_a_sound_engine_passes(few, monkeypatch):
     assert str(report).endswith("sound: 18 pass\n")
 
 
-def test_each_fault_fails_its_row(few, capsys):
+def test_check_engine_faults_fail_their_rows(few, capsys):
     assert main.main(["check-engine", f"{HERE}:Faulty"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert {line.split("  ")[0] for line in lines if "  fail " in line} == {
@@ -114,7 +114,7 @@ def test_check_engine_refuses_class_without_protocol(monkeypatch, capsys, where,
     assert message in capsys.readouterr().err
 
 
-def test_run_takes_engine_by_module_and_class(monkeypatch, capsys):
+def test_engine_by_module_and_class(monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(ROOT))
     assert main.main(["run", "--jobs", "0", "--engine", f"{HERE}:Sound", "rssr"]) == 0
     assert "rssr  sound   pass" in capsys.readouterr().out
@@ -142,7 +142,7 @@ def offered(monkeypatch):
     return offer
 
 
-def test_other_packages_offer_engines(offered, capsys):
+def test_entry_points_offer_engines(offered, capsys):
     offered(sound=f"{HERE}:Sound", broken="tests.nothing:Engine")
     assert "sound" in main.registry().engines
     assert main.main("run rssr --jobs 0 --engine sound".split()) == 0
@@ -150,13 +150,13 @@ def test_other_packages_offer_engines(offered, capsys):
     assert "No module named 'tests.nothing'" in capsys.readouterr().out
 
 
-def test_entry_point_with_builtin_name_is_refused(offered, capsys):
+def test_entry_point_with_builtin_name_refused(offered, capsys):
     offered(mujoco=f"{HERE}:Sound")
     assert main.main("run rssr --engine native".split()) == 2
     assert "offers an engine named 'mujoco', which is kincheck's own" in capsys.readouterr().err
 
 
-def test_the_entry_point_group_is_asked_for(monkeypatch):
+def test_entry_point_group_is_kincheck_engines(monkeypatch):
     asked = []
 
     def entry_points(*, group):
@@ -171,7 +171,7 @@ def test_the_entry_point_group_is_asked_for(monkeypatch):
 
 
 @pytest.mark.parametrize(("samples", "compared"), [(21, False), (22, True)])
-def test_rates_of_short_sweeps_are_not_compared(samples, compared):
+def test_rates_of_short_sweeps_are_skipped(samples, compared):
     """Three times as many steps as a difference has weights."""
     case = crank(reference=False)
     case = replace(case, sweep=replace(case.sweep, values=np.linspace(-1.0, 1.0, samples)))

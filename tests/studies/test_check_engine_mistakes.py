@@ -38,21 +38,21 @@ def failing(fault):
 
 
 @pytest.mark.parametrize("fault", OF_MOTION)
-def test_a_fault_of_motion_is_found(fault, without_loads):
+def test_check_engine_finds_fault_of_motion(fault, without_loads):
     assert failing(fault)
 
 
 @pytest.mark.parametrize("fault", OF_FORCES)
-def test_a_fault_of_forces_is_found(fault, with_loads):
+def test_check_engine_finds_fault_of_forces(fault, with_loads):
     found = failing(fault)
     assert any(check.startswith("forces: ") for check in found)
     assert not any(check.startswith(("rates: ", "refusal: ")) for check in found)
 
 
 @pytest.mark.parametrize("change", HARMLESS)
-def test_harmless_engine_changes_pass(change):
+def test_check_engine_passes_harmless_changes(change):
     assert failing(change) == []
 
 
-def test_the_engine_without_a_fault_passes():
+def test_check_engine_passes_without_fault():
     assert failing("") == failing("no fault, with bodies") == []

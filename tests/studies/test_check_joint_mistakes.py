@@ -281,7 +281,7 @@ MISTAKES |= {name: ("driver", make) for name, make in MISTAKES_OF_DRIVERS.items(
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_are_caught(mistake, few, monkeypatch):
+def test_check_joint_finds_joint_mistakes(mistake, few, monkeypatch):
     """Few poses find them; the two dear checks run where they must find one."""
     check, make = MISTAKES[mistake]
     monkeypatch.setattr(checking, "loops", lambda tested, engines, failing=(): [])
@@ -301,13 +301,13 @@ def test_joint_without_rows_is_reported():
     )
 
 
-def test_the_base_of_a_mistake_is_sound(few):
+def test_check_joint_passes_unmistaken_base(few):
     """The machinery of these tests makes no mistakes by itself."""
     assert check_joint(mistaken(Revolute, p.Dot11), samples=8).passed
     assert check_joint(mistaken(ConstantVelocity, p.ConstantVelocity), samples=8).passed
 
 
-def test_a_wrong_equivalent_is_caught(few, in_folder):
+def test_check_joint_finds_wrong_equivalent(few, in_folder):
     right = load_joint("pin_in_slot:PinInSlot")
 
     def equivalent(self):
@@ -318,7 +318,7 @@ def test_a_wrong_equivalent_is_caught(few, in_folder):
     assert "2 degrees of freedom" in report["loop: native, equivalent"].message
 
 
-def test_an_equivalent_with_fixed_names_is_caught(few):
+def test_equivalent_with_fixed_names_is_found(few):
     """The second joint of a mechanism would have parts of the same names."""
 
     def equivalent(self):

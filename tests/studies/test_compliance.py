@@ -67,7 +67,7 @@ def strut(tmp_path, more=""):
     return load_case(file)
 
 
-def test_command_writes_what_six_simulators_have(tmp_path, capsys):
+def test_kc_agrees_with_six_simulators(tmp_path, capsys):
     rows = STRUT["results"]
     (tmp_path / "strut.toml").write_text(strut_text())
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
@@ -97,7 +97,7 @@ def test_command_writes_what_six_simulators_have(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("travel", ["-10:10mm:3", "-10mm:10:3", "-0.01:0.01:3"])
-def test_unit_of_one_end_holds_for_both(tmp_path, travel):
+def test_travel_unit_of_one_end_suffices(tmp_path, travel):
     (tmp_path / "strut.toml").write_text(strut_text())
     out = tmp_path / "out.json"
     loads = ["--load", "lateral=-1:1kN:3", "--json", str(out)]
@@ -107,7 +107,7 @@ def test_unit_of_one_end_holds_for_both(tmp_path, travel):
     assert found["loads"]["lateral"]["lateral"] == [-1000.0, 0.0, 1000.0]
 
 
-def test_constant_load_acts_over_all_travel(tmp_path):
+def test_kc_constant_load_acts_over_travel(tmp_path):
     """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
     row = STRUT["results"][2]
     case = strut(
@@ -125,7 +125,7 @@ def test_constant_load_acts_over_all_travel(tmp_path):
 
 @pytest.mark.parametrize("convention", ["iso8855", "sae_j670"])
 @pytest.mark.parametrize("load", ["lateral", "longitudinal", "braking", "aligning"])
-def test_slopes_by_load_are_differences(tmp_path, convention, load):
+def test_slopes_by_load_equal_differences(tmp_path, convention, load):
     case = strut(tmp_path, WHEEL.replace("CONVENTION", convention))
     results = compliance(case, [0.0], {load: [-1.0, 0.0, 1.0]})
     curve = results.loads[load]
@@ -140,7 +140,7 @@ def test_slopes_by_load_are_differences(tmp_path, convention, load):
         assert moved > 0.0 if convention == "iso8855" else moved < 0.0
 
 
-def test_slope_by_travel_is_that_of_the_soft_suspension(tmp_path):
+def test_slope_by_travel_of_soft_suspension(tmp_path):
     case = strut(tmp_path, WHEEL.replace("CONVENTION", "iso8855"))
     found = compliance(case, [-1e-4, 0.0, 1e-4]).travel
     low, _, high = found.outputs["toe"].values
@@ -232,7 +232,7 @@ type = "roll_center_height"
     )
 
 
-def test_axle_has_its_wheel_rates(tmp_path):
+def test_axle_wheel_rates_heave_and_roll(tmp_path):
     rows = AXLE["rows"]
     file = tmp_path / "axle.toml"
     file.write_text(axle_text(rows["anti_roll_bar_turning_stiffness"]))
@@ -255,7 +255,7 @@ def test_axle_has_its_wheel_rates(tmp_path):
     assert rolled.wheel_load[0] > found.travel.wheel_load[1]  # the bar is twisted
 
 
-def test_axle_free_under_its_load_has_the_datas_compliance(tmp_path):
+def test_free_axle_compliance_equals_data(tmp_path):
     """Both wheels are free in height; loads and displacements at their centres."""
     rows = AXLE["rows"]
     file = tmp_path / "axle.toml"
@@ -276,7 +276,7 @@ def test_axle_free_under_its_load_has_the_datas_compliance(tmp_path):
     assert C[5, 1] + C[5, 7] == pytest.approx(lateral, rel=1e-9)
 
 
-def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
+def test_travel_beyond_equilibrium_is_error(tmp_path, capsys):
     """A tie rod that is pulled straight leaves no equilibrium at half a metre."""
     (tmp_path / "strut.toml").write_text(strut_text())
     out = tmp_path / "found.json"
@@ -289,7 +289,7 @@ def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
     assert found["wheel_load"][1] is None
 
 
-def test_load_beyond_equilibrium_is_named_and_counted(tmp_path, capsys):
+def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
     found = repr(compliance(strut(tmp_path), [0.0, 9.0]))
     assert found.endswith(", 2 samples of travel, 1 without equilibrium>")
     case = str(tmp_path / "strut.toml")
@@ -320,13 +320,13 @@ def test_load_beyond_equilibrium_is_named_and_counted(tmp_path, capsys):
         ("", ["--load", "aligning=0:3N:3"], "numbers in Nm or kNm"),
     ],
 )
-def test_study_that_lacks_facts_says_so(tmp_path, capsys, more, options, expected):
+def test_kc_without_facts_is_refused(tmp_path, capsys, more, options, expected):
     (tmp_path / "strut.toml").write_text(strut_text(more))
     assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 2
     assert expected in capsys.readouterr().err
 
 
-def test_table_without_rubber_is_said_to_be_rigid(tmp_path, capsys):
+def test_table_without_bushings_is_rigid(tmp_path, capsys):
     assert main(["templates", "double_wishbone"]) == 0
     table = tmp_path / "car.csv"
     table.write_text(capsys.readouterr().out)
@@ -337,7 +337,7 @@ def test_table_without_rubber_is_said_to_be_rigid(tmp_path, capsys):
         assert ("note: nothing is elastic" in capsys.readouterr().err) == rigid
 
 
-def test_rig_is_written_as_read(tmp_path):
+def test_rig_file_round_trip(tmp_path):
     table = '[compliance]\nwheel = "knuckle"\nloads = ["lateral"]\ntire_stiffness = 2e5\n'
     case = strut(tmp_path, table)
     again = tmp_path / "again.toml"
@@ -349,7 +349,7 @@ def test_rig_is_written_as_read(tmp_path):
     assert found["ride_rate"].values[0] == pytest.approx(rate * 2e5 / (rate + 2e5))
 
 
-def test_released_joint_of_held_driver_is_refused(tmp_path):
+def test_released_joint_with_held_driver_refused(tmp_path):
     text = strut_text('[compliance]\nheld = ["stroke", "turn"]\n').replace(
         "[sweep]", '[drivers.turn]\ntype = "joint_angle"\njoint = "lca_pivot"\n\n[sweep]'
     )
@@ -359,7 +359,7 @@ def test_released_joint_of_held_driver_is_refused(tmp_path):
         compliance(load_case(file))
 
 
-def test_bushings_in_a_file_serve_a_hardpoint_table(tmp_path, capsys):
+def test_bushing_file_for_hardpoint_table(tmp_path, capsys):
     table, rubber = tmp_path / "car.csv", tmp_path / "rubber.toml"
     assert main(["templates", "double_wishbone"]) == 0
     table.write_text(capsys.readouterr().out)
@@ -411,7 +411,7 @@ def load_cases(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", [*SIMULATORS, "exudyn-static"])
-def test_engine_finds_equilibria_of_the_data(load_cases, name):
+def test_engine_equilibria_equal_data(load_cases, name):
     """Wheel centre and load by its own kinematics, gravity and rows, for four load cases."""
     engine = engine_of(name)
     for asked, row in load_cases:
@@ -421,7 +421,7 @@ def test_engine_finds_equilibria_of_the_data(load_cases, name):
         assert found.forces.drivers["stroke"][0] == pytest.approx(row["wheel_load"], abs=4e-6)
 
 
-def test_engines_have_verdicts_on_an_axle(tmp_path, capsys):
+def test_engine_verdicts_on_axle(tmp_path, capsys):
     """Both wheels against each other, with an anti-roll bar."""
     names = ["mujoco", "exudyn-static"]
     for name in names:
@@ -445,7 +445,7 @@ def engine_of(name):
     return engine
 
 
-def test_engine_that_deviates_is_named(tmp_path, capsys):
+def test_deviating_engine_is_named(tmp_path, capsys):
     """Its bushings are twice as stiff; history and page have its verdict."""
     (tmp_path / "strut.toml").write_text(strut_text())
     options = ["--travel=0:20mm:2", "--jobs=0", "--engine", f"{__name__}:Stiff"]
@@ -478,7 +478,7 @@ def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     assert "finds no equilibria" in capsys.readouterr().out
 
 
-def test_bench_gives_times_of_samples_and_matrices(tmp_path, capsys):
+def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     (tmp_path / "strut.toml").write_text(strut_text())
     out = tmp_path / "bench.json"
     command = ["bench", "compliance", str(tmp_path / "strut.toml"), "--rounds=1", f"--json={out}"]
@@ -532,7 +532,7 @@ steps = 2
 
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "exudyn-static"])
-def test_body_between_two_bushings_is_a_series_of_springs(tmp_path, capsys, name):
+def test_bushings_in_series_closed_form(tmp_path, capsys, name):
     """In mm; the second bushing's axes turn with its first body, which carries a couple."""
     engine_of(name)
     (tmp_path / "series.toml").write_text(SERIES)
@@ -549,7 +549,7 @@ def test_body_between_two_bushings_is_a_series_of_springs(tmp_path, capsys, name
     assert {row["outcome"] for row in found["agreement"]} == {"pass", "not judged"}
 
 
-def test_python_has_verdicts_of_engines(tmp_path):
+def test_python_compliance_with_engine_verdicts(tmp_path):
     """A stiff engine by itself, and a simulator by its name."""
     engine_of("pinocchio")
     case = strut(tmp_path)
@@ -561,7 +561,7 @@ def test_python_has_verdicts_of_engines(tmp_path):
         kincheck.compliance(case, [0.0], engines="pinochio")
 
 
-def test_values_below_their_accuracy_are_printed_as_zero(tmp_path, monkeypatch, capsys):
+def test_values_below_accuracy_print_zero(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for options, file in (("", "car.csv"), (" --bushings", "rubber.toml")):
         assert main(f"templates mcpherson{options}".split()) == 0

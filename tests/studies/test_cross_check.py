@@ -38,7 +38,7 @@ def deviating(at):
     return Fake("off", answer=answer)
 
 
-def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
+def test_sweep_check_finds_deviating_variant(tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     (some,) = chosen(600, 1 / 600, 4)
@@ -61,7 +61,7 @@ def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
     assert max(each.ratio for each in found.checked if each is not bad) < 1e-4
 
 
-def test_impossible_check_is_refused_first(tmp_path):
+def test_impossible_sweep_check_is_refused(tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip=TIP)
     for engine, message in (
@@ -74,7 +74,7 @@ def test_impossible_check_is_refused_first(tmp_path):
             )
 
 
-def test_a_check_with_a_simulator_agrees(tmp_path):
+def test_sweep_check_with_mujoco_agrees(tmp_path):
     mujoco = adapters.engine("mujoco")
     if mujoco.version() is None:
         pytest.skip("mujoco is not installed")
@@ -124,7 +124,7 @@ def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch):
     assert (out / "report.html").exists()
 
 
-def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
+def test_sweep_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
     """An engine with values where the motion ends, and one that has not converged."""
     path = vary_file(tmp_path, {"rod": {"at": "joints.rod.length", "half_width": 3500.0}})
     native, known = adapters.engine("native"), adapters.engine
@@ -167,7 +167,7 @@ def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
     assert "the residual of samples that the engine calls solved is 0.001" in told
 
 
-def test_variant_solved_alone_is_no_contradiction(tmp_path):
+def test_sweep_check_of_variant_solved_alone(tmp_path):
     """Many variants at once do not pass a singular pose that one alone does: the engine has values
     there, and native too.
     """
@@ -195,7 +195,7 @@ def test_variant_solved_alone_is_no_contradiction(tmp_path):
     assert (record.outcome, record.message) == ("pass", "")
 
 
-def test_check_names_rows_without_values(tmp_path):
+def test_sweep_check_names_rows_without_values(tmp_path):
     """An engine with positions only passes by them; the message names the rows not judged."""
     case = load("rssr")
     name = next(iter(case.mechanism.points)).name

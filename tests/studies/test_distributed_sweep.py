@@ -104,7 +104,7 @@ def test_sweep_reports_lost_cluster(tmp_path, monkeypatch):
         )
 
 
-def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
+def test_sweep_without_scheduler_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(ours, "ANSWER", 0.25)
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})

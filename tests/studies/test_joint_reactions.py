@@ -43,7 +43,7 @@ def at_origins(self, freedom, i, j):
 
 
 @pytest.mark.parametrize("base", [Translational, Screw])
-def test_a_slide_driven_beside_its_axis_is_found(base):
+def test_slide_reaction_mistake_is_found(base):
     found = driven_checks(mistaken(base, measured=at_origins))
     assert found["reaction: acts and reacts"] is Verdict.FAIL
 
@@ -72,14 +72,14 @@ def planted(monkeypatch, change):
     monkeypatch.setattr(equations.ForceEquations, "reaction", wrong)
 
 
-def test_a_moment_about_a_free_axis_is_found(monkeypatch, traced_anew):
+def test_moment_about_free_axis_is_found(monkeypatch, traced_anew):
     """That of a hinge: the reaction works as it turns."""
     axis = unit(AXIS)
     planted(monkeypatch, lambda force, moment: (force, moment + (force @ axis) * axis))
     assert {"no work", "acts and reacts"} <= {*failing(Revolute)}
 
 
-def test_a_reaction_that_balances_no_body_is_found(monkeypatch, traced_anew):
+def test_unbalanced_reaction_is_found(monkeypatch, traced_anew):
     """It does no work on a ball's freedoms, but is too small."""
     planted(monkeypatch, lambda force, moment: (0.99 * force, moment))
     assert failing(Spherical) == ["acts and reacts"]
@@ -98,11 +98,11 @@ def by_place(self, factor):
 
 
 @pytest.mark.parametrize("scaled", [by_metres, by_place])
-def test_wrong_scaling_fails_the_size(scaled):
+def test_reaction_scaling_mistake_is_found(scaled):
     assert "size" in check_joint(mistaken(Spherical, scaled=scaled), samples=8).failures
 
 
-def test_forces_that_depend_on_the_order_are_found(monkeypatch, traced_anew):
+def test_order_dependent_reactions_are_found(monkeypatch, traced_anew):
     right = equations.ForceEquations.reaction
 
     def by_number(self, joint, multipliers):
@@ -113,7 +113,7 @@ def test_forces_that_depend_on_the_order_are_found(monkeypatch, traced_anew):
     assert "acts and reacts" in failing(Spherical)
 
 
-def test_a_wrong_sign_of_gravity_is_found(monkeypatch, traced_anew):
+def test_gravity_sign_mistake_is_found(monkeypatch, traced_anew):
     right = equations.inertial
     monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
     assert "power" in failing(Spherical)
@@ -144,7 +144,7 @@ class Right(Wrong):
 NATIVE = interpreted(NativeEngine())
 
 
-def test_an_engine_with_other_forces_is_found():
+def test_engine_with_other_reactions_is_found():
     right, wrong = (
         [each for each in loops(Spherical, [engine]) if each.check.startswith("reaction: wrong")]
         for engine in (Right(), Wrong())
@@ -154,7 +154,7 @@ def test_an_engine_with_other_forces_is_found():
     assert "force_" in wrong[0].message
 
 
-def test_forces_wait_for_sound_equations():
+def test_forces_skipped_if_equations_fail():
     report = check_joint(mistaken(Revolute, p.Dot11, gamma=negative_gamma), samples=4)
     (waiting,) = (each for each in report.findings if each.check == "reaction")
     assert waiting.verdict is Verdict.SKIP

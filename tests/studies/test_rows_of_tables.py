@@ -80,7 +80,7 @@ CASES.append(("mcpherson", RIGHT, CORNER))
 
 
 @pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
-def test_variant_of_a_row_equals_moved_table(tmp_path, name, rows, supplied):
+def test_variant_of_row_equals_moved_table(tmp_path, name, rows, supplied):
     """Every row of every template, moved by a millimetre and more along the axes of the table."""
     move = (1.0, -1.3, 0.7)
     ready = study_of(tmp_path, case_of(table(tmp_path, name, rows), supplied))
@@ -122,7 +122,7 @@ def compared(ready):
 
 
 @pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
-def test_explain_of_a_table_equals_gradients(tmp_path, name, rows, supplied):
+def test_explain_of_table_equals_gradients(tmp_path, name, rows, supplied):
     case = case_of(table(tmp_path, name, rows), supplied)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
@@ -131,13 +131,13 @@ SUSPENSIONS = [name for name in cases.names() if name.startswith(("mcpherson", "
 
 
 @pytest.mark.parametrize("name", SUSPENSIONS)
-def test_explain_of_a_suspension_equals_gradients(tmp_path, name):
+def test_explain_of_suspension_equals_gradients(tmp_path, name):
     """Positions at one point move together in both, with the markers of the wheel."""
     case = cases.load(name)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
 
-def test_moves_are_along_the_axes_of_the_table(tmp_path):
+def test_row_moves_follow_table_axes(tmp_path):
     """With x to the right, y up and z rearward."""
     rows = [
         [name, *(repr(sign * float(at[k])) for k, sign in ((1, -1.0), (2, 1.0), (0, -1.0)))]
@@ -177,7 +177,7 @@ def test_arm_axis_follows_its_two_rows(tmp_path):
 
 
 @pytest.mark.parametrize("at", ["lca_outer", "lower_ball", "joints.lower_ball.point", "Kugel"])
-def test_row_is_found_by_role_joint_and_place(tmp_path, at):
+def test_row_by_role_joint_or_place(tmp_path, at):
     """The user's own name of the row, its role, and the names of places as before."""
     rows = [
         ["Kugel" if row[0] == "lca_outer" else row[0], *row[1:]] for row in rows_of("mcpherson")
@@ -192,14 +192,14 @@ def test_row_is_found_by_role_joint_and_place(tmp_path, at):
     assert not any("." in number for number in numbers)
 
 
-def test_both_sides_of_an_axle_follow_a_row(tmp_path):
+def test_row_moves_both_axle_sides(tmp_path):
     case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), replace(CORNER, axle="heave"))
     found = moved(vary(tmp_path, case, ball={"at": "lca_outer", "sigma": 1.0}), ball__y=1e-3)
     assert [*found["joints.left_lower_ball.point"]] == pytest.approx([0, 1e-3, 0], abs=1e-15)
     assert [*found["joints.right_lower_ball.point"]] == pytest.approx([0, -1e-3, 0], abs=1e-15)
 
 
-def test_designs_of_python_move_rows(tmp_path):
+def test_python_designs_move_rows(tmp_path):
     """The places that follow, for `solve_designs`, against the table moved."""
     rows = rows_of("double_wishbone")
     case = load(table(tmp_path, "double_wishbone", rows), CORNER)
@@ -240,7 +240,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("points", "message"), FAULTS)
-def test_wrong_row_is_told(tmp_path, points, message):
+def test_invalid_row_is_refused(tmp_path, points, message):
     rows = [*rows_of("double_wishbone"), ["damper_lower", "0", "450", "130"]]
     case = load(table(tmp_path, "double_wishbone", rows), CORNER)
     with pytest.raises(CaseError) as caught:
@@ -248,7 +248,7 @@ def test_wrong_row_is_told(tmp_path, points, message):
     assert message in str(caught.value)
 
 
-def test_line_that_follows_already_is_accepted(tmp_path):
+def test_line_of_following_axis_is_accepted(tmp_path):
     """Variation files of tables had to state it, when axes did not follow by themselves."""
     case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
     ends = {"foot": {"at": "strut_lower", "sigma": 1.0}, "top": {"at": "strut_top", "sigma": 1.0}}
@@ -263,7 +263,7 @@ def test_line_that_follows_already_is_accepted(tmp_path):
         vary(tmp_path, case, lines={"strut": other}, axis=axis)
 
 
-def test_sensitivities_of_a_table_name_its_rows(tmp_path, capsys):
+def test_sensitivities_of_table_name_rows(tmp_path, capsys):
     """Toe by the wheel centre was 1000 times too large: the wheel's axis stayed behind."""
     text = sample_table(TEMPLATES["mcpherson"])
     file, out = tmp_path / "car.csv", tmp_path / "found.json"
@@ -292,7 +292,7 @@ def test_explain_names_coincident_places(capsys):
     assert "moved together: joints.ball.point = points.lower_ball.position, " in told
 
 
-def test_case_file_of_a_table_keeps_points_of_the_wheel(tmp_path):
+def test_case_file_of_table_keeps_wheel(tmp_path):
     """The radius and the axis of rotation follow their points in a case file too."""
     case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
     file = tmp_path / "case.toml"

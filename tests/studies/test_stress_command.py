@@ -48,7 +48,7 @@ def shifted(monkeypatch):
     )
 
 
-def test_a_run_writes_tables_and_data(tmp_path, capsys):
+def test_stress_writes_tables_and_data(tmp_path, capsys):
     new = tmp_path / "new"
     options = f"--family units degenerate --samples 40 --out {new} --json -"
     assert main.main(["stress", *options.split()]) == 0
@@ -81,7 +81,7 @@ def test_silent_error_is_reduced_and_replayed(tmp_path, capsys, shifted):
     assert "silently wrong first at turn = " in capsys.readouterr().out
 
 
-def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
+def test_stress_replay_of_sound_case(tmp_path, capsys):
     file = tmp_path / "rssr.toml"
     file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
     assert main.main(["stress", "--replay", str(file)]) == 0
@@ -99,7 +99,7 @@ def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
     ],
     ids=["unable", "missing"],
 )
-def test_stress_without_examined_samples_has_status_2(tmp_path, capsys, monkeypatch, engine, why):
+def test_stress_without_samples_has_status_2(tmp_path, capsys, monkeypatch, engine, why):
     monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
     assert main.main("stress --family units --samples 20 --no-proofs".split()) == 2
     out, err = capsys.readouterr()
@@ -126,7 +126,7 @@ def cell(name="one", **samples):
     return Cell(samples=counts, **of)
 
 
-def test_samples_without_a_verdict_are_counted_apart():
+def test_unjudged_samples_are_counted():
     refused, unjudged = {"refused, right reason": 2}, {"not judged": 3, "unsupported": 4}
     found = cell(right=5, **refused, **unjudged)
     assert headline([found]) == "None of 7 samples silently wrong, 3 not judged, 4 unsupported"
@@ -134,14 +134,14 @@ def test_samples_without_a_verdict_are_counted_apart():
     assert headline([found, wrong]) == "1 of 15 samples silently wrong, 3 not judged, 4 unsupported"
 
 
-def test_families_are_listed_with_their_sizes(capsys):
+def test_stress_list_prints_families(capsys):
     assert main.main(["stress", "--list"]) == 0
     out = capsys.readouterr().out
     assert "units" in out
     assert "1e7 m" in out
 
 
-def test_text_of_files_is_no_markup():
+def test_stress_page_escapes_file_text():
     """Names and messages come from files and simulators."""
     evil = "<script>|*x*`"
     others = ("refused, right reason", "refused, wrong reason", "silently wrong", "not judged")
@@ -240,7 +240,7 @@ def case():
     return four_bar_case("rod", 5)
 
 
-def test_a_bad_case_is_made_small():
+def test_reduction_removes_unneeded_parts():
     """Bad is whatever has a crank longer than 0.1 m that is turned by more than 0.3 rad."""
     case = four_bar_case("revolutes", 41)
 

@@ -62,7 +62,7 @@ def stats():
     return import_module("scipy.stats")
 
 
-def test_yield_and_capability_of_a_normal_output(found, stats):
+def test_yield_and_capability_of_normal_output(found, stats):
     y, x, whole = found.limits
     expected = stats.norm.cdf(3.0) - stats.norm.cdf(-2.0)
     assert y.share == pytest.approx(expected, abs=2.0 / 4096)
@@ -78,7 +78,7 @@ def test_yield_and_capability_of_a_normal_output(found, stats):
     assert (whole.output, whole.outside, whole.share) == ("", y.outside, y.share)
 
 
-def test_the_interval_is_that_of_clopper_and_pearson(found, stats):
+def test_yield_interval_is_clopper_pearson(found, stats):
     y = found.limits[0]
     inside = y.known - y.outside
     low = stats.beta.ppf(0.025, inside, y.outside + 1)
@@ -87,7 +87,7 @@ def test_the_interval_is_that_of_clopper_and_pearson(found, stats):
     assert found.limits[1].interval == pytest.approx((0.025 ** (1.0 / 4096), 1.0), rel=1e-9)
 
 
-def test_the_histogram_counts_every_variant(found, stats):
+def test_histogram_counts_every_variant(found, stats):
     each = found.outputs["y"].histogram
     assert sum(each.counts) == 4096
     assert len(each.edges) == len(each.counts) + 1 == 31
@@ -101,7 +101,7 @@ def test_the_histogram_counts_every_variant(found, stats):
     assert found.outputs["x"].histogram is None
 
 
-def test_the_page_has_limits_histograms_and_legends(found):
+def test_sweep_page_has_limits_and_histograms(found):
     text = page(found)
     assert "Specification limits" in text
     assert text.count('tabindex="0" aria-label="Histogram of y') == 1
@@ -123,13 +123,13 @@ def test_the_page_has_limits_histograms_and_legends(found):
         ({"sampling": "random"}, "assumes independent variants", False),
     ],
 )
-def test_remarks_of_a_study(found, changes, said, told):
+def test_study_remarks(found, changes, said, told):
     results = msgspec.structs.replace(found, **changes)
     lines = [*remarks(results), *limit_notes(results)]
     assert any(said in line for line in lines) is told, lines
 
 
-def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):
+def test_limit_counts_ignore_chunks_and_jobs(tmp_path):
     case = crank()
     limits = (Limit("y", high=0.4995),)
     variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
@@ -143,7 +143,7 @@ def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):
     assert one[0].above == int((y > 0.4995).any(axis=0).sum())
 
 
-def test_limits_of_a_rate_take_its_order(tmp_path):
+def test_rate_limits_raise_derivative_order(tmp_path):
     case = crank()
     limits = (Limit("y.velocity", high=0.4),)
     variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
@@ -159,7 +159,7 @@ def file(tmp_path):
     return vary_file(tmp_path, {"ball": {"at": "ball", "sigma": 1.0}}, limits=limits)
 
 
-def test_limits_use_units_of_the_file(file, tmp_path, capsys):
+def test_limits_use_file_units(file, tmp_path, capsys):
     out = tmp_path / "out"
     command = f"sweep mcpherson_strut --vary {file} --samples 50".split()
     limits = "--limit wheelbase_change::3.5 --limit half_track_change:-11:1".split()
@@ -193,13 +193,13 @@ def test_limits_use_units_of_the_file(file, tmp_path, capsys):
         ("toe:-1e-1:0.1rad", -math.degrees(0.1), math.degrees(0.1)),
     ],
 )
-def test_limits_take_a_unit(limit, low, high):
+def test_limits_with_own_unit(limit, low, high):
     (found,) = limits_of_texts([limit], load("mcpherson_suspension"), FileUnits("mm", "rad"))
     ends = [math.radians(low), math.radians(high)]
     assert [found.low, found.high] == pytest.approx(ends, rel=1e-15)
 
 
-def test_limits_of_a_table_are_in_degrees(tmp_path, capsys):
+def test_limits_of_table_in_degrees(tmp_path, capsys):
     main(["templates", "mcpherson"])
     car, out = tmp_path / "car.csv", tmp_path / "out"
     car.write_text(capsys.readouterr().out)
@@ -216,7 +216,7 @@ def test_limits_of_a_table_are_in_degrees(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("limit", ["toe:-2:2mm", "toe:-2deg:2rad", "toe:-2:2dgr", "toe:deg:deg"])
-def test_limits_of_another_unit_are_refused(limit):
+def test_limits_of_wrong_unit_are_refused(limit):
     with pytest.raises(
         KincheckError, match=r"--limit.*(expected one such as rad|OUTPUT:LOW:HIGH|neither)"
     ):
@@ -281,7 +281,7 @@ def studied(tmp_path_factory):
     return found, len(complete), int(sum(each.min() >= LOW for each in complete))
 
 
-def test_incomplete_variants_are_outside_unless_ignored(studied):
+def test_incomplete_variants_outside_unless_ignored(studied):
     found, complete, inside = studied
     assert VARIANTS / 4 < complete < 0.75 * VARIANTS
     assert 0 < inside < complete
@@ -301,7 +301,7 @@ def test_incomplete_variants_are_outside_unless_ignored(studied):
     assert below[0] > below[1] == complete - inside
 
 
-def test_variants_are_counted_by_side_and_whether_complete():
+def test_outside_variants_by_side_and_completeness():
     nan = np.nan
     values = np.array(
         [
@@ -319,7 +319,7 @@ def test_variants_are_counted_by_side_and_whether_complete():
     ]
 
 
-def test_samples_without_a_nominal_value_are_not_judged():
+def test_samples_without_nominal_are_unjudged():
     """Ackermann of straight wheels has no value in any variant; a lock-up is of one."""
     values, reached = np.zeros((1, 4, 5)), np.ones((4, 5), dtype=np.bool_)
     nominal = np.array([[0.0, 0.0, np.nan, 0.0]])
@@ -370,7 +370,7 @@ UNKNOWN = {"share": None, "interval": None, "share_of_all": 0.5, "share_of_compl
 @pytest.mark.parametrize("judgement", Incomplete)
 @pytest.mark.parametrize("cells", [on_page, on_terminal])
 @pytest.mark.parametrize("changed", [{}, NOTHING, UNKNOWN, {"cp": 0.0, "cpk": 0.0, "below": 0}])
-def test_printed_limits_are_those_of_the_results(studied, judgement, cells, changed):
+def test_printed_limits_equal_results(studied, judgement, cells, changed):
     """Zero is a number, and no number is a dash."""
     found, _, _ = studied
     first, whole = found[judgement].limits
@@ -395,7 +395,7 @@ def test_printed_limits_are_those_of_the_results(studied, judgement, cells, chan
         ]
 
 
-def test_csv_of_limits_is_that_of_the_results(studied):
+def test_limits_csv_equals_results(studied):
     for judgement, results in studied[0].items():
         for row, each in zip(
             csv.DictReader(io.StringIO(limits_csv(results))), results.limits, strict=True
@@ -416,7 +416,7 @@ def test_csv_of_limits_is_that_of_the_results(studied):
         (["--incomplete", "ignore"], "ignore", "Incomplete, and left out: "),
     ],
 )
-def test_command_states_how_incomplete_variants_count(tmp_path, capsys, option, judgement, words):
+def test_sweep_command_counts_incomplete_variants(tmp_path, capsys, option, judgement, words):
     file, points, out = tmp_path / "bars.toml", tmp_path / "vary.json", tmp_path / "out.json"
     file.write_text(case_text(four_bar()))
     tables = {**HEAD, "mode": "monte_carlo", "hardpoints": {"end": JOINT}}
@@ -471,7 +471,7 @@ def slider_crank(tmp_path_factory):
     return ready(tmp_path_factory.mktemp("forces"), "planar_slider_crank", **SLIDER_CRANK)
 
 
-def test_forces_are_those_of_single_variants(slider_crank):
+def test_sweep_forces_equal_single_variants(slider_crank):
     found = values_of(slider_crank)
     assert any(row.output.forces for row in slider_crank.study.rows)
     for index in (0, 3):
@@ -481,7 +481,7 @@ def test_forces_are_those_of_single_variants(slider_crank):
     assert not np.allclose(found[:, :, 0], found[:, :, 1], equal_nan=True)
 
 
-def test_a_spring_moves_with_its_hardpoint_and_its_rate_varies(tmp_path):
+def test_spring_follows_hardpoint_and_varies(tmp_path):
     made = ready(
         tmp_path,
         "mcpherson_strut_loaded",
@@ -502,7 +502,7 @@ def test_a_spring_moves_with_its_hardpoint_and_its_rate_varies(tmp_path):
     assert not np.allclose(found[spring], made.nominal[spring], rtol=1e-6)
 
 
-def test_a_mass_that_may_become_negative_is_refused(tmp_path):
+def test_possibly_negative_mass_is_refused(tmp_path):
     case = load("planar_slider_crank")
     mass = case.mechanism.body("slider").mass
     with pytest.raises(CaseError, match=r"found offsets down to .+ expected zero or more"):

@@ -60,7 +60,7 @@ def cranks(case, variation, seed, count):
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
-def test_a_sweep_is_the_closed_form_of_every_variant(tmp_path, jobs):
+def test_sweep_equals_closed_form(tmp_path, jobs):
     case, count = crank(), 700
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     found = sweep_designs(case, variation, samples=count, seed=11, jobs=jobs)
@@ -83,7 +83,7 @@ def test_a_sweep_is_the_closed_form_of_every_variant(tmp_path, jobs):
     np.testing.assert_allclose(found.outputs["y"].nominal, p[:, 1], atol=1e-15)
 
 
-def test_sweep_results_ignore_number_of_jobs(tmp_path):
+def test_sweep_results_ignore_job_count(tmp_path):
     case = load("mcpherson_strut")
     variation = vary(tmp_path, case, **STRUT)
 
@@ -94,7 +94,7 @@ def test_sweep_results_ignore_number_of_jobs(tmp_path):
     assert swept(1) == swept(2) == swept(5)
 
 
-def test_many_quantiles_are_of_a_random_subset(tmp_path, monkeypatch):
+def test_quantiles_of_large_sweep_use_subset(tmp_path, monkeypatch):
     from kincheck.core.studies.tolerance import sweep
 
     monkeypatch.setattr(sweep, "KEPT", 400)
@@ -174,7 +174,7 @@ def test_large_chunks_are_solved_in_parts(tmp_path, monkeypatch):
     np.testing.assert_array_equal(parts.summary.extremes, whole.summary.extremes)
 
 
-def test_one_at_a_time_gives_effects(tmp_path):
+def test_one_at_a_time_effects(tmp_path):
     case = crank()
     variation = vary(
         tmp_path, case, "one_at_a_time", tip={"at": "tip", "values": [[-2, 2], [1], [0]]}
@@ -199,7 +199,7 @@ def test_one_at_a_time_gives_effects(tmp_path):
         sweep_designs(case, variation, samples=3)
 
 
-def test_a_grid_is_swept_as_a_whole(tmp_path):
+def test_grid_sweep_covers_all_combinations(tmp_path):
     case = crank()
     variation = vary(
         tmp_path, case, "grid", tip={"at": "tip", "values": [[-2, 2], [-1, 0, 3], [0]]}
@@ -265,7 +265,7 @@ BALL = {"at": "ball", "sigma": 1.0}
 AXIS = {"at": "joints.lca_pivot.axis", "sigma": 0.1}
 
 
-def test_summaries_of_parts_are_the_summary_of_all():
+def test_merged_summaries_equal_whole_summary():
     """Ten thousand times as far from zero as they are apart: the sum of squares must not be a
     difference of large numbers.
     """
@@ -299,7 +299,7 @@ def test_summaries_of_parts_are_the_summary_of_all():
     assert nothing(1, 2).extremes.tolist() == [[-1, -1]]
 
 
-def test_quantiles_and_their_standard_errors():
+def test_quantiles_and_standard_errors():
     """The spread of quantiles over many samples is the standard error that each of them is given,
     to the fifth of it.
     """
@@ -325,7 +325,7 @@ def rotated(axis, angle, arm):
     return arm * c + np.cross(h, arm) * s + h * (h @ arm) * (1 - c)
 
 
-def test_gradients_are_the_closed_form(tmp_path):
+def test_sweep_gradients_equal_closed_form(tmp_path):
     """Of a crank by its tip, its pivot, and the components of its axis, at the samples and at
     design.
     """
@@ -351,7 +351,7 @@ def test_gradients_are_the_closed_form(tmp_path):
     assert (found.error < 1e-7).all()
 
 
-def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
+def test_coarse_variants_count_nominal_turns(tmp_path):
     """At the samples and at design, where gradients are read too."""
     output = JointAngle("turned", 1e-9, 0.0, "test", "pivot")
     attitude = Orientation("e0", 1e-9, 0.0, "test", "arm", Component.E0)
@@ -372,7 +372,7 @@ def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
     assert not np.abs(found.design).max() > 1e-9
 
 
-def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
+def test_rough_gradients_are_marked(tmp_path, monkeypatch):
     from kincheck.core.studies.tolerance import study as room
 
     monkeypatch.setattr(room, "STEP", 0.2)
@@ -382,7 +382,7 @@ def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
     ).accurate.all()
 
 
-def test_gradients_agree_with_differences_of_whole_sweeps(tmp_path):
+def test_gradients_equal_differences_of_sweeps(tmp_path):
     """Of the strut, against `solve` of mechanisms made anew, over another step."""
     case = load("mcpherson_strut")
     study = Study(case, vary(tmp_path, case, ball=BALL), 1, 0)
@@ -457,7 +457,7 @@ def test_stratified_sampling_fills_every_interval(tmp_path, law, sampling, of_sc
 
 
 @pytest.mark.parametrize("law", ["truncated_normal", "triangular"])
-def test_random_draws_have_the_distribution(tmp_path, law, stats, of_scipy):
+def test_random_draws_follow_distribution(tmp_path, law, stats, of_scipy):
     drawn = 1e3 * variation(tmp_path, tip=TIP_LAWS[law]).offsets(1, 0, 4 * DRAWN)[0]
     assert stats.kstest(drawn, of_scipy.cdf).pvalue > 0.01  # of a fixed seed
     assert np.abs(drawn).max() <= {"truncated_normal": 3.0, "triangular": 2.0}[law]
@@ -504,7 +504,7 @@ def correlated(tmp_path, law, r, count=8192):
 
 
 @pytest.mark.parametrize("r", [0.8, -0.5, 1.0])
-def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
+def test_correlated_normal_draws_have_correlation(tmp_path, r):
     x, y, z = correlated(tmp_path, "normal", r)
     found = np.corrcoef([x, y, z])
     assert found[0, 2] == pytest.approx(r, abs=5e-3)
@@ -514,7 +514,7 @@ def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
         np.testing.assert_allclose(x, z, rtol=1e-12)
 
 
-def test_correlated_uniform_coordinates_follow_copula(tmp_path):
+def test_correlated_uniform_draws_follow_copula(tmp_path):
     x, _, z = correlated(tmp_path, "uniform", 0.8)
     assert np.corrcoef(x, z)[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=5e-3)
     assert np.abs([x, z]).max() <= 2e-3
