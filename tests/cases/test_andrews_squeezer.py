@@ -6,13 +6,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.cases import (
-    andrews_squeezer,
-)
+from kincheck.cases import andrews_squeezer, load
 from kincheck.cases.jet import Jet
 from kincheck.cases.vectors import Circle
-
-from ..support.case_library import CASES
 
 # Andrews' squeezer: the equations and both states are those of the Bari test set for initial value
 # problems, problem andrews
@@ -64,7 +60,7 @@ def test_andrews_published_start_closes():
     with mp.workdps(40):
         assert max(map(abs, closure(START, "-.03635"))) < 1e-30
         assert max(map(abs, closure(START, ".03635"))) == pytest.approx(0.0727, abs=1e-12)
-    case = CASES["andrews_squeezer"]
+    case = load("andrews_squeezer")
     engine, still = Native(), replace(case, sweep=replace(case.sweep, values=np.zeros(1)))
     found = engine.solve(engine.build(still), still, 1e-12)
     assert max(found.residual, found.details["redundant_residual"]) <= 1e-17
