@@ -30,14 +30,14 @@ from kincheck.core.studies.truth.forces import known_forces
 from kincheck.core.studies.truth.motion import followed
 
 CASES = {name: cases.load(name) for name in cases.names()}
-COORDINATES = [
-    name
-    for name, case in CASES.items()
-    if all(isinstance(output, Output) for output in case.outputs)
-]
 
 
-CLOSED_FORMS = [name for name in COORDINATES if CASES[name].truth is Truth.CLOSED_FORM]
+def coordinates(case):
+    """The outputs that are coordinates of points."""
+    return [output for output in case.outputs if isinstance(output, Output)]
+
+
+CLOSED_FORMS = [name for name, case in CASES.items() if case.truth is Truth.CLOSED_FORM]
 # What is asked of the native engine [m]; each derivative passes the equations, of pivots above
 # 0.03, once more.
 ROUND_OFF = 1e-14
@@ -94,11 +94,11 @@ def off(case, name, found, reference):
     return max(each.max_abs / each.tolerance for _, each in against.items() if each)
 
 
-@pytest.mark.parametrize("name", COORDINATES)
+@pytest.mark.parametrize("name", CASES)
 def test_native_engine_equals_case_truth(name):
     case, found = solved(name)
     assert found.solved.all(), found.message
-    for output in case.outputs:
+    for output in coordinates(case):
         series = output_series(case, output, found)
         for order, limit in LIMITS.items():
             truth, values = getattr(case.reference[output.name], order), getattr(series, order)
@@ -108,10 +108,10 @@ def test_native_engine_equals_case_truth(name):
             )
 
 
-@pytest.mark.parametrize("name", COORDINATES)
+@pytest.mark.parametrize("name", CASES)
 def test_shifted_truth_fails(name):
     case, found = solved(name)
-    for output in case.outputs:
+    for output in coordinates(case):
         series = case.reference[output.name]
         shifted = series.position.copy()
         shifted[len(shifted) // 3] += 2.0 * output.atol
@@ -140,8 +140,7 @@ def test_closed_form_rates_equal_complex_step(name):
     path, drivers = case.sweep.path, [driver.name for driver in case.mechanism.drivers]
     step = 1e-30
     at = path.drive(drivers, path.times[1:-1:7] + 1j * step)
-    for output in case.outputs:
-        assert isinstance(output, Output)
+    for output in coordinates(case):
         for jet in motion(*map(Jet, *at))[output.point]:
             assert jet.x.imag / step == pytest.approx(jet.v.real, rel=1e-12, abs=1e-12)
             assert jet.v.imag / step == pytest.approx(jet.a.real, rel=1e-12, abs=1e-11)
