@@ -52,6 +52,10 @@ def table(folder, name, rows, axes="forward,left,up"):
     return file
 
 
+def mcpherson(folder):
+    return load(table(folder, "mcpherson", rows_of("mcpherson")), CORNER)
+
+
 def case_of(file, supplied):
     """The case of a table, with the outputs that studies reduce."""
     case = load(file, supplied)
@@ -152,7 +156,7 @@ def test_row_moves_follow_table_axes(tmp_path):
     np.testing.assert_allclose(
         there, np.add(case.mechanism.joint("lower_ball").point, found[place])
     )
-    iso = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    iso = mcpherson(tmp_path)
     by_number = [
         {
             each.number: each.by_sample
@@ -166,7 +170,7 @@ def test_row_moves_follow_table_axes(tmp_path):
 
 
 def test_arm_axis_follows_its_two_rows(tmp_path):
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    case = mcpherson(tmp_path)
     ends = {"front": {"at": "lca_front", "sigma": 1.0}, "rear": {"at": "lca_rear", "sigma": 1.0}}
     variation = vary(tmp_path, case, **ends)
     places = {"joints.lca_pivot.point", "joints.lca_pivot.axis"}
@@ -250,17 +254,17 @@ def test_invalid_row_is_refused(tmp_path, points, message):
 
 def test_line_of_following_axis_is_accepted(tmp_path):
     """Variation files of tables had to state it, when axes did not follow by themselves."""
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    case = mcpherson(tmp_path)
     ends = {"foot": {"at": "strut_lower", "sigma": 1.0}, "top": {"at": "strut_top", "sigma": 1.0}}
     line = {"axis": "joints.strut_slide.axis", "through": ["strut_slide", "strut_top"]}
     offsets = {"foot__x": 1e-3, "top__y": 2e-3}
-    found = moved(vary(tmp_path, case, lines={"strut": line}, **ends), **offsets)
+    found = moved(vary(tmp_path, case, tables={"lines": {"strut": line}}, **ends), **offsets)
     for place, change in moved(vary(tmp_path, case, **ends), **offsets).items():
         np.testing.assert_allclose(found[place], change, atol=1e-15)
     other = {"axis": "joints.strut_slide.axis", "through": ["strut_top", "strut_slide"]}
     axis = {"at": "joints.strut_slide.axis", "sigma": 0.1}
     with pytest.raises(CaseError, match="varies by itself"):
-        vary(tmp_path, case, lines={"strut": other}, axis=axis)
+        vary(tmp_path, case, tables={"lines": {"strut": other}}, axis=axis)
 
 
 def test_sensitivities_of_table_name_rows(tmp_path, capsys):
@@ -294,7 +298,7 @@ def test_explain_names_coincident_places(capsys):
 
 def test_case_file_of_table_keeps_wheel(tmp_path):
     """The radius and the axis of rotation follow their points in a case file too."""
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    case = mcpherson(tmp_path)
     file = tmp_path / "case.toml"
     file.write_text(case_text(case))
     again = load(file)

@@ -24,9 +24,9 @@ def vary_file(folder, hardpoints, mode="monte_carlo", **tables):
     return path
 
 
-def vary(tmp_path, case, mode="monte_carlo", lines=None, **hardpoints):
-    """The variation that a file of these hardpoints gives."""
-    return read_variation(vary_file(tmp_path, hardpoints, mode, lines=lines or {}), case)
+def vary(tmp_path, case, mode="monte_carlo", tables=None, **hardpoints):
+    """The variation that a file of these hardpoints and tables gives."""
+    return read_variation(vary_file(tmp_path, hardpoints, mode, **(tables or {})), case)
 
 
 def moved(variation, **offsets):
@@ -116,7 +116,8 @@ def test_line_follows_its_positions(tmp_path):
     offsets = {"foot__x": 0.01, "foot__z": -0.02, "top__y": 0.03}
     for through in (line["through"], line["through"][::-1]):
         found = moved(
-            vary(tmp_path, case, lines={"strut": {**line, "through": through}}, **ends), **offsets
+            vary(tmp_path, case, tables={"lines": {"strut": {**line, "through": through}}}, **ends),
+            **offsets,
         )
         np.testing.assert_allclose(
             found["joints.strut_slide.axis"], [-0.01, 0.03, 0.02], atol=1e-12
