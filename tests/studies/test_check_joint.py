@@ -28,7 +28,7 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.checks.findings import Verdict
 
-from ..support.fakes import Fake
+from ..support.fakes import Fake, native_but
 from ..support.joint_mutants import mutants
 from .test_check_joint_mistakes import mistaken
 
@@ -78,12 +78,8 @@ def test_check_joint_passes_user_joints(few, in_folder, module):
 
 
 def test_check_joint_loop_large_residual_fails(loops_only):
-    native = adapters.engine("native")
-
-    def answer(case):
-        return dataclasses.replace(native.solve(native.build(case), case, 1e-12), residual=1e-3)
-
-    found = check_joint(Revolute, engines=[Fake("loose", answer=answer)])["loop: loose"]
+    loose = native_but(lambda found, case: dataclasses.replace(found, residual=1e-3), "loose")
+    found = check_joint(Revolute, engines=[loose])["loop: loose"]
     assert found.verdict is Verdict.FAIL
     assert (
         "the residual of samples that the engine calls solved is 0.001, tolerance 1e-12"
@@ -92,17 +88,14 @@ def test_check_joint_loop_large_residual_fails(loops_only):
 
 
 def test_check_joint_loop_without_derivatives_noted(loops_only):
-    native = adapters.engine("native")
-
-    def answer(case):
-        found = native.solve(native.build(case), case, 1e-12)
+    def without_rates(found, case):
         bare = {
             name: dataclasses.replace(each, velocity=None, acceleration=None)
             for name, each in found.points.items()
         }
         return dataclasses.replace(found, points=bare)
 
-    found = check_joint(Revolute, engines=[Fake("bare", answer=answer)])["loop: bare"]
+    found = check_joint(Revolute, engines=[native_but(without_rates, "bare")])["loop: bare"]
     assert found.verdict is Verdict.PASS
     assert "not judged: velocity: the engine gives none" in found.message
 

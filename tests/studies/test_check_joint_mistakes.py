@@ -94,63 +94,28 @@ def cancelling(self, i, j):
     return tuple((each + 1e7 * x) - 1e7 * x for each in super(type(self), self).phi(i, j))
 
 
-def left_handed(self, i, j):
-    f, g, h = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(g, f, h)
+class Root(p.Spherical):
+    """Its equations cannot be traced."""
+
+    def phi(self, i, j):
+        return tuple(math.sqrt(x) for x in super().phi(i, j))
 
 
-def long_axis(self, i, j):
-    f, g, _ = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(f, g, vec(self.axis))
+def composed(base, primitives):
+    """A joint type like the base of primitives made of its two arms, its axes f, g and h, and its
+    axis as it is given.
+    """
 
+    def own(self, i, j):
+        P = vec(self.point)
+        axis = getattr(self, "axis", (0.0, 0.0, 1.0))
+        return primitives((i.arm(P), j.arm(P)), *triad(axis), vec(axis))
 
-def long_row(self, i, j):
-    P = vec(self.point)
-    return (p.Dot20(vec(self.axis), i.arm(P), j.arm(P), ZERO),)
-
-
-def missing_row(self, i, j):
-    f, _, h = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot10(f, h)
-
-
-def repeated_row(self, i, j):
-    f, _, h = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot10(f, h), p.Dot10(h, f)
-
-
-def wrong_body(self, i, j):
-    P = vec(self.point)
-    return (p.Spherical(j.arm(P), j.arm(P)),)
+    return mistaken(base, primitives=own)
 
 
 def global_arm(self, i, j):
     return (p.Spherical(vec(self.point), vec(self.point)),)
-
-
-def open_at_design(self, i, j):
-    P, (f, g, _) = vec(self.point), triad(self.axis)
-    arms = i.arm(P), j.arm(P)
-    return p.Spherical(*arms, d0=0.01 * f), p.Dot11(f, g, unit(self.axis))
-
-
-def untraceable(self, i, j):
-    class Root(p.Spherical):
-        def phi(self, i, j):
-            return tuple(math.sqrt(x) for x in super().phi(i, j))
-
-    P = vec(self.point)
-    return (Root(i.arm(P), j.arm(P)),)
-
-
-def unscaled(self, i, j):
-    P, (f, g, _) = vec(self.point), triad(self.axis)
-    arms = i.arm(P), j.arm(P)
-    return tuple(p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in (f, g))
 
 
 def measured_backwards(self, freedom, i, j):
@@ -225,11 +190,33 @@ MISTAKES = {
     "no rows": ("equations", lambda: mistaken(InPlane, primitives=no_rows)),
     "rows without an arm": ("rows", lambda: mistaken(InPlane, p.Dot20, rows=rows_without_arm)),
     "rows too long": ("newton", lambda: mistaken(Spherical, p.Spherical, rows=doubled_rows)),
-    "axes swapped": ("newton", lambda: mistaken(Revolute, primitives=left_handed)),
-    "axis not unit": ("axis lengths", lambda: mistaken(Revolute, primitives=long_axis)),
-    "a row as long as the axis": ("axis lengths", lambda: mistaken(InPlane, primitives=long_row)),
-    "a row missing": ("freedoms", lambda: mistaken(Revolute, primitives=missing_row)),
-    "a row twice": ("rank", lambda: mistaken(Revolute, primitives=repeated_row)),
+    "axes swapped": (
+        "newton",
+        lambda: composed(
+            Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot11(g, f, h))
+        ),
+    ),
+    "axis not unit": (
+        "axis lengths",
+        lambda: composed(
+            Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot11(f, g, axis))
+        ),
+    ),
+    "a row as long as the axis": (
+        "axis lengths",
+        lambda: composed(InPlane, lambda arms, f, g, h, axis: (p.Dot20(axis, *arms, ZERO),)),
+    ),
+    "a row missing": (
+        "freedoms",
+        lambda: composed(Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot10(f, h))),
+    ),
+    "a row twice": (
+        "rank",
+        lambda: composed(
+            Revolute,
+            lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot10(f, h), p.Dot10(h, f)),
+        ),
+    ),
     "a freedom too many": (
         "freedoms",
         lambda: mistaken(Universal, freedoms=("rotation i", "rotation j", "slide")),
@@ -244,14 +231,29 @@ MISTAKES = {
         "spurious branches",
         lambda: mistaken(ConstantVelocity, p.ConstantVelocity, branch=no_branch),
     ),
-    "arm of the wrong body": ("rigid motion", lambda: mistaken(Spherical, primitives=wrong_body)),
+    "arm of the wrong body": (
+        "rigid motion",
+        lambda: composed(Spherical, lambda arms, *axes: (p.Spherical(arms[1], arms[1]),)),
+    ),
     "global arms": ("place", lambda: mistaken(Spherical, primitives=global_arm)),
-    "not closed at design": ("design", lambda: mistaken(Revolute, primitives=open_at_design)),
-    "a length that is none": ("size", lambda: mistaken(InPlane, primitives=unscaled)),
+    "not closed at design": (
+        "design",
+        lambda: composed(
+            Revolute,
+            lambda arms, f, g, h, axis: (p.Spherical(*arms, d0=0.01 * f), p.Dot11(f, g, h)),
+        ),
+    ),
+    "a length that is none": (
+        "size",
+        lambda: composed(
+            InPlane,
+            lambda arms, *axes: [p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in axes[:2]],
+        ),
+    ),
     "called symmetric": ("exchange", lambda: mistaken(InPlane, symmetric=True)),
     "not smooth": ("newton", lambda: mistaken(InPlane, p.Dot20, phi=rough)),
     "cancellation": ("round-off", lambda: mistaken(Spherical, p.Spherical, phi=cancelling)),
-    "math.sqrt": ("equations", lambda: mistaken(Spherical, primitives=untraceable)),
+    "math.sqrt": ("equations", lambda: composed(Spherical, lambda arms, *axes: (Root(*arms),))),
     "other coordinates": (
         "mixed style",
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),

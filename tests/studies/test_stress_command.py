@@ -8,7 +8,6 @@ import kincheck.adapters
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.adapters.native import Native
 from kincheck.core import solve
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.joint_probe import probes
@@ -22,27 +21,23 @@ from kincheck.core.studies.stress.run import Cell, Finding, Stress
 from kincheck.core.studies.stress.verdicts import Verdict
 from kincheck.core.trajectory import PointMotion
 
-from ..support.fakes import Fake
+from ..support.fakes import Fake, crank, native_but
+from ..support.written_again import written_again
 
 
-class Shifted(Native):
-    """The native engine, off by a micrometre beyond 2 rad."""
-
-    def build(self, case):
-        found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
-        far = (np.abs(case.sweep.change) > 2.0)[:, None]
-        points = {
-            name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()
-        }
-        return replace(found, points=points)
-
-    def solve(self, model, case, tol):
-        return model
+def shift(found, case):
+    """Be off by a micrometre beyond 2 rad."""
+    far = (np.abs(case.sweep.change) > 2.0)[:, None]
+    points = {
+        name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()
+    }
+    return replace(found, points=points)
 
 
 @pytest.fixture
 def shifted(monkeypatch):
-    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": Shifted())
+    engine = native_but(shift)
+    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
     monkeypatch.setattr(
         "kincheck.core.studies.stress.run.suited", lambda engine, case, number: engine
     )
@@ -169,27 +164,12 @@ def test_stress_page_escapes_file_text():
 
 @pytest.mark.parametrize("name", sorted(set(cases.names()) - {"mcpherson_suspension"}))
 def test_written_built_in_cases_read_back(name, tmp_path):
-    same_after_writing(cases.load(name), tmp_path)
+    written_again(cases.load(name), tmp_path)
 
 
 @pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
 def test_written_joint_types_read_back(case, tmp_path):
-    same_after_writing(case, tmp_path)
-
-
-def same_after_writing(case, folder):
-    file = folder / "case.toml"
-    file.write_text(case_text(case, ["what it is", "and why"]), encoding="utf-8")
-    read = load_case(file)
-    values = read.sweep.values
-    for part in ("name", "source", "mechanism", "outputs"):
-        assert getattr(read, part) == getattr(case, part)
-    for part in ("driver", "rate", "design", "motions"):
-        assert getattr(read.sweep, part) == getattr(case.sweep, part)
-    # a grid in degrees is even but for its last places
-    assert np.abs(values - case.sweep.values).max() <= 4 * np.spacing(
-        np.abs(case.sweep.values).max()
-    )
+    written_again(case, tmp_path)
 
 
 def test_unwritable_cases_are_refused():
@@ -206,18 +186,11 @@ def test_unwritable_cases_are_refused():
 
 
 def test_written_names_are_quoted(tmp_path):
-    case = next(case for case in probes() if case.name == "revolute")
-    odd = 'ti "p"\\1'
-    points = [
-        replace(point, name=odd) if point.name == "tip_1" else point
-        for point in case.mechanism.points
-    ]
-    outputs = tuple(
-        replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs
-    )
-    same_after_writing(
-        replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path
-    )
+    case, odd = crank(), 'ti "p"\\1'
+    points = [replace(point, name=odd) for point in case.mechanism.points]
+    outputs = tuple(replace(each, point=odd) for each in case.outputs)
+    mechanism = replace(case.mechanism, points=points)
+    written_again(replace(case, mechanism=mechanism, outputs=outputs, reference={}), tmp_path)
 
 
 def test_stress_replay_refuses_output_files(tmp_path, capsys):
