@@ -73,7 +73,7 @@ def velocity_defect(specimen, i, j):
     )
     i, j = i.in_axes_of(primitive), j.in_axes_of(primitive)
     return np.max(
-        [defect(products(row, i.v, i.w, j.v, j.w), nu, phi.x_t) for phi, row, nu in found], axis=0
+        [defect(products(row, i.v, i.w, j.v, j.w), nu, phi.v) for phi, row, nu in found], axis=0
     )
 
 
@@ -85,7 +85,7 @@ def acceleration_defect(specimen, i, j):
     gamma = primitive.gamma(i.pose, j.pose, i.motion, j.motion)
     found = zip(phi, rows, gamma, strict=True)
     return np.max(
-        [defect(products(row, i.v_t, i.w_t, j.v_t, j.w_t), b, phi.x_tt) for phi, row, b in found],
+        [defect(products(row, i.v_t, i.w_t, j.v_t, j.w_t), b, phi.a) for phi, row, b in found],
         axis=0,
     )
 
@@ -134,7 +134,7 @@ def test_satisfied_on_the_manifold(kind, rng):
     i, j = admissible(specimen, rng)
     for phi in phi_jets(specimen, i, j):
         assert np.abs(phi.x).max() <= ROUND_OFF
-        assert np.abs(phi.x_t).max() <= ROUND_OFF * 10.0  # velocities reach ten
+        assert np.abs(phi.v).max() <= ROUND_OFF * 10.0  # velocities reach ten
 
 
 @pytest.mark.parametrize("kind", TYPES)
