@@ -3,7 +3,7 @@
 import dataclasses
 import importlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 from kincheck.core import (
@@ -11,6 +11,7 @@ from kincheck.core import (
     Cylindrical,
     InPlane,
     Revolute,
+    Screw,
     Spherical,
     Translational,
     Universal,
@@ -18,9 +19,15 @@ from kincheck.core import (
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
+from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
+from kincheck.core.studies.checks.findings import Verdict
+from kincheck.core.studies.checks.joint_loops import driven, loaded, loops, reactions, solved
+
+from ..support.engine_faults import changed
+from ..support.fakes import native_but
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 checking = importlib.import_module("kincheck.core.studies.checks.check_joint")
@@ -46,12 +53,7 @@ def mistaken(base, primitive=None, **changes):
 
 def _retyped(native, primitive, changes):
     fields = {each.name: getattr(native, each.name) for each in dataclasses.fields(native)}
-    methods = {name: change for name, change in changes.items() if name not in fields}
-    kind = type(f"Mistaken{primitive.__name__}", (primitive,), methods)
-    return kind(
-        **fields
-        | {name: change(fields[name]) for name, change in changes.items() if name in fields}
-    )
+    return type(f"Mistaken{primitive.__name__}", (primitive,), changes)(**fields)
 
 
 def negative_gamma(self, i, j, vi, vj):
@@ -330,3 +332,113 @@ def test_equivalent_with_fixed_names_is_found(few):
     assert report.failures == ("loop: native, equivalent",), report
     message = report["loop: native, equivalent"].message
     assert "names a part 'pin', whatever the joint's name is" in message
+
+
+# Reactions: each check finds its mistake
+
+equations = importlib.import_module("kincheck.core.kinematics.forces.equations")
+
+
+def failing(joint_type, case_of=loaded):
+    """The failing checks of reactions of a joint type, loaded or driven in its own coordinates."""
+    found = reactions(solved(case_of(probe(joint_type))))
+    return [each.check.removeprefix("reaction: ") for each in found if each.verdict is Verdict.FAIL]
+
+
+def at_origins(self, freedom, i, j):
+    """Slides between the internal origins of the bodies, not at the joint's point."""
+    P, h = vec(self.point), unit(self.axis)
+    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
+    return between if freedom == "translation" else p.DrivenAngle(h)
+
+
+@pytest.mark.parametrize("base", [Translational, Screw])
+def test_slide_reaction_mistake_is_found(base):
+    assert "acts and reacts" in failing(mistaken(base, measured=at_origins), driven)
+
+
+@pytest.fixture
+def traced_anew(monkeypatch):
+    """Programs are traced with the mistake of the test, not taken from the cache on disk."""
+    monkeypatch.setattr(
+        "kincheck.core.kinematics.compiled.compiled_model.load_or_make",
+        lambda content, make, read: read(make()),
+    )
+
+
+def plant(monkeypatch, change):
+    """Change force and moment of a joint by its place in the mechanism."""
+    right = equations.ForceEquations.reaction
+
+    def wrong(self, joint, multipliers):
+        found = right(self, joint, multipliers)
+        return change(joint.name, self.mechanism.joints.index(joint), *found)
+
+    monkeypatch.setattr(equations.ForceEquations, "reaction", wrong)
+
+
+def test_moment_about_free_axis_is_found(monkeypatch, traced_anew):
+    """That of a hinge: the reaction works as it turns."""
+    axis = unit(AXIS)
+    plant(
+        monkeypatch,
+        lambda name, k, force, moment: (force, moment + (name == "tested") * (force @ axis) * axis),
+    )
+    assert {"no work", "acts and reacts"} <= {*failing(Revolute)}
+
+
+def test_unbalanced_reaction_is_found(monkeypatch, traced_anew):
+    """It does no work on a ball's freedoms, but is too small."""
+    plant(
+        monkeypatch,
+        lambda name, k, force, moment: ((0.99 if name == "tested" else 1.0) * force, moment),
+    )
+    assert failing(Spherical) == ["acts and reacts"]
+
+
+def by_metres(self, factor):
+    """A point a centimetre off, whatever the unit."""
+    x, y, z = self.point
+    return replace(self, point=(factor * x + 0.01, factor * y, factor * z))
+
+
+def by_place(self, factor):
+    """A point that is off by more, the farther it is from the global origin."""
+    x, y, z = self.point
+    return replace(self, point=(factor * (x + 1e-3 * x * x), factor * y, factor * z))
+
+
+@pytest.mark.parametrize("scaled", [by_metres, by_place])
+def test_reaction_scaling_mistake_is_found(scaled):
+    assert "size" in check_joint(mistaken(Spherical, scaled=scaled), samples=8).failures
+
+
+def test_order_dependent_reactions_are_found(monkeypatch, traced_anew):
+    plant(monkeypatch, lambda name, k, *found: tuple((1.0 + 1e-6 * k) * each for each in found))
+    assert "acts and reacts" in failing(Spherical)
+
+
+def test_gravity_sign_mistake_is_found(monkeypatch, traced_anew):
+    right = equations.inertial
+    monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
+    assert "power" in failing(Spherical)
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, Verdict.PASS), (1.001, Verdict.FAIL)])
+def test_engine_with_other_reactions_is_found(factor, verdict):
+    def change(found, case):
+        joints = found.forces.joints
+        joints = {k: replace(each, force=factor * each.force) for k, each in joints.items()}
+        return changed(found, forces=replace(found.forces, joints=joints))
+
+    findings = loops(Spherical, [native_but(change, "wrong")])
+    (found,) = (each for each in findings if each.check.startswith("reaction: wrong"))
+    assert found.verdict is verdict
+    assert ("force_" in found.message) == (verdict is Verdict.FAIL)
+
+
+def test_forces_skipped_if_equations_fail():
+    report = check_joint(mistaken(Revolute, p.Dot11, gamma=negative_gamma), samples=4)
+    (waiting,) = (each for each in report.findings if each.check == "reaction")
+    assert waiting.verdict is Verdict.SKIP
+    assert "first repair" in waiting.message

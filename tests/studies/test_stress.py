@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core import primitives as p
-from kincheck.core import solve
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.caches import clear_caches
 from kincheck.core.case.io.case_file import case_text, load_case
@@ -37,11 +36,12 @@ from kincheck.core.studies.truth.forces import known_forces
 from kincheck.core.studies.truth.motion import Reach, followed
 
 from ..support.engine_faults import changed
-from ..support.fakes import Fake
+from ..support.fakes import Fake, native_but, raising
 
 NATIVE = engine("native")
 # Of a family whose specimens are of one kind, few show it.
 FEWER = {"loops": 3, "folds": 3}
+STRESS_FILES = sorted((Path(__file__).parents[1] / "data" / "stress").glob("*.toml"))
 
 
 def test_stress_corner_beside_small_loop():
@@ -135,19 +135,9 @@ def test_numpy_solver_in_singular_family():
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "four_bar_in_one_step",
-        "kite",
-        "loop_of_four_bodies",
-        "loop_of_eight_bodies",
-        "platform_nearly_singular",
-    ],
-)
-def test_former_silent_errors_stay_fixed(name):
+@pytest.mark.parametrize("file", [*STRESS_FILES], ids=lambda file: file.stem)
+def test_former_silent_errors_stay_fixed(file):
     """The smallest mechanisms found so far, a sample each."""
-    file = Path(__file__).parents[1] / "data" / "stress" / f"{name}.toml"
     assert judge_file(load_case(file), NATIVE, 1e-12).counts[Verdict.SILENTLY_WRONG] == 0
 
 
@@ -203,18 +193,15 @@ def truth(case):
     return followed(case)
 
 
-def fake(change=lambda motion: motion, failures=(), fails=None):
+def fake(change=lambda motion: motion, failures=()):
     """An engine that answers with the native motion, changed."""
 
-    def answer(case):
-        if fails:
-            raise fails
-        found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
+    def answer(found, case):
         points = {name: change(motion) for name, motion in found.points.items()}
         solved = np.isfinite([motion.position for motion in points.values()]).all(axis=(0, 2))
         return replace(found, points=points, solved=solved, failures=failures)
 
-    return Fake("native", answer)
+    return native_but(answer)
 
 
 def judge(case, truth, engine, **about):
@@ -295,7 +282,8 @@ def test_verdict_on_refusal_by_reason(case, truth, singular, failures, about, ri
 def test_verdict_on_errors_and_crashes(case):
     free = SolveError("a body can turn", FailureKind.FREE)
     reasons = frozenset({FailureKind.FREE})
-    assert judge(case, None, fake(fails=free), reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5
+    refusing = Fake("native", raising(free))
+    assert judge(case, None, refusing, reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5
     one = Specimen("one", case, None, reasons=reasons)
     for outcome, verdict in (
         (Outcome.CRASHED, Verdict.REFUSED_WRONGLY),
@@ -407,6 +395,11 @@ def test_force_mistakes_are_named(made, change, verdict):
     assert found.counts[verdict] == len(found.verdicts)
 
 
+def judge_specimen(number):
+    one = specimen(FORCES, 0, number, 3)
+    return judged(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
+
+
 def test_missing_gyroscopic_moment_is_found(monkeypatch):
     """No gyroscopic moment."""
     monkeypatch.setattr(
@@ -416,9 +409,7 @@ def test_missing_gyroscopic_moment_is_found(monkeypatch):
             demand.inertia_of(body) @ demand.spin_of(body, at)[1]
         ),
     )
-    one = specimen(FORCES, 0, SPINNING, 3)
-    found = judged(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
-    assert found.counts[Verdict.WRONG_FORCE] > 0
+    assert judge_specimen(SPINNING).counts[Verdict.WRONG_FORCE] > 0
 
 
 def test_force_of_offset_drive_is_judged(monkeypatch):
@@ -432,9 +423,7 @@ def test_force_of_offset_drive_is_judged(monkeypatch):
         return p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
 
     monkeypatch.setattr(AxialJoint, "measured", wrong)
-    one = specimen(FORCES, 0, SLIDING, 3)
-    found = judged(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
-    assert found.counts[Verdict.WRONG_FORCE] == 3
+    assert judge_specimen(SLIDING).counts[Verdict.WRONG_FORCE] == 3
 
 
 def test_engine_without_forces_is_unjudged(made):
