@@ -1,7 +1,5 @@
 """Andrews' squeezer mechanism against its published start, accelerations and states."""
 
-from dataclasses import replace
-
 import mpmath as mp
 import numpy as np
 import pytest
@@ -9,6 +7,8 @@ from kincheck.adapters.native import Native
 from kincheck.cases import andrews_squeezer, load
 from kincheck.cases.jet import Jet
 from kincheck.cases.vectors import Circle
+
+from ..support.fakes import swept
 
 # Andrews' squeezer: the equations and both states are those of the Bari test set for initial value
 # problems, problem andrews
@@ -61,7 +61,7 @@ def test_andrews_published_start_closes():
         assert max(map(abs, closure(START, "-.03635"))) < 1e-30
         assert max(map(abs, closure(START, ".03635"))) == pytest.approx(0.0727, abs=1e-12)
     case = load("andrews_squeezer")
-    engine, still = Native(), replace(case, sweep=replace(case.sweep, values=np.zeros(1)))
+    engine, still = Native(), swept(case, np.zeros(1))
     found = engine.solve(engine.build(still), still, 1e-12)
     assert max(found.residual, found.details["redundant_residual"]) <= 1e-17
     for point in case.mechanism.points:

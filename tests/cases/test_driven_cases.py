@@ -20,6 +20,7 @@ from kincheck.core.report.report import write_report
 
 from ..report.page import Page
 from ..support.case_texts import edited, write
+from ..support.fakes import swept
 
 STRUT = (cases.FOLDER / "mcpherson_strut.toml").read_text()
 RACK = """[joints.rack_guide]
@@ -107,11 +108,7 @@ def test_driven_case_rates_follow_path(case):
     for k in range(0, len(path.times), 10):
         near = path.times[k] + h * np.arange(-3, 4)
         at = near * case.sweep.rate + case.sweep.design if case.sweep.driver != "time" else near
-        x = (
-            solved(replace(case, sweep=replace(case.sweep, values=at)))
-            .points["wheel_center"]
-            .position
-        )
+        x = solved(swept(case, at)).points["wheel_center"].position
         velocity = sum(w * (x[3 + m] - x[3 - m]) for m, w in enumerate(weights[1], 1)) / h
         acceleration = (
             sum(w * (x[3 + m] + x[3 - m]) for m, w in enumerate(weights[2], 1)) - 49 / 18 * x[3]

@@ -2,7 +2,6 @@
 by module and class, or by an entry point.
 """
 
-from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from kincheck.core.studies.checks.check_engine import rates
 from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
-from ..support.fakes import Fake, crank
+from ..support.fakes import Fake, crank, swept
 from ..support.faulty_engine import Odd, Shy, Sound
 
 ROOT = Path(__file__).parents[2]
@@ -185,7 +184,7 @@ def test_entry_point_group_is_kincheck_engines(monkeypatch):
 def test_rates_of_short_sweeps_are_skipped(samples, compared):
     """Three times as many steps as a difference has weights."""
     case = crank(reference=False)
-    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-1.0, 1.0, samples)))
+    case = swept(case, np.linspace(-1.0, 1.0, samples))
     solved = [(case, record) for record in run([case], [Fake()], tol=1e-12).records]
     assert {each.verdict for each in rates(solved)} == {Verdict.PASS if compared else Verdict.SKIP}
 

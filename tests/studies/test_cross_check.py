@@ -17,7 +17,7 @@ from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.trajectory import QUANTITIES
 
-from ..support.fakes import Fake, crank, native_but
+from ..support.fakes import Fake, crank, native_but, swept
 from .test_sweep_command import POINTS
 from .test_sweep_study import PIVOT, STRUT, TIP
 from .test_vary import vary, vary_file
@@ -180,8 +180,7 @@ def test_sweep_check_of_variant_solved_alone(tmp_path):
     there, and native too.
     """
     case = load("iftomm_n_four_bar")
-    sweep = replace(case.sweep, values=np.deg2rad([0.0, 60.0, 90.0, 110.0]))
-    study, found, rows = nominal(tmp_path, replace(case, sweep=sweep, reference={}))
+    study, found, rows = nominal(tmp_path, swept(case, np.deg2rad([0.0, 60.0, 90.0, 110.0])))
     assert found.result.solved == 4
     rows[:, 2:] = np.nan  # as many at once leave them
     record = judged(study, 0, found, rows)

@@ -42,6 +42,7 @@ from kincheck.core.studies.diagnosis import diagnose
 from kincheck.core.studies.diagnosis.diagnose import determinacy
 from kincheck.core.studies.diagnosis.text import _directions, _forces
 
+from ..support.fakes import swept
 from ..support.mechanisms import four_bar, mcpherson, slider_crank
 
 
@@ -88,9 +89,7 @@ def test_run_explain_prints_program_account(capsys):
 def test_joints_between_fixed_bodies_are_skipped(tmp_path, capsys):
     """As a CAD export has them. What is written is read as the same case."""
     case = cases.load("mcpherson_strut")
-    case = replace(
-        case, sweep=replace(case.sweep, values=np.linspace(-0.05, 0.05, 3)), reference={}
-    )
+    case = swept(case, np.linspace(-0.05, 0.05, 3))
     bolts = [
         Revolute("bolt", "chassis", "rack", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
         Distance("stay", "ground", "chassis", ((0, 0, 0), (0, 0, 1))),
@@ -280,7 +279,7 @@ def test_conditioning_names_worst_sample_and_motion():
     """
     loaded = cases.load("mcpherson_strut")
     found = diagnose(
-        replace(loaded, sweep=replace(loaded.sweep, values=np.linspace(0.0, 0.293, 30))),
+        swept(loaded, np.linspace(0.0, 0.293, 30)),
         samples=30,
         tol=1e-12,
     )

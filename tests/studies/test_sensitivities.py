@@ -12,6 +12,7 @@ from kincheck.core import (
 from kincheck.core.kinematics import NativeSolver, places
 from kincheck.core.studies.diagnosis import diagnose
 
+from ..support.fakes import swept
 from ..support.mechanisms import four_bar, mcpherson
 from .test_explain import case
 
@@ -25,7 +26,7 @@ def test_sensitivities_equal_central_differences(name, value):
     """
     loaded = cases.load(name)
     case, mechanism = (
-        replace(loaded, sweep=replace(loaded.sweep, values=np.array([value]))),
+        swept(loaded, [value]),
         loaded.mechanism,
     )
     numbers = [

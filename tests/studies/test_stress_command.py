@@ -21,7 +21,7 @@ from kincheck.core.studies.stress.run import Cell, Finding, Stress
 from kincheck.core.studies.stress.verdicts import Verdict
 from kincheck.core.trajectory import PointMotion
 
-from ..support.fakes import Fake, crank, native_but
+from ..support.fakes import Fake, crank, native_but, swept
 from ..support.written_again import written_again
 
 
@@ -174,8 +174,7 @@ def test_written_joint_types_read_back(case, tmp_path):
 
 def test_unwritable_cases_are_refused():
     case = cases.load("rssr")
-    values = np.array([0.0, 1.0, 1.5])
-    uneven = replace(case, sweep=replace(case.sweep, values=values), reference={})
+    uneven = swept(case, [0.0, 1.0, 1.5])
     with pytest.raises(CaseError, match="no even grid"):
         case_text(uneven)
     strut = cases.load("mcpherson_suspension")

@@ -36,6 +36,8 @@ from kincheck.core.studies.truth.motion import (
 from kincheck.core.studies.truth.proofs import distance_from_proof
 from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 
+from ..support.fakes import swept
+
 PROBES = {case.name: case for case in probes()}
 CRANK, ROD = 0.3, 1.0
 
@@ -217,12 +219,7 @@ def test_sample_behind_rounding_singularity_may_fail(off, told):
 
 def test_round_off_bound_grows_with_condition():
     near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
-    bounds = [
-        followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][
-            0, 0
-        ]
-        for case in (near, far)
-    ]
+    bounds = [followed(swept(case, [-1.2])).bounds["C"][0, 0] for case in (near, far)]
     assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
 
 
@@ -256,7 +253,7 @@ def test_proof_chooses_rows_at_sample():
     other.
     """
     case = cases.load("bennett")
-    truth = followed(replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 45.0, 90.0]))))
+    truth = followed(swept(case, np.radians([0.0, 45.0, 90.0])))
     assert distance_from_proof(truth, 2) < 1e-2
 
 
@@ -265,7 +262,7 @@ def test_ground_point_needs_no_proof():
     case = cases.load("four_bar")
     points = [*case.mechanism.points, Point("here", "ground", (0.0, 0.0, 0.0))]
     case = replace(case, mechanism=replace(case.mechanism, points=points))
-    few = with_all_coordinates(replace(case, sweep=replace(case.sweep, values=np.array([0.25]))))
+    few = with_all_coordinates(swept(case, [0.25]))
     assert "here" in few.points
     assert distance_from_proof(followed(few), 0) < 1e-2
 

@@ -35,7 +35,7 @@ from kincheck.core.studies.variation.variation_file import limits_of_texts, read
 from scipy import stats
 
 from ..report.page import Page
-from ..support.fakes import crank
+from ..support.fakes import crank, swept
 from .test_vary import HEAD, vary, vary_file
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
@@ -45,7 +45,7 @@ TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 def found(tmp_path_factory):
     """The crank at its design: y of the tip is normal, of one millimetre, about zero."""
     case = crank()
-    still = replace(case, sweep=replace(case.sweep, values=case.sweep.values[4:5]))
+    still = swept(case, case.sweep.values[4:5])
     assert still.sweep.change == pytest.approx(0.0)
     variation = vary(tmp_path_factory.mktemp("limits"), still, tip=TIP)
     limits = (Limit("y", -2e-3, 3e-3), Limit("x", high=1.0))

@@ -34,7 +34,7 @@ from kincheck.core.studies.variation.study_choices import Sampling
 from kincheck.core.studies.variation.variation import DRAWN, Law, Limit
 from scipy import stats
 
-from ..support.fakes import crank, exact
+from ..support.fakes import crank, exact, swept
 from .test_vary import vary
 
 TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
@@ -87,11 +87,11 @@ def test_sweep_results_ignore_job_count(tmp_path):
     limits = (Limit("half_track_change", high=1e-3),)
     variation = replace(vary(tmp_path, case, **STRUT), limits=limits)
 
-    def swept(jobs):
+    def results(jobs):
         found = sweep_designs(case, variation, samples=1500, seed=3, order=1, jobs=jobs)
         return msgspec.json.encode(msgspec.structs.replace(found, run={}, measured={}))
 
-    assert swept(1) == swept(2) == swept(5)
+    assert results(1) == results(2) == results(5)
 
 
 def test_quantiles_of_large_sweep_use_subset(tmp_path):
@@ -159,7 +159,7 @@ def test_sweep_order_adds_derivatives(tmp_path):
 
 def test_large_chunks_are_solved_in_parts(tmp_path):
     case = crank(reference=False)
-    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-1.0, 1.0, 6001)))
+    case = swept(case, np.linspace(-1.0, 1.0, 6001))
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     ready = Ready.of(Study(case, variation, 300, 4))
     assert 8 < ready.lanes < 64
@@ -365,11 +365,10 @@ def test_coarse_variants_count_nominal_turns(tmp_path):
 
 def test_gradients_beside_stroke_end_are_rough(tmp_path):
     case = load("mcpherson_strut")
-    sweep = replace(case.sweep, values=np.linspace(0.0, 0.2933, 20))
     variation = vary(tmp_path, case, axis={"at": "joints.lca_pivot.axis", "sigma": 0.1})
     right, rough = (
         gradients(Ready.of(Study(each, variation, 1, 0)))
-        for each in (case, replace(case, sweep=sweep, reference={}))
+        for each in (case, swept(case, np.linspace(0.0, 0.2933, 20)))
     )
     assert not rough.accurate.all()
     assert right.accurate.all()

@@ -50,6 +50,11 @@ def crank(name="crank", *, truth=Truth.CLOSED_FORM, reference=True, rate=2.0, at
     )
 
 
+def swept(case, values):
+    """The case with other samples, of which it has no reference."""
+    return replace(case, sweep=replace(case.sweep, values=np.array(values)), reference={})
+
+
 def solution(case, *, solved=None, message="", **changed):
     """The exact trajectory; changed: position, velocity or acceleration to be used instead."""
     p, v, a = (
