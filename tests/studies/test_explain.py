@@ -394,6 +394,7 @@ def test_joint_by_residual_is_explained():
         ),
         (lambda text: text.replace("[1.0, 0.55, 0.6]", "[1.0, 0.55]"), 2, "bodies.strut.origin"),
     ],
+    ids=["sound", "end of stroke", "over-constrained", "free", "bad file"],
 )
 def test_explain_status_follows_findings(edit, status, said, tmp_path, capsys):
     text = (Path(cases.__file__).parent / "mcpherson_strut.toml").read_text(encoding="utf-8")

@@ -201,6 +201,7 @@ def test_free_parallelogram_ends_at_change_point():
             "no inertia",
         ),
     ],
+    ids=["massless", "unknown joint", "contradiction", "no inertia"],
 )
 def test_free_motion_without_law_is_refused(changed, rates, message):
     with pytest.raises(SolveError, match=message):

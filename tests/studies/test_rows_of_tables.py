@@ -79,11 +79,14 @@ def tables(name):
 
 
 RIGHT = [[name, x, f"-{y}", z] for name, x, y, z in rows_of("mcpherson")]
-CASES = [(name, *each) for name in TEMPLATES for each in tables(name)]
-CASES.append(("mcpherson", RIGHT, CORNER))
+CASES = {
+    f"{name} {what}": (name, *each)
+    for name in TEMPLATES
+    for what, each in zip(("corner", "axle"), tables(name), strict=True)
+} | {"mcpherson right": ("mcpherson", RIGHT, CORNER)}
 
 
-@pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
+@pytest.mark.parametrize(("name", "rows", "supplied"), CASES.values(), ids=CASES)
 def test_variant_of_row_equals_moved_table(tmp_path, name, rows, supplied):
     """Every row of every template, moved by a millimetre and more along the axes of the table."""
     move = (1.0, -1.3, 0.7)
@@ -125,7 +128,7 @@ def compared(ready):
     assert not known
 
 
-@pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
+@pytest.mark.parametrize(("name", "rows", "supplied"), CASES.values(), ids=CASES)
 def test_explain_of_table_equals_gradients(tmp_path, name, rows, supplied):
     case = case_of(table(tmp_path, name, rows), supplied)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []

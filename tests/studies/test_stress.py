@@ -270,6 +270,10 @@ def test_verdict_on_unknown_truth(case, truth):
         (False, [FailureKind.BELOW_ROUNDING], {"reasons": ROUNDING}, 0),
         (False, [FailureKind.FREE], {"reasons": ROUNDING, "excused": True}, 0),
     ],
+    ids=[
+        *("no singular pose", "singular pose", "no cause", "other cause", "excused", "no excuse"),
+        "other reason",
+    ],
 )
 def test_verdict_on_refusal_by_reason(case, truth, singular, failures, about, right):
     truth = replace(truth, singular=np.array([singular] * 2 + [False] * 3))
@@ -389,6 +393,7 @@ def test_known_forces_determined_and_undetermined(made):
             Verdict.MISSING_FORCE,
         ),
     ],
+    ids=["drivers", "moments", "undetermined", "missing"],
 )
 def test_force_mistakes_are_named(made, change, verdict):
     found = verdicts(made, FOUR_BAR, change)

@@ -319,14 +319,12 @@ def test_stopped_store_is_marked_partial(arguments, tmp_path, stop):
     assert parquet.read_table(stored).equals(parquet.read_table(whole))
 
 
-@pytest.mark.parametrize(
-    "change", [["--seed", "4"], ["--samples", "700"], ["--order", "1"], ["--tol", "1e-11"]]
-)
+@pytest.mark.parametrize("change", ["--seed 4", "--samples 700", "--order 1", "--tol 1e-11"])
 def test_resume_refuses_part_of_another_sweep(arguments, stopped, tmp_path, capsys, change):
     out = tmp_path / "out"
     shutil.copytree(stopped, out)
     kept = (out / "sweep.part").read_bytes()
-    assert main([*arguments, *change, "--out", str(out), "--resume"]) == 2
+    assert main([*arguments, *change.split(), "--out", str(out), "--resume"]) == 2
     assert "is the part of another study" in capsys.readouterr().err
     assert (out / "sweep.part").read_bytes() == kept
 

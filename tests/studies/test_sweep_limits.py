@@ -106,6 +106,10 @@ def test_sweep_page_has_limits_and_histograms(found):
         ({}, "assumes independent variants; for sobol sampling it is usually too wide", True),
         ({"sampling": "random"}, "assumes independent variants", False),
     ],
+    ids=[
+        *("power of two", "no power of two", "random", "few unsolved", "many unsolved"),
+        *("sobol interval", "random interval"),
+    ],
 )
 def test_study_remarks(found, changes, said, told):
     results = msgspec.structs.replace(found, **changes)
@@ -333,13 +337,22 @@ def near(value, **tolerance):
     return None if value is None else pytest.approx(value, **tolerance)
 
 
-NOTHING = {"share": 0.0, "interval": (0.0, 0.25), "share_of_all": 0.0, "share_of_complete": None}
-UNKNOWN = {"share": None, "interval": None, "share_of_all": 0.5, "share_of_complete": 0.0}
+CHANGES = {
+    "as found": {},
+    "no yield": {
+        "share": 0.0,
+        "interval": (0.0, 0.25),
+        "share_of_all": 0.0,
+        "share_of_complete": None,
+    },
+    "unknown": {"share": None, "interval": None, "share_of_all": 0.5, "share_of_complete": 0.0},
+    "zeros": {"cp": 0.0, "cpk": 0.0, "below": 0},
+}
 
 
 @pytest.mark.parametrize("judgement", Incomplete)
 @pytest.mark.parametrize("cells", [on_page, on_terminal])
-@pytest.mark.parametrize("changed", [{}, NOTHING, UNKNOWN, {"cp": 0.0, "cpk": 0.0, "below": 0}])
+@pytest.mark.parametrize("changed", CHANGES.values(), ids=CHANGES)
 def test_printed_limits_equal_results(studied, judgement, cells, changed):
     """Zero is a number, and no number is a dash."""
     found, _, _ = studied
@@ -382,8 +395,8 @@ def test_limits_csv_equals_results(studied):
 @pytest.mark.parametrize(
     ("option", "judgement", "words"),
     [
-        ([], "outside", "Incomplete, and so outside: "),
-        (["--incomplete", "ignore"], "ignore", "Incomplete, and left out: "),
+        ("", "outside", "Incomplete, and so outside: "),
+        ("--incomplete ignore", "ignore", "Incomplete, and left out: "),
     ],
 )
 def test_sweep_command_counts_incomplete_variants(tmp_path, capsys, option, judgement, words):
@@ -392,7 +405,7 @@ def test_sweep_command_counts_incomplete_variants(tmp_path, capsys, option, judg
     tables = {**HEAD, "mode": "monte_carlo", "hardpoints": {"end": JOINT}}
     points.write_text(json.dumps(tables | {"limits": {"height": {"low": 1000.0 * LOW}}}))
     command = f"sweep {file} --vary {points} --samples 40 --json {out}".split()
-    assert main([*command, *option]) == 1
+    assert main([*command, *option.split()]) == 1
     found = json.loads(out.read_text())
     limit = found["limits"][0]
     assert (found["incomplete"], limit["known"]) == (
