@@ -18,9 +18,9 @@ from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.trajectory import QUANTITIES
 
 from ..support.fakes import Fake, crank, native_but, swept
+from ..support.variations import vary, vary_file
 from .test_sweep_command import POINTS
 from .test_sweep_study import PIVOT, STRUT, TIP
-from .test_vary import vary, vary_file
 
 
 def deviating(variant, point, sample, name):

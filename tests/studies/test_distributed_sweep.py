@@ -17,7 +17,7 @@ from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import on_cluster, solve_there, sweep_designs
 
 from ..support.fakes import crank
-from .test_vary import vary
+from ..support.variations import vary
 
 # its own, of sockets and loops it leaves to the collector when a worker is killed
 pytestmark = [

@@ -17,8 +17,8 @@ from kincheck.core.studies.tolerance.study import Ready
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 
 from ..support.fakes import crank
+from ..support.variations import vary, vary_file
 from .test_sweep_study import TIP
-from .test_vary import vary, vary_file
 
 POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},

@@ -36,7 +36,7 @@ from scipy import stats
 
 from ..report.page import Page
 from ..support.fakes import crank, swept
-from .test_vary import HEAD, vary, vary_file
+from ..support.variations import HEAD, vary, vary_file
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 

@@ -15,7 +15,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..report.page import Page
 from ..support.printed import assert_printed, assert_row, blocks, cells_of
-from .test_vary import vary_file
+from ..support.variations import vary_file
 
 VARIED = {
     "ball": {"at": "ball", "sigma": 2.0},

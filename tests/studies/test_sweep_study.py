@@ -35,7 +35,7 @@ from kincheck.core.studies.variation.variation import DRAWN, Law, Limit
 from scipy import stats
 
 from ..support.fakes import crank, exact, swept
-from .test_vary import vary
+from ..support.variations import vary
 
 TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
 PIVOT = {"at": "pivot", "half_width": [0.0, 5.0, 0.0]}

@@ -22,7 +22,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 from kincheck.core.studies.variation.varied_places import Geometry
 
 from ..support.rods_of_templates import solved
-from .test_vary import moved, vary, vary_file
+from ..support.variations import moved, vary, vary_file
 
 CAR = {"cg_height": "0.5", "wheelbase": "2.6", "brake_share": "0.6", "position": "front"}
 CORNER = Supplied(travel="0.04:3", **CAR)
