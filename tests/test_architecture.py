@@ -165,7 +165,7 @@ def imports_against_the_table(path, syntax):
             yield f"imports {'.'.join(target)}: engines share adapters/shared only"
 
 
-def test_sources_import_by_the_table():
+def test_sources_import_by_table():
     found = {
         str(path): offences
         for path in SOURCES
@@ -202,7 +202,7 @@ OFFENDERS = [
 
 
 @pytest.mark.parametrize(("path", "text"), OFFENDERS)
-def test_offenders_are_found(path, text):
+def test_import_outside_table_is_found(path, text):
     assert list(imports_against_the_table(Path(path), ast.parse(text)))
 
 
@@ -223,11 +223,11 @@ ALLOWED = [
 
 
 @pytest.mark.parametrize(("path", "text"), ALLOWED)
-def test_allowed_code_passes(path, text):
+def test_import_inside_table_passes(path, text):
     assert list(imports_against_the_table(Path(path), ast.parse(text))) == []
 
 
-def test_the_table_is_exact():
+def test_import_table_is_exact():
     """Every folder has a row, and every arrow of the table is used."""
     arrows: dict[str, set[str]] = {
         folder_of(path): set() for path in SOURCES if path.parts[0] == "core"
@@ -246,7 +246,7 @@ def test_the_table_is_exact():
     assert set(MAY_IMPORT) == set(arrows)
 
 
-def test_imports_run_down_the_layers_and_never_in_a_circle():
+def test_import_table_follows_layers():
     level = {folder: k for k, layer in enumerate(LAYERS) for folder in layer}
     up = [
         (folder, other)
@@ -262,7 +262,7 @@ def test_imports_run_down_the_layers_and_never_in_a_circle():
     TopologicalSorter(MAY_IMPORT).prepare()
 
 
-def test_no_files_import_each_other_in_a_circle():
+def test_files_have_no_circular_imports():
     """Imports in functions and for type checkers count too."""
     arrows = {}
     for path in SOURCES:

@@ -64,16 +64,16 @@ def test_help_loads_no_library():
 
 
 @pytest.mark.parametrize("name", kincheck.__all__)
-def test_every_name_is_there(name):
+def test_public_name_is_found(name):
     assert getattr(kincheck, name) is not None
 
 
-def test_core_has_all_but_the_functions_by_name():
+def test_core_names_exclude_functions_by_name():
     assert set(kincheck.__all__) - set(kincheck.core.__all__) == {*BY_NAME}
     assert kincheck.Mechanism is kincheck.core.Mechanism
 
 
-def test_type_checkers_are_told_the_same_names():
+def test_core_names_match_type_checking_imports():
     """The imports under TYPE_CHECKING: name -> module, as the table that loads them."""
     syntax = ast.parse((ROOT / "core" / "__init__.py").read_text(encoding="utf-8"))
     block = next(node for node in syntax.body if isinstance(node, ast.If))
@@ -82,18 +82,18 @@ def test_type_checkers_are_told_the_same_names():
     assert {*told, "__version__"} == set(kincheck.core.__all__)
 
 
-def test_there_is_no_other_name():
+def test_unknown_public_name_is_refused():
     with pytest.raises(AttributeError, match="no attribute 'solv'"):
         _ = kincheck.solv
 
 
-def test_run_in_one_line():
+def test_run_of_built_in_case():
     results = kincheck.run("rssr", engines=["native"])
     assert [(each.case, each.outcome) for each in results.records] == [("rssr", "pass")]
     assert "rssr" in results.scenes
 
 
-def test_run_takes_a_measured_curve(tmp_path):
+def test_run_against_measured_curve(tmp_path):
     """That of the case itself, rounded."""
     table, curve = tmp_path / "car.csv", tmp_path / "rig.csv"
     table.write_text(sample_table(TEMPLATES["mcpherson"]))
@@ -111,7 +111,7 @@ def test_run_takes_a_measured_curve(tmp_path):
     assert "toe" in (tmp_path / "report.html").read_text()
 
 
-def test_sweep_and_primitives_are_there(tmp_path):
+def test_sweep_and_primitives_in_python(tmp_path):
     table, vary = tmp_path / "car.csv", tmp_path / "vary.toml"
     table.write_text(sample_table(TEMPLATES["mcpherson"]))
     vary.write_text(VARY)
@@ -122,13 +122,13 @@ def test_sweep_and_primitives_are_there(tmp_path):
     assert kincheck.primitives.Dot10 is Dot10
 
 
-def test_explain_is_that_of_the_command():
+def test_explain_of_built_in_case():
     found = kincheck.explain("rssr", samples=3)
     assert len(found.samples) == 3
     assert not found.findings
 
 
-def test_run_takes_cases_files_and_engines_of_its_own():
+def test_run_takes_files_and_engine_objects():
     class Own:
         name, mode, loop, settings = "own", "projection", "python", {}
         in_process = True
@@ -164,19 +164,19 @@ def test_run_takes_cases_files_and_engines_of_its_own():
         ("no/such.toml", "native", "no/such.toml"),
     ],
 )
-def test_wrong_names_are_told(cases, engines, message):
+def test_run_refuses_unknown_names(cases, engines, message):
     with pytest.raises(kincheck.KincheckError, match=message):
         kincheck.run(cases, engines)
 
 
 @pytest.mark.parametrize("path", ["core/__init__.py", "core/kincheck/__init__.py"])
-def test_type_checkers_see_no_function_for_any_name(path):
+def test_packages_define_no_static_getattr(path):
     """It would hide every misspelt name from them."""
     syntax = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     assert "__getattr__" not in {getattr(node, "name", "") for node in syntax.body}
 
 
-def test_addresses_of_earlier_readmes_go_on_working():
+def test_import_addresses_before_02_work():
     """The README named them before version 0.2."""
     from kincheck.core.harness import check_joint
     from kincheck.core.harness.reporting.table import print_table
@@ -198,14 +198,14 @@ def test_addresses_of_earlier_readmes_go_on_working():
     ],
     ids=["solve", "solve_designs", "trace", "assemble", "find_assemblies"],
 )
-def test_another_thing_than_a_mechanism_is_told(function, given, request):
+def test_solvers_refuse_other_than_mechanism(function, given, request):
     with pytest.raises(kincheck.SolveError, match=r"mechanism is .*, expected a Mechanism") as told:
         function(given)
     assert str(told.value).startswith(request.node.callspec.id.split("-")[0])
 
 
 @pytest.mark.parametrize("given", [None, 3])
-def test_another_thing_than_a_class_or_an_engine_is_told(given):
+def test_checks_refuse_invalid_class_or_engine(given):
     with pytest.raises(kincheck.KincheckError, match=f"joint_class is {given}, expected a class"):
         kincheck.check_joint(given)
     for function in (kincheck.check_engine, lambda engine: kincheck.run("rssr", [engine])):
@@ -224,7 +224,7 @@ COMMANDS_IN_PYTHON = {
 
 
 @pytest.mark.parametrize("name", COMMANDS_IN_PYTHON)
-def test_function_has_the_options_of_its_command(name):
+def test_function_documents_options_of_command(name):
     """All but those that print, write or store, which have no use in Python."""
     function, command = COMMANDS_IN_PYTHON[name], parser([name]).commands()[name]
     options = {each.help for each in command.arguments()}
@@ -246,18 +246,18 @@ def test_function_has_the_options_of_its_command(name):
         ("run", {"curve": CurveOptions(signs="iso8855")}, "--signs: for a measured curve, and"),
     ],
 )
-def test_function_refuses_what_its_command_refuses(function, given, said):
+def test_function_refuses_invalid_options(function, given, said):
     with pytest.raises(kincheck.KincheckError, match=said):
         getattr(kincheck, function)("rssr", **given)
 
 
 @pytest.mark.parametrize("function", ["compare", "explain", "run"])
-def test_what_is_no_case_is_refused(function):
+def test_function_refuses_other_than_case(function):
     with pytest.raises(kincheck.KincheckError, match="1 is no case"):
         getattr(kincheck, function)([1, 2] if function == "compare" else 1)
 
 
-def test_run_takes_options_of_the_command(tmp_path, capsys):
+def test_run_option_reactions_equals_command(tmp_path, capsys):
     file = tmp_path / "r.json"
     assert main(["run", "rssr", "--engine", "native", "--reactions", "--json", str(file)]) == 0
     (record,) = kincheck.run("rssr", "native", reactions=True).records

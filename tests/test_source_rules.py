@@ -64,7 +64,7 @@ RULES = [past_the_door, simulators_at_import, undocumented]
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
-def test_sources(rule):
+def test_sources_follow_rules(rule):
     found = {str(path): offences for path in SOURCES if (offences := list(rule(path, tree(path))))}
     assert found == {}
 
@@ -73,7 +73,7 @@ INSIDE = {"kinematics", "program", "test_probe.py"}
 """Below tests: those of the inside of kinematics, and of its programs."""
 
 
-def test_tests_of_anything_else_enter_kinematics_by_its_door():
+def test_tests_import_public_names_of_kinematics():
     found = {
         str(path): offences
         for path in TESTS
@@ -82,7 +82,7 @@ def test_tests_of_anything_else_enter_kinematics_by_its_door():
     assert found == {}
 
 
-def test_tests_use_the_installed_package():
+def test_tests_import_kincheck_packages():
     found = {str(path): each for path in TESTS if (each := list(bare_packages(path, tree(path))))}
     assert found == {}
 
@@ -110,7 +110,7 @@ OFFENDERS = [
 
 
 @pytest.mark.parametrize(("rule", "path", "text"), OFFENDERS)
-def test_offenders_are_found(rule, path, text):
+def test_source_rule_finds_offender(rule, path, text):
     assert list(rule(Path(path), ast.parse(text)))
 
 
@@ -136,5 +136,5 @@ ALLOWED = [
 
 
 @pytest.mark.parametrize(("rule", "path", "text"), ALLOWED)
-def test_allowed_code_passes(rule, path, text):
+def test_source_rule_passes_allowed_code(rule, path, text):
     assert list(rule(Path(path), ast.parse(text))) == []

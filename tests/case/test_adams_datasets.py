@@ -71,7 +71,7 @@ def left(tmp_path, deck, shift, turn):
 
 @pytest.mark.parametrize("ground_first", [False, True])
 @pytest.mark.parametrize("statement", ALLOWED)
-def test_joint_allows_its_motions_alone(tmp_path, statement, ground_first):
+def test_adams_joint_allows_only_its_motions(tmp_path, statement, ground_first):
     deck = jointed(statement, ground_first=ground_first)
     for shift, turn in ALLOWED[statement]:
         if ground_first:  # a line, plane or axis is J's: it moves with part 2
@@ -83,7 +83,7 @@ def test_joint_allows_its_motions_alone(tmp_path, statement, ground_first):
         assert left(tmp_path, deck, shift, turn) > 1e-6
 
 
-def test_hooke_crosses_y_of_j_and_x_of_i(tmp_path):
+def test_adams_hooke_crosses_y_and_x(tmp_path):
     deck = jointed("JOINT/1, HOOKE")
     allowed = about(Y, 0.6) * about(X, 0.9)
     assert left(tmp_path, deck, NONE, allowed) < 1e-12
@@ -92,14 +92,14 @@ def test_hooke_crosses_y_of_j_and_x_of_i(tmp_path):
 
 
 @pytest.mark.parametrize("statement", ["JOINT/1, UNIVERSAL", "JPRIM/1, PERPENDICULAR"])
-def test_universal_crosses_both_z_axes(tmp_path, statement):
+def test_adams_universal_crosses_z_axes(tmp_path, statement):
     deck = jointed(statement, **CROSSED)
     z_i = CROSSED["of_i"].apply([0.0, 0.0, 1.0])
     assert left(tmp_path, deck, NONE, about(Z, 0.6) * about(z_i, 0.9)) < 1e-12
     assert left(tmp_path, deck, NONE, about(np.cross(Z, z_i), 0.01)) > 1e-4
 
 
-def test_convel_bends_without_twist(tmp_path):
+def test_adams_convel_bends_without_twist(tmp_path):
     """Both z axes point away from the centre; the x axes are parallel."""
     deck = jointed("JOINT/1, CONVEL", of_i=HALF * AXES)
     bend = about(math.cos(0.4) * X + math.sin(0.4) * Y, 0.6)
@@ -107,7 +107,7 @@ def test_convel_bends_without_twist(tmp_path):
     assert left(tmp_path, deck, NONE, about(Z, 0.01)) > 1e-4
 
 
-def test_gcon_keeps_a_distance(tmp_path):
+def test_adams_gcon_keeps_distance(tmp_path):
     deck = Deck(1).part(2).marker(11, 2, AT + 50.0 * X, AXES).marker(12, 1, AT, AXES)
     deck.add("GCON/4, I = 11, FUNCTION = 2*(DM(11, 12) - 20.0) - 60")
     assert left(tmp_path, deck, NONE, ANY) < 1e-12
@@ -143,7 +143,7 @@ def turns(deck, poses):
 
 
 @pytest.mark.parametrize("function", MOTIONS)
-def test_motion_turns_i_from_j(tmp_path, function):
+def test_adams_motion_function_turns_i(tmp_path, function):
     """The function is the angle between markers, which stand 0.4 rad apart in the dataset."""
     deck = driven(function)
     case = read(tmp_path, deck, drive=("time:0:1.5:7",))
@@ -151,7 +151,7 @@ def test_motion_turns_i_from_j(tmp_path, function):
     assert np.abs(np.sin(0.5 * off)).max() < 1e-12
 
 
-def test_motion_slides_i_from_j_in_units(tmp_path):
+def test_adams_translation_in_file_units(tmp_path):
     units = "UNITS/LENGTH=INCH, MASS=POUND_MASS, FORCE=POUND_FORCE, TIME=MILLISECOND"
     deck = driven("5 + 2*SIN(TIME/100)", "TRANSLATION", "TRANSLATIONAL", units, 0.0, 5.0)
     case = read(tmp_path, deck, drive=("time:0:1.5:7",))
@@ -174,14 +174,14 @@ def test_motion_slides_i_from_j_in_units(tmp_path):
         ),
     ],
 )
-def test_motion_integrates_rates(tmp_path, arguments, expected):
+def test_adams_motion_integrates_rates(tmp_path, arguments, expected):
     deck = driven("0")
     deck.lines = [*deck.lines[:-2], f"MOTION/7, ROTATION, JOINT = 1, {arguments}"]
     case = read(tmp_path, deck, drive=("time:0:1.5:7",))
     assert np.abs(np.sin(0.5 * (turns(deck, solved(case)) - expected))).max() < 1e-12
 
 
-def test_motion_of_markers_drives_point_and_joint(tmp_path):
+def test_adams_motion_between_markers(tmp_path):
     deck = Deck(5).part(2).marker(11, 2, AT + 7.0 * Z, AXES).marker(12, 1, AT, AXES)
     deck.add("JOINT/1, CYLINDRICAL, I = 11, J = 12", "MOTION/1, I = 11, J = 12, Z, FUNC = 7+TIME")
     deck.add("MOTION/2, I = 11, J = 12, B3, FUNCTION = 90D*TIME")
@@ -192,7 +192,7 @@ def test_motion_of_markers_drives_point_and_joint(tmp_path):
     assert np.unwrap(turns(deck, poses)) == pytest.approx(0.5 * np.pi * TIMES, abs=1e-12)
 
 
-def test_case_file_of_a_deck_moves_alike(tmp_path):
+def test_adams_deck_as_case_file(tmp_path):
     deck = driven("STEP(TIME, 0.5, 0, 1, 30D) + 0.1*SIN(TIME)")
     case = read(tmp_path, deck, drive=("time:0:1.5:7",))
     again = written_again(case, tmp_path)
@@ -200,7 +200,7 @@ def test_case_file_of_a_deck_moves_alike(tmp_path):
         assert one == pytest.approx(other, abs=1e-14)
 
 
-def test_masses_turn_products_and_move_to_the_centre(tmp_path):
+def test_adams_part_inertia_about_centre(tmp_path):
     """A body of six point masses, whose integrals are summed by hand, about a marker elsewhere."""
     rng = np.random.default_rng(2)
     points, masses = rng.uniform(-100.0, 100.0, (6, 3)), rng.uniform(0.5, 2.0, 6)
@@ -238,7 +238,7 @@ def sprung(line):
 
 
 @pytest.mark.parametrize("line", SPRINGS)
-def test_spring_has_newtons_and_metres(tmp_path, line):
+def test_adams_spring_in_si_units(tmp_path, line):
     (spring,) = read(tmp_path, sprung(line)).mechanism.forces
     assert spring.stiffness == pytest.approx(12000.0)
     assert spring.damping == pytest.approx(400.0)
@@ -246,7 +246,7 @@ def test_spring_has_newtons_and_metres(tmp_path, line):
 
 
 @pytest.mark.parametrize("swapped", [False, True])
-def test_torsion_acts_on_i_about_z_of_j(tmp_path, swapped):
+def test_adams_torsion_spring_about_z(tmp_path, swapped):
     """T on I = -3 (AZ(I, J) - 10D) - 0.2 WZ, in N mm: from the markers, in both orders."""
     deck = driven("0.4+TIME")
     deck.add("MARKER/20, PART = 2", "PART/9, MASS = 0")
@@ -266,7 +266,7 @@ def test_torsion_acts_on_i_about_z_of_j(tmp_path, swapped):
     assert spring.free_angle == pytest.approx(free - 0.4)
 
 
-def test_torsion_of_the_reversed_angle_is_the_same(tmp_path):
+def test_adams_torsion_spring_of_reversed_angle(tmp_path):
     deck = driven("0.4+TIME").add("SFORCE/1, ROTATIONAL, I = 11, J = 12")
     deck.add(", FUNCTION = 3*(AZ(12, 11) + 10D) + 0.2*WZ(12, 11, 12)")
     (spring,) = read(tmp_path, deck).mechanism.forces
@@ -275,7 +275,7 @@ def test_torsion_of_the_reversed_angle_is_the_same(tmp_path):
     assert spring.free_angle == pytest.approx(math.radians(10.0) - 0.4)
 
 
-def test_loads_are_in_the_units_of_time(tmp_path):
+def test_adams_loads_in_milliseconds(tmp_path):
     """A damper of 0.4 N ms/mm, and gravity in mm/ms^2."""
     deck = sprung("SPRINGDAMPER/1, TRANSL, I=11, J=13, K=12, C=0.4, LENGTH=50")
     deck.lines[deck.lines.index("ACCGRAV/, KGRAV = -9806.65")] = "ACCGRAV/KGRAV = -9.80665E-3"
@@ -285,7 +285,7 @@ def test_loads_are_in_the_units_of_time(tmp_path):
     assert mechanism.gravity == pytest.approx((0.0, 0.0, -9.80665))
 
 
-def test_recorded_deck_with_a_further_freedom_follows_all(tmp_path):
+def test_adams_recorded_deck_drives_all_freedoms(tmp_path):
     deck = driven("TIME").part(3)
     deck.marker(21, 3, AT, AXES).marker(22, 2, AT, AXES).add("JOINT/2, REVOLUTE, I = 21, J = 22")
     case = read(tmp_path, deck, recorded=True)
@@ -313,7 +313,7 @@ def second(tmp_path, deck, number=(21, 22)):
     return math.atan2(y, x), float((of_j.inv().apply(i - j) / MM)[-1, 2])
 
 
-def test_coupler_couples_turns_and_slides(tmp_path):
+def test_adams_coupler_of_two_joints(tmp_path):
     """r1 q1 + r2 q2 = 0."""
     deck = coupled("COUPLER/1, JOINTS = 1, 2, SCALES = 1, -2")
     assert second(tmp_path, deck)[0] == pytest.approx(0.5)
@@ -325,7 +325,7 @@ def test_coupler_couples_turns_and_slides(tmp_path):
     assert second(tmp_path, deck)[1] == pytest.approx(-0.25)
 
 
-def test_coupler_couples_three_joints(tmp_path):
+def test_adams_coupler_of_three_joints(tmp_path):
     """r1 q1 + r2 q2 + r3 q3 = 0, the third one driven too."""
     deck = coupled("COUPLER/1, JOINTS = 1, 2, 3, TYPE = R:R:T, SCALES = 1, -2, 3").part(4)
     deck.marker(31, 4, AT + 90 * X, AXES).marker(32, 1, AT + 90 * X, AXES)
@@ -335,7 +335,7 @@ def test_coupler_couples_three_joints(tmp_path):
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_gear_turns_by_the_common_velocity(tmp_path, reverse):
+def test_adams_gear_ratio_by_pitch_point(tmp_path, reverse):
     """The pitch point is 20 mm from the first axis and 40 mm from the second: w2 = -w1 / 2."""
     deck = coupled("GEAR/1, JOINTS = 1, 2, CV = 30", reverse=reverse)
     tangent = Rotation.from_matrix(np.stack([Z, X, Y], axis=1))
@@ -344,7 +344,7 @@ def test_gear_turns_by_the_common_velocity(tmp_path, reverse):
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_rack_rolls_on_the_side_of_its_marker(tmp_path, side):
+def test_adams_rack_rolls_beside_marker(tmp_path, side):
     """The pitch point, 25 mm off along y, moves by 25 mm a radian, along x against the sense."""
     along = Rotation.from_matrix(np.stack([Y, Z, X], axis=1))
     deck = Deck(8).part(2).part(3).marker(11, 2, AT, AXES).marker(12, 1, AT, AXES)
@@ -357,7 +357,7 @@ def test_rack_rolls_on_the_side_of_its_marker(tmp_path, side):
     assert "half of PD" in refused(tmp_path, hidden)
 
 
-def test_points_on_axes_place_markers(tmp_path):
+def test_adams_marker_by_points_on_axes(tmp_path):
     text = f"""Points
 {UNITS}PART/1, GROUND
 MARKER/12, PART = 1, QP = 10, 20, 30, ZP = 10, 25, 30, XP = 10, 20, 37
@@ -371,7 +371,7 @@ MOTION/1, ROTATION, JOINT = 1, FUNCTION = TIME
     assert joint.point == pytest.approx((0.01, 0.02, 0.03))
 
 
-def test_marker_in_the_frame_of_another(tmp_path):
+def test_adams_marker_relative_to_marker(tmp_path):
     """RM: QP and REULER are those in the marker's frame."""
     plain = driven("TIME")
     moved = "MARKER/12, PART = 1, RM = 13, QP = 1, 2, 3, REULER = 40D, 30D, 20D"
@@ -387,7 +387,7 @@ def test_marker_in_the_frame_of_another(tmp_path):
     assert one.point == pytest.approx(other.point, abs=1e-14)
 
 
-def test_part_with_exact_coordinates_stays(tmp_path):
+def test_adams_exact_part_stays(tmp_path):
     """Of two parts whose markers are 2 mm apart, the one with EXACT coordinates keeps them."""
     deck = Deck(4).part(2, ", EXACT = X:Y:Z:PSI:THETA:PHI").part(3)
     deck.marker(11, 2, AT, AXES).marker(12, 1, AT, AXES)
@@ -401,12 +401,12 @@ def test_part_with_exact_coordinates_stays(tmp_path):
     assert any("JOINT_2 by 0.002 m" in each for each in case.assembly)
 
 
-def test_unknown_statement_may_be_left_out(tmp_path):
+def test_adams_unknown_statement_left_out(tmp_path):
     text = PLAIN.replace("END", "BLOB/1, I = 11\nEND")
     assert read(tmp_path, text, without=("BLOB",)).assembly[0] == "left out by --without: BLOB"
 
 
-def test_dialects_read_as_one_deck(tmp_path):
+def test_adams_dialects_read_alike(tmp_path):
     """Abbreviations, continuations, comments, letters, separators."""
     plain = driven("30D*TIME").text
     case = read(tmp_path, plain)
@@ -427,7 +427,7 @@ def test_dialects_read_as_one_deck(tmp_path):
     assert "GRAPHICS (1), OUTPUT (1), RESULTS (1)" in found.source
 
 
-def test_markers_apart_are_assembled_with_a_note(tmp_path):
+def test_adams_separate_markers_are_assembled(tmp_path):
     """A four-bar whose last marker is 0.5 mm and 0.2 degrees off."""
     deck = Deck(4).part(2).part(3).part(4)
     a, b, c, d = AT, AT + 80 * Y, AT + 200 * X + 150 * Y, AT + 200 * X
@@ -459,7 +459,7 @@ def test_markers_apart_are_assembled_with_a_note(tmp_path):
             assert np.abs((of_j.inv() * of_i).apply(z)[:, :2]).max() < 1e-12
 
 
-def test_markers_that_cannot_meet_are_refused(tmp_path):
+def test_adams_unclosable_markers_are_refused(tmp_path):
     deck = jointed("JOINT/1, FIXED")
     deck.marker(13, 2, AT + 3.0 * X, AXES).marker(14, 1, AT, AXES)
     deck.add("JPRIM/2, ATPOINT, I = 13, J = 14")
@@ -477,7 +477,7 @@ def test_markers_that_cannot_meet_are_refused(tmp_path):
         (about(X, 0.5) * AXES, "28.6 degrees apart at the start"),
     ],
 )
-def test_markers_far_apart_are_refused(tmp_path, of_i, words):
+def test_adams_distant_markers_are_refused(tmp_path, of_i, words):
     assert words in refused(tmp_path, jointed("JOINT/1, REVOLUTE", of_i=of_i), recorded=True)
 
 
@@ -510,7 +510,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("line", FAULTS)
-def test_fault_names_line_statement_and_remedy(tmp_path, line):
+def test_adams_fault_states_line_and_remedy(tmp_path, line):
     text = PLAIN.replace("END", f"{line}\nEND")
     message = refused(tmp_path, text)
     number = text.split("\n").index(line) + 1
@@ -531,14 +531,14 @@ FUNCTIONS = {
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
-def test_motion_beyond_the_language_is_refused(tmp_path, function):
+def test_adams_unreadable_motion_is_refused(tmp_path, function):
     message = refused(tmp_path, driven(function))
     assert FUNCTIONS[function] in message
     assert "MOTION/7" in message
     assert "--recorded" in message
 
 
-def test_line_that_may_be_a_sum_or_a_list_is_refused(tmp_path):
+def test_adams_ambiguous_continuation_is_refused(tmp_path):
     ends = "POLY(TIME, 0, 1,\n, -2)"
     assert read(tmp_path, driven(ends)).sweep.motions
     kept = read(tmp_path, driven("POLY(TIME, 0, 1\n, 2)")).sweep.motions["MOTION_7"]
@@ -547,7 +547,7 @@ def test_line_that_may_be_a_sum_or_a_list_is_refused(tmp_path):
     assert "may be a sum or the next number" in message
 
 
-def test_without_leaves_out_what_forces(tmp_path):
+def test_adams_without_omits_forces(tmp_path):
     text = PLAIN.replace("END", "BUSHING/3, I = 11, J = 12\nBEAM/1\nEND")
     case = read(tmp_path, text, without=("BUSHING/3", "beam"))
     assert "left out by --without: BEAM, BUSHING/3" in case.assembly
@@ -555,7 +555,7 @@ def test_without_leaves_out_what_forces(tmp_path):
     assert "found 'FIELD'" in refused(tmp_path, text, without=("BUSHING", "BEAM", "FIELD"))
 
 
-def test_deck_without_motion_names_its_freedoms(tmp_path):
+def test_adams_deck_without_motion_lists_freedoms(tmp_path):
     deck = jointed("JOINT/1, CYLINDRICAL")
     message = refused(tmp_path, deck)
     assert "2 freedoms left" in message
@@ -573,19 +573,19 @@ def test_deck_without_motion_names_its_freedoms(tmp_path):
     assert "3 of PART_2" in refused(tmp_path, jointed("JOINT/1, SPHERICAL"))
 
 
-def test_drive_counts_from_the_markers_axes(tmp_path):
+def test_adams_drive_counts_from_marker_axes(tmp_path):
     deck = driven("0")
     deck.lines = deck.lines[:-2]
     case = read(tmp_path, deck, drive=("JOINT_1:0.1:0.9:5",))
     assert turns(deck, solved(case)) == pytest.approx(np.linspace(0.1, 0.9, 5))
 
 
-def test_first_line_is_the_title(tmp_path):
+def test_adams_first_line_is_title(tmp_path):
     assert "takes for the title" in refused(tmp_path, PLAIN.split("\n", 1)[1])
     assert "'A deck'" in read(tmp_path, PLAIN).source
 
 
-def test_units_default_and_factor_are_told(tmp_path):
+def test_adams_default_and_factor_units(tmp_path):
     bare = PLAIN.replace(UNITS.strip(), "")
     assert any("no UNITS" in each for each in read(tmp_path, bare).assembly)
     spring = sprung("SPRINGDAMPER/1, TRANSL, I=11, J=13, K=12, LENGTH=50")

@@ -108,7 +108,7 @@ def expected(name, motion, value):
 
 @pytest.mark.parametrize("motion", ["heave", "roll", "steer"])
 @pytest.mark.parametrize("name", RODS)
-def test_axles(tmp_path, name, motion):
+def test_axle_outputs_in_closed_form(tmp_path, name, motion):
     case = axle(tmp_path, name, motion, "0.03:5" if motion == "steer" else "0.04:5")
     found = answer(case)
     for k, value in enumerate(case.sweep.values):
@@ -120,7 +120,7 @@ def test_axles(tmp_path, name, motion):
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_in_every_engine(tmp_path, name):
+def test_axle_outputs_in_other_engines(tmp_path, name):
     pytest.importorskip(name)
     case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
     found, native = answer(case, name), answer(case)
@@ -129,7 +129,7 @@ def test_in_every_engine(tmp_path, name):
         assert off < 1e-10, output.name
 
 
-def test_wheels_in_heave_are_one_wheel(tmp_path):
+def test_axle_in_heave_equals_one_wheel(tmp_path):
     """The roll centre of the axle is that of either wheel; half a track is of one wheel."""
     found = answer(axle(tmp_path, "double_wishbone", "heave"))
     height = found["axle_roll_center_height"]
@@ -140,7 +140,7 @@ def test_wheels_in_heave_are_one_wheel(tmp_path):
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_points_of_an_axle_are_on_bodies_of_their_side(tmp_path, name):
+def test_axle_points_mirror_one_wheel(tmp_path, name):
     """As those of one wheel, mirrored for the right; what is fixed stays so, steered or not."""
     file = table(tmp_path, name)
     wheel, both = (
@@ -156,7 +156,7 @@ def test_points_of_an_axle_are_on_bodies_of_their_side(tmp_path, name):
     assert not found
 
 
-def test_an_axle_without_steering(tmp_path):
+def test_axle_without_steering(tmp_path):
     case = axle(tmp_path, "three_link", "roll")
     assert [driver.name for driver in case.mechanism.drivers] == ["left_stroke", "right_stroke"]
     found = answer(case)
@@ -167,7 +167,7 @@ def test_an_axle_without_steering(tmp_path):
         axle(tmp_path, "three_link", "steer")
 
 
-def test_parallel_lines_have_no_roll_centre(tmp_path):
+def test_trailing_arms_have_no_roll_centre(tmp_path):
     """Trailing arms on hinges across the car: the contacts move in planes along it."""
     file = tmp_path / "car.csv"
     rows = "arm_inner,0.5,0.3,0.3\narm_outer,0.5,0.6,0.3\nwheel_center,0,0.7,0.3\n"
@@ -177,7 +177,7 @@ def test_parallel_lines_have_no_roll_centre(tmp_path):
     assert np.abs(found["left_roll_center_height"]).max() < 1e-15
 
 
-def test_a_case_file_of_an_axle(tmp_path):
+def test_axle_case_file_round_trip(tmp_path):
     """[suspension.other] and the sides are in it."""
     written_again(axle(tmp_path, "five_link", "roll"), tmp_path)
 
@@ -231,12 +231,12 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, kind):
+def test_axle_case_file_faults(tmp_path, kind):
     edit, fragments = FAULTS[kind]
     complains(changed(tmp_path, edit), fragments)
 
 
-def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
+def test_roll_centre_needs_both_travel_drivers(tmp_path):
     def edit(data):
         for side in ("left", "right"):
             data["drivers"][f"{side}_stroke"]["point"] = f"{side}_tierod_outer"
@@ -256,11 +256,11 @@ def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
         ({"axle": "steer", "wheelbase": "-2"}, "--wheelbase ... -2 m"),
     ],
 )
-def test_faults_of_options(tmp_path, supplied, fragments):
+def test_axle_option_faults(tmp_path, supplied, fragments):
     complains(table(tmp_path, "mcpherson"), fragments, Supplied(**supplied))
 
 
-def test_signs_of_sae(tmp_path):
+def test_roll_centre_offset_in_sae_axes(tmp_path):
     """The offset is along y, which points to the other side."""
     case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
     there = {output.name: output for output in case.outputs}["axle_roll_center_offset"]
@@ -314,7 +314,7 @@ def expected_while_steering(motion, position, travel, rack):
 
 
 @pytest.mark.parametrize(("motion", "position"), [("heave", "front"), ("roll", "rear")])
-def test_an_axle_that_steers_while_it_travels(tmp_path, motion, position):
+def test_axle_steered_during_travel(tmp_path, motion, position):
     said = Supplied(axle=motion, travel="0.03:3", rack="-0.02:0.03", position=position, **CAR)
     case = load(table(tmp_path), said)
     found = answer(case)
@@ -327,7 +327,7 @@ def test_an_axle_that_steers_while_it_travels(tmp_path, motion, position):
     assert np.isfinite(found["ackermann"]).any()
 
 
-def test_without_data_of_the_vehicle_there_are_no_anti_values(tmp_path):
+def test_anti_outputs_need_vehicle_data(tmp_path):
     names = {each.name for each in load(table(tmp_path)).outputs}
     assert not [name for name in names if "anti" in name]
     said = Supplied(position="front", wheelbase="2.6", cg_height="0.5")
@@ -352,17 +352,17 @@ STEERING_FAULTS = {
 
 
 @pytest.mark.parametrize("kind", STEERING_FAULTS)
-def test_faults_of_steering(tmp_path, kind):
+def test_steering_option_faults(tmp_path, kind):
     supplied, fragments = STEERING_FAULTS[kind]
     complains(table(tmp_path), fragments, Supplied(**supplied))
 
 
-def test_a_rack_needs_a_tie_rod(tmp_path):
+def test_rack_travel_needs_tie_rod(tmp_path):
     with pytest.raises(CaseError, match=r"--rack: found a travel, but .*three_link has no tie rod"):
         load(table(tmp_path, "three_link"), Supplied(rack="0.02"))
 
 
-def test_options_reach_the_case(tmp_path, capsys):
+def test_import_options_reach_case_file(tmp_path, capsys):
     options = ["--rack=0.02", "--position=front", "--wheelbase=2.6", "--cg-height=0.5"]
     options += ["--brake-share=0.6", "--drive-share=0.4", "--travel=-0.02:0.03:3"]
     out = tmp_path / "case.toml"
@@ -407,7 +407,7 @@ def of(name, **own):
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_right_wheel_has_the_left_ones_outputs(tmp_path, name):
+def test_right_wheel_outputs_mirror_left(tmp_path, name):
     """The rack moves to the other side for the mirror image."""
     left = load(plain(tmp_path, name, "FL"), of(name))
     other_way = {"rack": "0.01:-0.01"} if TEMPLATES[name].steered else {}
@@ -421,7 +421,7 @@ def test_right_wheel_has_the_left_ones_outputs(tmp_path, name):
         np.testing.assert_allclose(values, expected, rtol=CLOSE, atol=CLOSE, err_msg=output)
 
 
-def test_side_is_stated_in_the_file(tmp_path):
+def test_side_comment_in_hardpoint_table(tmp_path):
     case = load(plain(tmp_path, "mcpherson", "FR", "# side: right"), of("mcpherson"))
     assert not case.assembly
     assert "right side" in case.source
@@ -443,7 +443,7 @@ def test_side_is_stated_in_the_file(tmp_path):
         ("FL", [], {"corner": "nose"}, "--corner: found 'nose' ... FL, FR, RL, RR"),
     ],
 )
-def test_contradicted_sides_are_refused(tmp_path, corner, above, own, fragments):
+def test_contradictory_sides_are_refused(tmp_path, corner, above, own, fragments):
     complains(plain(tmp_path, "mcpherson", corner, *above), fragments, of("mcpherson", **own))
 
 
@@ -472,7 +472,7 @@ TABLES = {
 
 @pytest.mark.parametrize("corner", CORNERS)
 @pytest.mark.parametrize("kind", TABLES)
-def test_corner_of_a_whole_car_is_read(tmp_path, kind, corner):
+def test_corner_of_car_table_is_read(tmp_path, kind, corner):
     name = "double_wishbone"
     said = of(name, corner=corner)
     pairs = [TABLES[kind](each, row) for each in CORNERS for row in rows(name, each)]
@@ -486,7 +486,7 @@ def test_corner_of_a_whole_car_is_read(tmp_path, kind, corner):
     assert case.source.split(LEFT_OUT)[1] != "nothing"
 
 
-def test_several_corners_ask_for_one(tmp_path):
+def test_several_corners_need_corner_option(tmp_path):
     lines = ["corner,point,x,y,z"]
     lines += [",".join([each, *row]) for each in CORNERS for row in rows("mcpherson", each)]
     file = written(tmp_path, lines)
@@ -498,7 +498,7 @@ def test_several_corners_ask_for_one(tmp_path):
         load(file, of("mcpherson", corner="left"))
 
 
-def test_sheet_of_a_corner_is_read(tmp_path):
+def test_corner_sheet_of_workbook_is_read(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     book.remove(book.active)

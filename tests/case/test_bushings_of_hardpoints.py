@@ -52,7 +52,7 @@ def chrono_file(tmp_path, **spring):
 AXLE_OPTIONS = Supplied(axle="heave", wheel_radius="0.47")
 
 
-def test_file_of_chrono_has_wheel_load_and_rate_of_the_data(tmp_path):
+def test_chrono_bushings_wheel_load_and_rate(tmp_path):
     case = load(chrono_file(tmp_path), AXLE_OPTIONS)
     notes = "; ".join(case.assembly)
     assert "the inertia of 'Upper Control Arm' is left out: no body has it" in notes
@@ -64,7 +64,7 @@ def test_file_of_chrono_has_wheel_load_and_rate_of_the_data(tmp_path):
     assert rate == pytest.approx(rows["wheel_rate_parallel"], rel=1e-9)
 
 
-def test_spring_curve_of_chrono_is_tension_over_deflection(tmp_path):
+def test_chrono_spring_curve_equals_linear_spring(tmp_path):
     """A straight curve is the spring of the same rate."""
     straight = {"Spring Coefficient": 0.0, "Curve Data": [[-0.2, -36299.23], [0.2, 36299.23]]}
     loads = [
@@ -81,7 +81,7 @@ def sample(tmp_path, capsys, template, *options):
     return file
 
 
-def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
+def test_templates_bushings_option_prints_sample(tmp_path, capsys):
     table = sample(tmp_path, capsys, "mcpherson")
     rubber = sample(tmp_path, capsys, "mcpherson", "--bushings")
     assert list(tomllib.loads(rubber.read_text())["bushings"]) == [
@@ -97,14 +97,14 @@ def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("template", TEMPLATES)
-def test_sample_bushings_have_roles_of_sample_table(tmp_path, capsys, template):
+def test_sample_bushings_match_template_roles(tmp_path, capsys, template):
     rubber = sample(tmp_path, capsys, template, "--bushings")
     case = load(sample(tmp_path, capsys, template), Supplied(bushings=rubber))
     roles = tomllib.loads(rubber.read_text())["bushings"]
     assert len(case.mechanism.bushings) == len(roles) > 0
 
 
-def test_rods_in_rubber_are_springs_in_series(tmp_path, capsys):
+def test_rods_in_rubber_equal_springs(tmp_path, capsys):
     """Bushings of both ends, along all axes alike, against springs in place of the rods."""
     table = sample(tmp_path, capsys, "five_link")
     rubber = tmp_path / "rubber.toml"
@@ -129,7 +129,7 @@ def test_rods_in_rubber_are_springs_in_series(tmp_path, capsys):
     assert found.compliance == pytest.approx(expected.compliance, abs=1e-13 * largest)
 
 
-def test_rod_held_by_rubber_at_one_end_carries_no_side_force(tmp_path, capsys):
+def test_rod_with_end_bushing_is_axial(tmp_path, capsys):
     """A ball at its other end: soft across and stiff along is a stiff rod, until it tilts."""
     table = sample(tmp_path, capsys, "five_link")
     rubber = tmp_path / "rubber.toml"
@@ -142,7 +142,7 @@ def test_rod_held_by_rubber_at_one_end_carries_no_side_force(tmp_path, capsys):
     assert C["along"] == pytest.approx(C["all"], abs=1e-12 * np.abs(C["all"]).max())
 
 
-def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
+def test_axle_bushings_are_mirrored(tmp_path, capsys):
     table = sample(tmp_path, capsys, "double_wishbone")
     rubber = tmp_path / "rubber.toml"
     keys = "stiffness = [1e6, 5e6, 2e5]\nturning_stiffness = [90, 30, 5]\npreload = [900, 0, 70]\n"
@@ -173,7 +173,7 @@ def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
         ("", "found no bushing"),
     ],
 )
-def test_bushings_that_do_not_fit_a_table_are_refused(tmp_path, capsys, text, expected):
+def test_bushings_contradicting_table_are_refused(tmp_path, capsys, text, expected):
     table = sample(tmp_path, capsys, "double_wishbone")
     rubber = tmp_path / "rubber.toml"
     rubber.write_text(text)
@@ -181,7 +181,7 @@ def test_bushings_that_do_not_fit_a_table_are_refused(tmp_path, capsys, text, ex
         load(table, Supplied(bushings=rubber))
 
 
-def test_slopes_that_kc_lacks_are_named(tmp_path, capsys):
+def test_kc_lists_slopes_without_value(tmp_path, capsys):
     table = sample(tmp_path, capsys, "double_wishbone")
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
     assert main(["kc", str(table), "--travel=-10mm:10mm", *files]) == 0

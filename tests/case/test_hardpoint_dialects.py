@@ -141,24 +141,24 @@ DIALECTS = {
 
 
 @pytest.mark.parametrize("kind", DIALECTS)
-def test_dialects(tmp_path, plain, kind):
+def test_hardpoint_table_dialects_read_alike(tmp_path, plain, kind):
     assert read(tmp_path, DIALECTS[kind]).mechanism == plain
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
-def test_encodings(tmp_path, plain, encoding):
+def test_hardpoint_table_encodings(tmp_path, plain, encoding):
     """Excel's Unicode text, with its mark."""
     mark = "\ufeff" if encoding in ("utf-16-le", "utf-16-be") else ""
     assert read(tmp_path, mark + comma(table()), encoding=encoding).mechanism == plain
 
 
-def test_left_out_is_listed(tmp_path):
+def test_omitted_rows_and_columns_are_listed(tmp_path):
     text = "Front suspension\n" + table("Name;X;Y;Z;Mass;", "{};{};{};{};3;")
     source = read(tmp_path, text).source
     assert source.endswith(f"{LEFT_OUT}line 1 (Front suspension), column Mass")
 
 
-def test_a_strut_by_the_names_of_optimumk(tmp_path):
+def test_strut_table_with_optimumk_names(tmp_path):
     names = {"lca_front": "CHAS_LowFor", "lca_rear": "CHAS_LowAft", "lca_outer": "UPRI_LowPnt"}
     rows = {names.get(name, name): at for name, at in TEMPLATES["mcpherson"].sample.items()}
     file = tmp_path / "car.csv"
@@ -169,14 +169,14 @@ def test_a_strut_by_the_names_of_optimumk(tmp_path):
     assert theirs == load(file, by_role).mechanism
 
 
-def test_what_is_no_point_is_listed(tmp_path):
+def test_omitted_points_and_settings_are_listed(tmp_path):
     listed = read(tmp_path, DIALECTS["configuration below"]).source.split(LEFT_OUT)[1]
     assert listed == "line 11 (Steering rack,XXXX), line 12 (Wheelbase,1550)"
     listed = read(tmp_path, DIALECTS["both sides"]).source.split(LEFT_OUT)[1]
     assert listed.split(", ") == [*RIGHT]
 
 
-def test_right_points_are_read_as_left_ones_by_axes(tmp_path, plain):
+def test_mirrored_axes_read_right_points(tmp_path, plain):
     text = table(points={name: (x, -y, z) for name, (x, y, z) in POINTS.items()})
     said = Supplied("double_wishbone", "mm", "rearward,left,up")
     assert read(tmp_path, text, said).mechanism == plain
@@ -194,7 +194,7 @@ def edited(old, new):
 THOUSANDS = table(points=integers()).replace("-611", "-1.611")
 
 
-def test_rows_may_end_with_their_coordinates(tmp_path):
+def test_row_without_remark_is_read(tmp_path):
     """A point that is added below a table with remarks: a split number has one field more."""
     whole = table("name,x,y,z,meaning", "{},{},{},{},a remark")
     found = read(tmp_path, whole.removesuffix(",a remark\n"))
@@ -285,13 +285,13 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, kind):
+def test_hardpoint_table_dialect_faults(tmp_path, kind):
     text, fragments = FAULTS[kind]
     complains(write(tmp_path, text, "car.csv"), fragments, SAID)
 
 
 @pytest.mark.parametrize("unit", ["inch", "in", "inches"])
-def test_inches(tmp_path, unit):
+def test_hardpoint_table_in_inches(tmp_path, unit):
     """In the head, or said; a unit of one's own is not taken for another."""
     inches = {name: tuple(x / 25.4 for x in at) for name, at in POINTS.items()}
     said = Supplied("double_wishbone", unit, "adams")
@@ -313,13 +313,13 @@ def named(folder, text):
     return Supplied("double_wishbone", "mm", "adams", names=file)
 
 
-def test_own_names(tmp_path, plain):
+def test_hardpoint_names_file(tmp_path, plain):
     own = {OWN[name]: at for name, at in POINTS.items()}
     said = named(tmp_path, "\n".join(f'{role} = "{name}"' for role, name in OWN.items()))
     assert read(tmp_path, table(points=own), said).mechanism == plain
 
 
-def test_own_names_go_before_known_ones(tmp_path):
+def test_names_file_precedes_known_names(tmp_path):
     """One of two points that are called alike; roles without a line keep their names."""
     text = table(points=POINTS | {"wheel": (0.25, -600.0, 228.25)})
     case = read(tmp_path, text, named(tmp_path, 'wheel_center = "wheel"'))
@@ -335,11 +335,11 @@ def test_own_names_go_before_known_ones(tmp_path):
         ("lca_front", "names.toml ... not valid TOML"),
     ],
 )
-def test_faults_in_own_names(tmp_path, line, fragments):
+def test_names_file_faults(tmp_path, line, fragments):
     complains(write(tmp_path, table(), "car.csv"), fragments, named(tmp_path, line))
 
 
-def test_missing_points_advise_own_names(tmp_path, capsys):
+def test_missing_points_advise_names_option(tmp_path, capsys):
     file = tmp_path / "car.csv"
     file.write_text(table(points={OWN[name]: at for name, at in POINTS.items()}))
     options = ["--template", "double_wishbone", "--units", "mm", "--axes", "adams"]
@@ -366,7 +366,7 @@ ADAMS = """[UNITS]
 """
 
 
-def test_variants_of_adams(tmp_path, plain):
+def test_adams_hardpoint_variants_are_omitted(tmp_path, plain):
     file = tmp_path / "car.sub"
     rows = [f"'{name}' 'left/right' {x} {y} {z}" for name, (x, y, z) in POINTS.items()]
     file.write_text(ADAMS.format("\n".join(rows)))
@@ -388,7 +388,7 @@ def read_public(tmp_path, text, name, supplied=DRIVE):
     return load(file, supplied)
 
 
-def test_a_declaration_may_stand_after_white_space(tmp_path):
+def test_xml_declaration_after_white_space(tmp_path):
     text = f"""
  <?xml version="1.0" encoding="UTF-8"?>
 <mujoco><worldbody>{ARM}</worldbody><x/></mujoco>"""
@@ -397,7 +397,7 @@ def test_a_declaration_may_stand_after_white_space(tmp_path):
     assert read_public(tmp_path, text.replace("<x/>", ""), "arm.xml").mechanism.joints
 
 
-def test_a_body_that_stands_still_may_be_called_ground(tmp_path):
+def test_mjcf_fixed_body_named_ground(tmp_path):
     text = f"""<mujoco><worldbody><body name="ground" pos="1 0 0">{ARM}</body>{{}}</worldbody>
 <equality><connect body1="ground" body2="arm" anchor="0 0 0"/></equality></mujoco>"""
     case = read_public(tmp_path, text.format(""), "arm.xml")
@@ -408,7 +408,7 @@ def test_a_body_that_stands_still_may_be_called_ground(tmp_path):
         read_public(tmp_path, moving.replace('"ground" pos', '"base" pos'), "arm.xml")
 
 
-def test_what_stands_still_may_be_joined(tmp_path):
+def test_constraints_between_fixed_bodies_are_omitted(tmp_path):
     text = f"""<mujoco><worldbody>{ARM}<body name="a"/><body name="b" mocap="true"/></worldbody>
 <equality><weld body1="a" body2="b"/><connect body1="a" anchor="0 0 0"/></equality></mujoco>"""
     case = read_public(tmp_path, text, "arm.xml")
@@ -420,7 +420,7 @@ def test_what_stands_still_may_be_joined(tmp_path):
     assert "joints of what stands still (1)" in case.source.split(LEFT_OUT)[1]
 
 
-def test_the_world_of_a_urdf_needs_no_link(tmp_path):
+def test_urdf_world_without_link(tmp_path):
     text = """<robot name="r"><link name="base"/><link name="arm"/><joint name="foot" type="fixed">
 <parent link="world"/><child link="base"/><origin xyz="0 0 2"/></joint>
 <joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"""
@@ -428,7 +428,7 @@ def test_the_world_of_a_urdf_needs_no_link(tmp_path):
     assert case.mechanism.body("arm").origin == (0.0, 0.0, 2.0)
 
 
-def test_joints_in_one_place_have_no_size(tmp_path):
+def test_mjcf_joints_at_one_place(tmp_path):
     """Rounding of a composed place is no gap of a tenth of the model."""
     text = """<mujoco><worldbody><body name="arm" pos="0.1 0.2 0.3" euler="1 2 3">
 <joint name="hinge"/><body name="tip" pos="-0.1 -0.2 -0.3">
@@ -437,7 +437,7 @@ def test_joints_in_one_place_have_no_size(tmp_path):
     assert read_public(tmp_path, text, "arm.xml").mechanism.joints
 
 
-def test_messages_name_the_element_of_the_file(tmp_path):
+def test_sdf_message_states_element(tmp_path):
     text = '<sdf version="1.9"><model name="m"><link name="a"/><static>1</static></model></sdf>'
     with pytest.raises(CaseError, match="line 1: <sdf>: has no body with a joint"):
         read_public(tmp_path, text, "still.sdf")
@@ -476,13 +476,13 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_other_files(tmp_path, name):
+def test_foreign_file_formats_are_refused(tmp_path, name):
     data, fragment = OTHERS[name]
     file = write(tmp_path, data, name)
     complains(file, f"{file}: ... {fragment}", SAID)
 
 
-def test_a_folder(tmp_path, capsys):
+def test_folder_as_case_is_refused(tmp_path, capsys):
     (tmp_path / "car.csv").mkdir()
     assert main(["explain", str(tmp_path / "car.csv")]) == 2
     assert "car.csv: a folder, not a regular file; give the path" in capsys.readouterr().err
@@ -491,7 +491,7 @@ def test_a_folder(tmp_path, capsys):
 MISSPELT = {"uca_front": "UCA_Frnt", "lca_outer": "LCA outr", "wheel_center": "WheelCentr"}
 
 
-def test_likely_names_are_taken_with_a_note(tmp_path, plain):
+def test_misspelt_names_are_taken_with_note(tmp_path, plain):
     text = table(points={MISSPELT.get(name, name): at for name, at in POINTS.items()})
     case = read(tmp_path, text)
     assert case.mechanism == plain
@@ -511,7 +511,7 @@ def test_likely_names_are_taken_with_a_note(tmp_path, plain):
         ("wheel_center", "hub"),
     ],
 )
-def test_names_of_another_point_are_not_taken(tmp_path, role, name):
+def test_names_of_other_points_are_refused(tmp_path, role, name):
     with pytest.raises(CaseError, match=f"missing {role}"):
         read(
             tmp_path,
@@ -519,13 +519,13 @@ def test_names_of_another_point_are_not_taken(tmp_path, role, name):
         )
 
 
-def test_one_name_is_not_taken_twice(tmp_path):
+def test_misspelt_name_serves_one_role(tmp_path):
     points = {each: at for each, at in POINTS.items() if each not in ("uca_front", "lca_front")}
     with pytest.raises(CaseError, match="missing uca_front"):
         read(tmp_path, table(points={**points, "xca_front": POINTS["uca_front"]}))
 
 
-def test_a_new_file_of_names_is_written(tmp_path, plain):
+def test_names_file_is_written_when_missing(tmp_path, plain):
     text = table(points={MISSPELT.get(name, name): at for name, at in POINTS.items()})
     names = tmp_path / "names.toml"
     said = Supplied(*("double_wishbone", "mm", "adams"), names=names)

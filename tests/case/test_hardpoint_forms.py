@@ -99,7 +99,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_forms(tmp_path, plain, kind):
+def test_hardpoint_forms_read_alike(tmp_path, plain, kind):
     name, text = FORMS[kind]
     if name.endswith(("yaml", "yml")):
         pytest.importorskip("yaml")
@@ -107,19 +107,19 @@ def test_forms(tmp_path, plain, kind):
     assert replace(found, name=plain.name) == plain
 
 
-def test_a_coordinate_a_row_of_a_sheet(tmp_path, plain):
+def test_sheet_with_coordinate_per_row(tmp_path, plain):
     rows = [[f"{n}_{a}", x] for n, at in POINTS.items() for a, x in zip("xyz", at, strict=True)]
     file = book(tmp_path, {"a": [["Hardpoint", "Value [mm]"], *rows], "b": [["x"]]})
     assert replace(load(file, replace(SAID, units=None)).mechanism, name=plain.name) == plain
 
 
-def test_template_unit_and_axes_of_a_tree(tmp_path, plain):
+def test_json_keys_template_units_axes(tmp_path, plain):
     keys = {"type": "double_wishbone", "units": "mm", "axes": "rearward,right,up", "side": "left"}
     file = written(tmp_path, "car.json", json.dumps({**keys, "hardpoints": tree()}))
     assert replace(load(file).mechanism, name=plain.name) == plain
 
 
-def test_a_section_is_chosen(tmp_path, plain):
+def test_sheet_option_chooses_json_section(tmp_path, plain):
     text = json.dumps({"front": tree(), "rear": tree(RIGHT)})
     file = written(tmp_path, "car.json", text)
     with pytest.raises(CaseError, match=r"found points in 'front', 'rear', .* --sheet NAME"):
@@ -131,7 +131,7 @@ def test_a_section_is_chosen(tmp_path, plain):
         load(file, replace(SAID, sheet="frnt"))
 
 
-def test_words_written_together_are_names(tmp_path, plain):
+def test_camel_case_point_names(tmp_path, plain):
     text = lines("{};{};{};{}").replace("uca_outer", "upperBallJoint").replace("_center", "Centre")
     found = load(written(tmp_path, "car.csv", text), SAID).mechanism
     assert replace(found, name=plain.name) == plain
@@ -156,7 +156,7 @@ config:
 """
 
 
-def test_the_wheel_of_hub_face_offset_and_tire(tmp_path):
+def test_wheel_of_hub_offset_and_tire(tmp_path):
     """The offset is inboard; the radius is half the rim in inches and the height of the tire."""
     pytest.importorskip("yaml")
     case = load(written(tmp_path, "car.yaml", EXPLORER), Supplied(axes="iso"))
@@ -166,14 +166,14 @@ def test_the_wheel_of_hub_face_offset_and_tire(tmp_path):
     assert toe.vehicle.static_camber == 0.0
 
 
-def test_a_direction_is_no_place(tmp_path):
+def test_spin_axis_direction_is_omitted(tmp_path):
     """An axis of one metre from the origin would be a wheel of another attitude."""
     text = json.dumps({**NESTED, "wheel": NESTED["wheel"] | {"spin_axis": [0, 1, 0]}})
     case = load(written(tmp_path, "car.json", text), SAID)
     assert "wheel.spin_axis" in case.source
 
 
-def test_a_point_of_an_axis_is_a_place(tmp_path):
+def test_rocker_axis_point_is_read(tmp_path):
     """Of the rocker, or of the wheel."""
     points = {name: list(at) for name, at in TEMPLATES["pushrod_knuckle"].sample.items()}
     file = written(tmp_path, "car.json", json.dumps({"points": points}))
@@ -224,7 +224,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, kind):
+def test_hardpoint_form_faults(tmp_path, kind):
     name, text, fragments = FAULTS[kind]
     if name.endswith("yaml"):
         pytest.importorskip("yaml")

@@ -22,7 +22,7 @@ def sample(folder, name, travel="0.05:11", extra=""):
 
 
 @pytest.mark.parametrize("name", RODS)
-def test_outputs_of_each_template(tmp_path, name):
+def test_template_outputs_in_closed_form(tmp_path, name):
     case = sample(tmp_path, name)
     found, at = solved(case), TEMPLATES[name].sample
     for k, travel in enumerate(case.sweep.values):
@@ -33,17 +33,17 @@ def test_outputs_of_each_template(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", RODS)
-def test_a_case_file_of_the_table(tmp_path, name):
+def test_hardpoint_case_file_round_trip(tmp_path, name):
     written_again(sample(tmp_path, name), tmp_path)
 
 
-def test_a_slope_beside_each_output(tmp_path):
+def test_camber_slope_equals_difference_quotient(tmp_path):
     found = solved(sample(tmp_path, "double_wishbone", "1e-4:3"))
     difference = (found["camber"][2] - found["camber"][0]) / 2e-4
     assert found["camber.per_travel"][1] == pytest.approx(difference, abs=1e-6)
 
 
-def test_a_wheel_that_is_turned_at_design(tmp_path):
+def test_wheel_axis_point_gives_static_angles(tmp_path):
     """The wheel's axis by a point; toe and camber move as the carrier does."""
     toe, camber = np.radians(0.3), np.radians(-1.5)
     spin = np.array([np.cos(camber) * np.sin(toe), np.cos(camber) * np.cos(toe), -np.sin(camber)])
@@ -56,7 +56,7 @@ def test_a_wheel_that_is_turned_at_design(tmp_path):
         assert found[name][10] == pytest.approx(true[name], abs=CLOSE)
 
 
-def test_without_a_radius_nothing_is_at_the_road():
+def test_road_outputs_need_wheel_radius():
     case = load(DATA / "chrono_double_wishbone.json")
     names = {output.name for output in case.outputs}
     assert {"toe", "camber", "caster", "spring_ratio", "damper_ratio"} <= names
@@ -84,7 +84,7 @@ def test_without_a_radius_nothing_is_at_the_road():
         ({}, "wheel_axis,0,412,228\n", "wheel_axis ... inboard ... mirror"),
     ],
 )
-def test_faults(tmp_path, supplied, extra, fragments):
+def test_suspension_option_and_wheel_faults(tmp_path, supplied, extra, fragments):
     file = tmp_path / "car.csv"
     rows = [
         f"{role},{','.join(repr(1000.0 * x) for x in place)}\n"
@@ -95,7 +95,7 @@ def test_faults(tmp_path, supplied, extra, fragments):
     complains(file, fragments, Supplied("double_wishbone", "mm", "iso", **supplied))
 
 
-def test_templates_prints_tables_that_run(tmp_path, capsys):
+def test_templates_command_prints_runnable_tables(tmp_path, capsys):
     assert main(["templates"]) == 0
     printed = capsys.readouterr().out
     assert [name for name in TEMPLATES if f"# template: {name}\n" not in printed] == []
@@ -108,14 +108,14 @@ def test_templates_prints_tables_that_run(tmp_path, capsys):
     assert "'five_link'" in capsys.readouterr().err
 
 
-def test_samples_have_all_that_is_required():
+def test_template_samples_have_all_roles():
     for template in TEMPLATES.values():
         names = {role.name for role in template.roles}
         assert names <= template.sample.keys()
         assert template.sample.keys() <= names | {role.name for role in template.optional}
 
 
-def test_the_template_of_a_table(tmp_path):
+def test_template_comment_of_table(tmp_path):
     file = tmp_path / "car.csv"
     file.write_text(sample_table(TEMPLATES["mcpherson"]))
     with pytest.raises(CaseError, match="expected mcpherson"):
@@ -134,6 +134,6 @@ def test_the_template_of_a_table(tmp_path):
         "2inch": (-0.0508, 0.0508),
     }.items(),
 )
-def test_travel_takes_a_unit(tmp_path, travel, ends):
+def test_travel_option_units(tmp_path, travel, ends):
     case = sample(tmp_path, "double_wishbone", travel)
     assert (case.sweep.values[0], case.sweep.values[-1]) == pytest.approx(ends, rel=1e-15)

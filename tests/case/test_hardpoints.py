@@ -46,7 +46,7 @@ def turned(p, a):
 
 
 @pytest.mark.parametrize("name", CHRONO)
-def test_chrono_suspensions_move_as_rods_and_lines_do(name):
+def test_chrono_suspension_sweeps_to_40_digits(name):
     """Wheel centre and spin axis against 40-digit solutions by another formulation; the template is
     the file's own.
     """
@@ -68,7 +68,7 @@ def test_chrono_suspensions_move_as_rods_and_lines_do(name):
     )
 
 
-def test_what_is_left_out_is_listed():
+def test_chrono_omitted_keys_are_listed():
     source = load(DATA / "chrono_macpherson_strut.json").source
     assert source.startswith(
         "Project Chrono hardpoints of chrono_macpherson_strut.json on the template mcpherson"
@@ -85,12 +85,12 @@ def test_what_is_left_out_is_listed():
     assert "[PARAMETER] (4 rows)" in load(ADAMS, AXLE).source.split(LEFT_OUT)[1]
 
 
-def test_the_template_of_the_file_may_be_said_too():
+def test_chrono_template_option_agrees_with_file():
     said = load(DATA / "chrono_multi_link.json", Supplied(template="multi-link"))
     assert said.mechanism == load(DATA / "chrono_multi_link.json").mechanism
 
 
-def test_comments_as_chrono_takes_them(tmp_path):
+def test_chrono_json_comments(tmp_path):
     text = (DATA / "chrono_macpherson_strut.json").read_text()
     commented = tmp_path / "chrono_macpherson_strut.json"
     commented.write_text(
@@ -129,7 +129,7 @@ def rods(points, travel):
     return wheel + fsolve(defects, [0.0, 0.0, travel, 0.0, 0.0, 0.0], xtol=1e-12)[:3]
 
 
-def test_adams_front_suspension_moves_as_five_rods_do():
+def test_adams_front_suspension_on_five_rods():
     """Millimetres, x rearward and y right in the file; metres, x forward and y left in the case."""
     case = load(ADAMS, AXLE)
     iso = {name: np.array([-x, -y, z]) / 1000.0 for name, (x, y, z) in adams_points().items()}
@@ -172,7 +172,7 @@ AXES = {
 
 @pytest.mark.parametrize("axes", AXES)
 @pytest.mark.parametrize("unit", ["mm", "m"])
-def test_a_table_in_any_units_and_axes_is_the_same_suspension(tmp_path, axes, unit):
+def test_hardpoint_table_units_and_axes(tmp_path, axes, unit):
     file, scale = tmp_path / ADAMS.with_suffix(".csv").name, 1.0 if unit == "mm" else 1000.0
     points = {
         name: tuple(value / scale for value in AXES[axes](*at))
@@ -191,13 +191,13 @@ def test_a_table_in_any_units_and_axes_is_the_same_suspension(tmp_path, axes, un
         ("name,x,y,z", "# axes: rearward,right,up\n# units: mm"),
     ],
 )
-def test_a_table_can_say_its_units_and_axes(tmp_path, head, comment):
+def test_hardpoint_table_states_units_and_axes(tmp_path, head, comment):
     file = tmp_path / ADAMS.with_suffix(".csv").name
     file.write_text(table(adams_points(), head, comment))
     assert load(file, Supplied(template="double_wishbone")).mechanism == load(ADAMS, AXLE).mechanism
 
 
-def test_semicolons_prefixes_and_spelling(tmp_path):
+def test_hardpoint_table_semicolons_and_prefixes(tmp_path):
     file = tmp_path / ADAMS.with_suffix(".csv").name
     points = {f"hpl_{name}": at for name, at in adams_points().items()}
     points["hpl_Wheel Centre"] = points.pop("hpl_wheel_center")
@@ -208,7 +208,7 @@ def test_semicolons_prefixes_and_spelling(tmp_path):
     )
 
 
-def test_the_right_side_of_a_file_is_left_out(tmp_path):
+def test_adams_right_side_is_omitted(tmp_path):
     file = tmp_path / ADAMS.name
     broken = " 'lca_outer                   '  'right       '    267.0      750.0      130.0\n"
     file.write_text(
@@ -223,7 +223,7 @@ def test_the_right_side_of_a_file_is_left_out(tmp_path):
 
 
 @pytest.mark.parametrize("template", TEMPLATES.values(), ids=lambda template: template.name)
-def test_templates_make_sense(template):
+def test_template_roles_are_consistent(template):
     """Roles are named once, and what is compared tells how the knuckle stands."""
     names = [role.name for role in template.roles]
     assert len(set(names)) == len(names)
@@ -296,7 +296,7 @@ CHRONO_FAULTS = {
 
 
 @pytest.mark.parametrize("kind", CHRONO_FAULTS)
-def test_chrono(tmp_path, kind):
+def test_chrono_file_faults(tmp_path, kind):
     edit, fragments = CHRONO_FAULTS[kind]
     file = edited(tmp_path, STRUT, edit)
     if kind == "cut":
@@ -331,12 +331,12 @@ ADAMS_FAULTS = {
 
 
 @pytest.mark.parametrize("kind", ADAMS_FAULTS)
-def test_adams(tmp_path, kind):
+def test_adams_hardpoint_faults(tmp_path, kind):
     edit, fragments = ADAMS_FAULTS[kind]
     complains(edited(tmp_path, ADAMS, edit), fragments, Supplied(WISHBONE, ask_names=True))
 
 
-def test_adams_cut_short(tmp_path):
+def test_adams_truncated_hardpoints_are_refused(tmp_path):
     file = tmp_path / ADAMS.name
     file.write_text(ADAMS.read_text().split(" 'uca_rear")[0])
     missing = "missing uca_rear, the upper arm's rear pivot ... wheel_center, the wheel's centre"
@@ -457,7 +457,7 @@ TABLE_FAULTS = {
 
 
 @pytest.mark.parametrize("kind", TABLE_FAULTS)
-def test_table(tmp_path, kind):
+def test_hardpoint_table_faults(tmp_path, kind):
     edit, supplied, fragments = TABLE_FAULTS[kind]
     complains(edited(tmp_path, TABLE, *([edit] if edit else [])), fragments, supplied)
 
@@ -466,14 +466,14 @@ def test_table(tmp_path, kind):
     ("text", "fragment"),
     [("", "is empty"), ("name,x,y,z\n", "no row"), ("# nothing\n", "is empty")],
 )
-def test_empty_tables(tmp_path, text, fragment):
+def test_empty_hardpoint_table_is_refused(tmp_path, text, fragment):
     file = tmp_path / "car.csv"
     file.write_text(text)
     complains(file, fragment, WHOLE)
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_templates_follow_from_the_names(tmp_path, name, capsys):
+def test_template_follows_from_point_names(tmp_path, name, capsys):
     rows = [f"{role},{x},{y},{z}" for role, (x, y, z) in TEMPLATES[name].sample.items()]
     file = tmp_path / "car.csv"
     file.write_text("\n".join(["# units: m", "# axes: forward,left,up", "name,x,y,z", *rows]))
@@ -486,17 +486,17 @@ def test_templates_follow_from_the_names(tmp_path, name, capsys):
     assert said == [f"template {wanted}, by the names of its points: --template states it"]
 
 
-def test_the_template_must_not_contradict_the_file():
+def test_template_option_contradicting_file_is_refused():
     message = "--template ... found mcpherson ... MultiLink ... expected five_link"
     complains(MULTI_LINK, message, Supplied("mcpherson"))
 
 
-def test_units_of_chrono_are_known():
+def test_units_option_contradicting_chrono_is_refused():
     complains(STRUT, "--units ... found mm ... in m", Supplied(units="mm"))
     complains(STRUT, "--axes ... forward,left,up", Supplied(axes="adams"))
 
 
-def test_the_command_line_reads_hardpoints(tmp_path, capsys):
+def test_run_command_reads_hardpoint_table(tmp_path, capsys):
     file = edited(tmp_path, TABLE)
     options = [
         "--engine",

@@ -61,19 +61,19 @@ SAME = {
 
 
 @pytest.mark.parametrize("theirs", SAME)
-def test_the_published_sweep(explorer, published, theirs):
+def test_wishbone_explorer_sweep(explorer, published, theirs):
     """Rack and wheel move together; derivatives hold the rack."""
     ours, unit, allowed = SAME[theirs]
     assert np.abs(explorer[ours] - unit * published[theirs]).max() < allowed
 
 
-def test_the_published_half_track(explorer, published):
+def test_wishbone_explorer_half_track(explorer, published):
     half_track = MM * published["half_track"]
     change = explorer["half_track_change"] + 0.95 + RADIUS * 5.0 / np.hypot(150.0, 5.0)
     assert np.abs(change - half_track).max() < LENGTH
 
 
-def test_the_published_camber(explorer, published):
+def test_wishbone_explorer_camber(explorer, published):
     """Seen from the front, where ISO 8855 has the angle of the wheel plane itself."""
     toe, camber = explorer["toe"], explorer["camber"]
     seen = np.arctan2(np.tan(camber), np.cos(toe))
@@ -121,7 +121,7 @@ def corner(at, travel, start):
     return found.x
 
 
-def test_a_formula_student_corner_with_pushrod_and_rocker():
+def test_formula_student_pushrod_corner():
     file = DATA / "formula_student_pushrod.csv"
     case = load(file, Supplied(travel="0.03:7"))
     found = curves(case)
@@ -165,7 +165,7 @@ wheel_center,0.975,0.715,0.101
 ROAD = ("scrub_radius", "mechanical_trail", "roll_center_height", "half_track_change")
 
 
-def test_the_strut_of_the_paper(tmp_path):
+def test_mcpherson_strut_to_50_digits(tmp_path):
     """Against 50 digits of an independent solution; see the head of the built-in table."""
     file = tmp_path / "strut.csv"
     file.write_text(STRUT)
@@ -177,7 +177,7 @@ def test_the_strut_of_the_paper(tmp_path):
         assert np.abs(found[name] - true).max() < 1e-13, name
 
 
-def test_by_the_command_line(tmp_path, explorer):
+def test_wishbone_explorer_csv_by_command(tmp_path, explorer):
     """The curves leave as a table; there is nothing to compare a single engine with."""
     options = ["--travel=-0.04:0.12:3", "--rack", "0.04", "--wheel-radius", str(RADIUS)]
     file, out = str(DATA / "wishbone_explorer.csv"), tmp_path / "curves.csv"
@@ -187,7 +187,7 @@ def test_by_the_command_line(tmp_path, explorer):
     assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)
 
 
-def test_the_published_camber_by_the_command_line(tmp_path, published, capsys):
+def test_measured_camber_definition_is_named(tmp_path, published, capsys):
     """Compared as it stands, the camber is off, and the message states its other definition."""
     sweep = tmp_path / "sweep.csv"
     rows = zip(*(published[name] for name in ("wheel_travel", "toe_angle", "camber")), strict=True)
@@ -205,7 +205,7 @@ def test_the_published_camber_by_the_command_line(tmp_path, published, capsys):
 # Suspension outputs of Project Chrono's models, against an independent solution of
 
 
-def test_static_angles_of_chrono(tmp_path):
+def test_chrono_static_toe_and_camber(tmp_path):
     """Chrono turns the spindle of a left wheel by minus toe about z after minus camber about x."""
     file = tmp_path / "strut.json"
     text = (DATA / "chrono_macpherson_strut.json").read_text()
@@ -219,7 +219,7 @@ def test_static_angles_of_chrono(tmp_path):
     assert found["camber"][1] == pytest.approx(np.arcsin(-z), abs=1e-15)
 
 
-def test_chrono_strut_with_a_radius():
+def test_chrono_strut_with_wheel_radius():
     """Toe, camber and half track from 40-digit centres and spin axes; see test_hardpoints."""
     case = load(
         DATA / "chrono_macpherson_strut.json", Supplied(travel="0.07:15", wheel_radius="0.4")
@@ -239,7 +239,7 @@ def test_chrono_strut_with_a_radius():
     assert np.abs(found["half_track_change"] - (track - track[7])).max() < 1e-14
 
 
-def test_chrono_semi_trailing_arm():
+def test_chrono_semi_trailing_arm_outputs():
     """A turn about one line: the angle of each travel by scipy's root, all else by rotation."""
     case = load(
         DATA / "chrono_semi_trailing_arm.json", Supplied(travel="0.1:9", wheel_radius="0.45")
@@ -281,7 +281,7 @@ def test_chrono_semi_trailing_arm():
         assert {name: found[name][k] for name in true} == pytest.approx(true, abs=1e-13)
 
 
-def test_chrono_three_link():
+def test_chrono_three_link_outputs():
     case = load(DATA / "chrono_three_link.json", Supplied(travel="0.08:9", wheel_radius="0.45"))
     at = {
         "arm_pivot": (0.7, 0.9, 0.0),

@@ -91,7 +91,7 @@ def hinged(center, hinge, axis, angles, types, rate=1.0, points=(), between=None
 ANGLES = np.linspace(-0.3, 0.4, 8)
 
 
-def test_a_wheel_on_its_side_has_no_toe():
+def test_horizontal_wheel_has_no_toe():
     """Its axis of rotation is vertical, but for round-off: no direction in the road plane."""
     rolled = [0.5 * np.pi, 1.5 * np.pi, 0.3]
     types = ["toe", "steer_angle", "half_track_change", "camber"]
@@ -102,7 +102,7 @@ def test_a_wheel_on_its_side_has_no_toe():
     assert np.isnan(found["camber"].velocity).tolist() == [True, True, False]
 
 
-def test_a_steering_axis_along_a_view_has_no_angle_in_it():
+def test_steering_axis_along_view_is_nan():
     ends = Point("low", "carrier", (0.0, 0.6, 0.1)), Point("high", "carrier", (0.0, 0.6, 0.5))
     types, pair = ["caster", "kingpin_inclination", "scrub_radius"], {"kingpin": ("low", "high")}
     tipped = [0.5 * np.pi, 0.1]
@@ -113,7 +113,7 @@ def test_a_steering_axis_along_a_view_has_no_angle_in_it():
         assert np.isfinite(found["scrub_radius"].position).tolist() == [False, True]
 
 
-def test_half_a_turn_is_positive():
+def test_half_turn_of_toe_is_positive():
     """Engines agree to round-off, which must not choose between two ends of the range."""
     about = np.pi * (1.0 + np.array([-1e-12, 0.0, 1e-12]))
     found = hinged(
@@ -123,7 +123,7 @@ def test_half_a_turn_is_positive():
         assert found[each].position == pytest.approx(np.pi, abs=1e-11)
 
 
-def test_swing_axle():
+def test_swing_axle_outputs_in_closed_form():
     """A left wheel on an arm about x: it cambers as the arm turns, and its instant centre is the
     hinge.
     """
@@ -165,7 +165,7 @@ def test_swing_axle():
 
 
 @pytest.mark.parametrize("side", Side)
-def test_trailing_arm(side):
+def test_trailing_arm_outputs_in_closed_form(side):
     """A rear wheel behind a lateral hinge: no camber, no track change, and anti-effects by the
     slope up to the hinge.
     """
@@ -212,7 +212,7 @@ def test_trailing_arm(side):
     assert outboard["anti_squat"].position == pytest.approx(2.5 / 0.5 * ((0.3 - z) / -x), abs=1e-13)
 
 
-def test_leading_arm_in_front():
+def test_leading_arm_anti_dive():
     """A front wheel ahead of its hinge does not dive: the way to the instant centre rises
     rearward.
     """
@@ -222,7 +222,7 @@ def test_leading_arm_in_front():
 
 
 @pytest.mark.parametrize("side", Side)
-def test_wheel_steered_about_a_fixed_line(side):
+def test_steered_wheel_outputs_in_closed_form(side):
     """Toe, camber, trail and scrub radius of a wheel turned about an oblique kingpin, by a rotation
     matrix.
     """
@@ -271,7 +271,7 @@ def test_wheel_steered_about_a_fixed_line(side):
         )
 
 
-def test_strut_against_its_reference():
+def test_strut_outputs_match_reference():
     """Every output, rate, second rate and slope of the built-in case; its tolerances are far wider
     than what is seen.
     """
@@ -290,7 +290,7 @@ def test_strut_against_its_reference():
             assert error.within
 
 
-def test_reference_of_the_strut_is_that_of_sixty_digits():
+def test_strut_reference_matches_sixty_digits():
     lines = [
         line
         for line in (cases.FOLDER / "mcpherson_suspension.csv").read_text().splitlines()
@@ -335,7 +335,7 @@ ONE_SIGN = {"steer_angle", "wheel_center_y"}
 """Outputs that tell left from right, or one convention from the other."""
 
 
-def test_mirror_image_is_the_other_wheel():
+def test_mirror_image_gives_other_wheel():
     right, left = solved(loaded(STRUT)), solved(loaded(mirrored(STRUT)))
     assert right.keys() == left.keys()
     for name, series in right.items():
@@ -349,7 +349,7 @@ def test_mirror_image_is_the_other_wheel():
     assert np.ptp(right["toe"].position) > 0.05  # and it is no strut at rest
 
 
-def test_sae_turns_what_has_axes():
+def test_sae_convention_turns_lateral_outputs():
     iso, sae = (
         loaded(unreferenced(STRUT | {"suspension": STRUT["suspension"] | {"convention": each}}))
         for each in Convention
@@ -367,7 +367,7 @@ def test_sae_turns_what_has_axes():
     }
 
 
-def test_axes_of_the_file_do_not_matter():
+def test_suspension_outputs_in_other_axes():
     """The same car drawn with x to the left, y rearward and z up, or with z down."""
     for turn in (np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.diag([1, -1, -1])):
         turned = mirrored(STRUT, turn)
@@ -377,7 +377,7 @@ def test_axes_of_the_file_do_not_matter():
             assert found[name].position == pytest.approx(series.position, abs=ROUND_OFF)
 
 
-def test_without_velocities_there_are_positions_and_no_slopes():
+def test_slopes_need_velocities():
     case = loaded(STRUT)
     engine = Native()
     full = engine.solve(engine.build(case), case, TOL)
@@ -395,7 +395,7 @@ def test_without_velocities_there_are_positions_and_no_slopes():
         assert np.isnan(found[name].position).all()
 
 
-def test_slopes_where_the_wheel_stands_still_are_unknown():
+def test_slopes_at_turning_point_are_nan():
     """A swing axle whose wheel passes the top of its way: travel stops there, and camber does
     not.
     """
@@ -425,7 +425,7 @@ def test_markers_do_not_widen_tolerances():
     assert one.atol == pytest.approx(1e-9 / 0.61)  # the strut from ball to top
 
 
-def test_relative_is_measured_from_the_design():
+def test_relative_output_counts_from_design():
     """A wheel with static angles, each output once as it is and once relative."""
     data = STRUT | {
         "suspension": STRUT["suspension"] | {"static_toe": 0.02, "static_camber": -0.03}
@@ -482,7 +482,7 @@ def turned(motion, height):
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_samples_by_the_closed_form_of_the_arm(name):
+def test_reference_samples_by_arm_closed_form(name):
     case = cases.load(name)
     design = case.mechanism.point("wheel_center").position
     stroke, rack = (
@@ -508,7 +508,7 @@ def test_samples_by_the_closed_form_of_the_arm(name):
             )
 
 
-def test_the_decompositions_have_one_truth():
+def test_decompositions_share_reference():
     for one, other in (
         ("chrono_macpherson", "chrono_macpherson_cylindrical"),
         ("chrono_multi_link", "chrono_multi_link_bodies"),
@@ -559,7 +559,7 @@ def upright(case, stroke, near):
 
 
 @pytest.mark.parametrize("sample", [3, 24])
-def test_the_multi_link_by_five_distances(sample):
+def test_multi_link_reference_by_five_distances(sample):
     case = cases.load("chrono_multi_link")
     with mp.workdps(40):
         stroke, near = mp.mpf(case.sweep.values[sample]), [0] * 6

@@ -25,7 +25,7 @@ UNABLE = Fake("unable", refusal="joint 'cv' (universal) has no counterpart")
     [(RIGHT, 0), (WRONG, 1), (PARTIAL, 1), (BROKEN, 1), (MISSING, 0), (UNABLE, 0)],
     ids=lambda each: getattr(each, "name", each),
 )
-def test_exit_status_of_a_run(kincheck_main, engine, status):
+def test_run_exit_status_by_outcome(kincheck_main, engine, status):
     assert kincheck_main("run", engines=[RIGHT, engine]) == status
 
 
@@ -46,7 +46,7 @@ def test_exit_status_of_a_run(kincheck_main, engine, status):
         "missing",
     ],
 )
-def test_run_with_only_errors_has_status_2(kincheck_main, capsys, engines, status):
+def test_run_without_solution_has_status_2(kincheck_main, capsys, engines, status):
     assert kincheck_main("run", engines=engines) == status
     told = capsys.readouterr().err
     solved, tried = status != 2, BROKEN in engines
@@ -57,7 +57,7 @@ def test_run_with_only_errors_has_status_2(kincheck_main, capsys, engines, statu
     assert (nothing in told) is not tried
 
 
-def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
+def test_run_defaults_to_all_pairs(kincheck_main, capsys):
     assert kincheck_main("run --json -", engines=[RIGHT, MISSING]) == 0
     records = json.loads(capsys.readouterr().out)["records"]
     assert [(each["case"], each["engine"]) for each in records] == [
@@ -89,7 +89,7 @@ def test_simulators_run_in_worker_processes(
     assert (RIGHT.solves > 0) is inside
 
 
-def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
+def test_unloadable_adapter_gives_error_record(kincheck_main, capsys, monkeypatch):
     def load(name):
         if name == "other":
             raise ImportError("libother.so: no such file")
@@ -108,7 +108,7 @@ def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
     )
 
 
-def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
+def test_run_of_chosen_case_and_engine(kincheck_main, capsys):
     assert (
         kincheck_main(
             "run crank_two crank_two --engine native --json -",
@@ -121,7 +121,7 @@ def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
     ]
 
 
-def test_unselected_native_is_the_standard(kincheck_main, capsys):
+def test_unselected_native_is_standard(kincheck_main, capsys):
     cases = {"crank": crank(reference=False)}
     assert kincheck_main("run --engine wrong --json -", engines=[RIGHT, WRONG], cases=cases) == 1
     (record,) = json.loads(capsys.readouterr().out)["records"]
@@ -165,7 +165,7 @@ def test_unselected_native_is_the_standard(kincheck_main, capsys):
         ("--resume", "--resume needs a history. Give --history FILE, or set KINCHECK_HISTORY"),
     ],
 )
-def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, said):
+def test_run_invalid_options_have_status_2(kincheck_main, capsys, line, said):
     RIGHT.solves = 0
     assert kincheck_main("run", *line.split()) == 2
     captured = capsys.readouterr()
@@ -175,7 +175,7 @@ def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, s
     assert RIGHT.solves == 0
 
 
-def test_status_of_help_and_no_command(capsys):
+def test_help_and_missing_command_exit_status(capsys):
     assert main([]) == 2
     assert main(["--help"]) == 0
     assert main(["run", "--help"]) == 0
@@ -214,12 +214,12 @@ def test_required_engine_is_always_run(kincheck_main, capsys):
     ]
 
 
-def test_how_to_install_comes_from_the_metadata():
+def test_how_to_install_matches_package_metadata():
     assert how_to_install("pinocchio").startswith("pip install 'pin>=")
     assert how_to_install("mujoco").startswith("pip install 'mujoco>=")
 
 
-def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys, monkeypatch):
+def test_list_shows_truth_source_and_installation(kincheck_main, capsys, monkeypatch):
     monkeypatch.setattr("kincheck.core.cli.lists.installed_version", lambda name: None)
     pinocchio = Fake("pinocchio", installed=None)
     cases = {"crank": crank(), "free": crank("free", reference=False)}

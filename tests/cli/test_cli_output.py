@@ -19,7 +19,7 @@ from ..support.fakes import Fake, off
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
 
 
-def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
+def test_json_output_excludes_engine_prints(kincheck_main, capfd):
     def chatty(case):
         print("from Python")
         os.write(1, b"from the file descriptor\n")
@@ -129,7 +129,7 @@ def test_contradictory_length_is_noted_by_explain(tmp_path, capsys, length):
     assert (f"\n  note: {note}" in capsys.readouterr().out) is told
 
 
-def test_unsolvable_case_is_explained_beside_others(tmp_path, capsys):
+def test_explain_reports_unsolvable_case(tmp_path, capsys):
     (tmp_path / "far.toml").write_text(
         ROD.replace("LENGTH", "5.0").replace('name = "rod"', 'name = "far"')
     )
@@ -144,7 +144,7 @@ def test_unsolvable_case_is_explained_beside_others(tmp_path, capsys):
     assert "\nrod: 12 unknowns for crank, rocker\n" in printed
 
 
-def test_out_of_memory_names_the_limit(monkeypatch):
+def test_memory_error_states_limit(monkeypatch):
     assert error_text(MemoryError()) == "MemoryError"
     monkeypatch.setattr("kincheck.core.harness.execution.memory_limit", lambda: 4.0)
     assert (
@@ -179,7 +179,7 @@ def test_run_table_shows_every_outcome(kincheck_main, capsys):
     ]
 
 
-def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
+def test_run_writes_files_of_options(kincheck_main, capsys, tmp_path):
     out = tmp_path / "made" / "here"
     assert (
         kincheck_main(
@@ -204,7 +204,7 @@ def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
     ("option", "name"),
     [("--out", "file/sub"), ("--out", "file"), ("--json", "no/r.json"), ("--junit", ".")],
 )
-def test_unwritable_destination_is_found_first(kincheck_main, capsys, tmp_path, option, name):
+def test_unwritable_destination_stops_before_solving(kincheck_main, capsys, tmp_path, option, name):
     (tmp_path / "file").write_text("here already")
     RIGHT.solves = 0
     assert kincheck_main("run crank", option, tmp_path / name) == 2
@@ -214,7 +214,7 @@ def test_unwritable_destination_is_found_first(kincheck_main, capsys, tmp_path, 
     assert RIGHT.solves == 0
 
 
-def test_failed_file_keeps_the_others(kincheck_main, capsys, tmp_path):
+def test_failed_file_leaves_other_files(kincheck_main, capsys, tmp_path):
     def hostile(case):
         (tmp_path / "j.xml").mkdir(exist_ok=True)  # in the way, since the destinations were checked
         return off("position", lambda p: p)(case)

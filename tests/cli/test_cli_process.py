@@ -9,13 +9,13 @@ from kincheck.core.cli.main import main
 from kincheck.core.version import VERSION
 
 
-def test_the_version_is_that_of_the_installation(capsys):
+def test_version_option_prints_installed_version(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"kincheck {kincheck.core.__version__}\n"
     assert kincheck.core.__version__ == importlib.metadata.version("kincheck")
 
 
-def test_the_package_is_the_command_too(tmp_path):
+def test_python_module_runs_command(tmp_path):
     module = [sys.executable, "-m", "kincheck"]
     done = subprocess.run(
         [*module, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True
@@ -27,7 +27,7 @@ def test_the_package_is_the_command_too(tmp_path):
     assert (wrong.returncode, wrong.stderr[:9]) == (2, "kincheck:")
 
 
-def test_a_command_loads_no_other():
+def test_check_joint_help_loads_few_modules():
     code = (
         "import sys; from kincheck.core.cli import main as cli; cli.main(['check-joint',"
         " '--help']);print(*sorted(name.rpartition('.')[2] for name in sys.modules if"
@@ -39,7 +39,7 @@ def test_a_command_loads_no_other():
     )
 
 
-def test_the_start_loads_nothing_that_is_not_needed():
+def test_version_option_loads_no_library():
     code = (
         "import sys; from kincheck.core.cli import main as cli; status ="
         " cli.main(['--version']);print(sorted({'rich', 'jinja2', 'mujoco', 'pinocchio',"

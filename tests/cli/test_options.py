@@ -150,13 +150,13 @@ def test_invalid_arguments_in_python_are_refused(call, said):
         call()
 
 
-def test_none_and_any_iterable_are_arguments():
+def test_run_in_python_takes_iterables():
     found = kincheck.run((each for each in ["rssr"]), {"native"}, tol=None, supplied=None)
     assert [(each.case, each.engine) for each in found.records] == [("rssr", "native")]
     assert found.run["tol"] == 1e-12
 
 
-def test_an_abbreviation_is_the_shortest_option(capsys):
+def test_option_abbreviation_is_unique_prefix(capsys):
     assert main("run rssr --eng native -q".split()) == 0
     assert capsys.readouterr().out == "1 pass\n"
     assert main("run rssr --re native".split()) == 2
@@ -164,7 +164,7 @@ def test_an_abbreviation_is_the_shortest_option(capsys):
 
 
 @pytest.mark.parametrize(("line", "option", "other"), ONE_FILE)
-def test_two_options_cannot_name_one_file(line, option, other, here, capsys):
+def test_shared_output_file_is_refused(line, option, other, here, capsys):
     assert main(line.split()) == 2
     out, err = capsys.readouterr()
     (said,) = err.splitlines()
@@ -175,7 +175,7 @@ def test_two_options_cannot_name_one_file(line, option, other, here, capsys):
     assert not [*(here / "no").iterdir()]
 
 
-def test_a_second_file_of_an_export_does_not_go_over_the_json(here, capsys):
+def test_export_constraints_file_keeps_json(here, capsys):
     line = "assemblies four_bar --samples 8 --export urdf --out x.urdf --json x.constraints.json"
     assert main(line.split()) == 2
     assert "--out x.constraints.json: found the file of --json" in capsys.readouterr().err
@@ -198,6 +198,6 @@ def test_devices_take_several_outputs():
     )
 
 
-def test_a_limit_that_can_be_counted_is_one(capsys):
+def test_largest_memory_and_time_limits_run(capsys):
     assert main("run rssr --engine native --jobs 1 --memory 1e9 --timeout 1e9".split()) == 0
     assert "1 pass" in capsys.readouterr().out

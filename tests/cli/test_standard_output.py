@@ -24,7 +24,7 @@ def kincheck(*arguments, out=subprocess.PIPE, **env):
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
-def test_output_encoding_without_letters(encoding):
+def test_run_output_in_limited_encodings(encoding):
     done = kincheck(*RUN, PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
     assert "1 pass" in done.stdout.decode(encoding)
@@ -35,7 +35,7 @@ def test_output_encoding_without_letters(encoding):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 @pytest.mark.parametrize("asked", [["list"], RUN, [*RUN, "--json", "-"]])
-def test_a_full_standard_output_is_one_message(asked):
+def test_full_standard_output_has_status_2(asked):
     with open("/dev/full", "wb") as full:
         done = kincheck(*asked, out=full)
     assert done.returncode == 2
@@ -75,7 +75,7 @@ def test_broken_pipe_is_no_failure(command):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="has /dev/stdout")
-def test_output_file_equals_standard_output_refused(tmp_path):
+def test_file_behind_standard_output_is_refused(tmp_path):
     for name in ("/dev/stdout", str(tmp_path / "printed")):
         with open(tmp_path / "printed", "w") as printed:
             done = kincheck(*RUN, "--junit", name, out=printed)
