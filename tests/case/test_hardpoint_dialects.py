@@ -13,7 +13,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
-from ..support.case_texts import complains, write
+from ..support.case_texts import complains, rows, write
 
 POINTS = {
     "uca_front": (-89.75, -259.75, 285.25),
@@ -47,34 +47,28 @@ def plain(tmp_path):
     return read(tmp_path, table().replace(";", ",")).mechanism
 
 
-OPTIMUM = {
-    "uca_front": "CHAS_UppFor",
-    "uca_rear": "CHAS_UppAft",
-    "uca_outer": "UPRI_UppPnt",
-    "lca_front": "CHAS_LowFor",
-    "lca_rear": "CHAS_LowAft",
-    "lca_outer": "UPRI_LowPnt",
-    "tierod_inner": "CHAS_TiePnt",
-    "tierod_outer": "UPRI_TiePnt",
-    "wheel_center": "Wheel_Centre",
-}
-LOTUS = dict(
+OPTIMUM = dict(
     zip(
         POINTS,
-        (
-            "Upper wishbone front pivot",
-            "Upper wishbone rear pivot",
-            "Upper wishbone outer ball joint",
-            "Lower wishbone front pivot",
-            "Lower wishbone rear pivot",
-            "Lower wishbone outer ball joint",
-            "Inner track rod ball joint",
-            "Outer track rod ball joint",
-            "Wheel centre point",
-        ),
+        "CHAS_UppFor CHAS_UppAft UPRI_UppPnt CHAS_LowFor CHAS_LowAft UPRI_LowPnt "
+        "CHAS_TiePnt UPRI_TiePnt Wheel_Centre".split(),
         strict=True,
     )
 )
+LOTUS = {
+    **{
+        f"{arm}_{end}": f"{place} wishbone {pivot}"
+        for arm, place in (("uca", "Upper"), ("lca", "Lower"))
+        for end, pivot in (
+            ("front", "front pivot"),
+            ("rear", "rear pivot"),
+            ("outer", "outer ball joint"),
+        )
+    },
+    "tierod_inner": "Inner track rod ball joint",
+    "tierod_outer": "Outer track rod ball joint",
+    "wheel_center": "Wheel centre point",
+}
 RIGHT = {f"{name}_right": (x, -y, z) for name, (x, y, z) in POINTS.items()}
 LEFT = {f"{name}_left": at for name, at in POINTS.items()}
 
@@ -182,18 +176,6 @@ def test_mirrored_axes_read_right_points(tmp_path, plain):
     assert read(tmp_path, text, said).mechanism == plain
 
 
-def integers(points=POINTS):
-    return {name: tuple(map(int, at)) for name, at in points.items()}
-
-
-def edited(old, new):
-    assert old in table()
-    return table().replace(old, new)
-
-
-THOUSANDS = table(points=integers()).replace("-611", "-1.611")
-
-
 def test_row_without_remark_is_read(tmp_path):
     """A point that is added below a table with remarks: a split number has one field more."""
     whole = table("name,x,y,z,meaning", "{},{},{},{},a remark")
@@ -201,93 +183,81 @@ def test_row_without_remark_is_read(tmp_path):
     assert found.mechanism == read(tmp_path, whole).mechanism
 
 
+EDITS = """
+thousands and decimals | -611.75 | -1.611,75
+    | line 10: wheel_center: y ... '-1.611,75' ... thousands
+two commas | -611.75 | -1,611,750 | '-1,611,750' ... thousands
+thousands by a blank | -611.75 | -1 611.75 | line 10 ... separators of thous
+thousands of the Swiss | -611.75 | -1'611.75 | separators of thousands
+below no head | 228.25 | 228;25 | line 10 ... found 5 fields
+points above the head | name;x | lca_front;1;2;3\\nname;x
+    | line 1 ... expected the head ... above the points
+row of two units | y;z | y;z\\n;mm;mm;m | line 2 ... name the point
+unknown unit | x;y;z | x [furlong];y [furlong];z [furlong] | unit ... 'furlong'
+sign of one y | -219.75 | 219.75
+    | tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... correct its
+formula | -611.75 | =A1+1 | line 10: wheel_center: y ... '=A1+1' ... save the
+error of a formula | -611.75 | #REF! | line 10: wheel_center: y ... '#REF!'
+unit in a cell | -611.75 | -611.75 mm | '-611.75 mm' ... leave the unit out
+fraction | -611.75 | -611 3/4 | '-611 3/4' ... correct the number
+letter O | -611.75 | -61O.75 | '-61O.75' ... correct the number
+NaN | -611.75 | NaN | 'NaN'
+infinite | -611.75 | inf | 'inf'
+dash for nothing | -611.75 | - | line 10: wheel_center: y ... '-'
+date | -611.75 | 2026-05-01 | '2026-05-01' ... took the number for a date
+hexadecimal | -611.75 | 0x1F | '0x1F'
+point without numbers | 0.25;-611.75;228.25 | ;; | line 10 ... complete the
+missing point | wheel_center;0.25;-611.75;228.25\\n | | missing wheel_center, the wheel's centre
+twice, equal | 228.25 | 228.25\\nwheel_center;0.25;-611.75;228.25 | given before, in line 10
+twice, named otherwise | 228.25 | 228.25\\nWheel Centre;0;-600;228.25 | 'Wheel Centre' (line
+"""
+
+
+@pytest.mark.parametrize(("old", "new", "message"), rows(EDITS))
+def test_hardpoint_table_edit_faults(tmp_path, old, new, message):
+    assert table().count(old) == 1
+    complains(write(tmp_path, table().replace(old, new), "car.csv"), message, SAID)
+
+
+WHOLE_NUMBERS = table(points={name: tuple(map(int, at)) for name, at in POINTS.items()})
+WITH_MASS = table("name,x,y,z,mass", "{},{},{},{},3")
+THOUSANDS = WHOLE_NUMBERS.replace("-611", "-1.611")
+AXLES = {f"{name}_{side}": at for name, at in POINTS.items() for side in ("FL", "RL")}
+METRES = {name: [x / 1000 for x in at] for name, at in POINTS.items()}
 FAULTS = {
-    "both signs": (comma(table()).replace("-611,75", "-611.75"), "line 10 ... '-611.75' ... above"),
-    "thousands and decimals": (
-        table().replace("-611.75", "-1.611,75"),
-        "line 10: wheel_center: y ... '-1.611,75' ... thousands",
+    "line 10 ... '-611.75' ... above": comma(table()).replace("-611,75", "-611.75"),
+    "'-1.611' ... is -1.611 or -1611 ... write -1.6110 or -1611": THOUSANDS,
+    "'-1,611' ... is -1.611 or -1611": comma(THOUSANDS),
+    "found '-1,611' ... is -1.611 or -1611": (
+        WHOLE_NUMBERS.replace(";", ",").replace("-611", '"-1,611"')
     ),
-    "two commas": (table().replace("-611.75", "-1,611,750"), "'-1,611,750' ... thousands"),
-    "grouped or not": (THOUSANDS, "'-1.611' ... is -1.611 or -1611 ... write -1.6110 or -1611"),
-    "grouped by comma": (comma(THOUSANDS), "'-1,611' ... is -1.611 or -1611"),
-    "quoted and grouped": (
-        comma(table(points=integers())).replace(";", ",").replace("-611", '"-1,611"'),
-        "'-1,611' ... is -1.611 or -1611",
+    "line 2 ... found 7 fields, expected 4 ... decimal comma needs semicolons": (
+        comma(table()).replace(";", ",")
     ),
-    "decimal commas between commas": (
-        comma(table()).replace(";", ","),
-        "line 2 ... found 7 fields, expected 4 ... decimal comma needs semicolons",
+    "line 4 ... decimal comma needs semicolons": (
+        WITH_MASS.replace("15.25,-539.75,312.25,3", "15,25,-539,312,")
     ),
-    "shifted by a comma": (
-        table("name,x,y,z,mass", "{},{},{},{},3").replace(
-            "15.25,-539.75,312.25,3", "15,25,-539,312,"
-        ),
-        "line 4 ... decimal comma needs semicolons",
+    "line 4 ... complete the row": WITH_MASS.replace("15.25,-539.75,312.25,3", "15,-539,312"),
+    "line 1 ... 'x' twice": table("name;x [mm];y [mm];z [mm];x [m]", "{};{};{};{};1"),
+    "is not UTF-16": table().encode("utf-16")[:-1],
+    "line 10 ... separators of thousands": table().replace("-611.75", "-1\u202f611.75"),
+    "'\u2013611.75' ... as a hyphen": table().replace("-611.75", "\u2013611.75"),
+    "uca_front ... 'uca_front_FL' (line 2) and 'uca_front_RL' (line 3) ... expected one": (
+        table(points=AXLES)
     ),
-    "shorter by a comma": (
-        table("name,x,y,z,mass", "{},{},{},{},3").replace("15.25,-539.75,312.25,3", "15,-539,312"),
-        "line 4 ... complete the row",
-    ),
-    "below no head": (table().replace("228.25", "228;25"), "line 10 ... found 5 fields"),
-    "two x": (table("name;x [mm];y [mm];z [mm];x [m]", "{};{};{};{};1"), "line 1 ... 'x' twice"),
-    "points above the head": (
-        "lca_front;1;2;3\n" + table(),
-        "line 1 ... expected the head ... above the points",
-    ),
-    "row of two units": (table("name;x;y;z\n;mm;mm;m"), "line 2 ... name the point"),
-    "half of UTF-16": (table().encode("utf-16")[:-1], "is not UTF-16"),
-    "sign of one y": (
-        edited("-219.75", "219.75"),
-        ("tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... correct its"),
-    ),
-    "thousands by a blank": (edited("-611.75", "-1 611.75"), "line 10 ... separators of thous"),
-    "thousands of the French": (
-        edited("-611.75", "-1\u202f611.75"),
-        "line 10 ... separators of thousands",
-    ),
-    "thousands of the Swiss": (edited("-611.75", "-1'611.75"), "separators of thousands"),
-    "formula": (edited("-611.75", "=A1+1"), "line 10: wheel_center: y ... '=A1+1' ... save the"),
-    "error of a formula": (edited("-611.75", "#REF!"), "line 10: wheel_center: y ... '#REF!'"),
-    "dash": (edited("-611.75", "\u2013611.75"), "'–611.75' ... as a hyphen"),
-    "unit in a cell": (edited("-611.75", "-611.75 mm"), "'-611.75 mm' ... leave the unit out"),
-    "fraction": (edited("-611.75", "-611 3/4"), "'-611 3/4' ... correct the number"),
-    "letter O": (edited("-611.75", "-61O.75"), "'-61O.75' ... correct the number"),
-    "NaN": (edited("-611.75", "NaN"), "'NaN'"),
-    "infinite": (edited("-611.75", "inf"), "'inf'"),
-    "dash for nothing": (edited("-611.75", "-"), "line 10: wheel_center: y ... '-'"),
-    "date": (edited("-611.75", "2026-05-01"), "'2026-05-01' ... took the number for a date"),
-    "hexadecimal": (edited("-611.75", "0x1F"), "'0x1F'"),
-    "a point without numbers": (edited("0.25;-611.75;228.25", ";;"), "line 10 ... complete the"),
-    "missing point": (
-        edited("wheel_center;0.25;-611.75;228.25\n", ""),
-        "missing wheel_center, the wheel's centre",
-    ),
-    "front and rear corners": (
-        table(
-            points={f"{name}_{side}": at for name, at in POINTS.items() for side in ("FL", "RL")}
-        ),
-        ("uca_front ... 'uca_front_FL' (line 2) and 'uca_front_RL' (line 3) ... expected one"),
-    ),
-    "twice, equal": (table() + "wheel_center;0.25;-611.75;228.25\n", "given before, in line 10"),
-    "twice, named otherwise": (table() + "Wheel Centre;0;-600;228.25\n", "'Wheel Centre' (line"),
-    "metres said to be mm": (
-        table(points={name: tuple(x / 1000 for x in at) for name, at in POINTS.items()}),
-        "span ... metres declared as mm?",
-    ),
-    "no head at all": (table(row="{};1;{};{};{}").partition("\n")[2], "expected the head"),
-    "two tables": (table() + "\n" + table(), "a second head ... keep one"),
-    "two dimensions": ("name;x;y\nwheel;1;2\n", "expected the head name,x,y,z"),
-    "head of one letter": ("x\n1\n", "expected the head name,x,y,z"),
-    "unknown unit": (table("name;x [furlong];y [furlong];z [furlong]"), "unit ... 'furlong'"),
-    "JSON": ('{"wheel_center": [0, 1, 2]}', "expected the head"),
-    "control characters": (table().encode() + b"\x00\x01\xff", "a binary file, expected text"),
+    "span ... metres declared as mm?": table(points=METRES),
+    "line 1 ... expected the head": table(row="{};1;{};{};{}").partition("\n")[2],
+    "a second head ... keep one": table() + "\n" + table(),
+    "expected the head name,x,y,z": "name;x;y\nwheel;1;2\n",
+    "line 1 ... expected the head name,x,y,z": "x\n1\n",
+    "expected the head": '{"wheel_center": [0, 1, 2]}',
+    "a binary file, expected text": table().encode() + b"\x00\x01\xff",
 }
 
 
-@pytest.mark.parametrize("kind", FAULTS)
-def test_hardpoint_table_dialect_faults(tmp_path, kind):
-    text, fragments = FAULTS[kind]
-    complains(write(tmp_path, text, "car.csv"), fragments, SAID)
+@pytest.mark.parametrize(("message", "text"), FAULTS.items(), ids=FAULTS)
+def test_hardpoint_table_dialect_faults(tmp_path, message, text):
+    complains(write(tmp_path, text, "car.csv"), message, SAID)
 
 
 @pytest.mark.parametrize("unit", ["inch", "in", "inches"])
