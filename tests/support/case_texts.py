@@ -83,14 +83,14 @@ def complains(file, message, supplied=None):
     assert refused(lambda: read(file), message).startswith(str(file.parent))
 
 
-def rows(text):
-    """Parameters of a test from a table in a text: the name of each row, then its cells, between
-    bars. A line that begins with a bar goes on with the row above.
+def rows(text, named=True):
+    """Parameters of a test from a table in a text, cells between bars; the first names the row.
+    A line that begins with a bar goes on with the row above.
     """
     table = []
     for line in re.sub(r"\n *\|", "|", text.strip()).splitlines():
-        name, *cells = (cell.strip().replace(r"\n", "\n") for cell in line.split("|"))
-        table.append(pytest.param(*cells, id=name))
+        cells = [cell.strip().replace(r"\n", "\n") for cell in line.split("|")]
+        table.append(pytest.param(*cells[named:], id=cells[0]))
     return table
 
 
