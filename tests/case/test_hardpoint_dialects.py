@@ -298,12 +298,15 @@ def test_names_file_precedes_known_names(tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "fragments"),
-    [
-        ('lca_inner = "lca_front"', "names.toml: lca_inner ... expected a role ... lca_outer"),
-        ('lca_front = "lca_fornt"', "names.toml: lca_front ... 'lca_fornt' ... 'lca_front'"),
-        ("lca_front = 3", "names.toml: lca_front ... found 3 ... quotes"),
-        ("lca_front", "names.toml ... not valid TOML"),
-    ],
+    rows(
+        """
+lca_inner = "lca_front" | names.toml: lca_inner ... expected a role ... lca_outer
+lca_front = "lca_fornt" | names.toml: lca_front ... 'lca_fornt' ... 'lca_front'
+lca_front = 3 | names.toml: lca_front ... found 3 ... quotes
+lca_front | names.toml ... not valid TOML
+""",
+        named=False,
+    ),
 )
 def test_names_file_faults(tmp_path, line, fragments):
     complains(write(tmp_path, table(), "car.csv"), fragments, named(tmp_path, line))
@@ -473,13 +476,16 @@ def test_misspelt_names_are_taken_with_note(tmp_path, plain):
 
 @pytest.mark.parametrize(
     ("role", "name"),
-    [
-        ("uca_front", "lca_front2"),
-        ("uca_rear", "uca_front_2"),
-        ("tierod_outer", "tierod_inner_2"),
-        ("wheel_center", "wheel_cont"),
-        ("wheel_center", "hub"),
-    ],
+    rows(
+        """
+uca_front | lca_front2
+uca_rear | uca_front_2
+tierod_outer | tierod_inner_2
+wheel_center | wheel_cont
+wheel_center | hub
+""",
+        named=False,
+    ),
 )
 def test_names_of_other_points_are_refused(tmp_path, role, name):
     with pytest.raises(CaseError, match=f"missing {role}"):

@@ -9,6 +9,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 
 from ..report.page import Page
+from ..support.case_texts import rows
 from ..support.rods_of_templates import CLOSE, expected
 
 TEMPLATE = TEMPLATES["double_wishbone"]
@@ -119,16 +120,19 @@ def test_compare_beyond_reach_has_status_2(tmp_path, old, new, capsys):
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [
-        ("OLD", "found one design, expected two or more"),
-        ("OLD NEW OLD", "found twice"),
-        ("OLD nosuch.csv", "nosuch.csv: no such file"),
-        ("OLD four_bar", "four_bar: found the driver crank, expected stroke"),
-        ("OLD NEW --tolerance tow=1", "did you mean 'toe'?"),
-        ("OLD NEW --tolerance toe=1mm", "expected an angle"),
-        ("OLD NEW --tolerance toe", "expected a positive number"),
-        ("OLD NEW --axle hheave", "did you mean 'heave'?"),
-    ],
+    rows(
+        """
+OLD | found one design, expected two or more
+OLD NEW OLD | found twice
+OLD nosuch.csv | nosuch.csv: no such file
+OLD four_bar | four_bar: found the driver crank, expected stroke
+OLD NEW --tolerance tow=1 | did you mean 'toe'?
+OLD NEW --tolerance toe=1mm | expected an angle
+OLD NEW --tolerance toe | expected a positive number
+OLD NEW --axle hheave | did you mean 'heave'?
+""",
+        named=False,
+    ),
 )
 def test_compare_invalid_arguments_are_refused(old, new, capsys, given, said):
     words = given.replace("OLD", old).replace("NEW", new).split()
