@@ -10,7 +10,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_tab
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
-from ..support.case_texts import complains
+from ..support.case_texts import complains, rows, supplied, write
 from ..support.rods_of_templates import CLOSE, DATA, RODS, expected, solved
 from ..support.written_again import written_again
 
@@ -66,33 +66,31 @@ def test_road_outputs_need_wheel_radius():
     assert track.at == "wheel_center"
 
 
-@pytest.mark.parametrize(
-    ("supplied", "extra", "fragments"),
-    [
-        ({"wheel_radius": "30 deg"}, "", "--wheel-radius ... '30 deg' ... a length"),
-        (
-            {"wheel_radius": "300"},
-            "",
-            "--wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm",
-        ),
-        ({"wheel_radius": "-0.3"}, "", "found -0.3 m ... correct it"),
-        ({"wheelbase": "2600"}, "", "--wheelbase ... 0.1 to 20 m ... 2600mm"),
-        ({"cg_height": "500"}, "", "--cg-height ... 0.005 to 6 m ... 500mm"),
-        ({"rack_per_turn": "50"}, "", "--rack-per-turn ... 0.001 to 1 m ... 50mm"),
-        ({"wheel_radius": "0.3"}, "wheel_contact,0,612,0\n", "--wheel-radius ... wheel_contact"),
-        ({}, "wheel_contact,0,612,220\n", "wheel_contact ... 0.008 m"),
-        ({}, "wheel_axis,0,412,228\n", "wheel_axis ... inboard ... mirror"),
-    ],
-)
-def test_suspension_option_and_wheel_faults(tmp_path, supplied, extra, fragments):
-    file = tmp_path / "car.csv"
-    rows = [
-        f"{role},{','.join(repr(1000.0 * x) for x in place)}\n"
-        for role, place in TEMPLATES["double_wishbone"].sample.items()
+FAULTS = """
+angle | wheel_radius=30deg | | --wheel-radius ... '30deg' ... a length
+radius in mm | wheel_radius=300 |
+    | --wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm
+negative radius | wheel_radius=-0.3 | | found -0.3 m ... correct it
+wheelbase in mm | wheelbase=2600 | | --wheelbase ... 0.1 to 20 m ... 2600mm
+height in mm | cg_height=500 | | --cg-height ... 0.005 to 6 m ... 500mm
+rack in mm | rack_per_turn=50 | | --rack-per-turn ... 0.001 to 1 m ... 50mm
+radius and contact | wheel_radius=0.3 | wheel_contact,0,612,0 | --wheel-radius ... wheel_contact
+contact at centre | | wheel_contact,0,612,220 | wheel_contact ... 0.008 m
+axis inboard | | wheel_axis,0,412,228 | wheel_axis ... inboard ... mirror
+"""
+
+
+@pytest.mark.parametrize(("options", "extra", "message"), rows(FAULTS))
+def test_suspension_option_and_wheel_faults(tmp_path, options, extra, message):
+    places = TEMPLATES["double_wishbone"].sample.items()
+    lines = [
+        f"{role},{1e3 * x!r},{1e3 * y!r},{1e3 * z!r}"
+        for role, (x, y, z) in places
         if role != "wheel_contact"
     ]
-    file.write_text("name,x,y,z\n" + "".join(rows) + extra)
-    complains(file, fragments, Supplied("double_wishbone", "mm", "iso", **supplied))
+    file = write(tmp_path, "\n".join(["name,x,y,z", *lines, extra]), "car.csv")
+    said = supplied(f"template=double_wishbone units=mm axes=iso {options}")
+    complains(file, message, said)
 
 
 def test_templates_command_prints_runnable_tables(tmp_path, capsys):
