@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from .support.case_texts import rows
 from .support.sources import SOURCES, folder_of, imported, module_of, tree
 
 LAYERS = (
@@ -174,55 +175,39 @@ def test_sources_import_by_table():
     assert found == {}
 
 
-OFFENDERS = [
-    ("core/algebra.py", "from .mechanism.motions import JointAngle"),
-    ("core/primitives/new.py", "from ..joints.base import Joint"),
-    ("core/kinematics/new.py", "from ..harness import record"),
-    ("core/kinematics/new.py", "def f():\n    from .. import harness"),
-    (
-        "core/kinematics/formulation/new.py",
-        "from ..structure.components import Section",
-    ),
-    ("core/kinematics/continuation/new.py", "from .. import blocks"),
-    ("core/harness/run.py", "from ... import adapters"),
-    ("core/kincheck/new.py", "from kincheck.adapters import engine"),
-    ("core/kincheck/new.py", "from kincheck.core.program import Tape"),
-    ("core/harness/run.py", "from ...cases import load"),
-    ("core/history/new.py", "from ..report import table"),
-    ("core/extra/new.py", "from ..algebra import Vec3"),
-    ("core/mechanism/new.py", "from kincheck.core.joints import Joint"),
-    (
-        "adapters/mujoco/new.py",
-        "from ..pinocchio.dynamics import Dynamics",
-    ),
-    ("adapters/shared/new.py", "from ..mujoco.mujoco import MuJoCo"),
-    ("adapters/mujoco/new.py", "from ...cases import load"),
-    ("cases/rssr.py", "from ..adapters import engine"),
-]
+OUTSIDE = """
+core/algebra.py | from .mechanism.motions import JointAngle
+core/primitives/new.py | from ..joints.base import Joint
+core/kinematics/new.py | from ..harness import record
+core/kinematics/new.py | def f():\\n    from .. import harness
+core/kinematics/formulation/new.py | from ..structure.components import Section
+core/kinematics/continuation/new.py | from .. import blocks
+core/harness/run.py | from ... import adapters
+core/kincheck/new.py | from kincheck.adapters import engine
+core/kincheck/new.py | from kincheck.core.program import Tape
+core/harness/run.py | from ...cases import load
+core/history/new.py | from ..report import table
+core/extra/new.py | from ..algebra import Vec3
+core/mechanism/new.py | from kincheck.core.joints import Joint
+adapters/mujoco/new.py | from ..pinocchio.dynamics import Dynamics
+adapters/shared/new.py | from ..mujoco.mujoco import MuJoCo
+adapters/mujoco/new.py | from ...cases import load
+cases/rssr.py | from ..adapters import engine
+"""
+INSIDE = """
+core/kinematics/compiled/new.py | from ...program import Tape\\nfrom . import request
+core/cli/main.py | def f():\\n    from ... import adapters, cases
+adapters/mujoco/new.py
+    | from ...core.mechanism.mechanism import Body\\nfrom ..shared.projection import project
+"""
 
 
-@pytest.mark.parametrize(("path", "text"), OFFENDERS)
+@pytest.mark.parametrize(("path", "text"), rows(OUTSIDE, named=False))
 def test_import_outside_table_is_found(path, text):
     assert list(imports_against_the_table(Path(path), ast.parse(text)))
 
 
-ALLOWED = [
-    (
-        "core/kinematics/compiled/new.py",
-        "from ...program import Tape\nfrom . import request",
-    ),
-    (
-        "core/cli/main.py",
-        "def f():\n    from ... import adapters, cases",
-    ),
-    (
-        "adapters/mujoco/new.py",
-        "from ...core.mechanism.mechanism import Body\nfrom ..shared.projection import project",
-    ),
-]
-
-
-@pytest.mark.parametrize(("path", "text"), ALLOWED)
+@pytest.mark.parametrize(("path", "text"), rows(INSIDE, named=False))
 def test_import_inside_table_passes(path, text):
     assert list(imports_against_the_table(Path(path), ast.parse(text))) == []
 
