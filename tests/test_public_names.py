@@ -47,21 +47,6 @@ mode = "monte_carlo"
 units = { length = "mm", angle = "deg" }
 hardpoints.lca_front = { at = "lca_front", sigma = 1.0 }
 """
-HELP = """
-import contextlib, io, sys
-from kincheck.core.cli.main import main
-with contextlib.redirect_stdout(io.StringIO()):
-    status = main(["--help"])
-print(status, *sorted({name.split(".")[0] for name in sys.modules} & {"numpy", "scipy", "rich"}))
-"""
-
-
-def test_help_loads_no_library():
-    """In a fresh interpreter: with numpy, help and completion would take four times as long."""
-    found = subprocess.run(
-        [sys.executable, "-c", HELP], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert found.stdout.split() == ["0"]
 
 
 @pytest.mark.parametrize("name", kincheck.__all__)

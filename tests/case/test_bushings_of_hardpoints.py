@@ -1,6 +1,7 @@
 """Bushings of hardpoint tables by role, and of Project Chrono's files, by the command and files."""
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,7 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.mechanism.loads import SpringDamper
 from kincheck.core.studies.compliance.study import compliance
 
+from ..support.case_texts import rows, write
 from ..support.sources import ROOT
 
 AXLE = json.loads((ROOT / "tests/data/elastokinematics/8_hmmwv_axle.json").read_text())
@@ -154,31 +156,27 @@ def test_axle_bushings_are_mirrored(tmp_path, capsys):
     assert C[:6, :6] == pytest.approx(mirror @ C[6:, 6:] @ mirror, abs=1e-13 * np.abs(C).max())
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("[bushings.lca_frnt]\nstiffness = 5e6\n", "did you mean 'lca_front'"),
-        ("[bushings.wheel_center]\nstiffness = 5e6\n", "a role of a joint of double_wishbone"),
-        (
-            "[joints.tie_rod.bushings.a]\nstiffness = 5e6\npoint = [0.07, 0.22, 0.16]\n",
-            r"at neither end of the rod; give the one on 'ground', \[0.07 m, 0.22 m, 0.15 m\]",
-        ),
-        (
-            '[joints.tie_rod.bushings.a]\nstiffness = 5e6\nbodies = ["ground", "lca"]\n',
-            "are not those of the rod, 'ground' and 'knuckle'; leave bodies out",
-        ),
-        ("[bushings.lca_front]\nstiffness = -3.0\n", "zero or more"),
-        ("[bushings.lca_front]\nstifness = 3.0\n", "did you mean 'stiffness'"),
-        ("[bushings.lca_front]\n", "has no stiffness"),
-        ("", "found no bushing"),
-    ],
-)
-def test_bushings_contradicting_table_are_refused(tmp_path, capsys, text, expected):
+FAULTS = """
+misspelt role | [bushings.lca_frnt]\\nstiffness = 5e6 | did you mean 'lca_front'
+role of no joint | [bushings.wheel_center]\\nstiffness = 5e6
+    | a role of a joint of double_wishbone
+beside the rod | [joints.tie_rod.bushings.a]\\nstiffness = 5e6\\npoint = [0.07, 0.22, 0.16]
+    | at neither end of the rod; give the one on 'ground', [0.07 m, 0.22 m, 0.15 m]
+other bodies | [joints.tie_rod.bushings.a]\\nstiffness = 5e6\\nbodies = ["ground", "lca"]
+    | are not those of the rod, 'ground' and 'knuckle'; leave bodies out
+negative stiffness | [bushings.lca_front]\\nstiffness = -3.0 | zero or more
+misspelt key | [bushings.lca_front]\\nstifness = 3.0 | did you mean 'stiffness'
+no stiffness | [bushings.lca_front] | has no stiffness
+empty | | found no bushing
+"""
+
+
+@pytest.mark.parametrize(("text", "message"), rows(FAULTS))
+def test_bushings_contradicting_table_are_refused(tmp_path, capsys, text, message):
     table = sample(tmp_path, capsys, "double_wishbone")
-    rubber = tmp_path / "rubber.toml"
-    rubber.write_text(text)
-    with pytest.raises(KincheckError, match=expected):
-        load(table, Supplied(bushings=rubber))
+    said = Supplied(bushings=write(tmp_path, text, "rubber.toml"))
+    with pytest.raises(KincheckError, match=re.escape(message)):
+        load(table, said)
 
 
 def test_kc_lists_slopes_without_value(tmp_path, capsys):
