@@ -68,13 +68,11 @@ def test_interrupt_during_imports_is_one_line(count, number, status, said):
     assert stopped_at("import", count, number, "list") == (status, "", f"kincheck: {said}\n")
 
 
-@pytest.mark.parametrize(
-    "command", [["list"], "run rssr --engine native".split(), ["trace", "four_bar"], ["doctor"]]
-)
-def test_interrupt_of_command_is_one_line(command):
+@pytest.mark.parametrize("line", ["list", "run rssr --engine native", "trace four_bar", "doctor"])
+def test_interrupt_of_command_is_one_line(line):
     """Texts that imports compile, which make Python end by the signal if it is left to itself."""
     for count in (5, 40):
-        status, _, err = stopped_at("exec", count, signal.SIGINT, *command)
+        status, _, err = stopped_at("exec", count, signal.SIGINT, *line.split())
         assert (status, lines(err)) == (130, ["kincheck: interrupted"])
 
 

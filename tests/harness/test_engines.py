@@ -18,8 +18,8 @@ from kincheck.core.harness.engine import Unloadable, versions
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
-from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 from ..support.mechanisms import placed
+from ..support.version_engines import DEEDS, Foreign, Loading, Ours
 
 # Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in
 # geometry cannot hide.

@@ -1,4 +1,4 @@
-"""What makes the command line quick to use: completion, patterns, -q and -v, numbers, progress."""
+"""The command line at the terminal: completion, patterns, -q and -v, numbers, progress, widths."""
 
 import io
 import re
