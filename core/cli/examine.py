@@ -16,7 +16,7 @@ from ..options import (
     group,
     joint_types,
     json_file,
-    measured,
+    number_with_unit,
     option,
     options,
     positive,
@@ -25,7 +25,7 @@ from ..options import (
 )
 from .files import formats, keep_texts
 from .parser import Command
-from .registry import Registry, Status, given
+from .registry import Registry, Status, names_of_given
 from .shared_options import TOL, driver_value
 
 if TYPE_CHECKING:
@@ -212,7 +212,7 @@ class ListAssemblies(Command):
     at: str | None = option(
         "value of the swept driver, such as 30mm or -20deg, in SI without a unit; default: the"
         " design position",
-        measured,
+        number_with_unit,
         "VALUE",
     )
     samples: int = option(
@@ -237,7 +237,7 @@ class ListAssemblies(Command):
         from ..report.terminal import with_json
         from ..studies.assemblies import survey, written
 
-        if self.export is None and (found := given(self, ("number", "out"))):
+        if self.export is None and (found := names_of_given(self, ("number", "out"))):
             raise KincheckError(
                 f"{found}: only an export uses it. Add --export FORMAT, or leave it out."
             )

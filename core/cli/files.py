@@ -18,7 +18,7 @@ from ..options import (
     group,
     joint_types,
     json_file,
-    measured,
+    number_with_unit,
     option,
     options,
     switch,
@@ -64,7 +64,7 @@ class Export(Command):
     at: str | None = option(
         "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
         " default: the design position",
-        measured,
+        number_with_unit,
         "VALUE",
     )
     joint_type: tuple[str, ...] = joint_types()
@@ -238,7 +238,7 @@ class Same(Command):
             first, *others = (_read(name, registry, self.without) for name in names)
             used = {name for each in (first, *others) for name in each.without}
             require_used(Path(names[0]), self.without, used)
-            others += [_converted(name, Path(names[0]), registry) for name in self.converted_by]
+            others += [_convert(name, Path(names[0]), registry) for name in self.converted_by]
         except KincheckError as error:
             unread = {"files": [*names], "verdict": "not judged", "reason": str(error)}
             with with_json({**unread, **NO_MOTION}, self.json):
@@ -272,7 +272,7 @@ def _read(name: str, registry: Registry, without: Sequence[str]) -> Undriven:
     return undriven_case(registry.find_case(name, driven=False), name)
 
 
-def _converted(name: str, file: Path, registry: Registry) -> Undriven:
+def _convert(name: str, file: Path, registry: Registry) -> Undriven:
     """Return what a simulator saves of a model."""
     from ..case.models.undriven import undriven_file
 

@@ -169,7 +169,7 @@ def driver_value(text: str | None, case: Case) -> float | None:
         ) from None
 
 
-def judged(
+def with_references(
     cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
 ) -> tuple[list[Case], list[str]]:
     """Return the cases with the references in these files, and notes on how a curve was read.

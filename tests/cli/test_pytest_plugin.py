@@ -129,7 +129,7 @@ def bad_engines(monkeypatch):
             message=f"{engine.name} cannot",
         )
 
-    monkeypatch.setattr(pytest_plugin, "_solved", solved)
+    monkeypatch.setattr(pytest_plugin, "_solve", solved)
 
 
 def test_plugin_maps_each_outcome(bad_engines, pytest_there):

@@ -19,7 +19,7 @@ from kincheck.core.program import disk_cache
 @pytest.fixture
 def without_imports(monkeypatch):
     """Nothing is imported in processes of their own: that takes seconds."""
-    monkeypatch.setattr(installation, "_imported", lambda found, *others: found)
+    monkeypatch.setattr(installation, "_with_import_problems", lambda found, *others: found)
 
 
 def missing(monkeypatch, *names):
@@ -125,7 +125,7 @@ def test_doctor_fails_without_essential_library(without_imports, monkeypatch, ca
 def test_doctor_finds_broken_library(imported, said, monkeypatch):
     monkeypatch.setattr(installation, "PATIENCE", 5.0 if "sleep" not in imported else 0.5)
     part = installation.Part("numpy", "1.0", "kincheck", True, "", "")
-    (found,) = installation._imported([part], {"numpy": imported}, {})
+    (found,) = installation._with_import_problems([part], {"numpy": imported}, {})
     assert said in found.problem
     assert found.remedy == "pip install --force-reinstall numpy"
 
@@ -134,13 +134,13 @@ def test_doctor_runs_no_module_of_the_working_folder(monkeypatch, tmp_path):
     (tmp_path / "msgspec.py").write_text("raise SystemExit('planted')")
     monkeypatch.chdir(tmp_path)
     part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
-    assert installation._imported([part], {}, {}) == [part]
+    assert installation._with_import_problems([part], {}, {}) == [part]
 
 
 def test_a_missing_system_library_is_named():
     part = installation.Part("pin", "4.1", "engine", False, "", "")
     broken = {"pin": "ctypes; ctypes.CDLL('libnothing.so.7')"}
-    (found,) = installation._imported([part], broken, {})
+    (found,) = installation._with_import_problems([part], broken, {})
     assert found.remedy.startswith("install the system's package with libnothing.so.7 (of Debian: ")
 
 
