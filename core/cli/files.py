@@ -12,7 +12,6 @@ from ..case.io.escape import file_name
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, refuse, unknown
 from ..options import (
-    ONE_CASE,
     argument,
     destination,
     group,
@@ -25,10 +24,9 @@ from ..options import (
 )
 from .parser import Command
 from .registry import Registry, Status, tell_left_out
-from .shared_options import driver_value, return_cases
+from .shared_options import OfCase, driver_value, return_cases
 
 if TYPE_CHECKING:
-    from ..case.case import Case
     from ..case.models.undriven import Undriven
 
 
@@ -49,14 +47,13 @@ def formats() -> str:
 
 
 @options
-class Export(Command):
+class Export(OfCase):
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
     A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
 
     about = "write a mechanism for a simulator"
-    case: str | Path | Case = argument(ONE_CASE, "CASE")
     to: str = destination(formats(), metavar="FORMAT", required=True)
     out: Path | None = destination(
         "stem of the written files; default: the case's name, in this folder", Path
@@ -67,8 +64,6 @@ class Export(Command):
         number_with_unit,
         "VALUE",
     )
-    joint_type: tuple[str, ...] = joint_types()
-    supplied: Supplied = group(default_factory=Supplied)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""

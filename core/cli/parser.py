@@ -127,6 +127,7 @@ class Command:
         epilog: end of the help.
         one_thread: whether its matrices are so small that threads of libraries wait for each other.
         below: commands below this one, by name, with the heading of their list.
+        LAST: options behind all others of the command.
         command: the command line.
     """
 
@@ -134,6 +135,7 @@ class Command:
     epilog: ClassVar[str | None] = None
     one_thread: ClassVar[bool] = False
     below: ClassVar[Mapping[str, type[Command]]] = {}
+    LAST: ClassVar[tuple[str, ...]] = ()
     command: str = field(default="", init=False)
 
     def run(self, registry: Registry) -> int:
