@@ -237,9 +237,9 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
     kinds = {
         kind: each.attributes.get("modelIdentifier", "")
         for kind in ("ModelExchange", "CoSimulation")
-        for each in root.only(kind)
+        for each in root.findall(kind)
     }
-    states = any(True for s in root.only("ModelStructure") for _ in _states(s, fmi))
+    states = any(True for s in root.findall("ModelStructure") for _ in _states(s, fmi))
     stepping = "CoSimulation" in kinds and (states or "ModelExchange" not in kinds)
     if not stepping and (states or "ModelExchange" not in kinds):
         problem = (
@@ -302,20 +302,20 @@ def _require_binary(file: Path, names: Sequence[str], fmi: int) -> None:
 
 def _states(structure: Element, fmi: int) -> Sequence[Element]:
     if fmi == 2:
-        return [u for each in structure.only("Derivatives") for u in each.only("Unknown")]
-    return [*structure.only("ContinuousStateDerivative")]
+        return [u for each in structure.findall("Derivatives") for u in each.findall("Unknown")]
+    return [*structure.findall("ContinuousStateDerivative")]
 
 
 def _variables(root: Element) -> list[Variable]:
     """Return the numbers of an FMU that change over time."""
     units = {
         kind.attributes.get("name", ""): real.attributes.get("unit", "")
-        for types in root.only("TypeDefinitions")
+        for types in root.findall("TypeDefinitions")
         for kind in types.children
-        for real in ([kind] if kind.tag == "Float64Type" else kind.only("Real"))
+        for real in ([kind] if kind.tag == "Float64Type" else kind.findall("Real"))
     }
     found = list[Variable]()
-    for each in (v for variables in root.only("ModelVariables") for v in variables.children):
+    for each in (v for variables in root.findall("ModelVariables") for v in variables.children):
         kinds = [each] if each.tag in _REALS else [e for e in each.children if e.tag in _REALS]
         own = each.attributes
         if not kinds or own.get("causality") in ("parameter", "calculatedParameter", "independent"):

@@ -346,8 +346,8 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
         raise root.fault("found another document, expected <Results> of Adams; give its .res")
     found = {
         (analysis.attributes.get("name", ""), data.attributes.get("name", "")): (analysis, data)
-        for analysis in root.only("Analysis")
-        for data in analysis.only("Data")
+        for analysis in root.findall("Analysis")
+        for data in analysis.findall("Data")
         if not data.attributes.get("name", "").startswith(_NO_MOTION)
     }
     names = {key: key[1] for key in found}
@@ -360,7 +360,7 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
         raise fault(file, "--analysis", f"found the analyses {listed}, expected one; {advice}")
     analysis, data = found[chosen[0]]
     heads = _heads(analysis)
-    steps = [(step, step.text.split()) for step in data.only("Step")]
+    steps = [(step, step.text.split()) for step in data.findall("Step")]
     for step, numbers in steps:
         if len(numbers) < max(heads, default=0):
             problem = f"found {len(numbers)} numbers, expected {max(heads)}, one a component"
@@ -379,14 +379,14 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
 def _heads(analysis: Element) -> Mapping[int, Head]:
     """Return the heads of components by their ids."""
     found = dict[int, Head]()
-    for entity in (each for map_ in analysis.only("StepMap") for each in map_.only("Entity")):
+    for entity in (each for map_ in analysis.findall("StepMap") for each in map_.findall("Entity")):
         name = entity.attributes.get("name", "")
         part = (
             entity.attributes.get("entity", ""),
             name.removesuffix(_POSE),
             f"PART_{entity.attributes.get('objectId', '')}",
         )
-        for each in entity.only("Component"):
+        for each in entity.findall("Component"):
             number = each.attributes.get("id", "")
             if not (number.isascii() and number.isdigit() and 0 < len(number) < 9 and int(number)):
                 problem = f"id: found {shown(number)}, expected a whole number from 1"

@@ -25,7 +25,7 @@ from markdown_it import MarkdownIt
 
 from ..report.page import Page
 from ..support.fakes import crank
-from ..support.made_up import results
+from ..support.strut_results import results
 
 NAMES = {
     "terminal": "\x1b[31m\x1b]0;title\x07\x9b2J",

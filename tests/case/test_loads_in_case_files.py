@@ -26,15 +26,14 @@ from kincheck.core.studies.diagnosis.diagnose import diagnose
 from kincheck.core.studies.diagnosis.text import print_diagnosis
 from kincheck.core.studies.verified_reference import prove_case
 
-from ..kinematics.test_chain import chain
-from ..kinematics.test_singular import BRANCH
 from ..oracles import naive
 from ..support.case_texts import complains, edited, write
 from ..support.engine_forces import Beside, every_force, force_case, values
 from ..support.four_bar_within_digits import solved, truth, written
-from ..support.loaded import loaded
+from ..support.loaded_slider_crank import loaded
 from ..support.loads import loaded as with_loads
 from ..support.loads import six
+from ..support.mechanisms import BRANCH, chain
 from ..support.written_again import written_again
 
 PLAIN = """
