@@ -107,7 +107,7 @@ class Axes(StrEnum):
     BODY = "body"
 
     @classmethod
-    def named(cls, who: str, name: Any) -> Axes:
+    def of(cls, who: str, name: Any) -> Axes:
         """Return the axes of a name.
 
         Raises:
@@ -293,7 +293,7 @@ class Force(ForceElement):
     def __post_init__(self) -> None:
         self._vector("point", Kind.POSITION.value)
         self._vector("vector", "a force [x, y, z]")
-        object.__setattr__(self, "frame", Axes.named(str(self), self.frame))
+        object.__setattr__(self, "frame", Axes.of(str(self), self.frame))
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -318,7 +318,7 @@ class Torque(ForceElement):
 
     def __post_init__(self) -> None:
         self._vector("vector", "a torque [x, y, z]")
-        object.__setattr__(self, "frame", Axes.named(str(self), self.frame))
+        object.__setattr__(self, "frame", Axes.of(str(self), self.frame))
 
     @property
     def bodies(self) -> tuple[str, ...]:

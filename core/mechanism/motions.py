@@ -258,7 +258,7 @@ class Path(ByContent):
             f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named
         )
 
-    def ended(self, here: float, wanted: float, last: float | None, reason: str) -> str:
+    def end_message(self, here: float, wanted: float, last: float | None, reason: str) -> str:
         """Return the message of a motion that cannot reach a time: its limit, and the last reached
         sample, if any.
         """

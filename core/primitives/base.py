@@ -116,7 +116,7 @@ class Row(NamedTuple):
     rj: Vec3
     pj: Vec3
 
-    def along(self, body: str, twist: Twist) -> Scalar:
+    def part(self, body: str, twist: Twist) -> Scalar:
         """Return the part of row . velocity of one body, "i" or "j"."""
         return (
             self.ri @ twist.v + self.pi @ twist.w
@@ -191,7 +191,7 @@ class Primitive(ABC):
         else:
             pair = traced.i, traced.j
             speeds = [
-                row.along("i", traced.vi) + row.along("j", traced.vj) - value
+                row.part("i", traced.vi) + row.part("j", traced.vj) - value
                 for row, value in zip(
                     traced.primitive.rows(*pair), traced.primitive.nu(*pair), strict=True
                 )

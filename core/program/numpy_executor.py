@@ -272,7 +272,7 @@ class NumpyExecutor:
                 row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
                 self._worsen(parts.worst)
-                for slot, k in plan.left:
+                for slot, k in plan.fixed_targets:
                     parts.ahead[member, k] = block[slot, -1]
 
         return call
@@ -334,7 +334,7 @@ class NumpyTrack:
         extrapolates = plan.extrapolates(lanes)
         carried, moved = (
             np.array(each).T
-            for each in (plan.carried, plan.moved if extrapolates else plan.carried)
+            for each in (plan.carried, plan.moves if extrapolates else plan.carried)
         )
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]

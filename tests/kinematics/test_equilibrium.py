@@ -121,7 +121,7 @@ def test_equilibrium_angle_of_loaded_arm(name):
     model = StaticModel(replace(ARM, forces=[element]), [LoadPoint("tip", "arm", (0.4, 0.0, 0.0))])
     found = model.solve({"tip": np.array([[0.0, load, 0.0, 0.0, 0.0, 0.0]])}, {})
     assert found.reached.all()
-    x, y, _ = found.turned("arm", X)[0]
+    x, y, _ = found.direction("arm", X)[0]
     assert math.atan2(y, x) == pytest.approx(angle, abs=1e-14)
 
 
@@ -195,7 +195,7 @@ def test_torque_beyond_dead_centre_is_refused():
     loads[:, 5] = k * r * d * np.array([-0.7, 0.999, 1.001, 40.0])
     found = model.solve({"o": loads}, {})
     assert found.reached.tolist() == [True, True, False, False]
-    x, y, _ = found.turned("arm", X)[:2].T
+    x, y, _ = found.direction("arm", X)[:2].T
     turns = np.arctan2(y, x) - math.atan2(0.8, 0.6)
     assert turns == pytest.approx([math.asin(-0.7), math.asin(0.999)], abs=1e-12)
     assert found.share[2:] == pytest.approx([1.0 / 1.001, 1.0 / 40.0], rel=1e-8)
@@ -229,7 +229,7 @@ def test_strut_equilibrium_agrees_with_simulators():
     expected = [each["wheel_center"] for each in rows]
     assert np.abs(found.place("knuckle", facts["wheel_center"]) - expected).max() <= 1e-15
     axes = [each["spin_axis"] for each in rows]
-    assert np.abs(found.turned("knuckle", facts["spin_axis"]) - axes).max() <= 1e-14
+    assert np.abs(found.direction("knuckle", facts["spin_axis"]) - axes).max() <= 1e-14
     wheel = [each["wheel_load"] for each in rows]
     assert found.efforts["stroke"] == pytest.approx(wheel, abs=1e-10)
     patch = tuple(facts["contact_patch"])

@@ -107,7 +107,7 @@ class BodyStates:
         """Return the angular velocity of a body [rad/s]."""
         return self.twists.get(body, GROUND_TWIST).w
 
-    def turned(self, body: str, vector: Sequence[float]) -> Vec3:
+    def turn(self, body: str, vector: Sequence[float]) -> Vec3:
         """Return a vector fixed in a body, given at design, in its current direction."""
         return self._pose(body).turn(vec(vector))
 
@@ -234,7 +234,7 @@ def torsion(
 ) -> Applied:
     """Return a torsional spring-damper at work at its joint's angle."""
     joint: Any = mechanism.joint(each.joint)
-    axis = at.turned(joint.i, [*unit(joint.axis)])
+    axis = at.turn(joint.i, [*unit(joint.axis)])
     rate = axis @ (at.spin(joint.j) - at.spin(joint.i))
     elastic = _elastic(each, angle - each.free_angle)
     amount = -(elastic + each.damping * rate)
@@ -246,7 +246,7 @@ def torsion(
 def constant(each: Force | Torque, at: BodyStates) -> Applied:
     """Return a constant force or torque at work."""
     body = each.body
-    vector = vec(each.vector) if each.frame is Axes.GLOBAL else at.turned(body, each.vector)
+    vector = vec(each.vector) if each.frame is Axes.GLOBAL else at.turn(body, each.vector)
     amount = root(sum(x * x for x in each.vector))
     if isinstance(each, Torque):
         return Applied(amount, {body: Wrench(ZERO, vector)}, 0.0, -(vector @ at.spin(body)))
@@ -273,7 +273,7 @@ def bushing(each: Bushing, at: BodyStates) -> Applied:
     """Return a bushing at work; its amount is the size of its force, or torque if it has none."""
     i, j, place = each.i, each.j, each.point
     d = at.place(j, place) - at.place(i, place)
-    axes = [at.turned(i, axis) for axis in each.triad]
+    axes = [at.turn(i, axis) for axis in each.triad]
     reach = at.arm(i, place) + d
     seen = at.velocity(j, place) - at.velocity(i, place) - cross(at.spin(i), d)
     turn = at.spin(j) - at.spin(i)
@@ -313,7 +313,7 @@ def _torque(each: Bushing, at: BodyStates) -> Vec3:
         for axis, k in zip(axes, each.turning_stiffness, strict=True):
             t = t + (2.0 * k * (axis @ turn.e)) * axis
         found = turn.e0 * t + cross(turn.e, t)
-    return at.turned(each.i, [*found])
+    return at.turn(each.i, [*found])
 
 
 def _cardan(stiffness: tuple[float, float, float], turn: Quat) -> Vec3:
@@ -376,7 +376,7 @@ class ForceEquations:
     left_out: Cartesian
 
     @classmethod
-    def traced(
+    def with_angles(
         cls, mechanism: Mechanism, formulation: Cartesian, at: Configuration, states: BodyStates
     ) -> ForceEquations:
         """Return the equations at a configuration that has the angles of torsional springs."""
@@ -439,7 +439,7 @@ class ForceEquations:
         for k, c in self._of_joints[joint.name]:
             if isinstance(c, Relation):
                 for name, weight in c.weights.items():
-                    measuring = self.formulation.measuring[name]
+                    measuring = self.formulation.measuring_rows[name]
                     share = self.rows[measuring][self.formulation.coordinates[name]]
                     yield measuring, -(weight / share) * multipliers[k]
             elif not c.coordinate:

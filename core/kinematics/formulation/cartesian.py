@@ -101,7 +101,7 @@ class Cartesian:
         return [c for c in self.constraints for _ in range(c.n)]
 
     @cached_property
-    def measuring(self) -> Mapping[str, int]:
+    def measuring_rows(self) -> Mapping[str, int]:
         """Number of the row that measures a named coordinate."""
         rows = enumerate(self.of_rows)
         return {c.coordinate: k for k, c in rows if isinstance(c, Constraint) and c.coordinate}
@@ -246,7 +246,7 @@ class Cartesian:
             if body in carried:
                 rows = self._bound(c, at).rows(*_pair(c, at))
                 found = [
-                    x - row.along(place, carried[body]) for x, row in zip(found, rows, strict=True)
+                    x - row.part(place, carried[body]) for x, row in zip(found, rows, strict=True)
                 ]
         return found
 

@@ -68,7 +68,7 @@ class Frames:
         """Return a point of a body: its position and arm."""
         return position, self.arm(body, position)
 
-    def attached(self, joint: _Joint) -> tuple[_Joint, Attachment, Attachment]:
+    def attach(self, joint: _Joint) -> tuple[_Joint, Attachment, Attachment]:
         """Return a joint in units, and how it is attached to both bodies."""
         i, j = (Attachment(self.origins[body]) for body in joint.bodies)
         return joint.scaled(1.0 / self.unit), i, j
@@ -184,7 +184,7 @@ def _compose(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Const
     # the ground as body i: its rows are constant and the simplified ones need nothing of body j
     backwards = original.symmetric and mechanism.is_fixed(original.j)
     joint = original.reversed() if backwards else original
-    scaled, i, j = frame.attached(joint)
+    scaled, i, j = frame.attach(joint)
     composed = scaled.primitives(i, j)
     return [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
 
@@ -206,7 +206,7 @@ def _axial(
     # the ground as body i: its rows are constant; but a named coordinate is that of body j relative
     # to body i, in this order
     joint = original.reversed() if fixed_last and not named else original
-    scaled, i, j = frame.attached(joint)
+    scaled, i, j = frame.attach(joint)
     composed = (
         [*scaled.mixed(i, j)]
         if mixed
@@ -269,7 +269,7 @@ def _driver_constraint(
         )
     if mixed:
         return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
-    scaled, i, j = frame.attached(joint)
+    scaled, i, j = frame.attach(joint)
     primitive: Any = scaled.measured(driver.freedom, i, j)
     return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
 

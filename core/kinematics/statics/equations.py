@@ -210,7 +210,7 @@ class StaticEquations:
         still = dict.fromkeys(bodies, Twist(ZERO, ZERO))
         rests = dict.fromkeys(bodies, GROUND_ACCELERATION)
         states = BodyStates(self.frame, at.poses, still, rests)
-        equations = ForceEquations.traced(self.mechanism, self._formulation, at, states)
+        equations = ForceEquations.with_angles(self.mechanism, self._formulation, at, states)
         demand = [*equations.demand]
         for each, first in zip(self.loads, range(0, len(pulls), 6), strict=True):
             force, torque = vec(pulls[first : first + 3]), vec(pulls[first + 3 : first + 6])

@@ -127,9 +127,9 @@ class Equilibria:
         """Return a point of a body, given at design [m], shape (n, 3)."""
         return np.array(position) + columns_of(self._at.place(body, position), len(self.share))
 
-    def turned(self, body: str, direction: Sequence[float]) -> Array:
+    def direction(self, body: str, design: Sequence[float]) -> Array:
         """Return a direction fixed in a body, given at design [-], shape (n, 3)."""
-        return columns_of(self._at.turned(body, direction), len(self.share))
+        return columns_of(self._at.turn(body, design), len(self.share))
 
     def motion(self, step: Array, body: str, position: Sequence[float]) -> Array:
         """Return the motion of a point and the turn of its body [m, rad], shape (n, 6, ...), for

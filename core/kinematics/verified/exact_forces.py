@@ -262,7 +262,7 @@ class ExactForces(ForceEquations):
         forces along it, at each body's own copy of the joint's point.
         """
         joint: Any = self.mechanism.joint(name)
-        on_second = load * self.states.turned(joint.i, [*unit(joint.axis)])
+        on_second = load * self.states.turn(joint.i, [*unit(joint.axis)])
         for body, push in ((joint.i, -on_second), (joint.j, on_second)):
             if freedom == "rotation":
                 yield body, Wrench(ZERO, push)
