@@ -27,8 +27,7 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import (
 )
 
 from ..support.case_texts import write
-from ..support.mechanisms import Z, slider_crank
-from .test_chain import chain
+from ..support.mechanisms import Z, chain, slider_crank
 
 LOOPS = 14  # 29 bodies
 WELDED = DENSE + 1

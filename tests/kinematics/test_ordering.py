@@ -13,7 +13,7 @@ from kincheck.core.program.straight_line import lower
 from kincheck.core.program.tape import LEAVES, operands
 
 from ..support.mechanisms import mcpherson
-from ..support.running import run_on
+from ..support.program_blocks import run_on
 
 
 def cycles(found):
@@ -43,7 +43,7 @@ def waiting(steps, beside):
     return program("p", tape, {100 + k: value for k, value in enumerate([*products, x])})
 
 
-def test_what_the_rest_waits_for_comes_first_and_the_rest_between():
+def test_ordering_starts_with_longest_chain():
     found = reschedule(waiting(5, 30))
     kinds = [node[0] for node in found.nodes if node[0] not in LEAVES]
     assert kinds[0] == "/"
@@ -51,13 +51,13 @@ def test_what_the_rest_waits_for_comes_first_and_the_rest_between():
     assert cycles(found) == 5 * CYCLES["/"] < cycles(waiting(5, 30))
 
 
-def test_what_has_no_need_to_wait_is_left_as_it_was_traced():
+def test_ordering_leaves_wide_program():
     wide = waiting(1, 90)
     assert reschedule(wide) is wide
 
 
 @pytest.mark.parametrize("width", [2, 4, 8])
-def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkeypatch):
+def test_ordering_depends_on_registers(width, monkeypatch):
     each = compile_model(mcpherson(), Request(("stroke",), ("wheel",), compiled=False)).programs[
         "newton"
     ]
@@ -71,7 +71,7 @@ def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkey
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_programs_of_a_mechanism_take_fewer_cycles_and_say_the_same(order):
+def test_ordering_keeps_results(order):
     model = compile_model(
         mcpherson(), Request(("stroke",), ("wheel",), ("strut", "knuckle"), order=order)
     )

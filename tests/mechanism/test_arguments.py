@@ -25,8 +25,7 @@ from kincheck.core import (
 )
 from kincheck.core.mechanism.motions import Motion, Table
 
-from ..kinematics.test_chain import chain
-from ..support.mechanisms import mcpherson
+from ..support.mechanisms import chain, mcpherson
 
 VALUES = np.linspace(-0.01, 0.01, 3)
 NO_NUMBERS = (None, "x", 1j, np.complex128(1.0), np.array([1.0 + 0.0j]), [1.0, 2.0])

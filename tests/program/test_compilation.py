@@ -24,8 +24,7 @@ from kincheck.core.program import Plan, Program, Tape, program
 from kincheck.core.program.llvm import jit as llvm
 from kincheck.core.program.llvm.jit import LlvmCode
 
-from ..kinematics.test_chain import chain
-from ..support.mechanisms import four_bar, mcpherson
+from ..support.mechanisms import chain, four_bar, mcpherson
 from .test_bytecode import every_slot
 
 pytestmark = pytest.mark.usefixtures("no_programs_kept")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck.core.program import Elimination, Tape, absolute, minimum, program
 
-from ..support.running import run_on
+from ..support.program_blocks import run_on
 
 LITERALS = [1.0, -1.0, 1.0, -1.0, 0.5, 0.3, -2.0]
 

@@ -34,8 +34,7 @@ from kincheck.core.program.llvm import compiler
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import LlvmCode
 
-from ..kinematics.test_chain import chain
-from ..support.mechanisms import four_bar, mcpherson
+from ..support.mechanisms import chain, four_bar, mcpherson
 
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 

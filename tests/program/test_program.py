@@ -22,7 +22,7 @@ from kincheck.core.program import (
     where_larger,
 )
 
-from ..support.running import numpy_executor, run_on
+from ..support.program_blocks import numpy_executor, run_on
 
 INPUTS = 4
 

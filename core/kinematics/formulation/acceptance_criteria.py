@@ -171,6 +171,9 @@ def regular_between(ratio: Array) -> bool:
         return False
     if np.linalg.norm(change) <= LARGEST_CHANGE:  # never smaller than that eigenvalue, and cheap
         return True
+    y = change.sum(axis=1)
+    if (change @ y <= LARGEST_CHANGE * y).all():  # bounds it too (Collatz and Wielandt)
+        return True
     return bool(np.abs(np.linalg.eigvals(change)).max() <= LARGEST_CHANGE)
 
 

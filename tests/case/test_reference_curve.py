@@ -8,18 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.io.reference_samples import read_table, samples_of
-from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
-from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
-from ..support.case_texts import refused
+from ..support.case_texts import refused, write
 from ..support.rods_of_templates import solved
+from ..support.suspension_files import strut_of_table
 
 # Two minutes of arc: the repeatability of a rig, made up; its noise is an eighth of that.
 ATOL = 2.0 / 60.0
@@ -30,10 +28,8 @@ ACCURACY = (f"toe={ATOL} deg", "camber=2 arcmin")
 @pytest.fixture(scope="module")
 def car(tmp_path_factory):
     """A case of hardpoints, and toe and camber on the rig's grid [deg]."""
-    file = tmp_path_factory.mktemp("car") / "car.csv"
-    file.write_text(sample_table(TEMPLATES["mcpherson"]))
-    case = load(file, Supplied(travel="0.05:21"))
-    fine = load(file, Supplied(travel="0.05:401"))
+    folder = tmp_path_factory.mktemp("car")
+    case, fine = (strut_of_table(folder, f"0.05:{count}") for count in (21, 401))
     wanted = tuple(each for each in fine.outputs if each.name in ("toe", "camber"))
     found = solved(replace(fine, outputs=wanted))
     noise = np.random.default_rng(5).normal(scale=ATOL / 8.0, size=(2, len(GRID)))
@@ -82,7 +78,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_a_curve_is_judged(tmp_path, car, kind):
+def test_measured_curve_is_judged(tmp_path, car, kind):
     record, notes, suspect = judged(car, rig(tmp_path, car[1], **FORMS[kind]), citation="made up")
     assert record.outcome is Outcome.PASS
     assert suspect is None
@@ -100,7 +96,7 @@ def test_a_curve_is_judged(tmp_path, car, kind):
     )
 
 
-def test_what_the_user_states(tmp_path, car):
+def test_curve_with_map_and_signs(tmp_path, car):
     """Columns of other names, one with the opposite sign and without a unit; signs; the samples."""
     toe, camber = car[1]
     file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
@@ -115,7 +111,7 @@ def test_what_the_user_states(tmp_path, car):
 
 
 @pytest.mark.parametrize("k", [0, 1])
-def test_a_shift_of_two_tolerances_is_found(tmp_path, car, k):
+def test_shifted_curve_fails(tmp_path, car, k):
     record, *_ = judged(car, rig(tmp_path, car[1]))
     name = ("toe", "camber")[k]
     shift = np.zeros((2, 1))
@@ -135,7 +131,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("change", SLIPS)
-def test_slips_are_named(tmp_path, car, change):
+def test_slip_of_curve_is_named(tmp_path, car, change):
     record, _, suspect = judged(car, rig(tmp_path, SLIPS[change](car[1])))
     assert record.outcome is Outcome.FAIL
     assert f"the reference {change} fits" in suspect.message
@@ -179,14 +175,14 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, car, kind):
+def test_faulty_curve_is_refused(tmp_path, car, kind):
     form, options, fragments = FAULTS[kind]
     file = rig(tmp_path, car[1], **form)
     message = refused(lambda: with_curve(car[0], file, CurveOptions(**options)), fragments)
     assert message.startswith(str(tmp_path))
 
 
-def test_the_command_line(tmp_path, car, capsys):
+def test_run_with_measured_curve(tmp_path, car, capsys):
     table = tmp_path / "car.csv"
     table.write_text(sample_table(TEMPLATES["mcpherson"]))
     toe, camber = car[1]
@@ -207,43 +203,34 @@ def test_the_command_line(tmp_path, car, capsys):
 
 
 @pytest.mark.parametrize("accuracy", ["0.02", "toe=0.02", "toe=0.02deg", "toe=0.02 deg"])
-def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
+def test_bare_accuracy_has_column_unit(tmp_path, car, accuracy):
+    """Without an output it holds for all columns."""
     case, rows = car
-    file = rig(tmp_path, rows, "Travel [mm],toe [deg]", "{0},{1}")
-    judged_by, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
-    (toe,) = [output for output in judged_by.outputs if output.name == "toe"]
-    assert toe.atol == pytest.approx(math.radians(0.02), rel=1e-14)
-
-
-def test_bare_accuracy_holds_for_all_columns(tmp_path, car):
-    case, rows = car
-    file = rig(tmp_path, rows, "Travel [mm],toe [deg],camber [rad]", "{0},{1},{2}")
-    judged_by, _ = with_curve(case, file, CurveOptions(accuracy=("0.02",)))
-    found = {output.name: output.atol for output in judged_by.outputs}
+    file = rig(tmp_path, rows, "Travel [mm],toe [deg],camber [rad]")
+    case, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
+    found = {output.name: output.atol for output in case.outputs}
     assert found["toe"] == pytest.approx(math.radians(0.02), rel=1e-14)
-    assert found["camber"] == 0.02
+    assert (found["camber"] == 0.02) == (accuracy == "0.02")
 
 
-def test_first_rows_with_gaps_are_samples(tmp_path):
-    """A lone number below the head is a sample without the other columns, and never a title."""
-    file = tmp_path / "rig.csv"
-    file.write_text("Travel [mm],toe [deg]\n-50,\n-40,\n0,0.1\n50,0.2\n")
-    samples = samples_of(read_table(file, None, "--sheet"), [0, 1], gaps=True)
-    assert samples.numbers[:, 0].tolist() == [-50.0, -40.0, 0.0, 50.0]
+@pytest.mark.parametrize(
+    ("rows", "travel"),
+    [
+        # a lone number below the head is a sample without the other columns, and never a title
+        ("-50,\n-40,\n0,0.1\n50,0.2\n", [-50.0, -40.0, 0.0, 50.0]),
+        ("-50,0.3\n,,\n50,0.2\n", [-50.0, 50.0]),
+    ],
+    ids=["gaps", "blank row"],
+)
+def test_first_column_of_curve(tmp_path, rows, travel):
+    file = write(tmp_path, f"Travel [mm],toe [deg]\n{rows}", "rig.csv")
+    samples = samples_of(read_table(file, None, "--sheet"), [0, 1], remarks=True, gaps=True)
+    assert samples.numbers[:, 0].tolist() == travel
 
 
-def test_rows_of_a_case_are_no_remarks(tmp_path):
+def test_remark_in_case_reference_is_refused(tmp_path):
     """Only curves and recordings may hold remarks: their readers tell what is left out."""
-    file = tmp_path / "reference.csv"
-    file.write_text("push,tip_x\n0,1\nsensor changed\n1,2\n")
+    file = write(tmp_path, "push,tip_x\n0,1\nsensor changed\n1,2\n", "reference.csv")
     table = read_table(file, None, "--sheet")
     assert samples_of(table, remarks=True).left_out == ["line 3 (sensor changed)"]
-    with pytest.raises(CaseError, match="line 3"):
-        samples_of(table)
-
-
-def test_blank_row_of_a_curve_is_left_out(tmp_path):
-    file = tmp_path / "rig.csv"
-    file.write_text("Travel [mm],toe [deg]\n-50,0.3\n,,\n50,0.2\n")
-    samples = samples_of(read_table(file, None, "--sheet"), [0, 1], remarks=True, gaps=True)
-    assert samples.numbers[:, 0].tolist() == [-50.0, 50.0]
+    refused(lambda: samples_of(table), "line 3")

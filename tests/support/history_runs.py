@@ -5,6 +5,7 @@ them.
 import math
 import random
 
+from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Seconds
 from kincheck.core.harness.run import run
 from kincheck.core.history.comparison import regressions
@@ -14,6 +15,8 @@ from msgspec.structs import replace
 
 from .fakes import Fake, crank, off
 
+FIRST = ("first", "mujoco")
+"""The pair in which faults are planted unless another is named."""
 ENGINES = [
     Fake("native"),
     Fake("mujoco", answer=off("position", lambda p: p + 5e-13), installed="4.0.0"),
@@ -105,6 +108,21 @@ def nights(path, count, seed=1):
     noise = random.Random(seed)
     for _ in range(count):
         keep(path, records(noise=noise))
+
+
+def report(path, *words):
+    """Status of `kincheck report` of a history."""
+    return main(["report", "--history", str(path), *map(str, words)])
+
+
+def history(path, *words):
+    """Status of `kincheck history` of a file."""
+    return main(["history", "--history", str(path), *map(str, words)])
+
+
+def kinds(found):
+    """Kind, case and engine of the findings of a report."""
+    return [(each.kind, each.case, each.engine) for each in found.findings]
 
 
 def reported(path, run=None, against="last-green"):

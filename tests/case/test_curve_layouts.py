@@ -2,15 +2,16 @@
 rows, remarks, the head again, equal rows at an event, empty cells.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.core.errors import CaseError
+from kincheck.core.case.suspension import Side
 
+from ..support.case_texts import refused
 from ..support.rods_of_templates import solved
+from ..support.suspension_files import strut_of_table
 
 TRAVEL = np.arange(-50, 51, 10)
 TOE = 0.3e-4 * TRAVEL**2 - 0.011 * TRAVEL
@@ -20,18 +21,13 @@ FORCE = 3000 + 20 * TRAVEL
 
 @pytest.fixture(scope="module")
 def car(tmp_path_factory):
-    file = tmp_path_factory.mktemp("car") / "car.csv"
-    file.write_text(sample_table(TEMPLATES["mcpherson"]))
-    return load(file, Supplied(travel="0.05:11"))
+    return strut_of_table(tmp_path_factory.mktemp("car"), "0.05:11")
 
 
-def row(k, sep=",", comma=False):
-    cells = [str(TRAVEL[k]), f"{TOE[k]:.5f}", f"{CAMBER[k]:.5f}", str(FORCE[k])]
-    return sep.join(cell.replace(".", ",") if comma else cell for cell in cells)
-
-
-def rows(**form):
-    return [row(k, **form) for k in range(len(TRAVEL))]
+def rows(sep=",", decimal="."):
+    values = zip(TRAVEL, TOE, CAMBER, FORCE, strict=True)
+    texts = (f"{x} {toe:.5f} {camber:.5f} {fz}" for x, toe, camber, fz in values)
+    return [text.replace(".", decimal).replace(" ", sep) for text in texts]
 
 
 HEAD = "Wheel travel [mm],Toe [deg],Camber [deg],Fz [N]"
@@ -40,7 +36,7 @@ LAYOUTS = {
         "K&C rig 4711;Falcon",
         "Wheel travel;Toe left;Camber left;Fz",
         "mm;deg;deg;N",
-        *rows(sep=";", comma=True),
+        *rows(";", ","),
     ],
     "settings above": ["Rig,4711", "Spring rate,30,N/mm", "Tyre,205,55,16", "", HEAD, *rows()],
     "unknown unit": ["Wheel travel,Toe,Camber,Fz", "mm,deg,deg,daN?", *rows()],
@@ -68,7 +64,7 @@ def curve(folder, car, lines):
 
 
 @pytest.mark.parametrize("kind", LAYOUTS)
-def test_layout_of_a_curve_is_read(tmp_path, car, kind):
+def test_curve_layout_is_read(tmp_path, car, kind):
     case, notes = curve(tmp_path, car, LAYOUTS[kind])
     assert case.reference.keys() == {"toe", "camber"}
     np.testing.assert_allclose(case.sweep.values, 1e-3 * TRAVEL, atol=1e-15)
@@ -81,26 +77,26 @@ def test_layout_of_a_curve_is_read(tmp_path, car, kind):
     )
 
 
-def test_empty_cells_have_no_value(tmp_path, car):
+def test_empty_curve_cell_is_nan(tmp_path, car):
     lines = [HEAD, *rows()]
     lines[3] = lines[3].replace(f"{TOE[2]:.5f}", "")
     case, _ = curve(tmp_path, car, lines)
-    toe = case.reference["toe"].position
-    assert [*np.flatnonzero(np.isnan(toe))] == [2]
+    assert [*np.flatnonzero(np.isnan(case.reference["toe"].position))] == [2]
     assert np.isfinite(case.reference["camber"].position).all()
 
 
-def test_empty_cells_are_interpolated_over(tmp_path, car):
+def test_empty_curve_cell_is_interpolated(tmp_path, car):
     """On a grid of its own, a column has the rows that have a number in it."""
-    lines = [
-        HEAD,
-        *(each.replace(str(x), str(x + 1), 1) for each, x in zip(rows(), TRAVEL, strict=True)),
-    ]
+    lines = [HEAD, *rows()]
     lines[5] = lines[5].replace(f"{TOE[4]:.5f}", "")
+    shift = 0.4  # mm
+    for k, x in enumerate(TRAVEL, 1):
+        lines[k] = lines[k].replace(str(x), str(x + shift), 1)
     case, _ = curve(tmp_path, car, lines)
-    near = TOE[4] - (0.6e-4 * TRAVEL[4] - 0.011)
-    assert np.degrees(case.reference["toe"].position[4]) == pytest.approx(near, abs=1e-3)
-    assert case.reference["toe"].uncertainty["position"][4] > 0.0
+    toe = case.reference["toe"]
+    slope = 0.6e-4 * TRAVEL[4] - 0.011
+    assert np.degrees(toe.position[4]) == pytest.approx(TOE[4] - shift * slope, abs=1e-3)
+    assert toe.uncertainty["position"][4] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -113,35 +109,25 @@ def test_empty_cells_are_interpolated_over(tmp_path, car):
         ({k: f"{TRAVEL[k - 1]},,0.1,1" for k in range(1, 12)}, "0 numbers in column"),
     ],
 )
-def test_damaged_rows_are_refused(tmp_path, car, change, words):
-    lines = [HEAD, *rows()]
-    for k, line in change.items():
-        lines[k] = line
-    with pytest.raises(CaseError, match=words):
-        curve(tmp_path, car, lines)
+def test_damaged_curve_row_is_refused(tmp_path, car, change, words):
+    lines = [change.get(k, line) for k, line in enumerate([HEAD, *rows()])]
+    refused(lambda: curve(tmp_path, car, lines), words)
 
 
-def test_right_wheel_has_the_columns_of_its_side(tmp_path, car):
-    file = tmp_path / "right.csv"
-    text = sample_table(TEMPLATES["mcpherson"])
-    head, *points = text.split("meaning\n")
-    mirrored = [each.split(",") for each in "".join(points).splitlines()]
-    lines = [",".join([name, x, f"-{y}", *rest]) for name, x, y, *rest in mirrored]
-    file.write_text(head + "meaning\n" + "\n".join(lines))
-    right = load(file, Supplied(travel="0.05:11"))
+def test_right_wheel_takes_right_columns(tmp_path, car):
+    (toe,) = [each for each in car.outputs if each.name == "toe"]
+    toe = replace(toe, vehicle=replace(toe.vehicle, side=Side.RIGHT))
     lines = ["Wheel travel [mm],Toe left [deg],Toe right [deg]"]
-    lines += [f"{x},9.9,{toe:.5f}" for x, toe in zip(TRAVEL, TOE, strict=True)]
-    case, _ = curve(tmp_path, right, lines)
+    lines += [f"{x},9.9,{y:.5f}" for x, y in zip(TRAVEL, TOE, strict=True)]
+    case, _ = curve(tmp_path, replace(car, outputs=(toe,)), lines)
     np.testing.assert_allclose(np.degrees(case.reference["toe"].position), TOE, atol=1e-5)
 
 
 @pytest.mark.parametrize("decimals", range(6))
 @pytest.mark.parametrize("samples", [11, 17])
-def test_rounded_curve_is_within_its_digits(tmp_path, car, decimals, samples):
+def test_rounded_curve_is_within_digits(tmp_path, car, decimals, samples):
     """The curve of the case itself, at its samples and between rows, is off by the rounding."""
-    file = tmp_path / "car.csv"
-    file.write_text(sample_table(TEMPLATES["mcpherson"]))
-    fine = load(file, Supplied(travel=f"0.05:{samples}"))
+    fine = strut_of_table(tmp_path, f"0.05:{samples}")
     toe = np.degrees(solved(car)["toe"])
     lines = ["Wheel travel [mm],Toe [deg]"]
     lines += [f"{x},{y:.{decimals}f}" for x, y in zip(TRAVEL, toe, strict=True)]

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from kincheck.core.case.io.atomic_files import written
-from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome, to_json
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.runs import find, find_against
@@ -15,12 +14,20 @@ from kincheck.core.history.runs import keep as begin
 from kincheck.core.history.store import Store
 from msgspec.structs import replace
 
-from ..harness.test_unfinished import killed
+from ..harness.test_unfinished_runs import killed
 from ..support.fakes import Fake, crank
-from ..support.nights import changed, keep, keep_changed, nights, records, worse
-from .test_regression import reported
-
-FIRST = ("first", "mujoco")
+from ..support.history_runs import (
+    FIRST,
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    report,
+    reported,
+    worse,
+)
 
 
 def held_to(factor):
@@ -51,7 +58,7 @@ def told(found):
     return {(each.kind, each.case, each.engine) for each in found.regressions}
 
 
-def test_another_tolerance_is_no_step_of_the_error(path):
+def test_changed_tolerance_is_no_step(path):
     """Errors far below the floor, and a tolerance that makes the floor higher than they ever
     were.
     """
@@ -118,7 +125,7 @@ def test_removed_output_is_reported_once(path):
     assert told(reported(path, "3")) == set()
 
 
-def test_small_runs_in_between_hide_nothing(path):
+def test_partial_runs_hide_no_drift(path):
     nights(path, 1)
     for _ in range(62):
         keep(path, [each for each in records() if each.case == "second"])
@@ -151,7 +158,7 @@ def test_step_is_reported_once(path):
     assert [each.since for each in reported(path, "4").regressions] == [4]
 
 
-def test_a_wide_tolerance_later_does_not_hide_a_step(path):
+def test_widened_tolerance_keeps_step(path):
     for factor, wide in ((1.0, 1.0), (1.0, 1.0), (100.0, 1.0), (100.0, 1e4)):
         keep(path, changed(changed(records(), **worse(factor)), **held_to(wide)))
     assert [(step.first, step.now / step.before) for step in reported(path).steps] == [
@@ -170,21 +177,21 @@ def test_first_bad_run_may_be_killed(path, capsys):
     keep(path, bad)
     (finding,) = reported(path).regressions
     assert finding.since == run
-    assert main(["history", "--history", str(path)]) == 0
+    assert history(path) == 0
     assert " killed " in capsys.readouterr().out
     export = path.with_suffix(".csv")
-    assert main(f"history --history {path} --export {export}".split()) == 0
+    assert history(path, "--export", export) == 0
     assert ",killed," in export.read_text("utf-8")
 
 
 def test_report_refuses_running_run(path, capsys):
     nights(path, 1)
     killed(path, 3, owner=None)
-    assert main(f"report 2 --history {path}".split()) == 2
+    assert report(path, "2") == 2
     assert "run 2 is still running. Report it when it has ended" in capsys.readouterr().err
 
 
-def test_page_of_killed_run_names_missing_pairs(path, tmp_path):
+def test_killed_run_page_names_missing_pairs(path, tmp_path):
     case, engines = crank("first"), [Fake("native"), Fake("mujoco")]
     kept = begin(
         path,
@@ -200,21 +207,21 @@ def test_page_of_killed_run_names_missing_pairs(path, tmp_path):
     kept.store.close()
     with Store(path, writable=False) as store:
         assert store.results(1).references["first"].keys() == case.reference.keys()
-    assert main(f"report --history {path} --out {tmp_path}".split()) == 1
+    assert report(path, "--out", tmp_path) == 1
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "not run" in page
     assert "not requested" not in page
     assert "Lost (3)" in page  # in two rows
 
 
-def test_other_edits_are_named(path):
+def test_changed_edits_are_reported(path):
     git = {"commit": "ab" * 20, "branch": "main", "changed": True}
     for edits in ("one", "two"):
         keep(path, records(), git=git | {"edits": edits})
     assert [str(change) for change in reported(path).changes] == ["uncommitted edits one → two"]
 
 
-def test_errors_of_zero_leave_any_tolerance_loose(path):
+def test_zero_errors_have_loose_tolerance(path):
     for _ in range(10):
         keep_changed(path, **worse(0.0))
     (loose,) = [each for each in reported(path).loose if each.largest == 0.0]

@@ -7,29 +7,27 @@ import zlib
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import msgspec
 import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.case.case import ORDERS, Output, Series
-from kincheck.core.cli import main
 from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.harness.run import run
 from kincheck.core.history.findings import Kind
 from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
-from kincheck.core.report import junit, table
+from kincheck.core.report import table
 from kincheck.core.report.junit import to_junit, to_regression_junit
 from kincheck.core.report.regressions import to_markdown
 from kincheck.core.report.report import caveats, headline, write_report
 from msgspec import UNSET
 
-from ..support.fakes import SAMPLES, Fake, crank, off, partial, solution
-from ..support.nights import changed, keep, records, reported
+from ..support.fakes import SAMPLES, Fake, crank, off, partial, record_of, run_case, solution
+from ..support.history_runs import changed, history, keep, records, report, reported
+from ..support.printed import junit_messages, junit_tests
 
 TOL = 1e-12
 RIGHT, MISSING = Fake("native"), Fake("missing", installed=None)
@@ -42,10 +40,10 @@ UNREFERENCED = {"crank": crank(reference=False)}
 
 
 def unjudged():
-    return run([crank(reference=False)], [RIGHT, Fake()], tol=TOL)
+    return run_case(crank(reference=False), RIGHT, Fake())
 
 
-def test_many_cases_are_named_by_the_first(kincheck_main, capsys, monkeypatch, tmp_path):
+def test_many_unjudged_cases_are_summarised(kincheck_main, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     cases = {f"c{k:03}": crank(f"c{k:03}", reference=False) for k in range(30)}
     engines = [RIGHT, UNABLE]
@@ -63,7 +61,7 @@ def test_many_cases_are_named_by_the_first(kincheck_main, capsys, monkeypatch, t
     assert max(map(len, titles)) < 250
 
 
-def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):
+def test_not_judged_wording_in_every_format(tmp_path, kincheck_main, capsys):
     results = unjudged()
     assert kincheck_main("run", engines=[RIGHT, Fake()], cases=UNREFERENCED) == 0
     told = capsys.readouterr()
@@ -71,7 +69,7 @@ def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):
     assert re.search(r"^crank +native +not judged +–", told.out, re.MULTILINE)
     assert f"not judged: crank · native: {WHY}\n" in told.out
     assert told.out.rstrip().endswith("1 pass, 1 not judged")
-    skips = [skip.get("message") for skip in ET.fromstring(junit.to_junit(results)).iter("skipped")]
+    skips = junit_messages(to_junit(results), "skipped")
     assert skips == [f"not judged: {WHY}"] * 2  # an output each
     assert f"Not judged: crank in native: {WHY}." in table.to_markdown(results)
     assert "| not judged, residual 1e-15 |" in table.to_markdown(results)
@@ -89,35 +87,28 @@ def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):
 def test_unjudged_output_is_skipped_in_junit():
     case = crank()
     del case.reference["y"]
-    (record,) = run([case], [RIGHT], tol=TOL).records
+    record = record_of(RIGHT, case)
     assert (record.outcome, record.message) == (
         Outcome.PASS,
         "not judged: y: the reference does not have it",
     )
-    results = run([case], [RIGHT, WRONG], tol=TOL)
-    tests = {
-        (test.get("classname"), test.get("name")): [
-            (child.tag, child.get("message")) for child in test
-        ]
-        for test in ET.fromstring(junit.to_junit(results)).iter("testcase")
-    }
-    assert tests["crank.native.projection", "x"] == []
-    assert tests["crank.native.projection", "y"] == [
+    results = run_case(case, RIGHT, WRONG)
+    tests = junit_tests(to_junit(results))
+    assert tests["crank.native.projection x"] == []
+    assert tests["crank.native.projection y"] == [
         ("skipped", "not judged: the reference does not have it")
     ]
-    assert [tag for tag, _ in tests["crank.wrong.projection", "x"]] == ["failure"]
+    assert [kind for kind, _ in tests["crank.wrong.projection x"]] == ["failure"]
 
 
-def test_a_fault_of_the_whole_pair_fails_every_output():
+def test_large_residual_fails_every_output():
     def answer(case):
         found = RIGHT.answer(case)
         found.__dict__["residual"] = 1e-3
         return found
 
-    root = ET.fromstring(junit.to_junit(run([crank()], [Fake(answer=answer)], tol=TOL)))
-    assert [failure.get("message", "")[:12] for failure in root.iter("failure")] == [
-        "the residual"
-    ] * 2
+    failures = junit_messages(to_junit(run_case(crank(), Fake(answer=answer))), "failure")
+    assert [message[:12] for message in failures] == ["the residual"] * 2
 
 
 # Exit status
@@ -149,25 +140,25 @@ def test_unjudged_case_keeps_status_0(kincheck_main, capsys):
 
 
 @pytest.mark.parametrize(
-    ("named", "engines", "status"),
+    ("named", "status"),
     [
-        ("", [RIGHT, MISSING], 0),
-        ("--engine native", [RIGHT, MISSING], 0),
-        ("--engine native missing", [RIGHT, MISSING], 2),
-        ("--engine missing", [RIGHT, MISSING], 2),
-        ("--engine native unable", [RIGHT, UNABLE], 0),
-        ("--engine native missing --require missing", [RIGHT, MISSING], 2),  # told once
+        ("", 0),
+        ("--engine native", 0),
+        ("--engine native missing", 2),
+        ("--engine missing", 2),
+        ("--engine native unable", 0),
+        ("--engine native missing --require missing", 2),  # said once
     ],
 )
-def test_an_engine_that_is_named_is_required(kincheck_main, capsys, named, engines, status):
-    assert kincheck_main("run", *named.split(), engines=engines) == status
+def test_named_engine_is_required(kincheck_main, capsys, named, status):
+    assert kincheck_main("run", *named.split(), engines=[RIGHT, MISSING, UNABLE]) == status
     lines = capsys.readouterr().err.splitlines()
     told = [line for line in lines if "missing is not installed" in line and "engine '" in line]
     assert len(told) == (status == 2)
     assert all(line.startswith("kincheck: ") for line in told)
 
 
-def test_broken_native_leaves_others_unjudged(kincheck_main, capsys):
+def test_broken_native_leaves_engines_unjudged(kincheck_main, capsys):
     def broken(case):
         raise ValueError("no")
 
@@ -181,11 +172,11 @@ def test_broken_native_leaves_others_unjudged(kincheck_main, capsys):
 # Series with holes
 
 
-def test_a_reference_without_any_value_judges_nothing():
+def test_reference_without_values_is_unjudged():
     case = crank()
     unknown = np.full(len(case.sweep.values), np.nan)
     case.reference.update(dict.fromkeys(("x", "y"), Series(unknown, unknown, unknown)))
-    (record,) = run([case], [RIGHT], tol=TOL).records
+    record = record_of(RIGHT, case)
     assert record.outcome is Outcome.UNJUDGED
     assert "position: no sample is known to both the engine and closed form" in record.message
 
@@ -237,13 +228,13 @@ def test_old_history_is_read_as_unjudged(path, capsys):
             "unjudged"
         ]
         assert faultless(store) == set()
-    assert main.main(["history", "--history", str(path)]) == 0
+    assert history(path) == 0
     assert "1 not judged" in capsys.readouterr().out
-    assert main.main(f"history --history {path} --case first".split()) == 0
+    assert history(path, "--case", "first") == 0
     assert "not judged" in capsys.readouterr().out
 
 
-def test_names_that_look_like_deviations_are_none(path):
+def test_output_named_max_abs_is_unjudged(path):
     nothing = {"position": None, "velocity": None, "acceleration": None}
     odd = msgspec.structs.replace(
         next(iter(records()[0].errors.values())), **nothing, reason='"max_abs":1'
@@ -257,7 +248,7 @@ def test_names_that_look_like_deviations_are_none(path):
     assert outcomes["first", "native"] == "pass"
 
 
-def test_runs_of_unjudged_pairs_alone_are_not_green(path):
+def test_unjudged_run_is_not_green(path):
     all_bare = bare(records(), "native")
     keep(path, [each for each in all_bare if each.outcome is Outcome.UNJUDGED])
     with Store(path) as store:
@@ -270,7 +261,7 @@ def test_runs_of_unjudged_pairs_alone_are_not_green(path):
 # Reports
 
 
-def test_a_pair_that_is_no_longer_judged_is_a_regression(path):
+def test_pair_losing_judgement_is_regression(path):
     keep(path, records())
     keep(path, bare(records()))
     found = reported(path)
@@ -281,16 +272,14 @@ def test_a_pair_that_is_no_longer_judged_is_a_regression(path):
     assert found.unjudged == [("first", "mujoco", "projection")]
     assert "1 no longer judged" in to_markdown(found)
     with Store(path) as store:
-        suite = ET.fromstring(to_regression_junit(store.results(2), found))
-    assert [failure.get("message") for failure in suite.iter("failure")] == [
-        f"no longer judged: pass → not judged: {WHY}"
-    ]
+        text = to_regression_junit(store.results(2), found)
+    assert junit_messages(text, "failure") == [f"no longer judged: pass → not judged: {WHY}"]
     # as long as it is so, it is told: the run that compared most is the one to compare with
     keep(path, bare(records()))
     assert [each.kind for each in reported(path).findings] == [Kind.UNJUDGED]
 
 
-def test_a_failure_that_is_no_longer_judged_is_not_fixed(path):
+def test_unjudged_failure_is_not_fixed(path):
     keep(path, changed(records(), outcome=Outcome.FAIL, message="off"))
     keep(path, bare(records()))
     found = reported(path, against="1")
@@ -298,7 +287,7 @@ def test_a_failure_that_is_no_longer_judged_is_not_fixed(path):
     assert not found.steps or all(step.quantity != "outcome" or step.worse for step in found.steps)
 
 
-def test_judged_again_is_no_regression(path):
+def test_regained_judgement_is_no_regression(path):
     keep(path, bare(records()))
     keep(path, records())
     found = reported(path, against="1")
@@ -313,16 +302,16 @@ def test_judged_again_is_no_regression(path):
     ]
 
 
-def test_an_upgrade_is_no_regression(path):
+def test_old_unjudged_pass_is_no_regression(path):
     """The native pair was a pass in the older version, and is not judged today."""
     keep(path, bare(records(), outcome=Outcome.PASS))
     keep(path, bare(records()))
     assert (reported(path).findings, reported(path).regressed) == ([], False)
 
 
-def test_a_first_report_counts_only_what_was_judged(path, capsys):
+def test_first_report_counts_judged_pairs(path, capsys):
     keep(path, bare(records()))
-    assert main.main(["report", "--history", str(path)]) == 0
+    assert report(path) == 0
     assert "all 3 right, 1 not judged; nothing to compare with" in capsys.readouterr().out
 
 
@@ -356,7 +345,7 @@ class UndefinedRate(Rate):
 def test_output_without_values_fails(complete):
     x, y = crank().outputs
     case = replace(crank(), outputs=(Undefined(**vars(x)), y))
-    results = run([case], [Fake(answer=solution if complete else partial)], tol=1e-12)
+    results = run_case(case, Fake(answer=solution if complete else partial))
     (record,) = results.records
     assert record.outcome is Outcome.FAIL
     assert record.errors["x"].position is None
@@ -369,8 +358,8 @@ def test_output_without_values_fails(complete):
         f"x: position: {SAMPLES} samples without a value where closed form has one"
         in record.message
     ) is complete
-    failed = ET.fromstring(to_junit(results)).findall(".//testcase[failure]")
-    assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
+    failed = [name[-1] for name, found in junit_tests(to_junit(results)).items() if found]
+    assert failed == (["x"] if complete else ["x", "y"])
 
 
 def test_engine_without_samples_in_headline(tmp_path):
@@ -379,7 +368,7 @@ def test_engine_without_samples_in_headline(tmp_path):
             case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan)
         )
 
-    results = run([crank()], [Fake("native"), Fake("none", answer=nothing)], tol=1e-12)
+    results = run_case(crank(), Fake("native"), Fake("none", answer=nothing))
     assert headline(results) == "1 of 2 comparisons lacks samples"
     write_report(results, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text("utf-8")
@@ -421,5 +410,5 @@ def test_complete_reference_needs_no_native():
     """Of outputs that are derivatives there is no acceleration."""
     case, native = cases.load("mcpherson_suspension"), Fake("native")
     assert any(output.orders < ORDERS for output in case.outputs)
-    run([case], [Fake("mujoco", refusal="no")], tol=1e-12, baseline=native)
+    run_case(case, Fake("mujoco", refusal="no"), baseline=native)
     assert native.solves == 0

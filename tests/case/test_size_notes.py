@@ -2,6 +2,8 @@
 may be; never an error.
 """
 
+from functools import reduce
+
 import pytest
 from kincheck import cases
 from kincheck.core.case.io.case_file import load_case
@@ -51,9 +53,7 @@ steps = 5
 
 def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"):
     values = {"LENGTH": length, "ANGLE": angle, "SIZE": size, "DRIVER": driver, "WAY": way}
-    text = TEXT
-    for key, value in values.items():
-        text = text.replace(key, value)
+    text = reduce(lambda text, key: text.replace(key, values[key]), values, TEXT)
     return notes(load_case(write(tmp_path, text)))
 
 
@@ -69,8 +69,9 @@ def said(tmp_path, length="mm", angle="deg", size="500", driver="push", way="80"
         {"driver": "turn", "angle": "rad", "way": "6.28"},
         {"size": "0", "way": "0.001"},
     ],
+    ids=str,
 )
-def test_what_is_probable_gets_no_note(tmp_path, given):
+def test_probable_size_has_no_note(tmp_path, given):
     assert said(tmp_path, **given) == []
 
 
@@ -79,54 +80,53 @@ def test_what_is_probable_gets_no_note(tmp_path, given):
     [
         (
             {"size": "0.5", "way": "0.08"},
-            ["the mechanism spans 0.5 mm", "expected 5 mm to 100000 mm", "metres declared as mm?"],
+            "the mechanism spans 0.5 mm ... expected 5 mm to 100000 mm ... metres declared as mm?",
         ),
-        ({"length": "m", "size": "500"}, ["the mechanism spans 500 m", "mm declared as m?"]),
+        ({"length": "m", "size": "500"}, "the mechanism spans 500 m ... mm declared as m?"),
         (
             {"way": "0.08"},
-            [
-                "'push'",
-                "from -0.08 mm to 0.08 mm",
-                "mechanism of 500 mm",
-                "0.16 mm",
-                "metres declared as mm?",
-            ],
+            "'push' ... from -0.08 mm to 0.08 mm ... 0.16 mm ... mechanism of 500 mm"
+            " ... metres declared as mm?",
         ),
         (
             {"length": "m", "size": "0.5"},
-            ["from -80 m to 80 m", "mechanism of 0.5 m", "160 m", "mm declared as m?"],
+            "from -80 m to 80 m ... 160 m ... mechanism of 0.5 m ... mm declared as m?",
         ),
-        ({"length": "m", "size": "0.5", "way": "8e-5"}, ["0.00016 m", "mm converted to m twice?"]),
+        (
+            {"length": "m", "size": "0.5", "way": "8e-5"},
+            "0.00016 m ... mm converted to m twice?",
+        ),
         (
             {"driver": "turn", "way": "0.0349"},
-            ["from -0.0349 deg to 0.0349 deg", "0.0698 deg", "radians declared as deg?"],
+            "from -0.0349 deg to 0.0349 deg ... 0.0698 deg ... radians declared as deg?",
         ),
         (
             {"driver": "turn", "angle": "rad", "way": "45"},
-            ["from -45 rad to 45 rad", "90 rad", "degrees declared as rad?"],
+            "from -45 rad to 45 rad ... 90 rad ... degrees declared as rad?",
         ),
         (
             {"driver": "turn", "angle": "rad", "way": "0.0005"},
-            ["0.001 rad", "degrees converted to radians twice?"],
+            "0.001 rad ... degrees converted to radians twice?",
         ),
     ],
+    ids=str,
 )
-def test_what_is_improbable_gets_a_note_in_the_units_of_the_file(tmp_path, given, words):
+def test_improbable_size_is_noted(tmp_path, given, words):
+    """In the units of the file."""
     (note,) = said(tmp_path, **given)
-    assert [each for each in words if each not in note] == []
+    assert [each for each in words.split(" ... ") if each not in note] == []
 
 
-def test_no_built_in_case_gets_one():
+def test_built_in_cases_have_no_notes():
     assert {name: found for name in cases.names() if (found := notes(cases.load(name)))} == {}
 
 
-def test_run_explain_and_the_page_say_it(tmp_path, capsys):
+def test_size_note_in_run_and_explain(tmp_path, capsys):
     said(tmp_path, way="0.08")
     file = str(tmp_path / "case.toml")
     note = "driver 'push' goes from -0.08 mm to 0.08 mm"
-    out = str(tmp_path / "out")
-    argv = ["run", file, "--jobs", "0", "--engine", "native", "mujoco", "--out", out]
-    assert main.main(argv) == 0
+    options = "--jobs 0 --engine native mujoco --out".split()
+    assert main.main(["run", file, *options, str(tmp_path / "out")]) == 0
     assert note in capsys.readouterr().out
     assert note.replace("'", "&#39;")[8:] in (tmp_path / "out" / "report.html").read_text()
     main.main(["explain", file])

@@ -17,7 +17,6 @@ from kincheck.core.cli import main
 from kincheck.core.harness.evidence import digest
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
-from kincheck.core.harness.run import run
 from kincheck.core.harness.suspects import FACTORS, Held, slips
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
@@ -28,7 +27,7 @@ from kincheck.core.trajectory import Trajectory
 from ..support.case_texts import BASE, CSV, INLINE, complains, write
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
-from ..support.fakes import Fake, crank, exact, off
+from ..support.fakes import Fake, crank, exact, off, record_of, run_case
 from ..support.loaded_slider_crank import loaded
 
 ENGINES = [Fake("native"), Fake("other"), Fake("third")]
@@ -57,18 +56,27 @@ def every(series, change):
 
 
 def suspected(change, engines=ENGINES):
-    results = run([with_reference(change)], engines, tol=1e-12)
-    return results, results.suspects.get("crank")
+    return found_by(engines, with_reference(change))
+
+
+def scaled(factor):
+    """A change of references by a factor."""
+    return lambda name, x, _: every(x, lambda a: factor * a)
+
+
+def added(by):
+    """A change of the positions of references by a number or an array."""
+    return lambda name, x, _: replace(x, position=x.position + by)
 
 
 CHANGES = {
-    "with the other sign": lambda name, x, _: every(x, np.negative),
-    "times 1/1000": lambda name, x, _: every(x, lambda a: 1000.0 * a),
-    "times 1000": lambda name, x, _: every(x, lambda a: a / 1000.0),
-    "times pi/180": lambda name, x, _: every(x, lambda a: a * 180.0 / math.pi),
-    "times 25.4": lambda name, x, _: every(x, lambda a: a / 25.4),
-    "with the other sign and times 1000": lambda name, x, _: every(x, lambda a: -a / 1000.0),
-    "minus 0.7 m": lambda name, x, _: Series(x.position + 0.7, x.velocity, x.acceleration),
+    "with the other sign": scaled(-1.0),
+    "times 1/1000": scaled(1000.0),
+    "times 1000": scaled(1.0 / 1000.0),
+    "times pi/180": scaled(180.0 / math.pi),
+    "times 25.4": scaled(1.0 / 25.4),
+    "with the other sign and times 1000": scaled(-1.0 / 1000.0),
+    "minus 0.7 m": added(0.7),
     "shifted by one sample": lambda name, x, _: every(
         x, lambda a: np.roll(a, 1)[[1, *range(1, len(a))]]
     ),
@@ -77,7 +85,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("words", CHANGES)
-def test_slip_of_reference_is_named(words):
+def test_reference_slip_is_named(words):
     results, found = suspected(CHANGES[words])
     assert found is not None
     assert found.engines == ["native", "other", "third"]
@@ -98,11 +106,11 @@ def test_slip_of_reference_is_named(words):
 )
 def test_suspected_sample_has_unit_of_file(driver, unit, written):
     bump = np.where(np.arange(9) == 6, 0.01, 0.0)
-    case = with_reference(lambda name, x, _: Series(x.position + bump, x.velocity, x.acceleration))
+    case = with_reference(added(bump))
     sweep = replace(case.sweep, driver=driver)
     if driver == "time":
         sweep = replace(sweep, rate=1.0, motions={"angle": Ramp(2.0)})
-    suspects = run([replace(case, sweep=sweep, angle_unit=unit)], ENGINES, tol=1e-12).suspects
+    suspects = run_case(replace(case, sweep=sweep, angle_unit=unit), *ENGINES).suspects
     assert f"at sample 6 ({written}) of output" in suspects["crank"].message
 
 
@@ -132,13 +140,8 @@ def test_run_names_suspected_reference_once(kincheck_main, capsys):
 
 
 def test_suspicion_without_slip_is_unexplained():
-    bump = np.zeros(9)
-    bump[4] = 0.01
-    _, found = suspected(
-        lambda name, x, _: (
-            Series(x.position + bump, x.velocity, x.acceleration) if name == "y" else x
-        )
-    )
+    bump = np.where(np.arange(9) == 4, 0.01, 0.0)
+    _, found = suspected(lambda name, x, _: added(bump)(name, x, _) if name == "y" else x)
     assert found.explanations == []
     assert found.unexplained == ["y (position)"]
     assert (found.output, found.sample) == ("y", 4)
@@ -154,17 +157,12 @@ def test_disagreeing_engines_suspect_nobody():
 
 
 def test_one_wrong_engine_suspects_nobody():
-    assert (
-        run(
-            [crank()], [Fake("native"), Fake("wrong", off("position", lambda p: -p))], tol=1e-12
-        ).suspects
-        == {}
-    )
-    assert run([crank()], ENGINES, tol=1e-12).suspects == {}
-    assert run([crank(reference=False)], ENGINES, tol=1e-12).suspects == {}
+    wrong = [Fake("native"), Fake("wrong", off("position", lambda p: -p))]
+    for case, engines in ((crank(), wrong), (crank(), ENGINES), (crank(reference=False), ENGINES)):
+        assert run_case(case, *engines).suspects == {}
 
 
-def test_one_engine_alone_agrees_with_nobody():
+def test_lone_engine_suspects_explained_slips():
     """It is told only what a slip explains wholly."""
     _, found = suspected(CHANGES["times 1000"], [Fake("native")])
     assert "native is the only engine that solved it" in found.message
@@ -209,7 +207,7 @@ def test_slip_is_found_alone(slip):
     assert words(WAVY, SLIPS[slip], {"z": held(OTHER)}) == [slip]
 
 
-def test_other_output_is_tried_with_signs():
+def test_slip_by_definition_and_sign():
     toe = 0.3 * S
     seen = np.arctan(np.tan(WAVY) / np.cos(toe))
     definitions = [("taken as another", lambda x: camber_of_front_view(x, toe))]
@@ -246,11 +244,11 @@ def test_other_output_is_tried_with_signs():
         "another factor",
     ],
 )
-def test_nothing_is_invented(values, reference):
+def test_slip_needs_exact_fit(values, reference):
     assert words(values, reference) == []
 
 
-def test_samples_that_are_not_known_do_not_count():
+def test_slip_ignores_missing_samples():
     values = np.where(np.arange(24) == 5, np.nan, WAVY)
     assert words(values, -np.where(np.arange(24) == 7, np.nan, WAVY)) == ["with the other sign"]
 
@@ -269,11 +267,11 @@ def shifted(name, part):
 
 
 def found_by(engines, case=None):
-    results = run([case or crank(reference=False)], engines, tol=1e-12)
+    results = run_case(case or crank(reference=False), *engines)
     return results, results.suspects.get("crank")
 
 
-def test_native_against_all_others_is_suspected():
+def test_native_against_engines_is_suspected():
     results, found = found_by([WRONG, *OTHERS])
     assert found is not None
     assert (found.subject, found.engines) == ("native", ["one", "two", "three"])
@@ -297,7 +295,7 @@ def test_native_against_all_others_is_suspected():
         ("native", "3 of 3 other engines agree with each other", "; suspect native in crank"),
     ],
 )
-def test_suspicion_is_told_once_on_every_surface(subject, who, said, tmp_path):
+def test_suspicion_appears_once_per_format(subject, who, said, tmp_path):
     by_reference = subject == "reference"
     results, _ = suspected(CHANGES[OTHER_SIGN]) if by_reference else found_by([WRONG, *OTHERS])
     left = [] if by_reference else [Outcome.UNJUDGED]  # native itself
@@ -315,9 +313,9 @@ def test_suspicion_is_told_once_on_every_surface(subject, who, said, tmp_path):
     assert junit.count(f"suspect {rather} rather than the engine") == 6
 
 
-def test_native_outside_the_run_is_suspected():
+def test_suspected_native_outside_run():
     """It is the standard without a record."""
-    results = run([crank(reference=False)], OTHERS, tol=1e-12, baseline=WRONG)
+    results = run_case(crank(reference=False), *OTHERS, baseline=WRONG)
     assert results.suspects["crank"].subject == "native"
     assert "with the other sign" in results.suspects["crank"].message
 
@@ -333,7 +331,7 @@ def test_native_outside_the_run_is_suspected():
     ],
     ids=["one other", "three answers", "two against two", "variants", "one astray"],
 )
-def test_without_a_majority_nobody_is_suspected(engines):
+def test_suspicion_needs_majority(engines):
     results, found = found_by(engines)
     assert found is None
     assert any(outcome is Outcome.FAIL for _, outcome, _ in messages(results))
@@ -353,7 +351,7 @@ def test_modes_of_one_simulator_count_once():
     assert found_by([WRONG, *twice, OTHERS[1]])[1].engines == ["one", "two"]
 
 
-def test_agreement_is_within_the_sum_of_tolerances():
+def test_agreement_within_sum_of_tolerances():
     """Engines at three and at less than five tolerances from native agree; at six they do not."""
     native = Fake("native")
     assert found_by([native, shifted("one", 3.0), shifted("two", 4.9)])[1] is not None
@@ -361,7 +359,7 @@ def test_agreement_is_within_the_sum_of_tolerances():
     assert found_by([native, shifted("one", 0.9), shifted("two", 0.8)])[1] is None
 
 
-def test_suspect_keeps_other_faults_of_engines():
+def test_suspicion_keeps_engine_faults():
     """Its residual, or another output, is no fault of native."""
 
     def unconverged(case):
@@ -410,7 +408,7 @@ def test_simulators_suspect_native_moments():
     case = force_case(loaded(), [0.0, 0.25, 0.5])
     case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
     simulators = [engine(name) for name in ("mujoco", "pinocchio", "exudyn")]
-    results = run([case], [OtherMoments(), *simulators], tol=1e-12)
+    results = run_case(case, OtherMoments(), *simulators)
     found = results.suspects[case.name]
     assert found.engines == ["mujoco", "pinocchio", "exudyn"]
     assert all(" joint_moment " in name for name in found.outputs)
@@ -435,7 +433,7 @@ def results_of(tmp_path, text, *engines):
 
 @pytest.mark.parametrize("truth", ["closed_form", "third_party_data"])
 @pytest.mark.parametrize("cited", [True, False])
-def test_validation_needs_a_citation(tmp_path, capsys, truth, cited):
+def test_validation_needs_citation(tmp_path, capsys, truth, cited):
     text = BASE.replace('"closed_form"', f'"{truth}"') + INLINE + (CITED if cited else "")
     status, results = results_of(tmp_path, text, "mujoco")
     (record,) = results.records
@@ -449,7 +447,7 @@ def test_validation_needs_a_citation(tmp_path, capsys, truth, cited):
     assert record.evidence.sha256 == digest(load_case(tmp_path / "case.toml").reference)
 
 
-def test_the_digest_of_a_file_is_that_of_its_bytes(tmp_path):
+def test_reference_file_digest_is_of_bytes(tmp_path):
     (tmp_path / "x.csv").write_bytes(b"\xef\xbb\xbf" + CSV.encode())
     _, results = results_of(tmp_path, BASE + f'[reference]\nfile = "x.csv"{CITED}')
     evidence = results.records[0].evidence
@@ -478,14 +476,14 @@ def test_pinned_reference_digest_must_match(tmp_path):
 
 
 @pytest.mark.parametrize("citation", ['""', '"  "', "3"])
-def test_a_citation_says_something(tmp_path, citation):
+def test_empty_citation_is_refused(tmp_path, citation):
     complains(
         write(tmp_path, BASE + INLINE + f"citation = {citation}"),
         "reference.citation ... where the true values come from",
     )
 
 
-def test_the_digest_tells_values_apart():
+def test_reference_digest_depends_on_values():
     one, other = crank().reference, crank(rate=2.5).reference
     assert digest(one) == digest(dict(reversed(one.items())))
     assert digest(one) != digest(other)
@@ -493,14 +491,14 @@ def test_the_digest_tells_values_apart():
     assert digest({"x": one["x"]}) != digest({"y": one["x"]})
 
 
-def test_the_built_in_closed_forms_cite_their_modules():
+def test_built_in_closed_forms_cite_modules():
     for name in cases.names():
         case = cases.load(name)
         assert case.origin is not None
         if case.truth is Truth.CLOSED_FORM:
             assert "kincheck.cases." in case.origin.citation
         assert not [note for note in notes(case) if "uncited" in note]
-    (record,) = run([cases.load("rssr")], [adapters.engine("native")], tol=1e-12).records
+    record = record_of(adapters.engine("native"), cases.load("rssr"))
     assert record.validated
 
 
@@ -518,9 +516,9 @@ def third_party(change=lambda series: series, **changes):
     )
 
 
-@pytest.mark.parametrize("engines", [OWN, OWN[::-1]])
+@pytest.mark.parametrize("engines", [OWN, OWN[::-1]], ids=["native first", "native last"])
 def test_own_result_as_reference_is_recognised(engines):
-    results = run([third_party()], engines, tol=1e-12)
+    results = run_case(third_party(), *engines)
     assert [record.outcome for record in results.records] == [Outcome.PASS] * 2
     assert not any(record.validated for record in results.records)
     assert all(record.evidence.own for record in results.records)
@@ -530,35 +528,35 @@ def test_own_result_as_reference_is_recognised(engines):
 
 
 def test_own_result_is_recognised_by_baseline():
-    (record,) = run([third_party()], [Fake("other")], tol=1e-12, baseline=Fake("native")).records
+    record = record_of(Fake("other"), third_party(), baseline=Fake("native"))
     assert not record.validated
-    (record,) = run([third_party()], [Fake("other")], tol=1e-12).records
+    record = record_of(Fake("other"), third_party())
     assert record.validated  # nobody can tell
 
 
-def test_one_bit_makes_it_another_result():
+def test_reference_one_bit_off_validates():
     def bump(series):
         moved = series.position.copy()
         moved[3] = np.nextafter(moved[3], 9.0)
         return Series(moved, series.velocity, series.acceleration)
 
-    assert all(record.validated for record in run([third_party(bump)], OWN, tol=1e-12).records)
+    assert all(record.validated for record in run_case(third_party(bump), *OWN).records)
 
 
-def test_closed_forms_may_be_met_in_every_bit():
-    assert all(record.validated for record in run([crank()], OWN, tol=1e-12).records)
+def test_closed_form_met_exactly_validates():
+    assert all(record.validated for record in run_case(crank(), *OWN).records)
 
 
-@pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)])
-def test_few_samples_tell_nothing(taken):
+@pytest.mark.parametrize("taken", [slice(0, 2), slice(4, 5)], ids=["two", "one"])
+def test_few_equal_samples_prove_nothing(taken):
     case = third_party()
     case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[taken]))
     p, v, a = exact(case)
     case = replace(case, reference={"y": Series(p[:, 1].copy(), v[:, 1].copy(), a[:, 1].copy())})
-    assert not any(record.evidence.own for record in run([case], OWN, tol=1e-12).records)
+    assert not any(record.evidence.own for record in run_case(case, *OWN).records)
 
 
-def test_a_driven_coordinate_tells_nothing(tmp_path):
+def test_equal_driven_coordinate_proves_nothing(tmp_path):
     """The slide's tip is where its driver puts it: everybody's data are the same."""
     _, results = results_of(tmp_path, THIRD_PARTY + INLINE + CITED)
     assert results.records[0].validated

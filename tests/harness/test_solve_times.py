@@ -5,9 +5,8 @@ from itertools import accumulate, chain
 import pytest
 from kincheck.core.harness import execution
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 
-from ..support.fakes import SAMPLES, Fake, crank, off, solution
+from ..support.fakes import SAMPLES, Fake, off, record_of, solution
 
 TOL = 1e-12
 WARM_SOLVES = execution.WARM_SOLVES
@@ -16,11 +15,6 @@ WARM_SOLVES = execution.WARM_SOLVES
 @pytest.fixture(autouse=True)
 def as_users_solve(monkeypatch):
     monkeypatch.setattr(execution, "WARM_SOLVES", WARM_SOLVES)
-
-
-def record_of(engine):
-    (record,) = run([crank()], [engine], tol=TOL).records
-    return record
 
 
 def timed(monkeypatch, build, *solves, waits=()):
@@ -46,7 +40,7 @@ def test_times_are_of_warm_solves():
     assert record_of(stale).outcome is Outcome.FAIL
 
 
-def test_an_interruption_moves_no_time(monkeypatch):
+def test_interruption_changes_no_time(monkeypatch):
     engine, record = timed(monkeypatch, 0.5, 0.25, 0.001, 0.009, 0.002, 0.002, 0.002)
     assert engine.solves == 6
     seconds = record.seconds
@@ -61,8 +55,12 @@ def test_waiting_time_is_reported(monkeypatch):
     assert record.us_per_step == pytest.approx(1000.0 / SAMPLES)
 
 
-@pytest.mark.parametrize("solves", [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)])
-def test_the_compiler_is_in_no_time(solves, monkeypatch):
+@pytest.mark.parametrize(
+    "solves",
+    [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)],
+    ids=["first", "second", "second and slow", "first and slow"],
+)
+def test_compilation_is_not_timed(solves, monkeypatch):
     """It has come to work in one of the warm solves."""
     _, record = timed(monkeypatch, 0.1, 0.002, *solves, *[0.001] * 4)
     assert record.seconds.warm == pytest.approx(0.001)
