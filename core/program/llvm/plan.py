@@ -246,7 +246,7 @@ class PlanInMemory:
             "tolerance": _bits(plan.tolerance),
             "most": plan.most,
             "behind": plan.behind if extrapolates else 0,
-            "quick": extrapolates or not plan.rest,
+            "quick": extrapolates or not plan.remaining,
             "past": plan.past,
             "state": len(plan.remembered),
             **{name: self.entry(name) if name in self.calls else 0 for name in PROGRAMS},
