@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.adapters.shared.equivalents import in_own_frame, jointed, own_frame
+from kincheck.adapters.shared.equivalents import in_own_frame, own_frame, with_joints_alone
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.kinematics.formulation.constraints import frames, structure
@@ -40,7 +40,7 @@ def same_loads(a: Mechanism, b: Mechanism) -> None:
     [
         lambda m: replace(m, points=m.points),
         lambda m: placed(m, places(m)),
-        jointed,
+        with_joints_alone,
         lambda m: rounded(case_of(m), 9).mechanism,
     ],
     ids=["replace", "placed", "jointed", "rounded"],
@@ -60,7 +60,7 @@ def test_exact_numbers_are_those_of_the_loads():
 
 
 def test_added_bodies_have_no_mass():
-    added = {each.name: each.mass for each in jointed(pushed()).bodies}
+    added = {each.name: each.mass for each in with_joints_alone(pushed()).bodies}
     assert len(added) == 3 + 4  # of a rod, and three slides
     assert sum(added.values()) == 5.5
 
