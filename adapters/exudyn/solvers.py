@@ -150,7 +150,10 @@ def limitation_of(case: Case) -> str | None:
     if case.balance is None and (reason := uneven_samples(case, "Exudyn")) is not None:
         return reason
     if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).starts_at_design:
-        return "turns of coupled joints count from the design, where this motion does not begin"
+        return (
+            "turns of coupled joints count from the design, where this motion does not begin; use"
+            " projection"
+        )
     return None
 
 

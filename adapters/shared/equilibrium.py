@@ -257,5 +257,8 @@ class Walk:
         try:
             step = closing - free @ np.linalg.solve(stiffness, free.T @ left)
         except np.linalg.LinAlgError:
-            raise SolveError("the stiffness is singular: nothing holds a body") from None
+            raise SolveError(
+                "nothing holds a body: the stiffness is singular. Add a joint, a spring or a"
+                " bushing"
+            ) from None
         return step, int((values < 0.0).sum())

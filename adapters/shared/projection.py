@@ -151,10 +151,9 @@ class Walk:
         if self.rank < self.unknowns:
             raise SolveError(
                 f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
-                " coordinates of the simulator's model are left free by joints and drivers at the"
-                " design position; add a driver or a joint; if their number is"
-                " right a driver does not move it there (a lock-up): give the design in another"
-                " pose",
+                " coordinates of the simulator's model are left free at the design position. Add a"
+                " driver or a joint. If their number is right, a driver cannot move it there (a"
+                " lock-up): give the design in another pose",
                 FailureKind.FREE,
             )
 
