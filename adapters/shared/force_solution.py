@@ -19,10 +19,10 @@ from ...core.case.case import Case
 from ...core.forces import Forces, Multipliers, Reaction, in_wrenches
 from ...core.joints import Joint
 from ...core.joints.base import unit
-from ...core.mechanism.curves import Curve
 from ...core.mechanism.loads import (
     Axes,
     Bushing,
+    Curve,
     Force,
     ForceElement,
     Law,

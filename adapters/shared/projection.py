@@ -365,7 +365,7 @@ class Walk:
             for k in side:
                 at, reached = self.advance(path, at, float(times[k]), step)
                 if not reached:
-                    self.ended.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
+                    self.ended.append(path.end_message(at.t, float(times[k]), last, str(self.lost)))
                     self.failures.append(self.lost.kind)
                     break
                 last = float(times[k])

@@ -20,9 +20,9 @@ from kincheck.core.harness.workers.pool import in_workers
 from kincheck.core.joints import Revolute, Spherical
 from kincheck.core.mechanism.motions import Driver
 
+from ..support.aborting_engine import GivingUp
 from ..support.engine_motion import ENGINES, TOL, TREES, assert_consistent, installed
-from ..support.fakes import Fake, crank
-from ..support.giving_up import GivingUp
+from ..support.fakes import Fake, crank, record_of, run_case
 
 ROOT = Path(__file__).parents[2]
 # Round-off of the strut's coordinates, of about a metre, in each of the simulators [m, m/s, m/s^2].
@@ -38,8 +38,8 @@ def strut(values=(), rate=1.0):
 
 
 @ENGINES
-def test_strut_solved_to_round_off(engine):
-    (record,) = run([strut()], [installed(engine)], tol=TOL).records
+def test_strut_solved_to_round_off(engine: str) -> None:
+    record = record_of(installed(engine), strut())
     assert record.outcome is Outcome.PASS, record.message
     for errors in record.errors.values():
         for quantity, each in errors.items():
@@ -188,7 +188,7 @@ def test_tilted_axis_is_found_by_comparison(engine, monkeypatch):
         adapters.engine("native"),
         *(e for e in map(adapters.engine, ("mujoco", "exudyn")) if e.version()),
     ]
-    results = run([case], [*others, given], tol=TOL)
+    results = run_case(case, *others, given)
     wrong = next(each for each in results.records if each.engine == engine)
     assert wrong.residual_max is not None
     assert wrong.residual_max <= TOL  # its own rows tell nothing
