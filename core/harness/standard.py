@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import Case, Series
-from .record import OutputSeries, Record
+from .compare import as_array
+from .record import Record
 
 STANDARD = "native"
 """Name of the standard engine, for cases without a complete reference."""
@@ -51,7 +52,14 @@ def standard_of(native: Record) -> Standard:
     if not native.outputs:
         why = f", and the native engine has no answer ({native.outcome.shown}: {native.message})"
         return Standard({}, why)
-    outputs = {name: _series(output) for name, output in native.outputs.items()}
+    outputs = {
+        name: Series(
+            np.array(output.position, dtype=np.float64),
+            as_array(output.velocity),
+            as_array(output.acceleration),
+        )
+        for name, output in native.outputs.items()
+    }
     if native.solved == native.samples:
         return Standard(outputs, dof=native.dof)
     refused = ~known(outputs.values(), native.samples or 0)
@@ -78,12 +86,3 @@ def known(outputs: Iterable[Series], samples: int) -> NDArray[np.bool_]:
     for each in outputs:
         known |= np.isfinite(each.position)
     return known
-
-
-def _series(output: OutputSeries) -> Series:
-    """Return the inverse of `as_numbers`, without loss: NaN for null."""
-    rates = [
-        None if each is None else np.array(each, dtype=np.float64)
-        for each in (output.velocity, output.acceleration)
-    ]
-    return Series(np.array(output.position, dtype=np.float64), *rates)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...case.case import Case, Series
 from ...errors import KincheckError, SolveError, shortened
-from ...harness.compare import describe, deviation, pace
+from ...harness.compare import Curve, curve_of, describe, deviation, pace
 from ...harness.engine import Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Outcome
@@ -155,9 +155,8 @@ def judged(
                 f"{row.name}: {count} samples without a value where the sweep has one:"
                 f" {result.message or 'no reason given'}"
             )
-        off = deviation(
-            theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, STANDARD
-        )
+        mine = curve_of(row.output, row.derivative, beat, theirs)
+        off = deviation(mine, Curve(values), STANDARD)
         if off is None:
             continue
         ratio = off.ratio
