@@ -74,7 +74,7 @@ def test_the_harness_names_the_standard_in_one_place():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant) and node.value == "native"
     ]
-    assert named == ["core/harness/standard.py"]
+    assert named == ["core/harness/engine.py"]
 
 
 def test_nothing_is_called_utils():

@@ -20,10 +20,8 @@ from ..errors import shortened
 from ..trajectory import QUANTITIES, Array
 from ..unit_text import motion_word, value_text
 from .compare import Curve, as_array, curve_of, deviation
-from .engine import RECORDED
-from .evidence import REFERENCE, Explanation, Suspect
-from .record import Deviation, Deviations, Record
-from .standard import STANDARD
+from .engine import RECORDED, STANDARD
+from .record import REFERENCE, Deviation, Deviations, Explanation, Record, Suspect
 
 # Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12

@@ -15,10 +15,10 @@ from kincheck.core.case.notes import notes
 from kincheck.core.case.suspension import camber_of_front_view
 from kincheck.core.cli import main
 from kincheck.core.harness.compare import Curve
-from kincheck.core.harness.evidence import digest
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.suspects import FACTORS, slips
+from kincheck.core.harness.verdict import digest
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import headline, write_report

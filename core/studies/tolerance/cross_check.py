@@ -14,11 +14,10 @@ import numpy as np
 from ...case.case import Case, Series
 from ...errors import KincheckError, SolveError, shortened
 from ...harness.compare import Curve, curve_of, describe, deviation, pace
-from ...harness.engine import Engine
+from ...harness.engine import STANDARD, Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Outcome
-from ...harness.standard import STANDARD, UNCERTAIN
-from ...harness.verdict import NAMED, excess, promised
+from ...harness.verdict import NAMED, UNCERTAIN, excess, promised
 from ...kinematics import NativeSolver
 from ...trajectory import QUANTITIES, Array
 from .study import Study
