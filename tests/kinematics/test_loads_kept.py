@@ -16,7 +16,7 @@ from kincheck.core.kinematics.verified.exact import exact_mechanism
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.studies.stress.reduction import reduced, rounded
+from kincheck.core.studies.stress.reduction import reduce_case, round_geometry
 
 from ..support.loaded import GRAVITY, loaded, pushed
 
@@ -41,7 +41,7 @@ def same_loads(a: Mechanism, b: Mechanism) -> None:
         lambda m: replace(m, points=m.points),
         lambda m: placed(m, places(m)),
         jointed,
-        lambda m: rounded(case_of(m), 9).mechanism,
+        lambda m: round_geometry(case_of(m), 9).mechanism,
     ],
     ids=["replace", "placed", "jointed", "rounded"],
 )
@@ -118,7 +118,7 @@ def test_shrinking_drops_the_loads_of_parts_that_go():
     def still(smaller):
         return any(each.name == "clock" for each in smaller.mechanism.forces)
 
-    small, _ = reduced(case, still)
+    small, _ = reduce_case(case, still)
     assert [each.name for each in small.mechanism.forces] == ["clock"]
     assert [each.name for each in small.mechanism.moving] == ["crank"]
     assert small.mechanism.body("crank").mass == 2.0

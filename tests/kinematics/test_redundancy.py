@@ -16,7 +16,12 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.structure.redundancy import independent_rows, reduce_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
-from kincheck.core.studies.stress.families.linkages import any_plane, beside, crank_rocker, four_bar
+from kincheck.core.studies.stress.families.linkages import (
+    add_loop,
+    any_plane,
+    crank_rocker,
+    four_bar,
+)
 
 
 def test_independent_rows_of_a_known_matrix():
@@ -58,7 +63,7 @@ def test_rows_left_out_do_not_tie_loops_that_share_a_crank(seed):
     """
     rng = np.random.default_rng(seed)
     plane, bars = any_plane(rng), crank_rocker(rng)
-    mechanism, _ = beside(four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
+    mechanism, _ = add_loop(four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     selection = select_rows(mechanism, frame, formulation)
