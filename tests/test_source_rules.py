@@ -69,7 +69,7 @@ def test_sources(rule):
     assert found == {}
 
 
-INSIDE = {"kinematics", "program", "test_probe.py"}
+INSIDE = {"kinematics", "program", "test_joint_probe.py"}
 """Below tests: those of the inside of kinematics, and of its programs."""
 
 

@@ -217,7 +217,7 @@ class Statics:
             at_rest = number == self.rows.ground
             at = arm if at_rest else self.mbs.GetObjectOutputBody(number, self.kinds.Position, arm)
             points.append(np.array(at))
-        return Rest(self._saved(), c, still, still, np.array(points), 0, 0.0)
+        return Rest(self._saved(), c, still, still, 0, 0.0, np.array(points))
 
     def _efforts(self) -> Array:
         drivers = self.rows.rows[len(self.rows.rows) - len(self.names) :]

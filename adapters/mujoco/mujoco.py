@@ -36,10 +36,9 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.force_solution import RowWrench
 from ..shared.projection_engine import floor_of
-from ..shared.tree_forces import mass_properties
+from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import CHAINS, Chain, Closure, Link, Relation
-from ..shared.tree_simulator import Mass
 
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
 

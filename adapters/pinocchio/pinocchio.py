@@ -28,10 +28,9 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.equivalents import fits
 from ..shared.simulation import SimulatedPose, SteppedTree, Stepping, TiedTree
-from ..shared.tree_forces import mass_properties
+from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Chain, Closure, Link, Relation, relations
-from ..shared.tree_simulator import Mass
 
 
 class Pinocchio(TreeEngine):

@@ -361,26 +361,16 @@ def _array(a: Vec3) -> Array:
     return np.array([*a], dtype=float)
 
 
-class Coordinates(Protocol):
-    """A tree in its configuration q, and at the velocity v last set; see `tree_model.TreeModel`."""
-
-    q: Array
-
-    v: Array
-
-    @property
-    def unknowns(self) -> int: ...
-
-    def coordinate(self, body: Any) -> tuple[int, int]: ...
-
-
 @dataclass(frozen=True, eq=False)
 class Linear:
     """A weighted sum of coordinates [m or rad]: a driver's value, or zero for a coupler or a
     joint's own relation.
+
+    Attributes:
+        of: the `TreeModel`.
     """
 
-    of: Coordinates
+    of: Any
     bodies: list[Any]
     weights: Array
     n = 1

@@ -28,7 +28,7 @@ from ...core.trajectory import Array, PointMotion, Trajectory
 from .equivalents import own_frame
 from .force_solution import places, solved_forces
 from .projection import RANK_TOLERANCE
-from .projection_model import ProjectionModel
+from .projection_model import ProjectionModel, SolvedPose
 
 # As in the native walk: the ratio of two corrections that proves a solution nearby (Kantorovich),
 # a correction whose square is round-off, and round-off.
@@ -43,16 +43,10 @@ SHORTEST = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
-    """A configuration in equilibrium; see `force_solution.Solved`."""
+class Rest(SolvedPose):
+    """A configuration in equilibrium, with the case's points, shape (points, 3); residual in SI."""
 
-    saved: Any
-    c: Array
-    v: Array
-    a: Array
     points: Array
-    iterations: int
-    residual: float
 
 
 def loaded(case: Case, sample: int) -> Case:
@@ -171,8 +165,8 @@ class Walk:
         residual = float(np.abs(self.model.residual(c)).max(initial=0.0))
         points = [self.frame.back(x) for x, _, _ in self.model.points(still, still)]
         return Rest(
-            *(self.model.save(), c, still, still, np.array(points).reshape(-1, 3)),
-            *(self.iterations, unit * residual),
+            *(self.model.save(), c, still, still, self.iterations, unit * residual),
+            np.array(points).reshape(-1, 3),
         )
 
     def _advance(self, start: Array, to: Array, share: float) -> bool:

@@ -33,7 +33,7 @@ from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .equivalents import GLOBAL, OwnFrame
 from .force_solution import solved_forces
-from .projection_model import ProjectionModel
+from .projection_model import ProjectionModel, SolvedPose
 
 # Newton steps after one predictor of second order, by effort; None iterates to convergence.
 EFFORTS: Mapping[str, int | None] = {
@@ -93,21 +93,15 @@ LOST = PoseFailure(FailureKind.NOT_FOUND)
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class Sample(SolvedPose):
     """A solved pose with all data for the next step of the walk."""
 
     t: float
-    c: Array  # of the drivers
-    saved: Any
     x: Array
-    v: Array
-    a: Array
     rows: tuple[Array, Array, Array]
     jacobian: Array
     inverse: Array  # of the Jacobian
     corrected: Array
-    iterations: int
-    residual: float
 
 
 class Walk:
@@ -238,6 +232,7 @@ class Walk:
         done = self.newton(c)
         if done is None:
             return None
+        corrected, iterations, residual = done
         jacobian, columns = np.array(self.model.jacobian()), self.model.driver_columns()
         nu = columns @ c_t
         if (inverse := self.inverse(jacobian)) is None:
@@ -253,16 +248,18 @@ class Walk:
             np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True)
         )
         return Sample(
-            t,
-            c,
             self.model.save(),
-            position.ravel(),
+            c,
             v,
             a,
+            iterations,
+            residual,
+            t,
+            position.ravel(),
             (position, velocity, acceleration),
             jacobian,
             inverse,
-            *done,
+            corrected,
         )
 
     def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
@@ -365,7 +362,7 @@ class Walk:
             for k in side:
                 at, reached = self.advance(path, at, float(times[k]), step)
                 if not reached:
-                    self.ended.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
+                    self.ended.append(path.end_message(at.t, float(times[k]), last, str(self.lost)))
                     self.failures.append(self.lost.kind)
                     break
                 last = float(times[k])

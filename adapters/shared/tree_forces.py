@@ -37,7 +37,14 @@ from .force_solution import (
 )
 from .projection_model import Dynamics
 from .tree_plan import Relation
-from .tree_simulator import Mass, TreeSimulator
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """A body with mass, and a frame at its centre of mass."""
+
+    body: Body
+    frame: BodyFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +139,9 @@ NO_MASS = 1e-100
 
 
 class TreeForces:
-    """Frames of joints, masses and force elements of a model, and their forces."""
+    """Frames of joints, masses and force elements of a `TreeModel`, and their forces."""
 
-    def __init__(self, model: TreeSimulator) -> None:
+    def __init__(self, model: Any) -> None:
         self.model, mechanism = model, model.case.mechanism
         self.gravity = np.array(mechanism.gravity)
         self.frames: list[BodyFrame] = []

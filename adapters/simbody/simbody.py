@@ -36,10 +36,9 @@ from ...core.trajectory import Array
 from ..shared.force_solution import RowWrench
 from ..shared.poses import Parameters, euler_angles, orientation
 from ..shared.projection_engine import Call, floor_of
-from ..shared.tree_forces import NO_MASS, mass_properties
+from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import LEAST, TreeEngine, TreeModel
 from ..shared.tree_plan import Closure, Link, Relation
-from ..shared.tree_simulator import Mass
 
 UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
 

@@ -109,9 +109,9 @@ def test_check_engine_stops_on_protocol_error(few):
     ("where", "message"),
     [
         (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
-        (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
+        ("tests.support.engine_faults:Trajectory", "Trajectory cannot be created: TypeError"),
         (
-            f"{HERE}:np",
+            "tests.support.engine_faults:np",
             "np is no engine: name, mode, loop, settings, unsupported, build, solve missing",
         ),
         ("tests.nothing:Sound", "there is no module 'tests.nothing'"),

@@ -175,7 +175,7 @@ def test_doctor_of_user_without_home(without_imports, monkeypatch, capsys):
     assert "the user has no home directory; every process compiles again" in out
     assert disk_cache.load_or_make(b"said", lambda: b"made", bytes) == b"made"
     assert disk_cache.find(b"said", bytes) is None
-    assert not disk_cache.known(b"said")
+    assert not disk_cache.contains(b"said")
 
 
 def nobody():

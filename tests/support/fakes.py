@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from kincheck import adapters
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
+from kincheck.core.harness.run import run
 from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle
@@ -102,6 +103,17 @@ class Fake:
         assert model == "model"
         self.solves += 1
         return self.answer(case)
+
+
+def run_case(case, *engines, **options):
+    """Return the results of a case in these engines, by default to 1e-12."""
+    return run([case], engines, **{"tol": 1e-12, **options})
+
+
+def record_of(engine, case=None, **options):
+    """Return the one record of a case in an engine, by default of the crank."""
+    (record,) = run_case(case or crank(), engine, **options).records
+    return record
 
 
 def native_but(change, name="native"):
