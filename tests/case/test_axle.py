@@ -434,38 +434,32 @@ def test_contradictory_sides_are_refused(tmp_path, corner, above, options, messa
     complains(plain(tmp_path, "mcpherson", corner, above), message, of("mcpherson", **own))
 
 
-WORDS = {"FL": "Front,Left", "FR": "Front,Right", "RL": "Rear,Left", "RR": "Rear,Right"}
-TABLES = {
-    "column": lambda corner, row: ["corner,point,x,y,z", ",".join([corner, *row])],
-    "words": lambda corner, row: [
-        "wheel;name;x;y;z",
-        ";".join([WORDS[corner].replace(",", " "), *row]),
-    ],
-    "last column": lambda corner, row: ["name,x,y,z,corner", ",".join([*row, corner])],
-    "two columns": lambda corner, row: ["axle,side,point,x,y,z", ",".join([WORDS[corner], *row])],
-    "letters": lambda corner, row: ["axle,side,point,x,y,z", ",".join([*corner, *row])],
-    "merged cells": lambda corner, row: [
-        "corner,point,x,y,z",
-        ",".join([corner if row[0] == "uca_front" else "", *row]),
-    ],
-    "suffix": lambda corner, row: ["name,x,y,z", ",".join([f"{row[0]}_{corner}", *row[1:]])],
-    "prefix": lambda corner, row: ["name,x,y,z", ",".join([f"{corner}_{row[0]}", *row[1:]])],
-    "script": lambda corner, row: [
-        "% the car",
-        f"{corner}.{row[0]} = [{' '.join(row[1:])}];",
-    ],
-}
+TABLES = """
+column | corner,point,x,y,z | {corner},{name},{x},{y},{z}
+words | wheel;name;x;y;z | {axle} {side};{name};{x};{y};{z}
+last column | name,x,y,z,corner | {name},{x},{y},{z},{corner}
+two columns | axle,side,point,x,y,z | {axle},{side},{name},{x},{y},{z}
+letters | axle,side,point,x,y,z | {corner[0]},{corner[1]},{name},{x},{y},{z}
+merged cells | corner,point,x,y,z | {first},{name},{x},{y},{z}
+suffix | name,x,y,z | {name}_{corner},{x},{y},{z}
+prefix | name,x,y,z | {corner}_{name},{x},{y},{z}
+script | % the car | {corner}.{name} = [{x} {y} {z}];
+"""
+WORDS = {"F": "Front", "R": "Rear"}, {"L": "Left", "R": "Right"}
 
 
 @pytest.mark.parametrize("corner", CORNERS)
-@pytest.mark.parametrize("kind", TABLES)
-def test_corner_of_car_table_is_read(tmp_path, kind, corner):
-    name = "double_wishbone"
-    said = of(name, corner=corner)
-    pairs = [TABLES[kind](each, row) for each in CORNERS for row in points_at(name, each)]
-    lines = [pairs[0][0], *(line for _, line in pairs)]
-    case = load(written(tmp_path, lines, "car.m" if kind == "script" else "car.csv"), said)
-    alone = load(plain(tmp_path, name, corner), of(name))
+@pytest.mark.parametrize(("head", "form"), rows(TABLES))
+def test_corner_of_car_table_is_read(tmp_path, head, form, corner):
+    said = of("double_wishbone", corner=corner)
+    lines = [head]
+    for each in CORNERS:
+        axle, side = (words[letter] for words, letter in zip(WORDS, each, strict=True))
+        for k, (name, x, y, z) in enumerate(points_at("double_wishbone", each)):
+            place = {"name": name, "x": x, "y": y, "z": z, "first": "" if k else each}
+            lines.append(form.format(corner=each, axle=axle, side=side, **place))
+    case = load(written(tmp_path, lines, "car.m" if head[0] == "%" else "car.csv"), said)
+    alone = load(plain(tmp_path, "double_wishbone", corner), of("double_wishbone"))
     theirs, ours = solved(alone), solved(case)
     assert theirs.keys() == ours.keys()
     for output, values in ours.items():
