@@ -1,9 +1,7 @@
 """Whole axles against two independent carriers on rods, and wheels of a car."""
 
-import json
-import tomllib
+import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
 
 from ..oracles.rods import Carrier
-from ..support.case_texts import complains, rows, supplied
+from ..support.case_texts import complains, rows, supplied, write
 from ..support.rods_of_templates import RODS as ALL_RODS
 from ..support.rods_of_templates import solved
 from ..support.written_again import written_again
@@ -200,70 +198,45 @@ def test_axle_case_file_round_trip(tmp_path):
     written_again(axle(tmp_path, "five_link", "roll"), tmp_path)
 
 
-def changed(folder, edit):
-    """The file of an axle as data, changed."""
-    data = tomllib.loads(case_text(axle(folder, "double_wishbone", "roll", "0.02:3")))
-    edit(data)
-    file = Path(folder) / "case.json"
-    file.write_text(json.dumps(data))
-    return file
+def changed(folder, *edits):
+    """The case file of an axle with patterns replaced."""
+    text = case_text(axle(folder, "double_wishbone", "roll", "0.02:3"))
+    for old, new in edits:
+        text, count = re.subn(old, new, text, flags=re.DOTALL)
+        assert count
+    return write(folder, text)
 
 
-FAULTS = {
-    "other side": (
-        lambda data: data["outputs"]["left_toe"].update(side="middle"),
-        "outputs.left_toe ... 'middle' ... left, right",
-    ),
-    "no other": (
-        lambda data: data["suspension"].pop("other"),
-        ("outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]"),
-    ),
-    "no other for an axle": (
-        lambda data: (
-            data["suspension"].pop("other"),
-            data.update(outputs={"track": {"type": "track"}}),
-        ),
-        ("suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]"),
-    ),
-    "one wheel twice": (
-        lambda data: data["suspension"]["other"].update(wheel_center="left_wheel_center"),
-        "suspension.other.side ... 'right' ... on the other side",
-    ),
-    "no point": (
-        lambda data: data["suspension"]["other"].update(wheel_center="right_wheel_centre"),
-        "suspension.other.wheel_center ... 'right_wheel_center'",
-    ),
-    "upside down": (
-        lambda data: data["suspension"]["other"]["kingpin"].reverse(),
-        "suspension.other.kingpin ... the lower point, then the upper",
-    ),
-    "no driver": (
-        lambda data: data["suspension"]["other"].update(travel="right_strike"),
-        "suspension.other.travel ... 'right_stroke'",
-    ),
-    "side of an axle": (
-        lambda data: data["outputs"]["track"].update(side="left"),
-        "outputs.track ... side",
-    ),
-}
+FAULTS = """
+other side | (left_toe.*?side = )"left" | \\1"middle"
+    | outputs.left_toe ... 'middle' ... left, right
+no other | \\[suspension.other.*?(?=\\[outputs) |
+    | outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]
+no other for an axle | \\[suspension.other.*(?=\\[outputs.track) |
+    | suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]
+one wheel twice | (other.*?center = )"right | \\1"left
+    | suspension.other.side ... 'right' ... on the other side
+no point | (other.*?)right_wheel_center | \\1right_wheel_centre
+    | suspension.other.wheel_center ... 'right_wheel_center'
+upside down | ("right_lca_outer"), ("right_uca_outer") | \\2, \\1
+    | suspension.other.kingpin ... the lower point, then the upper
+no driver | travel = "right_stroke" | travel = "right_strike"
+    | suspension.other.travel ... 'right_stroke'
+side of an axle | type = "track" | type = "track"\\nside = "left" | outputs.track ... side
+"""
 
 
-@pytest.mark.parametrize("kind", FAULTS)
-def test_axle_case_file_faults(tmp_path, kind):
-    edit, fragments = FAULTS[kind]
-    complains(changed(tmp_path, edit), fragments)
+@pytest.mark.parametrize(("old", "new", "message"), rows(FAULTS))
+def test_axle_case_file_faults(tmp_path, old, new, message):
+    complains(changed(tmp_path, (old, new)), message)
 
 
 def test_roll_centre_needs_both_travel_drivers(tmp_path):
-    def edit(data):
-        for side in ("left", "right"):
-            data["drivers"][f"{side}_stroke"]["point"] = f"{side}_tierod_outer"
-        data["suspension"].pop("travel")
-        data["suspension"]["other"].pop("travel")
-        data["outputs"] = {"rc": {"type": "axle_roll_center_height"}}
-
+    points = r'point = "(left|right)_wheel_center"', r'point = "\1_tierod_outer"'
+    outputs = r"\[outputs.*", '[outputs.rc]\ntype = "axle_roll_center_height"\n'
+    file = changed(tmp_path, points, (r'travel = "\w+_stroke"\n', ""), outputs)
     with pytest.raises(CaseError, match=r"outputs\.rc: .* name them by suspension\.travel and"):
-        load_case(changed(tmp_path, edit))
+        load_case(file)
 
 
 def test_roll_centre_offset_in_sae_axes(tmp_path):
