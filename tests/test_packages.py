@@ -57,7 +57,7 @@ def test_harness_names_native_once():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant) and node.value == "native"
     ]
-    assert named == ["core/harness/standard.py"]
+    assert named == ["core/harness/engine.py"]
 
 
 def test_no_file_is_named_utils():

@@ -74,7 +74,7 @@ def test_sources_follow_rules(rule):
     assert found == {}
 
 
-INSIDE = {"kinematics", "program", "test_probe.py"}
+INSIDE = {"kinematics", "program", "test_joint_probe.py"}
 """Below tests: those of the inside of kinematics, and of its programs."""
 
 

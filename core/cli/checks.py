@@ -100,7 +100,7 @@ class CheckEngine(Command):
         Raises:
             KincheckError: there is no such engine, or a member of the engine protocol is missing.
         """
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
         from ..recorded.engine import ProgramEngine
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine

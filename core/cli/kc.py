@@ -95,8 +95,8 @@ class MeasureCompliance(Isolated):
         from ..case.io.atomic_files import write
         from ..case.models.files import is_table
         from ..case.units import LENGTHS
+        from ..harness.engine import STANDARD
         from ..harness.record import to_json
-        from ..harness.standard import STANDARD
         from ..report.progress import complain, lacking
         from ..report.table import print_table
         from ..report.terminal import with_json

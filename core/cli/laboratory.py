@@ -270,7 +270,7 @@ class StressEngines(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
         from ..report.sections import deliver
         from ..report.terminal import page, unheaded
         from ..studies.stress.families import FAMILIES

@@ -159,11 +159,10 @@ def _solve(case: Case, engine: Engine) -> Record:
     """Return the record of the pair. A simulator runs in a separate process, because a crash would
     end the tests.
     """
-    from ..harness.engine import may_run_here
+    from ..harness.engine import STANDARD, may_run_here
     from ..harness.execution import solve_in_process
     from ..harness.resource_limits import Limits
     from ..harness.run import run
-    from ..harness.standard import STANDARD
     from ..harness.workers.pool import in_workers
     from .shared_options import TOL
 

@@ -236,7 +236,7 @@ class Registry:
 
     def baseline(self, engines: Sequence[Engine]) -> Engine | None:
         """Return the native engine as the standard; None if it is among the engines."""
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
 
         return None if STANDARD in (each.name for each in engines) else self.engine(STANDARD)
 

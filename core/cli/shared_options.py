@@ -198,7 +198,7 @@ def with_references(
     """
     from ..case.io.reference import PROVED
     from ..case.io.reference_curve import with_curve
-    from ..case.io.reference_file import judged_by
+    from ..case.io.reference_file import with_proved_references
 
     curves = [file for file in files if file.suffix.lower() != PROVED]
     proved = [file for file in files if file not in curves]
@@ -208,7 +208,7 @@ def with_references(
             " measured curve and its case alone. Run them one by one."
         )
     if not curves:
-        return judged_by(cases, proved, unused), []
+        return with_proved_references(cases, proved, unused), []
     case, notes = with_curve(cases[0], curves[0], curve)
     return [case], notes
 

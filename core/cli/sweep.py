@@ -389,7 +389,7 @@ def with_limits(options: Sweep, variation: Variation, whole: Case, case: Case) -
 def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | None) -> int:
     """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
-    from ..harness.standard import STANDARD
+    from ..harness.engine import STANDARD
     from .destinations import deliver
 
     for index in options.replay:

@@ -13,7 +13,7 @@ from kincheck.core.errors import CaseError
 
 from ..support.case_texts import complains, rows, write
 from .test_hardpoint_dialects import POINTS, comma, table
-from .test_spreadsheets import book
+from .test_workbooks import book
 
 SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
 

@@ -9,7 +9,7 @@ import pytest
 from kincheck.core.harness.record import from_json
 
 ROOT = Path(__file__).parents[2]
-KINCHECK = "import sys; from tests.support.drill import main; sys.exit(main())"
+KINCHECK = "import sys; from tests.support.fake_command import main; sys.exit(main())"
 RUN = "run first --engine native --jobs 0"
 
 

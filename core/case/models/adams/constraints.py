@@ -95,7 +95,7 @@ class Link:
 
     def frames(self, places: Places) -> tuple[Frame, Frame]:
         """Return the frames of I and J, global."""
-        return self.i.place.seen_from(places[self.i.part]), self.j.place.seen_from(
+        return self.i.place.relative_to(places[self.i.part]), self.j.place.relative_to(
             places[self.j.part]
         )
 

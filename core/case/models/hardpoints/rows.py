@@ -30,7 +30,7 @@ from ...io.table import (
     read_sheets,
     split_head,
     text_table,
-    trimmed,
+    trim,
 )
 from ...units import LENGTHS
 from .programs import plain_lines
@@ -358,7 +358,7 @@ def _require_complete(
     indistinguishable from a value of a further column if rows may be shorter or longer than the
     head. A row may lack its remark.
     """
-    filled = len(trimmed(cells))
+    filled = len(trim(cells))
     headed = {k for k, name in enumerate(head.names) if name} | set(head.columns)
     surplus = delimiter and any(cell != "" and k not in headed for k, cell in enumerate(cells))
     exact = delimiter != "," or not head.others or len(cells) == len(head.names)

@@ -20,9 +20,7 @@ from ....mechanism.body import Body
 from ....mechanism.loads import Bushing, ForceElement, SpringDamper
 from ....mechanism.mechanism import GROUND, Vector
 from ...case import Case
-from ...io.document import explained
 from ...io.mechanism_sections import bushings_in, with_bushings
-from ...units import LENGTHS
 from .table import HardpointTable, number
 from .templates import KNUCKLE, TIEROD_INNER, Template
 
@@ -234,7 +232,7 @@ def with_file(
         found[role] = {name: getattr(keys, name) for name in keys.__struct_fields__}
     if not found:
         return with_bushings(case, file)
-    with explained(file, "bushings", LENGTHS["m"], root.at("bushings").value):
+    with root.at("bushings").explained():
         case = with_rubber(case, template, at, sides, Rubber(found))
     return with_bushings(case, file) if root.at("joints").value is not None else case
 
