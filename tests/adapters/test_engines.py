@@ -22,7 +22,6 @@ from kincheck.core.mechanism.motions import Driver
 
 from ..support.aborting_engine import GivingUp
 from ..support.engine_motion import ENGINES, TOL, TREES, assert_consistent, installed
-from ..support.aborting_engine import GivingUp
 from ..support.fakes import Fake, crank, record_of, run_case
 
 ROOT = Path(__file__).parents[2]
