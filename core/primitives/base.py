@@ -29,7 +29,7 @@ twist and dpi of a row have components in their own body.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, NamedTuple, cast
@@ -333,7 +333,7 @@ def map_numbers(
     value: Any, change: Callable[[Any], Any], is_number: Callable[[Any], bool] | None = None
 ) -> Any:
     """Return a value with its numbers, and all else that has no parts, passed to a function; the
-    parts of tuples, lists, mappings and data classes are looked into.
+    parts of tuples, lists, dictionaries and data classes are looked into.
 
     Args:
         is_number: whether a value is one number, although it may have parts.
@@ -347,8 +347,8 @@ def map_numbers(
             return (
                 [*map(map_part, parts)] if isinstance(part, list) else tuple(map(map_part, parts))
             )
-        if isinstance(part, Mapping):
-            return {key: map_part(each) for key, each in cast("Mapping[Any, Any]", part).items()}
+        if isinstance(part, dict):
+            return {key: map_part(each) for key, each in cast("dict[Any, Any]", part).items()}
         names = field_names(part.__class__)
         if names is None:
             return change(part)
