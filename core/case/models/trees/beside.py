@@ -31,7 +31,7 @@ from ....mechanism.mechanism import Vector
 from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
 from .element import Element
 from .graph import Freedom, Graph, Joint
-from .place import ORIGIN, Place, unit_quaternion, unit_vector
+from .place import Place, unit_quaternion, unit_vector
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
 CONSTRAINTS = ".constraints.json"
@@ -151,21 +151,21 @@ class Beside:
                 raise fault(file, f"bodies: {name}", "has no frame; export the case anew")
             turn = unit_quaternion(quat(each.euler_parameters))
             frame = Place(vec(each.origin), turn)
-            tree.places[name] = tree.places[name].then(frame)
+            tree.places[name] = tree.places[name] * frame
             if name in tree.moving:
-                tree.moving[name] = tree.moving[name].then(frame)
-                back = ORIGIN.relative_to(frame)
+                tree.moving[name] = tree.moving[name] * frame
+                back = frame.inverse
                 masses = tree.masses.get(name, ())
                 tree.masses |= {name: [mass.in_frame(back) for mass in masses]} if masses else {}
 
 
-def read_beside(file: Path, root: Element) -> Beside:
+def read_beside(root: Element) -> Beside:
     """Read the files beside a URDF, of the same name with another ending.
 
     Raises:
         CaseError: one of them cannot be read, or PyYAML is missing.
     """
-    constraints, types = None, dict[str, str]()
+    file, constraints, types = root.file, None, dict[str, str]()
     own = file.with_suffix(CONSTRAINTS)
     if own.exists():
         constraints = own, _constraints(own)

@@ -22,7 +22,7 @@ from ...io.schema import MOST_SAMPLES
 from ...units import ANGLES, LENGTHS
 from .assembly import AT_REST, Assembled, Pose, Start, Value
 from .element import Element
-from .place import ORIGIN, Place, unit_quaternion
+from .place import Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
 
 COORDINATES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}
@@ -123,7 +123,7 @@ def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = N
         raise error(f"the quaternion of {move.name!r} is zero, expected one of length one")
     turn, frame = unit_quaternion(quat(numbers[-4:])), tree.moving[move.inner]
     if move.kind == "free":
-        return Place(vec(numbers[:3]), turn).then(ORIGIN.relative_to(frame))
+        return Place(vec(numbers[:3]), turn) * frame.inverse
     # MuJoCo has the turn in the axes of the body
     turn = frame.turn * turn * frame.turn.conjugate()
     return Place(move.point - Place(turn=turn).direction(move.point), turn)
