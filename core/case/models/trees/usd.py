@@ -386,7 +386,8 @@ class _Reader:
                 lead, unit, other = self._leader(joint, f"{start}referenceJoint")
                 if unit != other:
                     raise element.fault(
-                        f"{start}referenceJoint: joins a hinge with a slide, expected two alike; correct it"
+                        f"{start}referenceJoint: joins a hinge with a slide, expected two alike;"
+                        " correct it"
                     )
                 if element.number(f"{start}naturalFrequency", 0.0) > 0.0:
                     self.graph.tree.notes.append(
