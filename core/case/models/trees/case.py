@@ -42,7 +42,7 @@ from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,
     Driving,
-    Freedom,
+    UndrivenMotions,
     choose_held,
     driving_of_motors,
     read_driving,
@@ -104,7 +104,7 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     used = Counter({"keyframe: key": any(each.startswith(KEYFRAME) for each in supplied.start)})
     if not (driving.moves or driving.fixed or supplied.hold_rest):
         own, note = driving_of_motors(tree, supplied)
-        if own.driven and len(own.driven) == Freedom(model, axes).dof:
+        if own.driven and len(own.driven) == UndrivenMotions(model, axes).dof:
             driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
     model = replace(model, tree=replace(model.tree, left_out=tree.left_out - used))

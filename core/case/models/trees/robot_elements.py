@@ -113,6 +113,11 @@ def screw(graph: Graph, name: str, lead: float, axis: Vec3, element: Element) ->
     return [(shift, "slide", axis), (turn, "hinge", axis)]
 
 
+def planar(x: Vec3, y: Vec3, normal: Vec3) -> list[Freedom]:
+    """Return the freedoms of a joint in a plane."""
+    return [(".slide1", "slide", x), (".slide2", "slide", y), (".rotation", "hinge", normal)]
+
+
 def mimic(move: str, leader: str, powers: Sequence[float], element: Element) -> Coupling:
     """Return a move that follows a polynomial of another one, from the constant on."""
     return Coupling(f"{move}.mimic", {move: 1.0}, {leader: 1.0}, powers, element)

@@ -35,6 +35,7 @@ from .robot_elements import (
     add_spring,
     add_ties,
     mimic,
+    planar,
     screw,
 )
 from .sdf_frames import (
@@ -371,12 +372,7 @@ def _planar(graph: Graph, frames: Frames, scope: str, element: Element) -> Joint
             "its frames are apart in the poses of the links, and Drake puts them together, expected"
             " one place; correct the pose of the child"
         )
-    x, y, z = map(place.direction, (X, Y, Z))
-    freedoms: list[Freedom] = [
-        (".slide1", "slide", x),
-        (".slide2", "slide", y),
-        (".rotation", "hinge", z),
-    ]
+    freedoms = planar(*map(place.direction, (X, Y, Z)))
     name = frames.short_name(full_name_of(scope, element.require("name")))
     return Joint.of(name, (outer, inner), place.at, freedoms, element)
 

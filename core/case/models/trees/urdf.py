@@ -18,7 +18,7 @@ from ....algebra import Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
-from .beside import read_beside
+from .beside import read_loop_files
 from .element import ZEROS, Element, words
 from .graph import Freedom, Graph, Joint
 from .masses import mass_in
@@ -36,6 +36,7 @@ from .robot_elements import (
     add_spring,
     add_ties,
     mimic,
+    planar,
     screw,
 )
 from .sdf import Frames, joints_of
@@ -93,7 +94,7 @@ class _Robot:
     """A robot during its reading."""
 
     def __init__(self, root: Element) -> None:
-        self.root, self.beside = root, read_beside(root)
+        self.root, self.beside = root, read_loop_files(root)
         name, beside = root.attributes.get("name", root.file.stem), self.beside.names
         others = f" with {', '.join(beside)}" if beside else ""
         described = f"URDF robot {name!r} of {root.file.name}{others}"
@@ -252,9 +253,7 @@ class _Robot:
                 freedoms = [(f".{each}", "slide", place.direction(a)) for each, a in _AXES.items()]
                 freedoms.append(("", "ball", X))
             case "planar":
-                f, g, h = triad((*axis(),))
-                freedoms = [(".slide1", "slide", f), (".slide2", "slide", g)]
-                freedoms.append((".rotation", "hinge", h))
+                freedoms = planar(*triad((*axis(),)))
             case "screw":
                 if element.child(PITCH) is None:
                     raise element.fault(f"<{PITCH}>: missing, expected metres in a turn; add it")

@@ -117,7 +117,9 @@ class _Reader:
         """Return the tree."""
         root, graph, tree = self.root, self.graph, self.graph.tree
         if not (self.metre > 0.0 and self.kilogram > 0.0):
-            raise root.fault("metersPerUnit, kilogramsPerUnit: expected positive numbers; correct")
+            raise root.fault(
+                "metersPerUnit, kilogramsPerUnit: expected positive numbers; correct them"
+            )
         if "metersPerUnit" not in root.attributes["said"].split():
             tree.notes.append(f"metersPerUnit is not given: lengths are in {self.metre:g} m")
         for path, name in self.names.items():
@@ -384,7 +386,8 @@ class _Reader:
                 lead, unit, other = self._leader(joint, f"{start}referenceJoint")
                 if unit != other:
                     raise element.fault(
-                        f"{start}referenceJoint: turns where it slides; couple alike"
+                        f"{start}referenceJoint: joins a hinge with a slide, expected two alike;"
+                        " correct it"
                     )
                 if element.number(f"{start}naturalFrequency", 0.0) > 0.0:
                     self.graph.tree.notes.append(
