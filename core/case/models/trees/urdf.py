@@ -18,9 +18,9 @@ from ....algebra import Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
-from .beside import read_loop_files
 from .element import ZEROS, Element, words
 from .graph import Freedom, Graph, Joint
+from .loop_files import read_loop_files
 from .masses import mass_in
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
