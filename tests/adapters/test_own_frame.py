@@ -48,15 +48,8 @@ def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
         return tuple(float(factor * x + o) for x, o in zip(rounded, offset, strict=True))
 
     found = placed(mechanism, place, factor=factor)
-    joints = [
-        replace(joint, lead=factor * joint.lead) if isinstance(joint, Screw) else joint
-        for joint in found.joints
-    ]
-    return replace(
-        found,
-        joints=joints,
-        couplers=[replace(each, radius=factor * each.radius) for each in found.couplers],
-    )
+    couplers = [replace(each, radius=factor * each.radius) for each in found.couplers]
+    return replace(found, couplers=couplers)
 
 
 @OF_SIMULATORS
