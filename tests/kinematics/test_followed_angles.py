@@ -12,8 +12,8 @@ from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Cylindrical, Revolute, Spherical, Translational, Universal
 from kincheck.core.kinematics import (
     NativeSolver,
+    angle_with_turns,
     followed,
-    followed_angle,
     follower,
     forces_of,
     in_doubt,
@@ -126,7 +126,7 @@ def test_rates_without_bound_towards_a_fold_are_no_turns():
     )
     end = math.sqrt(2.5**2 - 0.8**2) - 2.1  # crank and rod in line
     values = np.array([0.0, end / 2, end * (1 - 1e-7)])
-    found = followed_angle(crank, Path({"push": Ramp(1.0)}, values), "pivot")
+    found = angle_with_turns(crank, Path({"push": Ramp(1.0)}, values), "pivot")
     assert found is not None
     x = 2.1 + values  # of the wrist, 0.8 above the pivot
     to_wrist, beside = np.hypot(x, 0.8), np.arctan2(0.8, x)
@@ -145,7 +145,7 @@ def test_angles_of_a_path_are_followed_at_once(monkeypatch):
 
     monkeypatch.setattr(followed, "prepare_motion", prepare)
     path = Path({"turn": Ramp(7.5)}, np.array([1.0]))
-    first, second = (followed_angle(shafts(), path, joint) for joint in "ab")
+    first, second = (angle_with_turns(shafts(), path, joint) for joint in "ab")
     assert asked == [2]
     assert first == pytest.approx([7.5])
     assert second == pytest.approx(driven([7.5]))

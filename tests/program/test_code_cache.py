@@ -141,7 +141,7 @@ def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
     ):
         times.clear()
         for _ in range(2):
-            compiled_model.traced(*different())
+            compiled_model.load_or_trace(*different())
         assert times == ["traced"]
 
 
@@ -158,7 +158,7 @@ def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
     )
     mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
     mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
-    compiled_model.traced(mechanism, Request((known.drivers[0].name,), ()))
+    compiled_model.load_or_trace(mechanism, Request((known.drivers[0].name,), ()))
     assert not (tmp_path / "kincheck").exists()
 
 
