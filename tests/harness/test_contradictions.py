@@ -19,7 +19,19 @@ from kincheck.core.report.report import headline
 from kincheck.core.studies.tolerance.study import Study
 
 from ..oracles.rods import Carrier
-from ..support.fakes import RADIUS, SAMPLES, Fake, at, crank, exact, off, raising, solution
+from ..support.fakes import (
+    RADIUS,
+    SAMPLES,
+    Fake,
+    at,
+    crank,
+    exact,
+    off,
+    raising,
+    record_of,
+    run_case,
+    solution,
+)
 
 TOL = 1e-12
 ENDS = "cannot be followed beyond here: there is a singular pose ahead"
@@ -41,10 +53,8 @@ def reaching(samples, message=ENDS, **changed):
 
 def pair(native, engine, case=None):
     """Records of the native engine and another."""
-    return run(
-        [case or crank(reference=False)],
-        [Fake("native", answer=native), Fake(answer=engine)],
-        tol=TOL,
+    return run_case(
+        case or crank(reference=False), Fake("native", answer=native), Fake(answer=engine)
     ).records
 
 
@@ -65,7 +75,7 @@ def test_engine_values_beyond_native_reach_fail():
 
 def test_baseline_contradicts_engine_values():
     native = Fake("native", answer=reaching(range(7)))
-    (fake,) = run([crank(reference=False)], [Fake()], tol=TOL, baseline=native).records
+    fake = record_of(Fake(), crank(reference=False), baseline=native)
     assert (fake.outcome, "that native cannot reach" in fake.message) == (Outcome.FAIL, True)
 
 
@@ -83,7 +93,7 @@ def test_different_ends_name_longer_motion():
     assert alike.message == "6 of 9 samples solved: ends here"
 
 
-def test_contradiction_and_deviation_are_both_told():
+def test_contradiction_and_deviation_share_message():
     _, fake = pair(reaching(range(7)), off("position", at(2, 1, 9.0)))
     assert "that native cannot reach" in fake.message
     assert "y: position is off by" in fake.message
@@ -94,7 +104,7 @@ def test_native_reaching_nothing_contradicts_every_value():
     assert (fake.outcome, fake.errors["x"].contradicted) == (Outcome.FAIL, SAMPLES)
 
 
-def test_a_reference_without_a_value_says_nothing():
+def test_reference_gap_leaves_native_judge():
     case = crank()
     short = np.where(np.arange(SAMPLES) < 7, 1.0, np.nan)
     for name, series in case.reference.items():
@@ -110,13 +120,11 @@ def test_a_reference_without_a_value_says_nothing():
         Outcome.FAIL,
         True,
     )
-    (alone,) = run(
-        [case], [Fake()], tol=TOL, baseline=Fake("native", answer=reaching(range(7)))
-    ).records
+    alone = record_of(Fake(), case, baseline=Fake("native", answer=reaching(range(7))))
     assert alone.outcome is Outcome.FAIL
 
 
-def test_a_reference_is_believed_before_native():
+def test_reference_overrules_native_refusal():
     """Native refuses samples that the closed form has: native is wrong there, and the others are
     not.
     """
@@ -136,9 +144,7 @@ def test_failed_native_judges_nothing(outcome):
             else:
                 yield index, attempt(each)
 
-    native, fake = run(
-        [crank(reference=False)], [Fake("native"), Fake()], tol=TOL, solver=solver
-    ).records
+    native, fake = run_case(crank(reference=False), Fake("native"), Fake(), solver=solver).records
     assert native.outcome is outcome
     why = (
         f"the case has no reference, and the native engine has no answer ({outcome}: it went down)"
@@ -154,13 +160,13 @@ def leaving(residual, **changed):
 
 
 def test_residual_above_tolerance_fails():
-    (fake,) = run([crank()], [leaving(1e-6)], tol=TOL).records
+    fake = record_of(leaving(1e-6))
     assert fake.outcome is Outcome.FAIL
     assert fake.message.startswith(
         "the residual of samples that the engine calls solved is 1e-06, tolerance 1e-12"
     )
     assert "1 of 1 comparisons has a residual above the tolerance" in headline(
-        run([crank()], [leaving(1e-6)], tol=TOL)
+        run_case(crank(), leaving(1e-6))
     )
 
 
@@ -173,6 +179,7 @@ def test_residual_above_tolerance_fails():
         (1e-6, {}, {"mode": "simulate"}),
         (1e-6, {"residuals": False}, {}),
     ],
+    ids=["tolerance", "round-off", "simulation", "effort"],
 )
 def test_residual_within_tolerance_passes(residual, options, engine):
     given = {"tol": TOL, **options}
@@ -180,23 +187,23 @@ def test_residual_within_tolerance_passes(residual, options, engine):
 
 
 def test_residual_fails_uncompared_pair():
-    (fake,) = run([crank(reference=False)], [leaving(1e-6)], tol=TOL).records
+    fake = record_of(leaving(1e-6), crank(reference=False))
     assert fake.outcome is Outcome.FAIL
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_simulators_keep_their_promise_at_any_size(name):
+def test_simulators_keep_residual_promise(name):
     engine = adapters.engine(name)
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
-    (record,) = run([cases.load("chrono_macpherson")], [engine], tol=1e-9).records
+    record = record_of(engine, cases.load("chrono_macpherson"), tol=1e-9)
     assert record.outcome is Outcome.PASS, record.message
 
 
 # What native says of samples beside singular poses
 
 
-def test_uncertain_samples_contradict_nobody():
+def test_uncertain_samples_contradict_no_engine():
     others = [k for k in range(SAMPLES) if k != 4]
     uncertain = reaching(
         others, "refused at angle = 0: so near a singular pose", details={"uncertain_samples": [4]}
@@ -210,14 +217,12 @@ def test_uncertain_samples_contradict_nobody():
 
 
 def test_contradictions_are_written_read_and_resumed():
-    results = run(
-        [crank(reference=False)], [Fake("native", answer=reaching(range(7))), Fake()], tol=TOL
-    )
+    results = run_case(crank(reference=False), Fake("native", answer=reaching(range(7))), Fake())
     read = from_json(to_json(results))
     assert read == results
     assert "contradict" in headline(results)
     engines = [Fake("native", answer=raising(AssertionError("not again"))), Fake()]
-    again = run([crank(reference=False)], engines, tol=TOL, made=read.records[:1])
+    again = run_case(crank(reference=False), *engines, made=read.records[:1])
     assert again.records[1].message == results.records[1].message
 
 
@@ -360,7 +365,7 @@ def test_derivatives_by_travel_at_every_sample(tmp_path, kind):
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_in_every_engine(tmp_path, name):
+def test_derivatives_by_travel_in_engines(tmp_path, name):
     pytest.importorskip(name)
     case = case_of(tmp_path, SWEEPS["sine"])
     found, native = answer(case, name), answer(case, "native")
@@ -369,7 +374,7 @@ def test_in_every_engine(tmp_path, name):
         assert np.abs(off).max() < 1e-11
 
 
-def test_a_slope_of_a_quotient(tmp_path):
+def test_roll_centre_slope_equals_difference(tmp_path):
     """The roll centre by travel, against its difference over two wheel heights."""
     case = case_of(tmp_path, SWEEPS["both"])
     slope = answer(case, "native").outputs["rc.per_travel"].position
@@ -387,7 +392,7 @@ def test_slope_without_travel_driver(tmp_path):
     assert alone.outputs[0].vehicle.travel == ()
 
 
-def test_unsolved_samples_say_so(tmp_path):
+def test_missing_derivative_has_reason(tmp_path):
     """A pose that the other path does not find has no derivative, and the reason is given."""
     case = case_of(tmp_path, SWEEPS["both"])
 
@@ -414,7 +419,7 @@ def test_no_tolerance_study_of_held_derivatives(tmp_path):
         Study(case, None, 10, 1)
 
 
-def test_waypoints_are_a_smooth_motion():
+def test_waypoints_interpolate_smoothly():
     motion = Waypoints((0.0, 1.0, 1.5), (0.2, -0.3, 0.4), 0.05)
     assert np.array_equal(motion.at(np.array(motion.times)), [motion.values, [0.05] * 3, [0.0] * 3])
     t, h = np.array([-0.5, 0.0, 0.3, 0.999999, 1.0, 1.3, 1.5, 2.0]), 1e-6
@@ -424,7 +429,7 @@ def test_waypoints_are_a_smooth_motion():
     assert x[0] == 0.2 - 0.025
 
 
-def test_the_held_path_has_the_values_of_the_sweep(tmp_path):
+def test_held_path_keeps_sweep_values(tmp_path):
     case = case_of(tmp_path, SWEEPS["sine"])
     path, again = case.sweep.path, held_case(case, ["stroke"]).sweep.path
     names = ["rack", "stroke"]

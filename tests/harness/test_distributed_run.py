@@ -21,7 +21,7 @@ from kincheck.core.harness.workers.serve import pack
 
 from ..support.bad_engine import Bad
 from ..support.fake_command import Slow
-from ..support.fakes import Fake, crank, raising
+from ..support.fakes import Fake, crank, raising, run_case
 from .test_workers import timeless
 
 TOL = 1e-12
@@ -159,19 +159,19 @@ def forbid_clients(monkeypatch):
     monkeypatch.setattr(importlib.import_module("distributed"), "Client", client)
 
 
-def test_no_scheduler_is_a_message(monkeypatch):
+def test_silent_scheduler_is_reported(monkeypatch):
     """Where nobody listens, and where somebody does who is none and says nothing."""
     monkeypatch.setattr(ours, "ANSWER", 0.25)
     with pytest.raises(
         ClusterError, match=r"scheduler tcp://127.0.0.1:1: does not answer \(.+\). Start one with"
     ):
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
+        run_case(crank(), Fake(), solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(
             ClusterError, match=rf"scheduler {address}: does not answer \(TimeoutError"
         ):
-            run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
+            run_case(crank(), Fake(), solver=on_cluster(address, LIMITS))
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_invalid_scheduler_address_is_refused(address, monkeypatch):
     """Who had waited in vain would be told that nobody answers."""
     forbid_clients(monkeypatch)
     with pytest.raises(ClusterError) as caught:
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster(address, LIMITS))
+        run_case(crank(), Fake(), solver=on_cluster(address, LIMITS))
     message = str(caught.value)
     assert message.startswith(f"scheduler {address}: found no address (")
     assert message.endswith(
@@ -220,16 +220,16 @@ def test_commands_refuse_invalid_scheduler(kincheck_main, capsys, tmp_path, monk
     assert not (tmp_path / "h.db").exists()
 
 
-def test_without_dask_there_is_a_message(monkeypatch):
+def test_missing_dask_names_package(monkeypatch):
     def absent(name):
         raise ImportError(name)
 
     monkeypatch.setattr(importlib, "import_module", absent)
     with pytest.raises(ClusterError, match="pip install 'distributed>="):
-        run([crank()], [Fake()], tol=TOL, solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
+        run_case(crank(), Fake(), solver=on_cluster("tcp://127.0.0.1:1", LIMITS))
 
 
-def test_another_kincheck_on_the_cluster_is_an_error():
+def test_cluster_version_mismatch_is_error():
     from kincheck.core.harness.execution import Pair
 
     found = ours.solve_there(pack(Pair(crank(), Fake(), TOL)), "fake", LIMITS, "0.0.1")

@@ -16,10 +16,10 @@ from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine import Unloadable, versions
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 
-from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
+from ..support.fakes import record_of, run_case
 from ..support.mechanisms import placed
+from ..support.version_engines import DEEDS, Foreign, Loading, Ours
 
 # Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in
 # geometry cannot hide.
@@ -40,13 +40,12 @@ def engine(name):
 
 
 def record(case, name):
-    (found,) = run([case], [engine(name)], tol=1e-12).records
-    return found
+    return record_of(engine(name), case)
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
 @pytest.mark.parametrize("case", ["four_bar", "rssr", "spatial_slider_crank"])
-def test_closed_forms_hold_over_a_full_turn(case, name):
+def test_closed_forms_over_full_turn(case, name):
     found = record(built_in(case), name)
     assert found.outcome is Outcome.PASS
     assert np.ptp(next(iter(found.driver.values()))) == pytest.approx(2.0 * np.pi)
@@ -112,7 +111,7 @@ def test_round_off_near_singular_pose_passes(name):
     times as fast there, and so does the round-off.
     """
     case = load_case(Path(__file__).parents[1] / "data" / "fast_loop.toml")
-    native, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
+    native, found = run_case(case, engine("native"), engine(name)).records
     fastest = max(np.max(np.abs(each.acceleration)) for each in native.outputs.values())
     assert fastest > 5000 * case.sweep.rate**2
     worst = max(
@@ -132,12 +131,12 @@ def test_versions_keep_order_of_engines(monkeypatch):
     assert found == ["1.2", "3", *[None] * 5]
 
 
-def test_an_engine_that_hangs_has_no_version(monkeypatch):
+def test_hanging_engine_has_no_version(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     assert versions([Loading("hangs")], patience=1.0) == [None]
 
 
-def test_version_is_read_in_process_on_request(monkeypatch):
+def test_version_read_in_process(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     ours, foreign = versions([Ours("any"), Foreign("native")])
     assert ours == str(os.getpid())

@@ -13,6 +13,7 @@ from kincheck.core.case.case import NO_SIZE, Output, Series, size
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import (
+    Curve,
     as_numbers,
     describe,
     deviation,
@@ -27,17 +28,30 @@ from kincheck.core.mechanism.motions import PointCoordinate
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.table import print_table
 
-from ..support.fakes import RADIUS, SAMPLES, Fake, crank, exact, off, partial, raising, solution
+from ..support.fakes import (
+    RADIUS,
+    SAMPLES,
+    Fake,
+    crank,
+    exact,
+    off,
+    partial,
+    raising,
+    run_case,
+    solution,
+)
+from ..support.printed import junit_tests
 
 TOL = 1e-12
 
 
-def test_json_has_the_keys_of_the_schema_and_every_digit():
+def test_json_has_schema_and_digits():
     p = exact(crank())[0]
-    results = run(
-        [crank()],
-        [Fake(), Fake("partial", answer=partial), Fake("missing", installed=None)],
-        tol=TOL,
+    results = run_case(
+        crank(),
+        Fake(),
+        Fake("partial", answer=partial),
+        Fake("missing", installed=None),
         command="kincheck run",
     )
     text = to_json(results)
@@ -58,11 +72,11 @@ def test_json_has_the_keys_of_the_schema_and_every_digit():
 
 def test_json_keeps_lists_on_lines():
     message = 'list [1,2,\t3] of "quoted, [4,5]" numbers'
-    results = run([crank()], [Fake(answer=raising(ValueError(message)))], tol=TOL)
+    results = run_case(crank(), Fake(answer=raising(ValueError(message))))
     text = to_json(results)
     assert from_json(text).records[0].message == f"ValueError: {message}"
     assert b'"angle": [' not in text
-    lines = to_json(run([crank()], [Fake()], tol=TOL)).decode().splitlines()
+    lines = to_json(run_case(crank(), Fake())).decode().splitlines()
     assert any(line.strip().startswith('"angle": [-1.0, ') and line.endswith("]") for line in lines)
 
 
@@ -71,18 +85,15 @@ def test_foreign_results_are_refused():
         from_json(b'{"schema": "kincheck-results/2", "run": {}, "records": []}')
 
 
-def test_undecodable_messages_still_give_json_and_xml():
-    results = run(
-        [crank()],
-        [Fake(answer=raising(ValueError("bad \udcff and \x00")))],
-        tol=TOL,
-        command="kincheck \udcff",
+def test_undecodable_message_in_json_and_junit():
+    results = run_case(
+        crank(), Fake(answer=raising(ValueError("bad \udcff and \x00"))), command="kincheck \udcff"
     )
     assert from_json(to_json(results)) == results
     ET.fromstring(to_junit(results))
 
 
-def test_junit_has_a_test_case_per_case_engine_and_output():
+def test_junit_has_testcase_per_output():
     engines = [
         Fake("right"),
         Fake("wrong", answer=off("position", lambda p: p * [1.0, -1.0, 1.0])),
@@ -91,27 +102,15 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
         Fake("missing", installed=None),
         Fake("unable", refusal="no such joint"),
     ]
-    root = ET.fromstring(to_junit(run([crank("a"), crank("b")], engines, tol=TOL)))
-    tests = root.findall(".//testcase")
-    assert len(tests) == 2 * 6 * 2
-    assert root.find("testsuite").attrib == {
-        "name": "a",
-        "tests": "12",
-        "failures": "3",
-        "errors": "2",
-        "skipped": "4",
-    }
-    found = {
-        (test.get("classname"), test.get("name")): [
-            (child.tag, child.get("message")) for child in test
-        ]
-        for test in tests
-    }
-    assert found["a.right.projection", "x"] == []
-    assert found["a.wrong.projection", "x"] == []  # only y is wrong
-    assert found["a.wrong.projection", "y"][0][0] == "failure"
-    assert "y: position is off by" in found["a.wrong.projection", "y"][0][1]
-    assert found["a.partial.projection", "x"] == [
+    text = to_junit(run([crank("a"), crank("b")], engines, tol=TOL))
+    found = junit_tests(text)
+    assert len(found) == 2 * 6 * 2
+    assert b'<testsuite name="a" tests="12" failures="3" errors="2" skipped="4">' in text
+    assert found["a.right.projection x"] == []
+    assert found["a.wrong.projection x"] == []  # only y is wrong
+    ((kind, message),) = found["a.wrong.projection y"]
+    assert (kind, "y: position is off by" in message) == ("failure", True)
+    assert found["a.partial.projection x"] == [
         (
             "failure",
             (
@@ -120,8 +119,8 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
             ),
         )
     ]
-    assert found["b.broken.projection", "y"] == [("error", "error: ValueError: no")]
-    assert found["b.missing.projection", "y"] == [
+    assert found["b.broken.projection y"] == [("error", "error: ValueError: no")]
+    assert found["b.missing.projection y"] == [
         (
             "skipped",
             (
@@ -130,16 +129,16 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
             ),
         )
     ]
-    assert found["b.unable.projection", "y"] == [("skipped", "unsupported: no such joint")]
+    assert found["b.unable.projection y"] == [("skipped", "unsupported: no such joint")]
 
 
-def test_a_long_message_is_not_broken_into_lines(capsys):
+def test_table_keeps_long_message_whole(capsys):
     message = "row " * 200
-    print_table(run([crank()], [Fake(answer=raising(ValueError(message)))], tol=1e-12), sys.stdout)
+    print_table(run_case(crank(), Fake(answer=raising(ValueError(message)))), sys.stdout)
     assert message.strip() in capsys.readouterr().out
 
 
-def test_missing_engines_have_a_row_each_and_one_message(capsys):
+def test_table_sums_up_missing_engines(capsys):
     engines = [Fake("one"), Fake("two", installed=None), Fake("three", installed=None)]
     found = run([crank(), crank("other")], engines, tol=TOL)
     print_table(found, sys.stdout)
@@ -148,10 +147,10 @@ def test_missing_engines_have_a_row_each_and_one_message(capsys):
     assert [said.count(name) for name in ("two", "three")] == [3, 3]
 
 
-def test_the_table_names_modes_where_there_are_several(capsys):
-    print_table(run([crank()], [Fake("one"), Fake("two")], tol=TOL), sys.stdout)
+def test_table_names_modes_if_several(capsys):
+    print_table(run_case(crank(), Fake("one"), Fake("two")), sys.stdout)
     assert "projection" not in capsys.readouterr().out
-    print_table(run([crank()], [Fake("one"), Fake("two", mode="simulate")], tol=TOL), sys.stdout)
+    print_table(run_case(crank(), Fake("one"), Fake("two", mode="simulate")), sys.stdout)
     assert "two · simulate" in capsys.readouterr().out
 
 
@@ -180,7 +179,12 @@ def test_report_refuses_file_without_results(tmp_path, capsys, text, said):
 REFERENCE = np.array([0.0, 1.0, 3.0, 2.0])
 
 
-def test_an_output_is_the_projection_less_the_design_value():
+def reference_off(error, atol, rtol=0.0):
+    """The deviation of the reference with these errors."""
+    return deviation(Curve(REFERENCE + error, atol, rtol), Curve(REFERENCE), "closed_form")
+
+
+def test_output_is_projection_minus_design():
     case = crank()
     position, velocity, acceleration = exact(case)
     d = np.array([0.6, 0.8, 0.0])
@@ -209,7 +213,7 @@ def test_unsolved_samples_are_nan():
     assert numbers.reason == "samples without a value are null"
 
 
-def test_missing_derivatives_are_null_with_a_reason():
+def test_missing_derivative_is_null_with_reason():
     case = crank()
     series = output_series(case, case.outputs[0], solution(case, velocity=None, acceleration=None))
     numbers = as_numbers(series, case.outputs[0])
@@ -221,8 +225,8 @@ def test_missing_derivatives_are_null_with_a_reason():
     assert found.reason == "velocity: the engine gives none; acceleration: the engine gives none"
 
 
-def test_deviation_measures_and_names_the_worst_sample():
-    found = deviation(REFERENCE + [0.0, 3e-3, -4e-3, 0.0], REFERENCE, 1e-3, 1e-3, "closed_form")
+def test_deviation_has_worst_sample():
+    found = reference_off([0.0, 3e-3, -4e-3, 0.0], 1e-3, 1e-3)
     assert found is not None
     assert found.max_abs == pytest.approx(4e-3, rel=1e-12)
     assert found.rms == pytest.approx(2.5e-3, rel=1e-12)  # sqrt((9 + 16) / 4) e-3
@@ -232,27 +236,29 @@ def test_deviation_measures_and_names_the_worst_sample():
 
 
 @pytest.mark.parametrize(("error", "within"), [(0.9e-3, True), (1.1e-3, False), (-1.1e-3, False)])
-def test_the_verdict_turns_at_the_tolerance(error, within):
-    assert deviation(REFERENCE + [0, 0, 0, error], REFERENCE, 1e-3, 0.0, "x").within is within
+def test_deviation_within_tolerance(error, within):
+    assert reference_off([0, 0, 0, error], 1e-3).within is within
 
 
-def test_only_samples_both_have_are_compared():
+def test_deviation_compares_common_samples():
     nan = np.nan
-    found = deviation(np.array([nan, 1.5, 3.0, 9.0]), np.array([0.0, 1.0, 3.0, nan]), 0.0, 0.1, "x")
+    one, other = (Curve(np.array(each)) for each in ([nan, 1.0], [0.0, nan]))
+    known = Curve(np.array([0.0, 1.0, 3.0, nan]))
+    found = deviation(Curve(np.array([nan, 1.5, 3.0, 9.0]), rtol=0.1), known)
     assert (found.max_abs, found.worst_step) == (0.5, 1)
     assert found.tolerance == pytest.approx(0.2)  # the range over the compared samples is 2, not 3
     assert found.rms == pytest.approx(0.5 / np.sqrt(2))
-    assert deviation(np.array([nan, 1.0]), np.array([0.0, nan]), 1.0, 0.0, "x") is None
+    assert deviation(one, other) is None
     # without any error the worst sample is still one that was compared
-    assert deviation(np.array([nan, 1.0]), np.array([nan, 1.0]), 0.0, 0.0, "x").worst_step == 1
+    assert deviation(one, one).worst_step == 1
 
 
-def test_a_reference_of_another_length_is_refused_not_broadcast():
+def test_reference_of_wrong_length_is_refused():
     with pytest.raises(CaseError, match=r"closed form has shape \(1,\), expected \(4,\)"):
-        deviation(REFERENCE, np.zeros(1), 1e-9, 0.0, "closed_form")
+        deviation(Curve(REFERENCE), Curve(np.zeros(1)), "closed_form")
 
 
-def test_derivatives_scale_with_the_rate_per_radian():
+def test_derivative_tolerance_scales_with_rate():
     assert pace(crank(rate=2.0)) == 2.0
     assert pace(crank(rate=-2.0)) == 2.0
     case = crank(rate=3.0)
@@ -262,7 +268,7 @@ def test_derivatives_scale_with_the_rate_per_radian():
     assert [each.tolerance for _, each in found.items()] == pytest.approx([1e-9, 3e-9, 9e-9])
 
 
-def test_points_that_coincide_to_rounding_have_no_size():
+def test_coincident_points_have_no_size():
     case = crank()
     m, at = case.mechanism, (0.1, 0.2, 0.3)
     joints = [joint.changed(point=at) for joint in m.joints]
@@ -316,7 +322,7 @@ def test_missing_value_of_solved_sample_fails(complete):
 
 
 def test_deviation_text_names_sample_and_tolerance():
-    found = deviation(REFERENCE + [0.0, 0.0, 4e-3, 0.0], REFERENCE, 1e-3, 0.0, "closed_form")
+    found = reference_off([0.0, 0.0, 4e-3, 0.0], 1e-3)
     said = describe("half_track_change", "velocity", found, "stroke", [-0.1, 0.0, 0.1, 0.2])
     assert (
         said

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core.case.io.case_file import case_text, load_case
-from kincheck.core.case.measures import DriverEffort, JointForce, JointMoment
+from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 from scipy.optimize import brentq
+
+from ..support.fakes import record_of
 
 G = 9.81
 ARM = """
@@ -87,7 +88,7 @@ def read(tmp_path, text):
 def values(case, engine="native"):
     """Return the outputs of a case by an engine."""
     engine = adapters.engine(engine)
-    (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    record = record_of(engine, case, baseline=adapters.engine("native"))
     assert not record.outcome.bad, record.message
     return {name: np.array(each.position, float) for name, each in record.outputs.items()}
 
@@ -132,10 +133,10 @@ def test_static_case_is_written_as_read(tmp_path):
     assert values(load_case(again))["lift"] == pytest.approx(values(case)["lift"], rel=1e-15)
 
 
-def test_rates_are_not_results_at_rest(tmp_path):
+def test_static_results_have_no_rates(tmp_path):
     case = read(tmp_path, ARM + SWEEP + '[outputs.x]\npoint = "tip"\ncomponent = "x"\n')
     engine = adapters.engine("pinocchio")
-    (record,) = run([case], [engine], tol=1e-12, baseline=adapters.engine("native")).records
+    record = record_of(engine, case, baseline=adapters.engine("native"))
     assert (record.outcome.value, record.message) == ("pass", "")
     assert record.outputs["x"].velocity is None
 
@@ -186,7 +187,7 @@ def test_resting_pose_needs_no_drivers(tmp_path):
         assert found[f"{name}.effort"] == pytest.approx([0.0], abs=1e-11)
 
 
-def test_driver_may_have_the_name_of_a_sprung_joint(tmp_path):
+def test_driver_named_as_sprung_joint(tmp_path):
     """A single joint; its row had been left out with the driver's."""
     alone = ARM.partition("[bodies.hand]")[0] + ARM[ARM.index("[forces.coil]") :]
     alone += TURNED[TURNED.index("[joints.pin]") : TURNED.index("[points.post]")]
@@ -199,7 +200,7 @@ def test_driver_may_have_the_name_of_a_sprung_joint(tmp_path):
     assert values(read(tmp_path, alone))["effort"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_effort_at_a_dead_centre_says_why_it_has_none(tmp_path):
+def test_missing_effort_at_dead_centre(tmp_path):
     """A straight slider crank: no force on the slider holds it."""
     text = ARM.partition("[bodies.arm]")[0] + TURNED[TURNED.index("[drivers.turn]") :]
     for body, x in (("crank", 0.5), ("rod", 2.0), ("slider", 3.0)):
@@ -214,7 +215,7 @@ def test_effort_at_a_dead_centre_says_why_it_has_none(tmp_path):
     text += '[joints.slide]\ntype = "translational"\nbodies = ["ground", "slider"]\n'
     text += "point = [3.0, 0.0, 0.0]\naxis = [1.0, 0.0, 0.0]\n"
     text += '[outputs.e]\ntype = "driver_effort"\ndriver = "turn"\nat = "slide"\n'
-    (record,) = run([read(tmp_path, text)], [NativeEngine()], tol=1e-12).records
+    record = record_of(NativeEngine(), read(tmp_path, text))
     assert record.outputs["e"].position[0] is None
     assert "at 1 of 3 samples joint 'slide' is at a dead centre" in record.outputs["e"].reason
 
@@ -230,19 +231,19 @@ class Heavy(NativeEngine):
         return super().build(replace(case, mechanism=replace(case.mechanism, gravity=gravity)))
 
 
-def test_equilibrium_without_outputs_of_efforts_is_judged(tmp_path):
+def test_equilibrium_without_effort_outputs_is_judged(tmp_path):
     """The efforts of free drivers vanish; bushings of joints wait for a compliance study."""
     text = ARM + "[equilibrium]\n" + ANGLE + WRIST
     text += "[joints.shoulder.bushings.rubber]\nstiffness = 1e5\nturning_stiffness = 90.0\n"
     case = read(tmp_path, text)
     found = values(case, "native")
     assert [found[f"{name}.effort"][0] for name in ("lift", "bend")] == pytest.approx([0.0] * 2)
-    (record,) = run([case], [Heavy()], tol=1e-12, baseline=NativeEngine()).records
+    record = record_of(Heavy(), case, baseline=NativeEngine())
     assert record.outcome is Outcome.FAIL
     assert "lift.effort" in record.message
 
 
-def test_resting_pose_follows_a_held_driver(tmp_path):
+def test_resting_pose_follows_held_driver(tmp_path):
     text = ARM + '[equilibrium]\nheld = ["bend"]\n' + EFFORTS + ANGLE
     text += '[sweep]\ndriver = "bend"\nstart = -0.5\nstop = 0.5\nsteps = 3\n'
     case = read(tmp_path, text)
@@ -281,9 +282,9 @@ def test_pose_without_equilibrium_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["rssr", "four_bar"])
-def test_effort_at_another_joint_is_by_virtual_work(name):
+def test_effort_at_joint_by_virtual_work(name):
     """An actuator there holds the same mechanism: found by driving that joint instead."""
-    case = cases.load("four_bar")
+    case = cases.load(name)
     mechanism = case.mechanism
     driver = mechanism.drivers[0]
     other = "rocker_pivot"
@@ -316,36 +317,26 @@ def test_effort_at_another_joint_is_by_virtual_work(name):
     assert found == pytest.approx(effort / slope, rel=1e-8)
 
 
-def test_reactions_turn_with_frame_and_move_with_point(tmp_path):
-    case = read(tmp_path, ARM + SWEEP + EFFORTS)
-    mechanism = case.mechanism
-    common = (1e-9, 0.0, "")
-    every = [
-        *(JointForce(f"g{x}", *common, joint="elbow", component=x) for x in "xyz"),
-        *(JointForce(f"b{x}", *common, joint="elbow", component=x, frame="body") for x in "xyz"),
-        *(
-            JointForce(f"j{x}", *common, joint="shoulder", component=x, frame="joint")
-            for x in "xyz"
-        ),
-        *(JointForce(f"s{x}", *common, joint="shoulder", component=x) for x in "xyz"),
-        JointMoment("m", *common, joint="elbow", component="y", about="tip"),
-        JointMoment("o", *common, joint="elbow", component="y"),
-    ]
-    bound = tuple(each.bound(mechanism) for each in every)
-    case = replace(case, mechanism=with_markers(mechanism, bound), outputs=bound)
+def test_reaction_frames_and_moment_points(tmp_path):
+    outputs = components("global", "force", "elbow") + components("body", "force", "elbow")
+    outputs += components("joint", "force", "shoulder")
+    for name, about in (("tip", 'about = "tip"\n'), ("elbow", "")):
+        outputs += f'[outputs.{name}]\ntype = "joint_moment"\njoint = "elbow"\n'
+        outputs += f'component = "y"\n{about}'
+    case = read(tmp_path, ARM + SWEEP + outputs)
+    # the hand weighs 9.81 N, and hangs on the elbow: it is turned by 1.5 times the driver
+    turn = 1.5 * np.linspace(-0.4, 0.4, 5)
     for engine in ("native", "pinocchio"):
         found = values(case, engine)
-        # the hand weighs 9.81 N, and hangs on the elbow: it is turned by 1.5 times the driver
-        turn = 1.5 * np.linspace(-0.4, 0.4, 5)
-        assert found["gz"] == pytest.approx(np.full(5, G), abs=1e-11)
-        assert found["bx"] == pytest.approx(-G * np.sin(turn), abs=1e-11)
-        assert found["bz"] == pytest.approx(G * np.cos(turn), abs=1e-11)
+        assert found["global_z"] == pytest.approx(np.full(5, G), abs=1e-11)
+        assert found["body_x"] == pytest.approx(-G * np.sin(turn), abs=1e-11)
+        assert found["body_z"] == pytest.approx(G * np.cos(turn), abs=1e-11)
         # z of the joint's frame is its axis, y of the global one
-        size = np.hypot(found["jx"], found["jy"])
+        size = np.hypot(found["joint_x"], found["joint_y"])
         assert size == pytest.approx(np.full(5, 3.0 * G), abs=1e-11)
-        assert found["jz"] == pytest.approx(np.zeros(5), abs=1e-11)
+        assert found["joint_z"] == pytest.approx(np.zeros(5), abs=1e-11)
         # the tip is 0.2 m beyond the elbow
-        assert found["m"] == pytest.approx(found["o"] + G * 0.2 * np.cos(turn), abs=1e-11)
+        assert found["tip"] == pytest.approx(found["elbow"] + G * 0.2 * np.cos(turn), abs=1e-11)
 
 
 TURNED = """
@@ -374,7 +365,7 @@ rate = 0
 
 
 @pytest.mark.parametrize("engine", ["native", "mujoco", "exudyn"])
-def test_reactions_about_a_point_in_turned_frames(tmp_path, engine):
+def test_moments_about_point_in_frames(tmp_path, engine):
     """The beam's own y is up at design, its z forward; the joint's z is its axis."""
     head = ARM.partition("[bodies.arm]")[0]
     about = 'about = "post"\n'

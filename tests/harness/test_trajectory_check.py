@@ -9,14 +9,13 @@ import pytest
 from kincheck.core.forces import Forces
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
 from kincheck.core.trajectory import Trajectory
 
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
-from ..support.fakes import SAMPLES, Fake, at, crank, solution
-from ..support.loaded import loaded
+from ..support.fakes import SAMPLES, Fake, at, crank, record_of, run_case, solution
+from ..support.loaded_slider_crank import loaded
 
 NATIVE = NativeEngine(every_body=True)
 
@@ -35,146 +34,108 @@ def altered(found, part, value):
     return (changed if isinstance(found, Trajectory) else replace)(found, **{name: new})
 
 
-FORMS = {
-    "negative residual": (
-        ("residual", -1e-15),
-        "residual is -1e-15 although 9 samples are called solved",
-    ),
-    "no residual": (("residual", math.nan), "residual is nan"),
-    "infinite residual": (("residual", math.inf), "residual is inf"),
-    "complex residual": (
-        ("residual", 1e-15 + 0j),
-        "residual is of complex128, expected a real number",
-    ),
-    "residual of a sample": (
-        ("residual", np.zeros(SAMPLES)),
-        "residual has shape (9,), expected ()",
-    ),
-    "complex positions": (
-        ("points.position", lambda p: p + 0j),
+FORMS = [
+    ("residual", -1e-15, "residual is -1e-15 although 9 samples are called solved"),
+    ("residual", math.nan, "residual is nan"),
+    ("residual", math.inf, "residual is inf"),
+    ("residual", 1e-15 + 0j, "residual is of complex128, expected a real number"),
+    ("residual", np.zeros(SAMPLES), "residual has shape (9,), expected ()"),
+    (
+        "points.position",
+        lambda p: p + 0j,
         "position of point 'tip' is of complex128, expected floats",
     ),
-    "whole positions": (
-        ("points.position", np.zeros((SAMPLES, 3), int)),
+    (
+        "points.position",
+        np.zeros((SAMPLES, 3), int),
         "position of point 'tip' is of int64, expected floats",
     ),
-    "objects": (
-        ("points.velocity", lambda v: v.astype(object)),
+    (
+        "points.velocity",
+        lambda v: v.astype(object),
         "velocity of point 'tip' is of object, expected floats",
     ),
-    "texts": (
-        ("points.acceleration", np.full((SAMPLES, 3), "0")),
+    (
+        "points.acceleration",
+        np.full((SAMPLES, 3), "0"),
         "acceleration of point 'tip' is of <U1, expected floats",
     ),
-    "no position": (("points.position", None), "is of object"),
-    "rows of two lengths": (
-        ("points.position", [[0.0, 1.0], [0.0]]),
-        "position of point 'tip' is no array",
-    ),
-    "positions turned over": (
-        ("points.position", np.transpose),
-        "position of point 'tip' has shape (3, 9), expected (9, 3)",
-    ),
-    "a sample too few": (
-        ("points.velocity", lambda v: v[1:]),
+    ("points.position", None, "is of object"),
+    ("points.position", [[0.0, 1.0], [0.0]], "position of point 'tip' is no array"),
+    ("points.position", np.transpose, "position of point 'tip' has shape (3, 9), expected (9, 3)"),
+    (
+        "points.velocity",
+        lambda v: v[1:],
         "velocity of point 'tip' has shape (8, 3), expected (9, 3)",
     ),
-    "not a number": (
-        ("points.position", np.full((SAMPLES, 3), math.nan)),
+    (
+        "points.position",
+        np.full((SAMPLES, 3), math.nan),
         "which is called solved; 9 of 9 samples are so",
     ),
-    "infinite at one sample": (
-        ("points.acceleration", at(3, 2, math.inf)),
+    (
+        "points.acceleration",
+        at(3, 2, math.inf),
         "at sample 3 (angle = -0.25), which is called solved",
     ),
-    "no points": (("points", {}), "no motion of point 'tip'; found: none"),
-    "solved of too few": (
-        ("solved", lambda each: each[1:]),
-        "solved has shape (8,), expected (9,)",
-    ),
-    "numbers for solved": (
-        ("solved", np.ones(SAMPLES)),
-        "solved is of float64, expected booleans",
-    ),
-    "half iterations": (
-        ("iterations", np.full(SAMPLES, 2.5)),
-        "iterations is of float64, expected whole numbers",
-    ),
-    "negative iterations": (("iterations", np.full(SAMPLES, -3)), "iterations has -3"),
-    "no message": (("message", None), "message is None"),
-    "details in a list": (("details", [1]), "details [1]"),
-}
+    ("points", {}, "no motion of point 'tip'; found: none"),
+    ("solved", lambda each: each[1:], "solved has shape (8,), expected (9,)"),
+    ("solved", np.ones(SAMPLES), "solved is of float64, expected booleans"),
+    ("iterations", np.full(SAMPLES, 2.5), "iterations is of float64, expected whole numbers"),
+    ("iterations", np.full(SAMPLES, -3), "iterations has -3"),
+    ("message", None, "message is None"),
+    ("details", [1], "details [1]"),
+]
 
 
 def refused(answer):
-    (record,) = run([crank()], [Fake(answer=answer)], tol=1e-12).records
+    record = record_of(Fake(answer=answer))
     assert record.outcome is Outcome.ERROR
     assert record.message.startswith("BadTrajectoryError: fake: ")
     return record.message
 
 
-@pytest.mark.parametrize("breach", FORMS)
-def test_a_breach_of_the_form_is_one_message(breach):
-    part, said = FORMS[breach]
-    assert said in refused(lambda case: altered(solution(case), *part))
+@pytest.mark.parametrize(("part", "value", "said"), FORMS, ids=[said for *_, said in FORMS])
+def test_malformed_trajectory_is_reported(part, value, said):
+    assert said in refused(lambda case: altered(solution(case), part, value))
 
 
-def test_another_thing_than_a_trajectory_is_refused():
+def test_answer_of_wrong_type_is_refused():
     assert "returned tuple" in refused(lambda case: (1, 2))
 
 
-FORCES = {
-    "complex moment": (
-        ("forces.joints.moment", np.zeros((3, 3)) + 1j),
+FORCES = [
+    (
+        "forces.joints.moment",
+        np.zeros((3, 3)) + 1j,
         "moment of joint 'pin' is of complex128, expected floats",
     ),
-    "whole force": (
-        ("forces.joints.force", np.zeros((3, 3), int)),
-        "force of joint 'pin' is of int64",
-    ),
-    "one force for all samples": (
-        ("forces.joints.force", np.zeros(3)),
-        "force of joint 'pin' has shape (3,), expected (3, 3)",
-    ),
-    "infinite force": (
-        ("forces.joints.force", np.full((3, 3), math.inf)),
-        "force of joint 'pin' is infinite",
-    ),
-    "directions of forces alone": (
-        ("forces.joints.free", np.zeros((3, 3, 0))),
+    ("forces.joints.force", np.zeros((3, 3), int), "force of joint 'pin' is of int64"),
+    ("forces.joints.force", np.zeros(3), "force of joint 'pin' has shape (3,), expected (3, 3)"),
+    ("forces.joints.force", np.full((3, 3), math.inf), "force of joint 'pin' is infinite"),
+    (
+        "forces.joints.free",
+        np.zeros((3, 3, 0)),
         "free directions of joint 'pin' has shape (3, 3, 0), expected (3, 6, 'any')",
     ),
-    "effort by columns": (
-        ("forces.drivers", {"turn": np.zeros((3, 1))}),
+    (
+        "forces.drivers",
+        {"turn": np.zeros((3, 1))},
         "effort of driver 'turn' has shape (3, 1), expected (3,)",
     ),
-    "element in one number": (
-        ("forces.elements", {"spring": 1.0}),
-        "force of element 'spring' has shape (), expected (3,)",
-    ),
-    "power in one number": (("forces.power", 0.0), "power has shape ()"),
-    "complex power": (("forces.power", np.zeros(3) + 0j), "power is of complex128"),
-    "a body missing": (
-        ("bodies", lambda bodies: {"crank": bodies["crank"]}),
+    ("forces.elements", {"spring": 1.0}, "force of element 'spring' has shape (), expected (3,)"),
+    ("forces.power", 0.0, "power has shape ()"),
+    ("forces.power", np.zeros(3) + 0j, "power is of complex128"),
+    (
+        "bodies",
+        lambda bodies: {"crank": bodies["crank"]},
         "motions of bodies crank, but 'slider' is missing. Give those of all moving bodies",
     ),
-    "a body too many": (
-        ("bodies", lambda bodies: {**bodies, "wall": bodies["crank"]}),
-        "'wall' is no moving body",
-    ),
-    "angles for parameters": (
-        ("bodies.p", np.zeros((3, 3))),
-        "p of body 'crank' has shape (3, 3), expected (3, 4)",
-    ),
-    "long parameters": (
-        ("bodies.p", lambda p: 1.001 * p),
-        "p of body 'crank' has length 1.001",
-    ),
-    "a body nowhere": (
-        ("bodies.r", np.full((3, 3), math.nan)),
-        "r of body 'crank' is [nan, nan, nan] at sample 0",
-    ),
-}
+    ("bodies", lambda bodies: {**bodies, "wall": bodies["crank"]}, "'wall' is no moving body"),
+    ("bodies.p", np.zeros((3, 3)), "p of body 'crank' has shape (3, 3), expected (3, 4)"),
+    ("bodies.p", lambda p: 1.001 * p, "p of body 'crank' has length 1.001"),
+    ("bodies.r", np.full((3, 3), math.nan), "r of body 'crank' is [nan, nan, nan] at sample 0"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -187,19 +148,18 @@ def found(case):
     return NATIVE.solve(NATIVE.build(case), case, 1e-12)
 
 
-@pytest.mark.parametrize("breach", FORCES)
-def test_a_breach_of_forces_and_bodies_is_one_message(breach, case, found):
-    part, said = FORCES[breach]
+@pytest.mark.parametrize(("part", "value", "said"), FORCES, ids=[said for *_, said in FORCES])
+def test_malformed_forces_and_bodies_are_reported(part, value, said, case, found):
     check(case, "fake", found)
-    with pytest.raises(BadTrajectoryError, match=r"^fake: ") as told:
-        check(case, "fake", altered(found, *part))
-    assert said in str(told.value)
+    with pytest.raises(BadTrajectoryError, match=r"^fake: ") as caught:
+        check(case, "fake", altered(found, part, value))
+    assert said in str(caught.value)
 
 
 def outcome(case, found, mode="projection"):
     """Outcome and message of a trajectory in a run, judged by itself alone."""
     engine = Fake("native", answer=lambda case: found, mode=mode)
-    (record,) = run([case], [engine], tol=1e-12).records
+    record = record_of(engine, case)
     return record.outcome, record.message
 
 
@@ -208,14 +168,14 @@ def unbalanced(found, watts, sample=1):
 
 
 @pytest.mark.parametrize("watts", [100.0, -100.0, 1e-3])
-def test_a_missing_balance_of_power_fails_with_its_sample(watts, case, found):
+def test_unbalanced_power_fails_with_sample(watts, case, found):
     case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
     result, message = outcome(case, unbalanced(found, watts))
     assert result is Outcome.FAIL
     assert f"the balance of power is off by {abs(watts):.3g} W at sample 1 (turn = 0.25)" in message
 
 
-def test_a_balance_within_round_off_or_tolerance_passes(case, found):
+def test_power_balance_within_tolerance_passes(case, found):
     assert outcome(case, found)[0] is Outcome.UNJUDGED
     assert outcome(case, unbalanced(found, 1e-9))[0] is Outcome.UNJUDGED
     # a force within its own tolerance of 1 N may leave as much at the driver's pace
@@ -271,7 +231,7 @@ def test_points_off_their_bodies_fail(case, found):
     assert "position of points on" in message
 
 
-def test_bodies_without_rates_are_judged_by_positions(case, found):
+def test_bodies_without_rates_judged_by_position(case, found):
     still = {name: replace(each, v=None, a=None) for name, each in found.bodies.items()}
     found = changed(found, bodies=still)
     assert outcome(case, found)[0] is Outcome.UNJUDGED
@@ -281,16 +241,16 @@ def test_bodies_without_rates_are_judged_by_positions(case, found):
 def test_engine_with_points_alone_passes():
     free = Forces({}, {}, {}, np.zeros(SAMPLES), np.zeros(SAMPLES))
     engine = Fake(answer=lambda case: changed(solution(case), forces=free, residual=0))
-    (record,) = run([crank()], [engine], tol=1e-12).records
+    record = record_of(engine)
     assert record.outcome is Outcome.PASS
 
 
-def test_another_number_of_freedoms_than_native_fails():
+def test_freedoms_unlike_native_fail():
     def two(case):
         found = solution(case)
         return changed(found, details={**found.details, "dof": 2})
 
-    native, other = run([crank()], [Fake("native"), Fake("other", two)], tol=1e-12).records
+    native, other = run_case(crank(), Fake("native"), Fake("other", two)).records
     assert native.outcome is Outcome.PASS
     assert other.outcome is Outcome.FAIL
     assert other.message == "counts 2 degrees of freedom without drivers, native 1"

@@ -19,7 +19,7 @@ from kincheck.core.harness.workers.pool import in_workers
 
 from ..support.bad_engine import Bad, Elsewhere, Leaking, Unimportable
 from ..support.fake_command import Slow
-from ..support.fakes import Fake, crank, raising
+from ..support.fakes import Fake, crank, raising, record_of, run_case
 
 ROOT = Path(__file__).parents[2]
 TOL = 1e-12
@@ -81,13 +81,13 @@ def test_engine_faults_become_records():
 
 
 def test_flood_of_output_is_discarded():
-    (record,) = run([crank("flood")], [Bad()], tol=TOL, solver=in_workers(1, PATIENT)).records
+    record = record_of(Bad(), crank("flood"), solver=in_workers(1, PATIENT))
     assert (record.outcome, record.message) == (Outcome.PASS, "")
     assert "printed" not in record.details
 
 
-def test_an_engine_that_cannot_be_imported_errs():
-    results = run([crank()], [Unimportable(), Fake("good")], tol=TOL, solver=in_workers(1, PATIENT))
+def test_unimportable_engine_is_error():
+    results = run_case(crank(), Unimportable(), Fake("good"), solver=in_workers(1, PATIENT))
     assert [each.outcome for each in results.records] == [Outcome.ERROR, Outcome.PASS]
     assert "No module named 'no_such_simulator_anywhere'" in results.records[0].message
 
@@ -116,12 +116,12 @@ def test_workers_use_one_algebra_thread(monkeypatch, given):
         return start(*command, **options)
 
     monkeypatch.setattr(subprocess, "Popen", noted)
-    (record,) = run([crank("a")], [Elsewhere()], tol=TOL, solver=in_workers(1, PATIENT)).records
+    record = record_of(Elsewhere(), crank("a"), solver=in_workers(1, PATIENT))
     assert record.outcome is Outcome.PASS
     assert started == [given or "1"] * len(THREADS)
 
 
-def test_leaked_memory_costs_no_other_pair():
+def test_memory_leak_costs_no_pair():
     """Each pair keeps 0.3 GB of the half that there is: the second fails in the process of the
     first, and passes in its own.
     """
@@ -134,7 +134,7 @@ def test_leaked_memory_costs_no_other_pair():
     assert [each.message for each in results.records] == ["", ""]
 
 
-def test_records_are_the_same_however_many_jobs():
+def test_records_do_not_depend_on_jobs():
     """Without a reference the others wait for the native engine, which is the last to be
     through.
     """
@@ -154,9 +154,7 @@ def test_records_are_the_same_however_many_jobs():
 
 def test_crash_of_baseline_is_reported():
     case = crank("segfault", reference=False)
-    (record,) = run(
-        [case], [Fake()], tol=TOL, baseline=Bad("native"), solver=in_workers(2, PATIENT)
-    ).records
+    record = record_of(Fake(), case, baseline=Bad("native"), solver=in_workers(2, PATIENT))
     assert record.outcome is Outcome.UNJUDGED
     why = (
         "the case has no reference, and the native engine has no answer (crashed: the process died"
@@ -166,9 +164,7 @@ def test_crash_of_baseline_is_reported():
 
 
 def test_unpicklable_engine_names_remedy():
-    (record,) = run(
-        [crank()], [Fake(answer=raising(ValueError()))], tol=TOL, solver=in_workers(1, PATIENT)
-    ).records
+    record = record_of(Fake(answer=raising(ValueError())), solver=in_workers(1, PATIENT))
     assert record.outcome is Outcome.ERROR
     assert record.message.startswith("cannot be sent to a worker process: ")
     assert "--jobs 0" in record.message
@@ -190,7 +186,7 @@ def until(condition):
     return condition()
 
 
-def test_an_interrupt_ends_the_workers_at_once(deaf):
+def test_interrupt_ends_workers(deaf):
     def interrupt(record, done, total):
         assert deaf()
         raise KeyboardInterrupt
@@ -198,19 +194,13 @@ def test_an_interrupt_ends_the_workers_at_once(deaf):
     marker = mark()
     begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        run(
-            [crank("deaf")],
-            [Bad(), Fake()],
-            tol=TOL,
-            solver=in_workers(2, Limits()),
-            progress=interrupt,
-        )
+        run_case(crank("deaf"), Bad(), Fake(), solver=in_workers(2, Limits()), progress=interrupt)
     assert marked(marker) == []
     assert time.monotonic() - begin < Limits().timeout
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere only between pairs")
-def test_a_worker_that_hangs_dies_with_its_parent(deaf):
+def test_hanging_worker_dies_with_parent(deaf):
     marker = mark()
     code = (
         "from tests.harness.test_workers import *; run([crank('deaf')], [Bad()], tol=TOL,"

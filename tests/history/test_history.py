@@ -20,14 +20,19 @@ from kincheck.core.report.figures import Past, trend_figures
 from kincheck.core.report.trends import trends
 from msgspec.structs import replace
 
-from ..support.nights import changed, keep, keep_changed, nights, records, reported, times
+from ..support.history_runs import (
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    reported,
+    times,
+)
 
 FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
 """Two runs of a crank in three and four engines, made by schema 1."""
-
-
-def history(path, *argv):
-    return main(["history", "--history", str(path), *map(str, argv)])
 
 
 # Files of another time
@@ -61,7 +66,7 @@ def test_first_schema_file_is_migrated(path):
         ).fetchone() == (18, 1)
 
 
-def test_a_migrated_file_goes_on(path):
+def test_migrated_history_takes_runs(path):
     shutil.copy(FIRST_SCHEMA, path)
     assert keep(path, records()) == 3
     with Store(path) as store:
@@ -71,7 +76,7 @@ def test_a_migrated_file_goes_on(path):
         ).fetchone() == (4, 11)
 
 
-def test_a_later_schema_is_refused_by_every_command(path, capsys):
+def test_later_schema_is_refused(path, capsys):
     nights(path, 1)
     with Store(path) as store:
         store.connection.execute("PRAGMA user_version = 99")
@@ -83,7 +88,7 @@ def test_a_later_schema_is_refused_by_every_command(path, capsys):
 # Lists
 
 
-def test_runs_are_listed_the_latest_first(path, capsys):
+def test_history_lists_latest_run_first(path, capsys):
     nights(path, 2)
     keep(
         path,
@@ -101,7 +106,7 @@ def test_runs_are_listed_the_latest_first(path, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 2
 
 
-def test_trends_of_a_pair_and_its_steps(path, capsys):
+def test_trends_of_pair_with_steps(path, capsys):
     nights(path, 6)
     for _ in range(3):
         keep(path, changed(records(), **times(4.0)), numpy="2.1.0")
@@ -149,7 +154,7 @@ def drawn(page):
     return json.loads(zlib.decompress(b64decode(packed)))["figures"]
 
 
-def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
+def test_plot_has_numbers_of_history(path, tmp_path):
     nights(path, 4)
     page = tmp_path / "trends.html"
     assert history(path, "--engine", "mujoco", "--plot", page) == 0
@@ -174,7 +179,7 @@ def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
     assert mine[0].run == "2026-11-01 03:00 #1"
 
 
-def test_a_velocity_fault_is_drawn_red_since_its_run(path, tmp_path):
+def test_plot_marks_velocity_fault(path, tmp_path):
     """Whose positions are as before: with its step, and the version that came with it."""
     for night in range(1, 9):
         made = records()
@@ -249,7 +254,7 @@ def test_quantities_without_values_are_not_drawn(path, tmp_path):
     assert "data-figure" not in text.partition("<script")[0]
 
 
-def test_close_times_span_a_decade():
+def test_time_axis_spans_decade():
     """Else a tenth looks like a step; a decade or more is drawn as it is."""
     for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
         past = [
@@ -269,7 +274,7 @@ def test_close_times_span_a_decade():
 # Rules for the run to compare with, and files without a history
 
 
-def test_rules_find_the_run_to_compare_with(path):
+def test_baseline_rules(path):
     keep(path, records())
     keep(path, records(), git={"commit": "b" * 40, "branch": "topic", "changed": False})
     keep(path, records(), status="interrupted")
@@ -298,7 +303,7 @@ def test_rules_find_the_run_to_compare_with(path):
         reported(path, against="green")
 
 
-def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
+def test_report_compares_files_without_history(tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
     facts = {
         "host": "a-host",
@@ -380,7 +385,7 @@ def test_exports_hold_every_number(path, tmp_path):
     } == {(None, None, None, None)}
 
 
-def test_an_export_can_be_of_a_case_and_an_engine(path, tmp_path):
+def test_export_of_case_and_engine(path, tmp_path):
     nights(path, 1)
     with Store(path) as store:
         assert (

@@ -11,7 +11,7 @@ from kincheck.core.history.database import MIGRATIONS
 from kincheck.core.history.store import Store
 
 from ..support.fakes import crank
-from ..support.nights import nights
+from ..support.history_runs import history, nights, report
 
 NO_TRENDS = "The history cannot be read, so this page shows no earlier runs."
 
@@ -146,7 +146,7 @@ def test_history_passes_over_damaged_run(damaged, tmp_path, capsys):
 
 
 def test_report_passes_over_damaged_run(damaged, tmp_path, capsys):
-    assert main(f"report --history {damaged} --out {tmp_path / 'out'}".split()) == 2
+    assert report(damaged, "--out", tmp_path / "out") == 2
     assert "run 3 against run 1 (last green)" in passed_over(capsys, damaged)
     assert (tmp_path / "out" / "report.html").exists()
 
@@ -154,14 +154,14 @@ def test_report_passes_over_damaged_run(damaged, tmp_path, capsys):
 def test_report_skips_run_with_damaged_record(path, capsys):
     nights(path, 3)
     change(path, "UPDATE records SET record = x'00' WHERE run_id = 2")
-    assert main(["report", "--history", str(path)]) == 2
+    assert report(path) == 2
     assert "run 3 against run 1 (last green)" in passed_over(capsys, path)
-    assert main(f"report 2 --history {path}".split()) == 2
+    assert report(path, "2") == 2
     passed_over(capsys, path)
 
 
 def test_removed_run_is_not_reported(damaged, capsys):
-    assert main(f"history --history {damaged} --remove 2".split()) == 0
+    assert history(damaged, "--remove", "2") == 0
     assert "run 2 is removed" in capsys.readouterr().out
     with Store(damaged) as store:
         assert [row.id for row in store.runs()] == [3, 1]
@@ -169,14 +169,14 @@ def test_removed_run_is_not_reported(damaged, capsys):
             "SELECT count(*) FROM records WHERE run_id = 2"
         ).fetchone() == (0,)
         assert len(store.records(3)) == 4
-    assert main(f"history --history {damaged} --remove 2".split()) == 2
+    assert history(damaged, "--remove", "2") == 2
     assert "there is no run 2" in capsys.readouterr().err
 
 
 def test_many_damaged_runs_are_summed_up(path, capsys):
     nights(path, 9)
     change(path, "UPDATE runs SET plan = '(' WHERE id > 1")
-    assert main(["history", "--history", str(path)]) == 2
+    assert history(path) == 2
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 6
     assert "3 more runs cannot be read: 4, 3, 2" in said[-1]

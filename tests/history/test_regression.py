@@ -2,7 +2,6 @@
 
 import math
 import random
-import xml.etree.ElementTree as ET
 
 import msgspec
 import pytest
@@ -14,32 +13,33 @@ from kincheck.core.report.junit import to_regression_junit
 from kincheck.core.report.regressions import headline, print_regressions, rows, to_markdown
 from msgspec.structs import replace
 
-from ..support.nights import (
+from ..support.history_runs import (
     FACTS,
+    FIRST,
     RESULTS,
     changed,
     keep,
     keep_changed,
+    kinds,
     nights,
     records,
+    report,
     reported,
     times,
     worse,
 )
-from ..support.printed import Terminal, coloured
+from ..support.printed import Terminal, coloured, junit_tests
 
 
-def kinds(found):
-    return [(each.kind, each.case, each.engine) for each in found.findings]
-
-
-FIRST = ("first", "mujoco")
+def timed(record, factor):
+    """The record with a time so many times as long."""
+    return replace(record, seconds=times(factor)["seconds"](record.seconds))
 
 
 # False alarms
 
 
-def test_quiet_and_noisy_nights_are_not_reported(path):
+def test_noise_is_no_regression(path):
     noise = random.Random(943745)
     for _ in range(20):
         keep(path, records(noise=noise), calibration_seconds=0.02 * noise.uniform(0.8, 1.25))
@@ -49,10 +49,9 @@ def test_quiet_and_noisy_nights_are_not_reported(path):
             assert (found.findings, found.steps, found.regressed) == ([], [], False)
 
 
-def test_one_slow_machine_is_no_slow_engine(path):
+def test_slow_machine_is_no_regression(path):
     nights(path, 8)
-    slow = [replace(each, seconds=replace(each.seconds, warm=0.04)) for each in records()]
-    keep(path, slow, calibration_seconds=0.08)
+    keep(path, [timed(each, 4.0) for each in records()], calibration_seconds=0.08)
     assert kinds(reported(path)) == []
     waiting = [
         replace(each, seconds=replace(each.seconds, warm=0.04, waited=0.03)) for each in records()
@@ -61,18 +60,10 @@ def test_one_slow_machine_is_no_slow_engine(path):
     assert kinds(reported(path)) == []
 
 
-def test_scattered_times_widen_the_limit(path):
+def test_scattered_times_widen_limit(path):
     noise = random.Random(1)
     for _ in range(10):
-        keep(
-            path,
-            [
-                changed(
-                    [each], case=each.case, engine=each.engine, **times(noise.choice((1.0, 2.0)))
-                )[0]
-                for each in records()
-            ],
-        )
+        keep(path, [timed(each, noise.choice((1.0, 2.0))) for each in records()])
     keep_changed(path, **times(3.0))
     found = reported(path)
     assert found.time_limit > 3.0
@@ -92,21 +83,19 @@ def test_microseconds_are_no_regression(path, warm):
     assert kinds(reported(path)) == ([] if warm < 7e-5 else [(Kind.SLOWER, *FIRST)])
 
 
-def test_round_off_that_grows_is_no_drift(path):
+def test_growing_round_off_is_no_drift(path):
     nights(path, 3)
     keep_changed(path, **worse(1e-4))
     keep_changed(path, **worse(1.8e-3))  # from 5e-17 to 9e-16 m
     assert kinds(reported(path)) == []
 
 
-def test_other_processor_compares_calibrated_times(path):
+def test_calibrated_times_on_changed_processor(path):
     nights(path, 6)
     keep(path, changed(records(), **times(3.0)), processor="another", calibration_seconds=0.06)
     slower = [each.engine + each.case for each in reported(path).findings]
     assert slower == []
-    quick = [
-        changed([each], case=each.case, engine=each.engine, **times(0.25))[0] for each in records()
-    ]
+    quick = [timed(each, 0.25) for each in records()]
     keep(path, changed(quick, **times(4.0)), processor="another", calibration_seconds=0.005)
     assert kinds(reported(path, against="6")) == [(Kind.SLOWER, *FIRST)]  # 10 ms, as before
 
@@ -167,7 +156,7 @@ def test_planted_regressions_are_reported(path, what):
     assert {(each.case, each.engine) for each in found.findings} == {FIRST}
 
 
-def test_a_changed_engine_version_is_named(path):
+def test_changed_engine_version_is_named(path):
     nights(path, 2)
     newer = [
         replace(each, version="4.1.0") if each.engine == "mujoco" else each for each in records()
@@ -200,7 +189,7 @@ def test_fixed_added_absent_are_no_regressions(path):
     assert not found.regressed
 
 
-def test_a_changed_tolerance_is_said(path):
+def test_changed_tolerance_is_reported(path):
     nights(path, 1)
 
     def loosened(errors):
@@ -258,11 +247,11 @@ def test_loose_tolerances_are_named(path):
 # What a regression report is written as: Markdown, JSON, JUnit and a page, from one comparison
 
 
-def test_the_command_writes_every_format(path, tmp_path, capsys):
+def test_report_writes_every_format(path, tmp_path, capsys):
     nights(path, 6)
     keep_changed(path, **worse(20.0), message="<script>alert(1)</script> | *x*")
     out = tmp_path / "report"
-    assert main(f"report --history {path} --out {out}".split()) == 1
+    assert report(path, "--out", out) == 1
     text = (out / "regressions.md").read_text()
     assert capsys.readouterr().out == text
     found = msgspec.json.decode((out / "regressions.json").read_bytes(), type=Regressions)
@@ -272,14 +261,9 @@ def test_the_command_writes_every_format(path, tmp_path, capsys):
     assert page.index("1 less accurate") < page.index('id="overview"')
     assert "x position error 5e-13 → 1e-11 m" in page
     assert "case-0-trend-time" in page
-    root = ET.parse(out / "junit.xml").getroot()
-    failed = [
-        (test.get("classname"), test.get("name"))
-        for test in root.iter("testcase")
-        if test.find("failure") is not None
-    ]
-    assert failed == [("first.mujoco.projection", "x")]
-    assert len(list(root.iter("testcase"))) == 8
+    tests = junit_tests((out / "junit.xml").read_text())
+    assert [name for name, found in tests.items() if found] == ["first.mujoco.projection x"]
+    assert len(tests) == 8
 
 
 def test_regression_junit_keeps_skips(path):
@@ -297,16 +281,14 @@ def test_regression_junit_keeps_skips(path):
     )
     found = reported(path)
     with Store(path) as store:
-        root = ET.fromstring(to_regression_junit(store.results(7), found))
-    failed = {
-        f"{test.get('classname')} {test.get('name')}"
-        for test in root.iter("testcase")
-        if test.find("failure") is not None
-    }
-    assert failed == {"first.mujoco.projection slower", "second.mujoco.projection lost"}
-    assert [suite.get("failures") for suite in root] == ["1", "1"]
-    assert [suite.get("skipped") for suite in root] == ["0", "2"]
-    assert [(suite.get("tests"), suite.get("errors")) for suite in root] == [("5", "2"), ("5", "0")]
+        text = to_regression_junit(store.results(7), found)
+    kinds = {name: [kind for kind, _ in found] for name, found in junit_tests(text).items()}
+    assert [name for name, found in kinds.items() if found == ["failure"]] == [
+        "first.mujoco.projection slower",
+        "second.mujoco.projection lost",
+    ]
+    assert b'name="first" tests="5" failures="1" errors="2" skipped="0"' in text
+    assert b'name="second" tests="5" failures="1" errors="0" skipped="2"' in text
 
 
 def test_regression_markdown_escapes_and_folds(path):
@@ -324,20 +306,20 @@ def test_regression_markdown_escapes_and_folds(path):
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")
 
 
-def test_pairs_that_no_engine_can_solve_are_not_right(path):
+def test_unavailable_pairs_are_not_right(path):
     first, *others = records()
     gone = [replace(each, outcome=Outcome.UNAVAILABLE) for each in others]
     keep(path, [first, *gone])
     assert f": all 1 right, {len(others)} unavailable or unsupported;" in headline(reported(path))
 
 
-def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
+def test_terminal_report_has_no_markup(path, capsys, monkeypatch):
     nights(path, 6)
     keep(path, changed(records(), **worse(20.0), message="<script> | *x*")[:-1])
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")  # no colours
     monkeypatch.setenv("COLUMNS", "200")
-    assert main(["report", "--history", str(path)]) == 1
+    assert report(path) == 1
     shown = capsys.readouterr().out
     for mark in ("<details>", "<summary>", "## ", "| ", "**", "&lt;"):
         assert mark not in shown
@@ -376,65 +358,64 @@ def found_after(path, **now):
     night(path, unjudged=now.get("unjudged", True))
     night(path, **now)
     found = reported(path, against="1")
-    return (
-        [(each.kind, each.case, each.engine) for each in found.findings],
-        [each.message for each in found.findings],
-        found,
-    )
+    return kinds(found), [each.message for each in found.findings], found
 
 
 @pytest.mark.parametrize(
-    "values", [{"position": [0.0, -0.5, None]}, {"velocity": [1.0, 1.001, None]}]
+    ("motion", "values", "size"),
+    [
+        ("position", [0.0, -0.5, None], "1 m "),
+        ("velocity", [1.0, 1.001, None], "1e-3 m/s "),
+    ],
 )
-def test_other_values_at_the_same_samples(path, values):
-    kinds, messages, found = found_after(path, **values)
-    assert kinds == [(Kind.MOVED, *FIRST)]
+def test_changed_values_are_reported_moved(path, motion, values, size):
+    moved, messages, found = found_after(path, **{motion: values})
+    assert moved == [(Kind.MOVED, *FIRST)]
     assert found.regressed
-    assert (
-        f"y {next(iter(values))} differs by up to {'1 m ' if 'position' in values else '1e-3 m/s '}"
-        in messages[0]
-    )
+    assert f"y {motion} differs by up to {size}" in messages[0]
 
 
-@pytest.mark.parametrize(("off", "kinds"), [(1e-6, [Kind.MOVED]), (0.0, [])])
-def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
+@pytest.mark.parametrize("off", [1e-6, 0.0])
+def test_large_forces_hide_no_motion(path, off):
     """Of an output without a standard, the scale is that of the outputs of its unit."""
     for moved in (0.0, off):
         force = OutputSeries(position=[9e5, 1e6, 0.0], velocity=None, acceleration=None, unit="N")
         y = replace(SERIES, position=[0.0, 0.5 + moved, None])
         outputs = {"y": y, "load": force}
         keep_changed(path, driver=DRIVER, outputs=outputs, errors={})
-    assert [each.kind for each in reported(path, against="1").findings] == kinds
+    assert kinds(reported(path, against="1")) == [(Kind.MOVED, *FIRST)] * (off > 0.0)
 
 
-def test_round_off_is_no_other_motion(path):
-    kinds, messages, _ = found_after(
+def test_round_off_is_no_motion(path):
+    moved, messages, _ = found_after(
         path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]
     )
-    assert kinds == [(Kind.GONE, *FIRST)]
+    assert moved == [(Kind.GONE, *FIRST)]
     assert messages == [
         "y velocity has no value at 1 of 2 samples that had one, first at turn = 0.5: no reason is"
         " given"
     ]
 
 
-@pytest.mark.parametrize(("off", "kinds"), [(1.9e-9, []), (2.1e-9, [(Kind.MOVED, *FIRST)])])
-def test_values_within_tolerances_are_no_motion(path, off, kinds):
-    assert found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])[0] == kinds
+@pytest.mark.parametrize(("off", "count"), [(1.9e-9, 0), (2.1e-9, 1)])
+def test_values_within_tolerances_are_no_motion(path, off, count):
+    moved, *_ = found_after(path, unjudged=False, position=[0.0, 0.5 + off, None])
+    assert moved == [(Kind.MOVED, *FIRST)] * count
 
 
-def test_another_sweep_is_said(path):
-    kinds, messages, _ = found_after(path, driver={"turn": [0.0, 0.25, 0.5]})
-    assert kinds == [(Kind.MOVED, *FIRST)]
-    assert messages == ["solved at other values of the drivers than before"]
-
-
-def test_the_last_digit_of_a_driver_is_no_other_sweep(path):
-    assert found_after(path, driver={"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]})[0] == []
-
-
-def test_another_driver_is_another_sweep(path):
-    assert found_after(path, driver={"push": DRIVER["turn"]})[0] == [(Kind.MOVED, *FIRST)]
+@pytest.mark.parametrize(
+    ("driver", "count"),
+    [
+        ({"turn": [0.0, 0.25, 0.5]}, 1),
+        ({"push": DRIVER["turn"]}, 1),
+        ({"turn": [0.0, math.nextafter(0.5, 1.0), 1.0]}, 0),
+    ],
+    ids=["values", "name", "last digit"],
+)
+def test_changed_sweep_is_reported(path, driver, count):
+    moved, messages, _ = found_after(path, driver=driver)
+    assert moved == [(Kind.MOVED, *FIRST)] * count
+    assert messages == ["solved at other values of the drivers than before"] * count
 
 
 def test_fewer_samples_are_reported_lost(path):

@@ -2,17 +2,15 @@
 now, pairs that are missing.
 """
 
-import xml.etree.ElementTree as ET
+import re
 
 import pytest
-from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import WHY, Kind
 from msgspec.structs import replace
 
-from ..support.nights import keep, keep_changed, nights, records, reported
-
-FIRST = ("first", "mujoco")
+from ..support.history_runs import FIRST, keep, keep_changed, nights, records, report, reported
+from ..support.printed import junit_messages
 
 
 def of_output(output="x", **changes):
@@ -87,7 +85,7 @@ def test_solution_changes_are_in_every_format(path, tmp_path, capsys, what):
     assert (finding.kind, finding.case, finding.engine) == (kind, *FIRST)
     assert finding.message.startswith(message)
     assert found.regressed is kind.regression is (kind is not Kind.RANK)
-    assert main(f"report --history {path} --out {tmp_path}".split()) == kind.regression
+    assert report(path, "--out", tmp_path) == kind.regression
     capsys.readouterr()
     title = f"{kind.capitalize()} (1): {WHY[kind]}"
     assert title in (tmp_path / "regressions.md").read_text("utf-8")
@@ -95,9 +93,7 @@ def test_solution_changes_are_in_every_format(path, tmp_path, capsys, what):
     assert f"{kind.capitalize()} (1)</b>: " in page
     assert message in page
     assert message in (tmp_path / "regressions.json").read_text("utf-8")
-    failures = [
-        each.get("message") for each in ET.parse(tmp_path / "junit.xml").getroot().iter("failure")
-    ]
+    failures = junit_messages((tmp_path / "junit.xml").read_text(), "failure")
     assert [each.startswith(f"{kind}: {message}") for each in failures] == [True] * kind.regression
 
 
@@ -146,17 +142,17 @@ def test_lost_samples_are_reported_once(path):
 def test_missing_pairs_are_failures_on_request(path, tmp_path, capsys):
     nights(path, 2)
     keep(path, [each for each in records() if each.case == "first" and each.engine == "native"])
-    assert main(["report", "--history", str(path)]) == 0
+    assert report(path) == 0
     said = capsys.readouterr().out
     assert "nothing regressed; 3 not in this run" in said
     assert "| mujoco | first, second | pass there |" in said
-    assert main(f"report --history {path} --missing-is-failure --out {tmp_path}".split()) == 1
+    assert report(path, "--missing-is-failure", "--out", tmp_path) == 1
     said = capsys.readouterr().out
     assert said.startswith("## run 3 against run 2 (last green): 3 not in this run")
     assert "**Not in this run (3): " in said
     assert "<details open>" in (tmp_path / "report.html").read_text("utf-8")
-    suites = ET.parse(tmp_path / "junit.xml").getroot()
-    assert [(each.get("name"), each.get("failures")) for each in suites] == [
+    text = (tmp_path / "junit.xml").read_text("utf-8")
+    assert re.findall(r'name="(\w+)" tests="\d+" failures="(\d)"', text) == [
         ("first", "1"),
         ("second", "2"),
     ]
@@ -171,12 +167,12 @@ def test_pair_of_last_run_is_missing(path, capsys):
     assert [(each.kind, each.case, each.message) for each in found.findings] == [
         (Kind.ABSENT, "second", "in run 2, by the same command")
     ] * 2
-    assert main(["report", "--history", str(path)]) == 0
-    assert main(f"report --history {path} --missing-is-failure".split()) == 1
+    assert report(path) == 0
+    assert report(path, "--missing-is-failure") == 1
     capsys.readouterr()
 
 
-def test_other_command_has_no_missing_pairs(path, capsys):
+def test_changed_command_has_no_missing_pairs(path, capsys):
     keep(path, records()[:2])
     keep(
         path,
@@ -184,13 +180,13 @@ def test_other_command_has_no_missing_pairs(path, capsys):
         command="kincheck run mine.toml",
     )
     keep(path, records()[:2])
-    assert main(f"report --history {path} --missing-is-failure".split()) == 0
+    assert report(path, "--missing-is-failure") == 0
     assert "not in this run" not in capsys.readouterr().out
 
 
-def test_missing_pairs_count_with_nothing_to_compare_with(path, capsys):
+def test_missing_pairs_without_baseline(path, capsys):
     keep_changed(path, outcome=Outcome.FAIL)
     keep(path, records()[:2])
-    assert main(["report", "--history", str(path)]) == 0
+    assert report(path) == 0
     assert "2 not in this run; nothing to compare with" in capsys.readouterr().out
-    assert main(f"report --history {path} --missing-is-failure".split()) == 1
+    assert report(path, "--missing-is-failure") == 1

@@ -6,7 +6,7 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.store import Store
 
 from ..support.fakes import Fake, crank, off
-from ..support.nights import changed, keep, records, reported, worse
+from ..support.history_runs import changed, keep, records, reported, worse
 
 # untimed: a busy machine is slower, which a report names too
 RIGHT = Fake("native", untimed=True)
@@ -50,7 +50,7 @@ def report(kincheck_main, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("nights", [1, 3])
-def test_another_selection_turns_no_night_green(run, report, nights):
+def test_unlike_selection_repairs_nothing(run, report, nights):
     for _ in range(nights - 1):
         run(*NIGHT)
     run(*NIGHT, right=False)
@@ -63,7 +63,7 @@ def test_another_selection_turns_no_night_green(run, report, nights):
     assert report()[0] == 0
 
 
-def test_another_selection_turns_no_night_red(run, report):
+def test_unlike_selection_breaks_nothing(run, report):
     run(*NIGHT)
     run(*OTHER, right=False)
     assert report()[0] == 0
@@ -86,7 +86,7 @@ def test_another_selection_turns_no_night_red(run, report):
     ],
     ids=["tolerance", "places", "more", "more and tolerance", "all"],
 )
-def test_same_selection_repairs_a_night(run, report, monkeypatch, tmp_path, again, status):
+def test_same_selection_repairs_run(run, report, monkeypatch, tmp_path, again, status):
     monkeypatch.chdir(tmp_path)
     run(*NIGHT)
     run(*NIGHT, right=False)
@@ -94,7 +94,7 @@ def test_same_selection_repairs_a_night(run, report, monkeypatch, tmp_path, agai
     assert report()[0] == status
 
 
-def test_a_mistyped_case_is_not_in_the_history(run, report, capsys, tmp_path):
+def test_run_with_mistyped_case_is_unstored(run, report, capsys, tmp_path):
     run(*NIGHT)
     for mistyped in (("crnk",), (*NIGHT, "crnk", "--out", str(tmp_path / "out")), ("crnk*",)):
         assert run(*mistyped) == 2
@@ -115,7 +115,7 @@ def test_undecodable_names_are_stored(run, tmp_path, monkeypatch):
     assert row.circumstances["selection"]["cases"] == ["?.toml", "crank"]
 
 
-def test_a_run_of_nothing_readable_is_not_stored(run, report, capsys, tmp_path):
+def test_run_without_readable_case_is_unstored(run, report, capsys, tmp_path):
     (tmp_path / "broken.toml").write_text("no case")
     run(*NIGHT)
     for _ in range(2):
@@ -127,9 +127,7 @@ def test_a_run_of_nothing_readable_is_not_stored(run, report, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("again", "status"), [("b/swing.toml", 1), ("./a/swing.toml", 0)], ids=["other", "same"]
 )
-def test_another_file_of_its_name_repairs_nothing(
-    run, report, monkeypatch, tmp_path, again, status
-):
+def test_same_name_in_folders(run, report, monkeypatch, tmp_path, again, status):
     monkeypatch.chdir(tmp_path)
     for folder in "ab":
         (tmp_path / folder).mkdir()
@@ -141,9 +139,11 @@ def test_another_file_of_its_name_repairs_nothing(
 
 
 @pytest.mark.parametrize(
-    "more", [("--static",), ("--engine-command", "true {case} {samples} {out}")]
+    "more",
+    [("--static",), ("--engine-command", "true {case} {samples} {out}")],
+    ids=["static", "engine command"],
 )
-def test_options_of_the_task_make_another_selection(run, tmp_path, more):
+def test_task_options_change_selection(run, tmp_path, more):
     run(*NIGHT)
     run(*NIGHT, *more)
     with Store(tmp_path / "kept", writable=False) as store:
@@ -151,12 +151,12 @@ def test_options_of_the_task_make_another_selection(run, tmp_path, more):
     assert first != second
 
 
-def test_a_mistyped_case_makes_no_history(run, tmp_path):
+def test_mistyped_case_makes_no_history(run, tmp_path):
     assert run("crnk") == 2
     assert not (tmp_path / "kept").exists()
 
 
-def test_a_night_without_one_of_its_cases_is_red(run, report):
+def test_unreadable_case_is_regression(run, report):
     run(*NIGHT, *OTHER)
     assert run(*NIGHT, *OTHER, cases={"crank": crank()}) == 2
     status, said = report()
@@ -164,7 +164,7 @@ def test_a_night_without_one_of_its_cases_is_red(run, report):
     assert said.startswith("## run 2 against run 1 (last green): 1 case could not be read")
 
 
-def test_runs_of_older_versions_are_repaired_by_all_their_pairs(path):
+def test_old_run_needs_all_pairs_repaired(path):
     keep(path, records()[:2])
     keep(path, changed(records(), outcome=Outcome.FAIL)[:2])
     keep(path, records()[2:], command="kincheck run second")
@@ -173,7 +173,7 @@ def test_runs_of_older_versions_are_repaired_by_all_their_pairs(path):
     assert reported(path).run.number == 4
 
 
-def test_runs_with_other_options_are_no_measure(path):
+def test_runs_with_changed_options_are_ignored(path):
     night = {"cases": ["first"], "engines": [], "options": {"run": {"tol": 1e-12}}}
     coarse = night | {"options": {"run": {"tol": 1e-3}}}
     for selection in (night, night, night, coarse, night):
@@ -183,7 +183,7 @@ def test_runs_with_other_options_are_no_measure(path):
     assert (found.against.number, found.findings, found.steps) == (3, [], [])
 
 
-def test_a_red_run_counts_for_sixty_runs(path):
+def test_failed_run_counts_sixty_runs(path):
     keep(path, changed(records(), outcome=Outcome.FAIL), command="kincheck run once")
     for _ in range(59):
         keep(path, records()[:2])
@@ -192,7 +192,7 @@ def test_a_red_run_counts_for_sixty_runs(path):
     assert reported(path).run.number == 61
 
 
-def test_a_run_without_records_has_an_outcome_in_the_table(path, kincheck_main, capsys):
+def test_history_lists_run_without_records(path, kincheck_main, capsys):
     keep(path, [])
     with Store(path) as store:
         facts = {"started": "2026-11-02T03:00", "command": "kincheck run"}

@@ -7,14 +7,23 @@ import random
 
 import numpy as np
 import pytest
-from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
 from kincheck.core.history.steps import change_points, lasting, steps
 from kincheck.core.history.store import Store
 from msgspec.structs import replace
 
-from ..support.nights import changed, keep, keep_changed, nights, records, times, worse
+from ..support.history_runs import (
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    report,
+    times,
+    worse,
+)
 
 
 def found(path, standing=False):
@@ -23,12 +32,19 @@ def found(path, standing=False):
     return lasting(every) if standing else every
 
 
+def slow_nights(path, factors, seed=3):
+    """Nights whose time in the first case is so many times as long."""
+    noise = random.Random(seed)
+    for factor in factors:
+        keep(path, changed(records(noise=noise), **times(factor)))
+
+
 def noisy(levels, spread=0.05, seed=3):
     noise = random.Random(seed)
     return np.array([level + noise.gauss(0.0, spread) for level in levels])
 
 
-def test_a_slow_drift_is_no_step():
+def test_slow_drift_is_no_step():
     drift = np.linspace(0.0, math.log(4.0), 60)
     for seed in range(20):
         assert change_points(noisy(drift, seed=seed), least=math.log(1.5), lasting=3) == []
@@ -55,7 +71,7 @@ def test_alternating_values_are_no_steps():
     ],
     ids=["quiet", "step", "two", "at the end", "too short", "outlier", "too small"],
 )
-def test_levels_are_found_where_they_change(levels, expected):
+def test_change_points_of_levels(levels, expected):
     for seed in range(5):
         assert change_points(noisy(levels, seed=seed), least=math.log(1.5), lasting=3) == expected
 
@@ -121,38 +137,32 @@ def test_outcome_step_ends_with_repair(path):
     assert [(each.first, each.worse) for each in found(path)] == [(5, False), (3, True)]
 
 
-def test_slow_nights_are_no_step_of_time(path):
-    noise = random.Random(5)
-    for night in range(12):
-        keep(path, changed(records(noise=noise), **times(3.0 if night in (5, 10, 11) else 1.0)))
+def test_slow_nights_are_no_step(path):
+    slow_nights(path, [3.0 if night in (5, 10, 11) else 1.0 for night in range(12)], seed=5)
     assert found(path) == []
 
 
 def test_repeated_slow_stretches_are_separate(path, capsys):
-    noise = random.Random(3)
-    for night in range(32):
-        keep(path, changed(records(noise=noise), **times(2.0 if night // 8 % 2 else 1.0)))
+    slow_nights(path, 2 * ([1.0] * 8 + [2.0] * 8))
     assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
         (25, True, None),
         (17, False, None),
         (9, True, 17),
     ]
     assert [(each.first, each.last) for each in found(path, standing=True)] == [(25, 24)]
-    assert main(f"report --against 20 --history {path}".split()) == 1
+    assert report(path, "--against", "20") == 1
     said = capsys.readouterr().out
     assert " · since run 25 |" in said
     assert "ms a sweep since run 25 (" in said
     assert "steps that came and went" in said.lower()
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
-    assert main(f"history --case first --engine mujoco --last 0 --history {path}".split()) == 0
+    assert history(path, "--case", "first", "--engine", "mujoco", "--last", "0") == 0
     said = capsys.readouterr().out
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
 
 
 def test_partly_repaired_step_stands(path):
-    noise = random.Random(3)
-    for night in range(24):
-        keep(path, changed(records(noise=noise), **times((1.0, 8.0, 3.0)[night // 8])))
+    slow_nights(path, [1.0] * 8 + [8.0] * 8 + [3.0] * 8)
     assert [(each.first, each.worse, each.repaired) for each in found(path)] == [
         (17, False, None),
         (9, True, None),
@@ -160,7 +170,7 @@ def test_partly_repaired_step_stands(path):
     assert [each.first for each in found(path, standing=True)] == [9]
 
 
-def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
+def test_one_bad_night_is_repaired_step(path):
     for night in range(12):
         keep_changed(path, **worse(100.0 if night == 5 else 1.0))
     assert [(each.first, each.repaired) for each in found(path) if each.worse] == [(6, 7)]
@@ -179,7 +189,7 @@ def test_successive_error_steps_both_stand(path):
     ]
 
 
-def test_a_missing_engine_repairs_nothing(path):
+def test_missing_engine_repairs_nothing(path):
     nights(path, 2)
     keep_changed(path, outcome=Outcome.FAIL)
     for _ in range(2):

@@ -127,7 +127,7 @@ def test_stopped_run_resumes_to_equal_records(path, stop):
         assert store.run(second.run).status == "finished"
 
 
-def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
+def test_only_equal_unfinished_run_is_resumed(path, monkeypatch):
     # the same code everywhere, with or without a repository
     here = {"commit": "a" * 40, "changed": False}
     monkeypatch.setattr("kincheck.core.harness.provenance.git_state", lambda _: here)
@@ -201,7 +201,7 @@ with Store(Path(sys.argv[1])) as store:
 """  # noqa: E501
 
 
-def test_runs_at_once_do_not_disturb_each_other(path):
+def test_concurrent_runs_are_stored(path):
     """From the making of the file on."""
     writers = [
         subprocess.Popen(
@@ -262,7 +262,7 @@ def test_schema_check_is_one_statement(path):
 # History files of another time or kind, and full disks
 
 
-def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
+def test_failed_migration_changes_nothing(path, monkeypatch):
     keeping, results = kept(path, [crank()], ENGINES)
     with monkeypatch.context() as patch:
         patch.setattr(
@@ -276,7 +276,7 @@ def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
         assert store.results(keeping.run) == results
 
 
-def test_a_file_of_another_program_is_left_alone(path):
+def test_foreign_database_is_unchanged(path):
     other = sqlite3.connect(path)
     other.execute("CREATE TABLE bookmarks (url TEXT)")
     other.close()
@@ -290,7 +290,7 @@ def test_a_file_of_another_program_is_left_alone(path):
 
 
 @pytest.mark.parametrize("command", ["history", "report"])
-def test_an_empty_file_is_left_empty(path, command, capsys):
+def test_empty_history_file_stays_empty(path, command, capsys):
     path.touch()
     assert main([command, "--history", str(path)]) == 2
     assert "it is empty; `kincheck run --history FILE` stores runs" in capsys.readouterr().err
@@ -352,7 +352,7 @@ MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
 
 
 def kincheck(*arguments, limit=None, **environment):
-    """The command line with made-up cases and engines: see drill.py. limit: on the size of files
+    """The command line of fake_command_line.py. limit: on the size of files
     [bytes].
     """
     restrict = (
@@ -446,7 +446,7 @@ def test_killed_run_resumes_to_equal_records(tmp_path):
 # What a run is told by
 
 
-def test_a_digest_is_of_content():
+def test_digest_depends_on_content():
     assert digest(crank()) == digest(crank())
     assert digest({"a": 1}) != digest({"a": 1.0}) != digest({"a": True})
     assert digest(np.array([0.0])) != digest(np.array([-0.0]))
@@ -454,7 +454,7 @@ def test_a_digest_is_of_content():
     assert len({digest(crank(rate=rate)) for rate in (1.0, 2.0)}) == 2
 
 
-def test_the_state_of_a_repository(tmp_path):
+def test_git_state_of_repository(tmp_path):
     def git(*arguments):
         name = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "init.defaultBranch=trunk"]
         return subprocess.run(
@@ -487,5 +487,5 @@ def test_the_state_of_a_repository(tmp_path):
     assert not (tmp_path / "started").exists()
 
 
-def test_calibration_is_a_time():
+def test_calibration_gives_seconds():
     assert 0.0 < calibration() < 60.0

@@ -152,8 +152,8 @@ def test_extrapolation_carries_no_earlier_step(order):
     }
     # what stands in the last lane `extrapolate` puts out itself
     puts = plan.programs["extrapolate"].outputs
-    assert {*plan.moved} == {pair for pair in plan.continued if pair[1] not in puts}
-    assert {target for _, target in plan.moved} == {
+    assert {*plan.moves} == {pair for pair in plan.continued if pair[1] not in puts}
+    assert {target for _, target in plan.moves} == {
         slots[name] for name in (FROM + TIME, EARLIER + TIME, *ACCEPT)
     }
 

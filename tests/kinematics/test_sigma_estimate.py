@@ -5,7 +5,7 @@ import pytest
 from kincheck.core.program import Elimination, Tape, program
 from kincheck.core.program.elimination import COMPARED
 
-from ..support.running import run_on
+from ..support.program_blocks import run_on
 
 # The signs of determinants
 

@@ -82,6 +82,11 @@ class Page:
             if message["type"] == kind:
                 return message
 
+    def refusal(self, **message):
+        """Return why a message is no question of this page."""
+        self.say(**message)
+        return self.told("invalid")["message"]
+
     def moved(self, name, axis, by):
         """Return the points with one number moved."""
         rows = [[*row] for row in self.points]

@@ -43,6 +43,32 @@ def toe(browser):
     return float(browser.run("return kincheckLive.answer.outputs.toe.at(-1)"))
 
 
+def height(browser):
+    """The y of the ball joint [mm]."""
+    return browser.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]")
+
+
+def type_in(browser, field, text):
+    """Type a text in place of what a field has, and leave it."""
+    browser.click(field)
+    browser.run("document.activeElement.select()")
+    browser.write(text)
+    browser.key("Tab")
+
+
+def until_state(browser, text):
+    """Wait for the line of state to begin with a text."""
+    browser.until(f"document.querySelector('#state').textContent.startsWith({text!r})")
+
+
+def saved_toe(browser, car):
+    """Save the table; the toe that `run` gives for the new file."""
+    browser.click("#saving button")
+    until_state(browser, "saved as")
+    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
+    return record.outputs["toe"].position
+
+
 def text(browser, selector):
     return browser.run(f"return document.querySelector({selector!r}).textContent")
 
@@ -69,21 +95,17 @@ def drag(browser, by):
     return [b - a for a, b in zip(before, after, strict=True)]
 
 
-def test_dragged_point_gives_what_run_gives(opened, car):
+def test_dragged_point_equals_run(opened, car):
     before = toe(opened)
     moved = drag(opened, (9.0, -3.0))
     assert moved[0] == 0.0
     assert moved[1] != 0.0 != moved[2]
     assert toe(opened) != before
-    opened.click("#saving button")
-    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
-    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
-    expected = record.outputs["toe"].position[-1]
-    assert toe(opened) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    assert toe(opened) == pytest.approx(saved_toe(opened, car)[-1], rel=1e-12, abs=1e-15)
     assert car.read_text("utf-8") == CAR
 
 
-def test_ball_joint_dragged_ten_millimetres(opened, car):
+def test_ball_joint_dragged_by_millimetres(opened, car):
     """What the page shows, and what `run` gives for the saved table, agree in all digits but the
     last three, which the order of sums decides.
     """
@@ -92,36 +114,33 @@ def test_ball_joint_dragged_ten_millimetres(opened, car):
     millimetre = (outer - inner) / (612 - 210)
     moved = drag(opened, (10.0 * millimetre, 0.0))
     assert moved == pytest.approx([0.0, 10.0, 0.0], abs=0.051)  # tenths of millimetres
-    opened.click("#saving button")
-    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
-    (record,) = run(load(car.with_name("car_2.csv"), TRAVEL), "native").records
     shown = opened.run("return kincheckLive.answer.outputs.toe")
-    assert shown == pytest.approx(record.outputs["toe"].position, rel=1e-13, abs=1e-15)
+    assert shown == pytest.approx(saved_toe(opened, car), rel=1e-13, abs=1e-15)
 
 
-def test_locked_axis_stays_under_drag_and_keys(opened):
+def test_locked_axis_is_kept(opened):
     opened.click("[aria-label='lock y of all points']")
     moved = drag(opened, (9.0, -3.0))
     assert moved[1] == 0.0 != moved[2]
     opened.click(FIELD)
     opened.key("ArrowUp")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    assert height(opened) == 540
 
 
-def test_numbers_survive_a_reload(opened):
+def test_reload_keeps_numbers(opened):
     opened.click(FIELD)
     opened.key("ArrowUp")
     answered(opened)
     moved = toe(opened)
     opened("Page.reload")
     opened.until("'ready' in document.documentElement.dataset && !kincheckLive.isDue()")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541
+    assert height(opened) == 541
     assert toe(opened) == moved
     opened.key("z", ctrl=True)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    assert height(opened) == 540
 
 
-def test_page_is_used_by_keys_alone(opened, car):
+def test_live_page_by_keys_alone(opened, car):
     """Every control has a name and a mark of its focus, in the order of the page."""
     seen = []
     for _ in range(100):
@@ -140,23 +159,23 @@ def test_page_is_used_by_keys_alone(opened, car):
         if name == "uca_outer y [mm]":
             opened.key("ArrowUp")
     answered(opened)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541
+    assert height(opened) == 541
     order = ["CSV", "save", "play", "front", "centres", "film", "uca_front x [mm]", "check"]
     assert [name for name in seen if name in order] == order
     opened.run("document.querySelector('#name').focus()")
     opened.key("Tab")
     opened.key("Enter")
-    opened.until("document.querySelector('#state').textContent.startsWith('saved as')")
+    until_state(opened, "saved as")
     assert "uca_outer,-15,541,312" in car.with_name("car_2.csv").read_text("utf-8")
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="axe is not installed: npm install axe-core")
-def test_axe_finds_nothing_on_the_live_page(opened):
+def test_live_page_passes_axe(opened):
     opened.run("for (const each of document.querySelectorAll('[data-layer]')) each.checked = true")
     assert opened.violations() == []
 
 
-def test_figures_out_of_view_follow_at_rest(opened):
+def test_hidden_figures_are_drawn_later(opened):
     last = "[...document.querySelectorAll('#figures .curve')].at(-1).getAttribute('d')"
     before = opened.run(f"return {last}")
     opened.click(FIELD)
@@ -164,7 +183,7 @@ def test_figures_out_of_view_follow_at_rest(opened):
     opened.until(f"{last} !== {before!r}")
 
 
-def test_gesture_is_undone_and_redone_whole(opened):
+def test_gesture_is_undone_whole(opened):
     before = toe(opened)
     drag(opened, (9.0, -3.0))
     moved = toe(opened)
@@ -176,38 +195,29 @@ def test_gesture_is_undone_and_redone_whole(opened):
     assert toe(opened) == moved
 
 
-def test_arrow_keys_step_a_number(opened):
+def test_arrow_keys_step_number(opened):
     opened.click(FIELD)
     for how in ({}, {"shift": True}, {"alt": True}):
         opened.key("ArrowUp", **how)
     answered(opened)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == pytest.approx(551.1)
+    assert height(opened) == pytest.approx(551.1)
 
 
-def test_typed_number_may_have_a_decimal_comma(opened):
-    opened.click(FIELD)
-    opened.run("document.activeElement.select()")
-    opened.write("541,5")
-    opened.key("Tab")
+def test_typed_number_with_decimal_comma(opened):
+    type_in(opened, FIELD, "541,5")
     answered(opened)
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 541.5
+    assert height(opened) == 541.5
 
 
-def test_typed_word_is_refused_and_the_number_stays(opened):
-    opened.click(FIELD)
-    opened.run("document.activeElement.select()")
-    opened.write("54o")
-    opened.key("Tab")
+def test_typed_word_is_refused(opened):
+    type_in(opened, FIELD, "54o")
     opened.until("document.querySelector('#trouble').textContent.includes('coordinate')")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    assert height(opened) == 540
 
 
-def test_design_that_the_reader_refuses_marks_its_row(opened):
+def test_refused_design_marks_row(opened):
     before = toe(opened)
-    opened.click("[aria-label='uca_outer z [mm]']")
-    opened.run("document.activeElement.select()")
-    opened.write("12")
-    opened.key("Tab")
+    type_in(opened, "[aria-label='uca_outer z [mm]']", "12")
     opened.until("document.querySelector('tr.wrong th')")
     assert text(opened, "tr.wrong th") == "uca_outer"
     assert "uca_outer" in text(opened, "#trouble")
@@ -216,31 +226,29 @@ def test_design_that_the_reader_refuses_marks_its_row(opened):
     opened.until("!document.querySelector('tr.wrong')")
 
 
-def test_check_shows_a_verdict_that_an_edit_removes(opened):
+def test_edit_removes_verdict(opened):
     opened.click("#check")
-    opened.until("document.querySelector('#state').textContent === 'checked'")
+    until_state(opened, "checked")
     assert "native" in text(opened, "#verdicts")
     opened.click(FIELD)
     opened.key("ArrowUp")
     assert text(opened, "#verdicts") == ""
 
 
-def test_limit_marks_the_numbers_beyond(opened):
-    opened.click("[aria-label='high limit of toe [°]']")
-    opened.write("0.1")
-    opened.key("Tab")
+def test_limit_marks_exceeding_numbers(opened):
+    type_in(opened, "[aria-label='high limit of toe [°]']", "0.1")
     over = "return [...document.querySelectorAll('tr[data-output=toe] .over')].length"
     assert opened.run(over) == 1
     assert opened.run("return document.querySelectorAll('.limit').length") == 1
 
 
-def test_lost_server_is_told_and_numbers_stay(opened, served):
+def test_lost_server_keeps_numbers(opened, served):
     served.close()
-    opened.until("document.querySelector('#state').textContent.startsWith('connection lost')")
-    assert opened.run(f"return kincheckLive.rows()[{BALL_JOINT}][1]") == 540
+    until_state(opened, "connection lost")
+    assert height(opened) == 540
 
 
-def test_page_fits_a_narrow_window(served, browser):
+def test_live_page_fits_narrow_window(served, browser):
     browser("Emulation.setDeviceMetricsOverride", width=900, height=900, deviceScaleFactor=1,
             mobile=False)  # fmt: skip
     browser.visit(served.address)
@@ -248,14 +256,14 @@ def test_page_fits_a_narrow_window(served, browser):
     assert browser.run("return document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_page_measures_its_edits(served, browser):
+def test_live_page_measures_edits(served, browser):
     browser.visit(f"{served.address}&measure=3")
     assert served.ended.wait(60)
     assert len(served.measured) == 3
     assert min(served.measured) > 0.0
 
 
-def test_point_of_both_sides_moves_its_mirror(browser, tmp_path):
+def test_mirrored_point_moves_along(browser, tmp_path):
     head, _, rows = CAR.partition("name,x,y,z,meaning\n")
     fields = [row.split(",") for row in rows.splitlines()]
     sides = (("FL", 1.0), ("FR", -1.0))
@@ -280,7 +288,7 @@ def test_point_of_both_sides_moves_its_mirror(browser, tmp_path):
     server.close()
 
 
-def test_unreached_travel_is_marked_in_curve_and_scene(browser, car):
+def test_unreached_travel_is_marked(browser, car):
     server = kincheck.live(car, kincheck.Supplied(travel="0.06:21", axle="steer"))
     browser.visit(server.address)
     answered(browser)
@@ -292,7 +300,7 @@ def test_unreached_travel_is_marked_in_curve_and_scene(browser, car):
 
 
 @pytest.mark.parametrize("framed", [True, False])
-def test_page_stands_in_frames_of_notebooks_alone(browser, car, framed):
+def test_live_page_in_notebook_frame(browser, car, framed):
     known = registry()
     server = LiveServer(
         car, lambda: LiveTable(car, TRAVEL), known.engines, judge_by(known), framed=framed
@@ -323,7 +331,7 @@ def test_page_stands_in_frames_of_notebooks_alone(browser, car, framed):
     server.close()
 
 
-def test_scene_shows_the_roll_centre_of_the_outputs(opened):
+def test_live_scene_shows_roll_centre(opened):
     """The construction is from differences of poses a few millimetres apart."""
     opened.click("[data-layer=centres]")
     drawn, expected = opened.run(
@@ -335,7 +343,7 @@ def test_scene_shows_the_roll_centre_of_the_outputs(opened):
     assert drawn == pytest.approx(expected, abs=1e-4)
 
 
-def test_scene_is_saved_as_picture_and_film(opened):
+def test_scene_saved_as_picture_and_film(opened):
     opened.run(
         "window.files = []; const made = URL.createObjectURL;"
         "URL.createObjectURL = (blob) => (files.push(blob), made.call(URL, blob));"
@@ -355,7 +363,7 @@ def test_scene_is_saved_as_picture_and_film(opened):
     assert opened.run("return (await files[2].arrayBuffer()).byteLength") > 10_000
 
 
-def test_scene_turns_moves_and_enlarges(opened):
+def test_live_scene_turns_and_enlarges(opened):
     look = "return document.querySelector('#scene canvas').toDataURL()"
     seen = [opened.run(look)]
     x, y = opened.middle("#scene canvas")
@@ -369,15 +377,15 @@ def test_scene_turns_moves_and_enlarges(opened):
     assert len({*seen}) == len(seen)
 
 
-def test_slider_moves_a_mechanism(tmp_path, browser):
+def test_slider_moves_mechanism(tmp_path, browser):
     known = registry()
     file = tmp_path / "rssr"
     server = LiveServer(file, lambda: LiveModel(file, load("rssr")), known.engines, judge_by(known))
     browser.visit(server.address)
     x, y = browser.middle("#sliders input[type=range]")
     browser.drag((x, y), (25.0, 0.0))
-    browser.until("document.querySelector('#state').textContent === 'all loops closed'")
+    until_state(browser, "all loops closed")
     assert "pose of the sliders" in text(browser, "#scene output")
     browser.until("document.querySelector('#sliders .row .quiet').textContent")
     server.close()
-    browser.until("document.querySelector('#state').textContent.startsWith('connection lost')")
+    until_state(browser, "connection lost")

@@ -51,35 +51,36 @@ def status(server, path, method="GET", **headers):
     return answer.status, answer.headers
 
 
-def test_server_listens_on_this_machine_alone(served):
+def test_server_listens_on_loopback(served):
     assert served.listener.socket.getsockname()[0] == "127.0.0.1"
 
 
 @pytest.mark.parametrize(
-    ("path", "headers", "expected"),
+    ("path", "header", "expected"),
     [
-        ("/?token={token}", {}, 200),
-        ("/live.js", {}, 200),
-        ("/live.css", {}, 200),
-        ("/", {}, 403),
-        ("/?token=wrong", {}, 403),
-        ("/?token=%C3%A9", {}, 403),
-        ("/?token={token}", {"Host": "evil.example"}, 403),
-        ("/?token={token}", {"Host": "127.0.0.1.evil.example"}, 403),
-        ("/?token={token}", {"Origin": "http://evil.example"}, 403),
-        ("/?token={token}", {"Origin": "http://127.0.0.1:1"}, 403),
-        ("/live.js", {"Host": "evil.example"}, 403),
-        ("/car.csv?token={token}", {}, 404),
-        ("/../car.csv", {}, 404),
-        ("/%2e%2e/car.csv", {}, 404),
-        ("/socket?token={token}", {}, 403),
+        ("/?token={token}", "", 200),
+        ("/live.js", "", 200),
+        ("/live.css", "", 200),
+        ("/", "", 403),
+        ("/?token=wrong", "", 403),
+        ("/?token=%C3%A9", "", 403),
+        ("/?token={token}", "Host evil.example", 403),
+        ("/?token={token}", "Host 127.0.0.1.evil.example", 403),
+        ("/?token={token}", "Origin http://evil.example", 403),
+        ("/?token={token}", "Origin http://127.0.0.1:1", 403),
+        ("/live.js", "Host evil.example", 403),
+        ("/car.csv?token={token}", "", 404),
+        ("/../car.csv", "", 404),
+        ("/%2e%2e/car.csv", "", 404),
+        ("/socket?token={token}", "", 403),
     ],
 )
-def test_request_gets_only_its_own_page(served, path, headers, expected):
+def test_request_without_token_is_refused(served, path, header, expected):
+    headers = dict([header.split()] if header else [])
     assert status(served, path.format(token=served.token), **headers)[0] == expected
 
 
-def test_page_may_neither_be_framed_nor_load_others(served):
+def test_live_page_security_policy(served):
     _, headers = status(served, f"/?token={served.token}")
     policy = headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy
@@ -93,7 +94,7 @@ def test_post_is_refused(served):
 
 
 @pytest.mark.parametrize("case", ["token", "origin", "host"])
-def test_socket_of_a_stranger_is_refused(served, case):
+def test_socket_without_token_is_refused(served, case):
     host = f"127.0.0.1:{served.port}"
     token = "x" if case == "token" else served.token
     origin = "http://evil.example" if case == "origin" else f"http://{host}"
@@ -110,7 +111,7 @@ def test_socket_of_a_stranger_is_refused(served, case):
     "text",
     [
         "",
-        "[" * 9000,
+        pytest.param("[" * 9000, id="nested"),
         "{}",
         '{"type": "solve"}',
         '{"type": "solve", "points": [[1, 2, NaN]]}',
@@ -123,13 +124,13 @@ def test_socket_of_a_stranger_is_refused(served, case):
         b"\xff\x00",
     ],
 )
-def test_bad_message_is_told_and_the_next_answered(page, text):
+def test_bad_message_is_answered_invalid(page, text):
     page.socket.send(text)
     assert page.told("invalid")["message"].startswith("message: ")
     assert page.answers(4)
 
 
-def test_flood_of_messages_ends_the_page_alone(page, open_page):
+def test_flood_of_messages_closes_socket(page, open_page):
     for _ in range(2 * MOST_MESSAGES):
         with suppress(ConnectionClosed):
             page.socket.send("{}")
@@ -141,7 +142,7 @@ def test_flood_of_messages_ends_the_page_alone(page, open_page):
     assert other.answers(1)
 
 
-def test_slow_page_holds_up_no_other(page, open_page):
+def test_slow_page_delays_no_page(page, open_page):
     """A page that reads nothing: its answers wait in its socket, and the newest comes last."""
     for k in range(300):
         page.solve(page.moved("uca_outer", 1, 0.01 * k), id=k)
@@ -152,7 +153,7 @@ def test_slow_page_holds_up_no_other(page, open_page):
         pass
 
 
-def test_killed_worker_is_a_verdict_and_the_server_lives(page):
+def test_killed_worker_gives_crashed_verdict(page):
     page.say(type="check", engines=["native", "mujoco"], points=page.points)
     children = Path(f"/proc/{os.getpid()}/task")
     killed = set[int]()
@@ -169,13 +170,13 @@ def test_killed_worker_is_a_verdict_and_the_server_lives(page):
     assert page.answers(9)
 
 
-def test_message_beyond_the_limit_ends_the_page(page):
+def test_oversized_message_closes_socket(page):
     page.socket.send(" " * (LARGEST_MESSAGE + 1))
     with pytest.raises(ConnectionClosed):
         page.told("answer")
 
 
-def test_every_answer_has_the_number_asked(page):
+def test_answers_keep_message_number(page):
     """`Page` holds both ways against the schema."""
     numbers = {"points": page.points}
     asked = {
@@ -192,7 +193,7 @@ def test_every_answer_has_the_number_asked(page):
         assert page.told(kind)["id"] == number
 
 
-def test_mechanism_speaks_the_schema():
+def test_live_mechanism_follows_schema():
     """Opened from Python, as in a notebook."""
     server = kincheck_live("mcpherson_strut_loaded")
     with page_of(server) as socket:
@@ -207,19 +208,19 @@ def test_mechanism_speaks_the_schema():
             pose = page.told("pose")
             assert ("tie_rod_force_y" in pose["outputs"]) == measured
             assert bool(pose["reactions"]) == measured
-        page.say(type="move", drivers={"strok": 0.0})
-        assert "strok" in page.told("invalid")["message"]
-        page.say(type="rank", points=[], output="toe")
-        assert page.told("invalid")["message"] == "a model has no answer to 'rank'"
+        assert "strok" in page.refusal(type="move", drivers={"strok": 0.0})
+        assert (
+            page.refusal(type="rank", points=[], output="toe") == "a model has no answer to 'rank'"
+        )
     server.close()
 
 
-def test_case_from_python_has_no_tolerances_of_a_table(tmp_path):
+def test_live_case_refuses_variation(tmp_path):
     with pytest.raises(KincheckError, match="--vary: rssr is no table of hardpoints; give one"):
         kincheck_live(load("rssr"), variation=tmp_path / "vary.toml")
 
 
-def test_case_from_python_follows_the_page(car):
+def test_live_case_follows_page(car):
     server = kincheck_live(car, TRAVEL)
     with page_of(server) as socket:
         page = Page(socket)
@@ -245,9 +246,8 @@ def test_case_from_python_follows_the_page(car):
         ("=A1", "write the value of the formula"),
     ],
 )
-def test_typed_text_has_the_message_of_the_file(page, car, text, told):
-    page.say(type="read", point="uca_outer", axis="y", text=text)
-    message = page.told("invalid")["message"]
+def test_typed_text_message_equals_file(page, car, text, told):
+    message = page.refusal(type="read", point="uca_outer", axis="y", text=text)
     assert told in message
     car.write_text(CAR.replace("-15,540,", f'-15,"{text}",'), "utf-8")
     with pytest.raises(KincheckError) as error:
@@ -255,7 +255,7 @@ def test_typed_text_has_the_message_of_the_file(page, car, text, told):
     assert str(error.value) == message
 
 
-def test_edit_answers_what_run_gives_for_the_saved_table(page, car):
+def test_edit_answer_equals_run(page, car):
     """The numbers of a program whose inputs are hardpoints, against one made for the table."""
     points = page.moved("uca_outer", 1, 10.0)
     page.solve(points, id=1)
@@ -268,7 +268,7 @@ def test_edit_answers_what_run_gives_for_the_saved_table(page, car):
         assert found[name] == pytest.approx(expected.position, rel=1e-9, abs=1e-12, nan_ok=True)
 
 
-def test_ranking_gives_what_a_moved_point_changes(page):
+def test_ranking_equals_difference(page):
     """Against the difference of two tables that are read and solved anew."""
     page.say(type="rank", points=page.points, output="toe")
     effects = {(e["point"], e["axis"]): e["slopes"] for e in page.told("ranking")["effects"]}
@@ -280,14 +280,14 @@ def test_ranking_gives_what_a_moved_point_changes(page):
         assert slope == pytest.approx((toe[0][sample] - toe[1][sample]) / 1e-4, rel=1e-5, abs=1e-9)
 
 
-def test_refusal_names_the_row(page):
+def test_refusal_names_point(page):
     page.solve(page.moved("uca_outer", 2, -400), id=7)
     found = page.told("refused")
     assert found["point"] == "uca_outer"
     assert "expected" in found["message"] or "not above" in found["message"]
 
 
-def test_travel_out_of_reach_is_marked_and_told(page):
+def test_unreached_samples_are_null(page):
     page.solve(page.moved("tierod_outer", 1, -40.0), id=7)
     message = json.loads(page.socket.recv(timeout=60))
     if message["type"] == "answer" and not all(message["solved"]):
@@ -296,7 +296,7 @@ def test_travel_out_of_reach_is_marked_and_told(page):
         assert all(message["outputs"]["toe"][k] is None for k in lost)
 
 
-def test_of_many_edits_the_last_is_answered(page):
+def test_last_edit_is_answered(page):
     for k in range(100):
         page.solve(page.moved("uca_outer", 1, 0.1 * k), id=k)
     answers = [page.told("answer")["id"]]
@@ -305,7 +305,7 @@ def test_of_many_edits_the_last_is_answered(page):
     assert len(answers) < 100
 
 
-def test_two_pages_do_not_disturb_each_other(open_page):
+def test_two_pages_are_independent(open_page):
     one, other = open_page(), open_page()
     one.solve(one.moved("uca_outer", 1, 5.0), id=1)
     other.solve(other.points, id=1)
@@ -313,7 +313,7 @@ def test_two_pages_do_not_disturb_each_other(open_page):
     assert first["camber"] != second["camber"]
 
 
-def test_page_that_ends_early_leaves_the_server_alive(served, open_page):
+def test_server_survives_closed_page(served, open_page):
     gone = open_page()
     gone.solve(gone.points)
     gone.socket.socket.close()
@@ -321,7 +321,7 @@ def test_page_that_ends_early_leaves_the_server_alive(served, open_page):
     assert page.answers(3)
 
 
-def test_save_keeps_the_text_and_all_files(page, car):
+def test_save_keeps_comments_and_file(page, car):
     page.say(type="save", points=page.moved("uca_front", 0, 2.5), name="car_2.csv")
     page.told("saved")
     assert car.read_text("utf-8") == CAR
@@ -333,10 +333,11 @@ def test_save_keeps_the_text_and_all_files(page, car):
     "name",
     ["car.csv", "../car_2.csv", "/tmp/x.csv", ".x.csv", "x.toml", "a\0.csv", "x", "a/b.csv"],
 )
-def test_save_refuses_other_places_and_present_files(page, car, name):
+def test_save_refuses_unsafe_names(page, car, name):
     before = sorted(car.parent.rglob("*"))
-    page.say(type="save", points=page.moved("uca_front", 0, 2.5), name=name)
-    assert page.told("invalid")["message"].startswith("save ")
+    assert page.refusal(type="save", points=page.moved("uca_front", 0, 2.5), name=name).startswith(
+        "save "
+    )
     assert sorted(car.parent.rglob("*")) == before
     assert car.read_text("utf-8") == CAR
 
@@ -350,20 +351,19 @@ def test_save_follows_no_link(page, car):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
-def test_save_in_a_folder_without_rights_is_told(page, car):
+def test_save_in_unwritable_folder(page, car):
     car.parent.chmod(stat.S_IRUSR | stat.S_IXUSR)
-    page.say(type="save", points=page.points, name="other.csv")
-    assert "cannot be written" in page.told("invalid")["message"]
+    assert "cannot be written" in page.refusal(type="save", points=page.points, name="other.csv")
 
 
-def test_file_changed_underneath_is_told_and_read_anew(page, car, open_page):
+def test_changed_file_is_read_again(page, car, open_page):
     car.write_text(CAR.replace("uca_front,90,", "uca_front,95,"), "utf-8")
     page.solve(page.points)
     assert "has changed" in page.told("changed")["message"]
     assert open_page().points[0] == [95.0, 260.0, 285.0]
 
 
-def test_file_spoilt_underneath_refuses_a_new_page(car, served, page):
+def test_spoilt_file_refuses_page(car, served, page):
     car.write_text("name,x,y,z\n", "utf-8")
     host = f"127.0.0.1:{served.port}"
     with connect(f"ws://{host}/socket?token={served.token}", origin=f"http://{host}") as other:
@@ -371,15 +371,14 @@ def test_file_spoilt_underneath_refuses_a_new_page(car, served, page):
     assert page.answers(5)
 
 
-def test_check_tells_each_engine_and_ignores_strange_ones(page):
+def test_check_gives_verdict_per_engine(page):
     page.say(type="check", engines=["native"], points=page.points, id=2)
     found = page.told("verdict")
     assert (found["engine"], found["outcome"], found["last"]) == ("native", "unjudged", True)
-    page.say(type="check", engines=["os:system"], points=page.points)
-    assert "os:system" in page.told("invalid")["message"]
+    assert "os:system" in page.refusal(type="check", engines=["os:system"], points=page.points)
 
 
-def test_model_closes_its_loops_at_every_slider_value(tmp_path):
+def test_slider_pose_closes_loops(tmp_path):
     live = LiveModel(tmp_path / "rssr", load("rssr"))
     (driver,) = live.drivers.values()
     found = live.move(Move(drivers={driver.name: driver.design + 0.3}, measured=True))
@@ -389,7 +388,7 @@ def test_model_closes_its_loops_at_every_slider_value(tmp_path):
     assert found.drivers[driver.name] == pytest.approx(driver.design + 0.3, abs=1e-12)
 
 
-def test_model_at_rest_has_the_reactions_of_run(tmp_path):
+def test_slider_reactions_equal_run(tmp_path):
     case = load("mcpherson_strut_loaded")
     live = LiveModel(tmp_path / "strut", case)
     (driver,) = live.drivers.values()
@@ -410,7 +409,7 @@ def test_model_at_rest_has_the_reactions_of_run(tmp_path):
     assert live.move(Move(drivers={})).reactions == {}
 
 
-def test_open_loop_is_named_with_its_gap(tmp_path):
+def test_open_loop_is_reported(tmp_path):
     case = load("rssr")
     joints = [
         replace(each, length=each.length + 9.0) if each.name == "rod" else each
@@ -423,7 +422,7 @@ def test_open_loop_is_named_with_its_gap(tmp_path):
     assert found.drawing["bodies"]  # the design position
 
 
-def test_model_out_of_reach_shows_the_last_pose(tmp_path):
+def test_slider_stops_at_last_pose(tmp_path):
     live = LiveModel(tmp_path / "strut", load("mcpherson_strut"))
     (driver,) = live.drivers.values()
     found = live.move(Move(drivers={driver.name: 5.0}))
@@ -444,7 +443,7 @@ def kincheck(*words):
     )
 
 
-def test_interrupt_ends_with_130_and_one_line(car):
+def test_serve_interrupted_has_status_130(car):
     process = kincheck(car)
     assert process.stdout is not None
     address = process.stdout.readline()
@@ -454,7 +453,7 @@ def test_interrupt_ends_with_130_and_one_line(car):
     assert (process.returncode, out, errors) == (130, "", "kincheck: interrupted\n")
 
 
-def test_once_ends_when_the_page_closes(car):
+def test_serve_once_ends_with_page(car):
     process = kincheck(car, "--once")
     assert process.stdout is not None
     host, _, token = process.stdout.readline().strip().partition("/?token=")
@@ -464,18 +463,18 @@ def test_once_ends_when_the_page_closes(car):
     assert process.returncode == 0
 
 
-@pytest.mark.parametrize("words", [["absent.csv"], ["four_bar", "--port", "1"]])
-def test_what_cannot_be_served_is_status_2(words, car):
-    if words[-1] == "1" and os.geteuid() == 0:
-        words = ["four_bar", "--port", "70000"]
-    process = kincheck(*words)
+@pytest.mark.parametrize("words", ["absent.csv", "four_bar --port 1"])
+def test_unservable_model_has_status_2(words, car):
+    if os.geteuid() == 0:
+        words = words.replace("--port 1", "--port 70000")
+    process = kincheck(*words.split())
     out, errors = process.communicate(timeout=60)
     assert (process.returncode, out) == (2, "")
     assert "Traceback" not in errors
 
 
 @pytest.mark.parametrize("axle", ["heave", "roll", "steer"])
-def test_axle_answers_all_outputs_as_run(car, axle):
+def test_axle_answer_equals_run(car, axle):
     """Derivatives by travel with the steering held too."""
     supplied = Supplied(travel="0.01:5", axle=axle)
     live = LiveTable(car, supplied)
@@ -493,7 +492,7 @@ def test_axle_answers_all_outputs_as_run(car, axle):
     ("axle", "travel", "whole"),
     [("roll", "0.06:161", True), ("steer", "0.04:161", True), ("steer", "0.06:161", False)],
 )
-def test_edit_of_an_axle_divides_no_step(car, monkeypatch, axle, travel, whole):
+def test_axle_edit_divides_no_step(car, monkeypatch, axle, travel, whole):
     """Each divided step is found by itself, some hundred times as long as the others; the rack of
     the last case locks up, which may wait until a gesture rests.
     """
@@ -526,7 +525,7 @@ high = 0.3
 """
 
 
-def test_reference_has_its_tolerance_and_judges(car, tmp_path):
+def test_live_reference_has_tolerance(car, tmp_path):
     (tmp_path / "rig.csv").write_text(RIG, "utf-8")
     options = CurveOptions(accuracy=["toe=0.02 deg"])
     live = LiveTable(car, TRAVEL, lambda case: with_curve(case, tmp_path / "rig.csv", options)[0])
@@ -539,7 +538,7 @@ def test_reference_has_its_tolerance_and_judges(car, tmp_path):
     assert record.errors["toe"].position.tolerance == pytest.approx(found.tolerance)
 
 
-def test_spread_is_that_of_the_sweep(car, tmp_path):
+def test_live_spread_equals_sweep(car, tmp_path):
     (tmp_path / "vary.toml").write_text(VARY, "utf-8")
     live = LiveTable(car, TRAVEL, vary=tmp_path / "vary.toml")
     opening = live.opening([])
@@ -561,7 +560,7 @@ def test_spread_is_that_of_the_sweep(car, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "start"), [("csv", b"stroke"), ("xlsx", b"PK"), ("report", b"<!")]
 )
-def test_export_is_the_file_of_run(page, kind, start):
+def test_live_export_files(page, kind, start):
     points = page.moved("uca_outer", 1, 2.0)
     page.say(type="export", kind=kind, engines=["native"], points=points)
     found = page.told("exported")
@@ -570,7 +569,7 @@ def test_export_is_the_file_of_run(page, kind, start):
 
 
 @pytest.mark.parametrize("axle", [None, "heave"])
-def test_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
+def test_live_edits_compile_nothing(car, tmp_path, monkeypatch, axle):
     """The first answer has compiled all that an edit runs: none waits for the compiler."""
     pytest.importorskip("llvmlite")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))

@@ -66,6 +66,10 @@ class Page(HTMLParser):
         return [row for rows in found for row in rows]
 
     @property
+    def words(self):
+        return " ".join(self.text.split())
+
+    @property
     def data(self):
         text = zlib.decompress(base64.b64decode(self.scripts["report-data"], validate=True))
         return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))

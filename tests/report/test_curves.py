@@ -12,9 +12,12 @@ from contextlib import redirect_stdout
 
 import pytest
 from kincheck.core.cli.main import main
-from kincheck.core.harness.record import from_json
+from kincheck.core.harness.record import Results, from_json
 from kincheck.core.report import curves
 from kincheck.core.report.report import write_report
+
+from ..support import strut_results
+from ..support.strut_results import GRID
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +33,7 @@ def rows(text):
     return list(csv.DictReader(io.StringIO(text)))
 
 
-def test_the_csv_has_every_number_of_every_engine_and_reference(made):
+def test_csv_has_every_number(made):
     folder, results = made
     found = rows((folder / "curves.csv").read_text())
     assert [*found[0]] == [*curves.COLUMNS]
@@ -55,7 +58,7 @@ def test_the_csv_has_every_number_of_every_engine_and_reference(made):
                     ]
 
 
-def test_parquet_has_the_same_table(made, tmp_path):
+def test_parquet_equals_csv(made, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     folder, results = made
     count = curves.write_curves(results, tmp_path / "curves.parquet", "parquet", long=False)
@@ -68,7 +71,7 @@ def test_parquet_has_the_same_table(made, tmp_path):
     assert shown == found
 
 
-def test_without_pyarrow_nothing_is_solved(tmp_path, monkeypatch, capsys):
+def test_missing_pyarrow_stops_before_solving(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     file = tmp_path / "curves.parquet"
     assert main(f"run rssr --engine native --parquet {file}".split()) == 2
@@ -85,7 +88,7 @@ def offered(page):
     return json.loads(zlib.decompress(base64.b64decode(packed)))
 
 
-def test_the_page_offers_the_curves_of_each_case(made, tmp_path, monkeypatch):
+def test_page_offers_curves_per_case(made, tmp_path):
     _, results = made
     write_report(results, file := tmp_path / "page.html")
     page = file.read_text()
@@ -94,9 +97,14 @@ def test_the_page_offers_the_curves_of_each_case(made, tmp_path, monkeypatch):
     for anchor, record in zip(found, results.records, strict=True):
         assert {row["case"] for row in rows(found[anchor])} == {record.case}
         assert found[anchor] == curves.csv_of(results, record.case)
-    # with room for one case only, the page says where the other curves are
-    monkeypatch.setattr(curves, "MOST", len(found["case-0"]) + 1)
-    write_report(results, file)
+
+
+def test_page_leaves_large_curves_out(tmp_path):
+    grids = {"small": GRID, "large": [0.01 * k for k in range(20_000)]}
+    records = [
+        strut_results.record(case, "closed_form", "one", 0.0, grid) for case, grid in grids.items()
+    ]
+    write_report(Results(run={}, records=records), file := tmp_path / "page.html")
     assert [*offered(file.read_text())] == ["case-0"]
     assert file.read_text().count("too many for this page") == 1
 
@@ -110,7 +118,7 @@ def table(tmp_path_factory):
     return file
 
 
-def test_table_curves_are_wide_in_its_units(table, tmp_path):
+def test_table_curves_have_file_units(table, tmp_path):
     wide, long, book = (tmp_path / name for name in ("wide.csv", "long.csv", "wide.xlsx"))
     command = ["run", str(table), "--engine", "native"]
     assert main([*command, "--csv", str(wide), "--xlsx", str(book)]) == 2  # nothing to compare

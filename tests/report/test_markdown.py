@@ -20,9 +20,9 @@ from kincheck.core.report.table import code, escaped, row
         ("\x1b[31m", r"\\x1b[31m"),
     ],
 )
-def test_foreign_text_is_text(text, expected):
+def test_markdown_escapes_foreign_text(text, expected):
     assert escaped(text) == expected
 
 
-def test_rows_and_code():
+def test_markdown_row_with_code():
     assert row([code("a`b|c"), "d"]) == r"| `a'b\|c` | d |"

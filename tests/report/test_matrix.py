@@ -5,17 +5,14 @@ the documentation.
 import re
 from pathlib import Path
 
-import kincheck.adapters
-import kincheck.cases
 import pytest
-from kincheck.core.cli import main as cli
 from kincheck.core.harness.record import Results
 from kincheck.core.joints import Coupler, Joint
 from kincheck.core.report.table import print_matrix
 
 from ..support.fakes import Fake, crank, off, raising
-from ..support.made_up import GRID, record
 from ..support.printed import Terminal
+from ..support.strut_results import GRID, record
 
 ENGINES_PAGE = Path(__file__).parents[2] / "docs" / "pages" / "reference" / "engines.md"
 BUILT_IN = [
@@ -27,22 +24,18 @@ BUILT_IN = [
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path, capsys):
+def run(kincheck_main, tmp_path, capsys):
     """Runs the command line with fake engines; (exit status, what it printed, the Markdown it
     wrote).
     """
 
-    def main(*argv, engines, cases=()):
-        by_name = {engine.name: engine for engine in engines}
-        monkeypatch.setattr(kincheck.adapters, "ENGINES", dict.fromkeys(by_name, "Fake"))
-        monkeypatch.setattr(kincheck.adapters, "SIMULATIONS", {})
-        monkeypatch.setattr(kincheck.adapters, "engine", by_name.get)
-        monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(case.name for case in cases))
-        monkeypatch.setattr(kincheck.cases, "load", {case.name: case for case in cases}.get)
-        status = cli.main(["run", *argv, "--jobs", "0", "--markdown", str(tmp_path / "matrix.md")])
-        return status, capsys.readouterr().out, (tmp_path / "matrix.md").read_text("utf-8")
+    def run(*argv, engines, case):
+        file = tmp_path / "matrix.md"
+        cases = {case.name: case}
+        status = kincheck_main("run", *argv, "--markdown", file, engines=engines, cases=cases)
+        return status, capsys.readouterr().out, file.read_text("utf-8")
 
-    return main
+    return run
 
 
 ENGINES = (
@@ -55,8 +48,8 @@ ENGINES = (
 )
 
 
-def test_cells_say_how_far_off_or_why_not(run):
-    status, _, markdown = run(engines=ENGINES, cases=[crank(reference=False)])
+def test_matrix_cells_have_errors_or_reasons(run):
+    status, _, markdown = run(engines=ENGINES, case=crank(reference=False))
     assert status == 1
     head, _, row = (
         [cell.strip() for cell in line.split("|")[1:-1]] for line in markdown.splitlines()[:3]
@@ -82,7 +75,7 @@ def test_run_joints_prints_matrix(run):
     """A fake engine has no such points, so every cell is an error; what counts here is which cells
     there are.
     """
-    _, printed, markdown = run("--joints", engines=[Fake("native"), Fake("other")], cases=[crank()])
+    _, printed, markdown = run("--joints", engines=[Fake("native"), Fake("other")], case=crank())
     found = re.findall(r"^\| `(\w+)` \|", markdown, re.MULTILINE)
     assert sorted(found) == sorted([*Joint.registry, *Coupler.registry])
     lines = [line.split() for line in printed.splitlines()]
@@ -90,9 +83,7 @@ def test_run_joints_prints_matrix(run):
     assert [line[0] for line in lines[1 : len(found) + 1]] == found
 
 
-def test_narrow_matrix_is_split_by_engines(
-    monkeypatch,
-):
+def test_narrow_matrix_is_split_by_engines(monkeypatch):
     names = ("native", "mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody", "my_engine")
     records = [
         record(case, "closed_form", name, 1e-12, GRID)
@@ -111,19 +102,19 @@ def test_narrow_matrix_is_split_by_engines(
     assert sum(line.startswith("with_a_longer_name ") for line in lines) == len(heads)
 
 
-def test_without_anything_to_compare_with_there_are_no_errors(run):
-    _, _, markdown = run(engines=[Fake("native")], cases=[crank(reference=False)])
+def test_matrix_without_comparison(run):
+    _, _, markdown = run(engines=[Fake("native")], case=crank(reference=False))
     assert "No errors: nothing was compared with anything" in markdown
     assert "Largest errors" not in markdown
 
 
-def test_joints_and_cases_can_be_run_together(run):
-    _, _, markdown = run("--joints", "crank", engines=[Fake("native")], cases=[crank()])
+def test_run_joints_with_case(run):
+    _, _, markdown = run("--joints", "crank", engines=[Fake("native")], case=crank())
     assert "| `crank` |" in markdown
     assert "| `revolute` |" in markdown
 
 
-def test_every_joint_type_is_in_the_documentation():
+def test_documentation_lists_joint_types():
     """`kincheck run --joints --markdown FILE` makes the table anew."""
     if not ENGINES_PAGE.exists():
         pytest.skip("the documentation is not here")

@@ -13,7 +13,7 @@ from kincheck.core.report.figures import SYMBOLS, Past
 from kincheck.core.report.report import write_report
 from msgspec.structs import replace
 
-from ..support.made_up import CRANK, GRID, distances, judged, record, results, series
+from ..support.strut_results import CRANK, GRID, distances, judged, record, results, series
 from .page import report, traces
 
 
@@ -35,7 +35,7 @@ def test_figures_hold_outputs_in_millimetres(tmp_path):
     assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
 
 
-def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path):
+def test_driver_angle_axis_is_in_degrees(tmp_path):
     page = report(results(driver=CRANK | {"name": "stroke"}), tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert curve["x"] == "driver"
@@ -44,7 +44,7 @@ def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path):
     )
 
 
-def test_forces_come_first_and_constant_outputs_are_folded(tmp_path):
+def test_page_order_of_outputs(tmp_path):
     """A constant output that is wrong is not folded."""
 
     def with_more(record):
@@ -80,7 +80,7 @@ def in_unit(found, unit):
 
 @pytest.mark.parametrize("unit", ["m", "rad", "N"])
 @pytest.mark.parametrize("motion", ["position", "velocity"])
-def test_error_figures_hold_the_distances_from_the_reference(tmp_path, motion, unit):
+def test_error_figures_have_distances_from_reference(tmp_path, motion, unit):
     made = results()
     run = replace(made, records=[in_unit(record, unit) for record in made.records])
     page = report(run, tmp_path)
@@ -109,9 +109,7 @@ def test_error_figures_hold_the_distances_from_the_reference(tmp_path, motion, u
     assert "case-0-0-acceleration" not in page.data["figures"]
 
 
-def test_figures_without_reference_show_differences(
-    tmp_path,
-):
+def test_figures_without_reference_show_differences(tmp_path):
     run = results("consensus_only")
     native, one, _ = run.records
     nothing = Deviations(
@@ -130,7 +128,7 @@ def test_figures_without_reference_show_differences(
     assert traces(page, "case-0-0-position", "native", "lines+markers") == []
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
     assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=5e-3)  # type: ignore[union-attr]
-    words = re.sub(r"\s+", " ", page.text)
+    words = page.words
     assert "1 of 1 comparisons is outside tolerance, 1 not judged" in words
     assert "✗ fail 1 ? not judged 1" in words
     assert "Not judged: native on strut the case has no reference" in words
@@ -157,7 +155,7 @@ def test_missing_values_leave_gaps(tmp_path):
     assert "µs" not in overview
 
 
-def test_zero_errors_have_a_floor(tmp_path):
+def test_zero_errors_have_floor(tmp_path):
     figure = report(results(), tmp_path).data["figures"]["case-0-0-position"]
     errors = [e for trace in figure["data"] if trace["mode"] == "lines+markers" for e in trace["y"]]
     assert 0 in errors
@@ -165,7 +163,7 @@ def test_zero_errors_have_a_floor(tmp_path):
     assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
 
 
-def test_long_series_are_thinned_and_said_to_be(tmp_path):
+def test_long_series_are_thinned(tmp_path):
     driver = [1e-4 * k for k in range(3 * SAMPLES)]
     spike = 1234
     found = series(driver)
@@ -197,7 +195,7 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path):
     assert "Thinned figures: strut" in page.text
 
 
-def test_earlier_runs_are_drawn_where_there_are_any(tmp_path):
+def test_figures_of_earlier_runs(tmp_path):
     runs = [
         Past(run=str(k), engine="one", errors={"position": 1.0}, us_per_step=2.0) for k in range(2)
     ]
@@ -210,7 +208,7 @@ def test_earlier_runs_are_drawn_where_there_are_any(tmp_path):
         )
 
 
-def test_every_symbol_has_a_swatch_of_its_own(tmp_path):
+def test_legend_swatches_differ(tmp_path):
     """What the legend shows is what is drawn: symbols without one would all be told by the same
     cross.
     """
@@ -225,7 +223,7 @@ def test_every_symbol_has_a_swatch_of_its_own(tmp_path):
     assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
 
 
-def test_differences_of_round_off_are_drawn_within_the_tolerance(tmp_path):
+def test_round_off_is_drawn_within_tolerance(tmp_path):
     """Else the round-off of an output that stays where it is looks like a motion."""
     still = replace(series(GRID), position=[1e-17 * (k % 3) for k in range(21)])
     errors = {"x": judged(still, replace(still, position=[0.0] * 21), 1e-9, "native")}

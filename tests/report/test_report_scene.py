@@ -22,7 +22,7 @@ from kincheck.core.report.drawing import drawing
 from msgspec.structs import replace as replaced
 
 from ..oracles.naive import A
-from ..support.made_up import GRID, STROKE, record
+from ..support.strut_results import GRID, STROKE, record
 
 STRUT = cases.load("mcpherson_strut")
 AXIS = driver_axis(
@@ -40,7 +40,7 @@ def place(drawn, node, frame):
     return np.array(body["r"][k]) + A(np.array(body["p"][k])) @ np.array(local)
 
 
-def test_hardpoints_are_drawn_where_the_native_engine_has_them():
+def test_scene_hardpoints_follow_native():
     shown = scene(STRUT)
     drawn = drawing(shown, AXIS)
     assert len(shown.frames) == FRAMES

@@ -5,7 +5,7 @@ from kincheck.core.errors import number_of, with_article
 from kincheck.core.harness.labels import number, output_label
 
 
-def test_outputs_are_labelled_in_words():
+def test_output_labels():
     assert output_label("half_track_change") == "half-track change"
     assert output_label("half_track_change.per_travel") == "half-track change per travel"
     assert output_label("kingpin_inclination.per_travel") == "kingpin inclination per travel"
@@ -24,7 +24,7 @@ def test_outputs_are_labelled_in_words():
         (2e7, "2e7"),
     ],
 )
-def test_numbers_are_short_and_a_dash_is_no_zero(value, text):
+def test_number_text(value, text):
     assert number(value) == text
 
 
@@ -38,10 +38,10 @@ def test_numbers_are_short_and_a_dash_is_no_zero(value, text):
         ("unknown joint", "an unknown joint"),
     ],
 )
-def test_a_noun_has_its_article(noun, text):
+def test_noun_with_article(noun, text):
     assert with_article(noun) == text
 
 
-def test_one_thing_is_singular():
+def test_count_with_noun():
     assert [number_of(k, "case") for k in (0, 1, 2)] == ["0 cases", "1 case", "2 cases"]
     assert number_of(2, "assembly", "assemblies") == "2 assemblies"

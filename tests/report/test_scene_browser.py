@@ -6,11 +6,11 @@ from kincheck import cases
 from kincheck.core.harness.scene import FRAMES, scene
 from msgspec.structs import replace
 
-from ..support.made_up import results
+from ..support.strut_results import results
 from .test_report_browser import strut
 
 
-def test_the_mechanism_is_drawn_turned_and_moved(visit):
+def test_scene_turns_and_plays_in_browser(visit):
     told = visit(
         strut(),
         """

@@ -17,8 +17,8 @@ from kincheck.core.report.drawing import drawing
 from msgspec.structs import replace
 
 from ..oracles.naive import A
-from ..support.made_up import GRID, record, series
 from ..support.mechanisms import chain
+from ..support.strut_results import GRID, record, series
 from .test_report_scene import AXIS, STRUT, UP
 
 
@@ -34,6 +34,7 @@ from .test_report_scene import AXIS, STRUT, UP
         ({"name": "lift", "type": "joint_displacement"}, 0, "lift"),
         ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
     ],
+    ids=["up", "down", "point", "absolute", "aslant", "level", "slide", "angle"],
 )
 def test_travel_axis_of_vertical_driver(driver, up, name):
     made = record(
@@ -55,7 +56,7 @@ def test_large_scenes_have_fewer_frames():
     assert with_scenes(Results(run={}, records=[]), [case(LARGEST // 2)]).scenes == {}
 
 
-def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
+def test_scene_wheel_about_spin_axis():
     shown = scene(cases.load("mcpherson_suspension"), poses=False)
     [wheel] = shown.wheels
     # a right wheel in axes x rearward, y outboard and z up, without static angles
@@ -109,7 +110,7 @@ def test_scene_arrows_are_output_forces():
     )
 
 
-def test_an_arm_has_both_pivots_of_its_table(tmp_path):
+def test_scene_arm_has_both_pivots(tmp_path):
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["double_wishbone"]), "utf-8")
     case = load(tmp_path / "car.csv")
     drawn = drawing(scene(case, poses=False), AXIS)
@@ -128,7 +129,7 @@ def test_an_arm_has_both_pivots_of_its_table(tmp_path):
     assert contact not in {node for link in drawn.links for node in link}
 
 
-def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path):
+def test_scene_strut_has_tube(tmp_path):
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]), "utf-8")
     drawn = drawing(scene(load(tmp_path / "car.csv"), poses=False), AXIS)
     names = [body["name"] for body in drawn.bodies]
@@ -140,7 +141,7 @@ def test_a_strut_slides_in_a_tube_towards_its_mount(tmp_path):
     ("axle", "rack", "middle"),
     [(None, None, 3), (None, "0.01", 0), ("heave", None, 3), ("steer", None, 0)],
 )
-def test_steering_in_the_sweep_leaves_no_centre(tmp_path, axle, rack, middle):
+def test_steered_sweep_has_no_centre(tmp_path, axle, rack, middle):
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]), "utf-8")
     case = load(tmp_path / "car.csv", Supplied(axle=axle, rack=rack, travel="0.02:3"))
     assert [len(wheel.middle) for wheel in scene(case, poses=False).wheels] == [middle] * (

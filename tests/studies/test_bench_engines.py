@@ -30,7 +30,7 @@ TOL = 1e-12
 # Rounds
 
 
-def test_contestants_take_turns(monkeypatch):
+def test_bench_contestants_take_turns(monkeypatch):
     monkeypatch.setattr(rounds, "TURN", 1e-12)  # one call a turn
     called = []
     found = rounds.take_turns({name: lambda name=name: called.append(name) for name in "ab"}, 3)
@@ -63,7 +63,7 @@ def test_slow_first_calls_are_not_timed(monkeypatch):
     assert now[0] - begin == pytest.approx(0.6)  # it is slow: twice is enough
 
 
-def test_spread():
+def test_spread_has_quartiles():
     found = rounds.spread([4.0, 1.0, 2.0, 3.0, 100.0])
     assert (found.least, found.lower, found.median, found.upper, found.rounds) == (
         1.0,
@@ -92,7 +92,7 @@ class Measured(Fake):
         return Floor(0.5, "half a microsecond", {"all": 0.5}) if self.mode == "projection" else None
 
 
-def test_an_entry_has_error_and_outcome():
+def test_precision_entry_has_error():
     coarse, fine = precision.contestants(crank(), Measured().efforts(), TOL)
     assert (coarse.entry.setting, coarse.entry.outcome, fine.entry.outcome) == (
         "coarse",
@@ -117,8 +117,9 @@ def test_an_entry_has_error_and_outcome():
         (Fake(answer=raising(RuntimeError("broken"))), Outcome.ERROR),
         (Fake(answer=partial), Outcome.FAIL),
     ],
+    ids=["missing", "unable", "broken", "partial"],
 )
-def test_unsolved_effort_is_an_untimed_entry(engine, outcome):
+def test_unsolved_effort_is_untimed(engine, outcome):
     found = precision.contestants(crank(), {"one": engine}, TOL)
     assert [(each.entry.outcome, each.work) for each in found] == [(outcome, None)]
     assert found[0].entry.message
@@ -138,7 +139,7 @@ def entries():
     ]
 
 
-def test_the_fastest_effort_that_meets_the_error():
+def test_fastest_effort_meeting_error():
     by_error = {each.required: each for each in precision.needed(entries())}
     assert {required: each.setting for required, each in by_error.items()} == {
         1e-3: "coarse",
@@ -152,7 +153,7 @@ def test_the_fastest_effort_that_meets_the_error():
     assert "1.0e-06 m" in none.reason
 
 
-def test_a_case_without_a_reference_is_proved():
+def test_bench_proves_case_without_reference():
     pytest.importorskip("flint")
     case, known = crank(reference=False), crank()
     found = precision.with_truth(case, TOL)
@@ -224,7 +225,7 @@ def test_bench_rows_have_loop_and_error():
         assert entry.message if entry.us_per_sample is None else entry.errors.position is not None
 
 
-def test_results_are_read_as_they_were_written(tmp_path):
+def test_bench_results_are_read_back(tmp_path):
     found = measured()
     file = tmp_path / "bench.json"
     file.write_bytes(msgspec.json.encode(found))
@@ -237,7 +238,7 @@ def test_results_are_read_as_they_were_written(tmp_path):
     assert "https:" not in html.partition("<script")[0]
 
 
-def test_an_effort_leaves_a_residual_on_purpose():
+def test_effort_residual_is_no_failure():
     def answer(case):
         return replace(solution(case), residual=1e-6)
 
@@ -317,7 +318,7 @@ def one_thread(monkeypatch):
 
 
 @pytest.mark.usefixtures("one_thread")
-def test_command_and_report_of_a_run(tmp_path, capsys):
+def test_bench_engines_command_and_report(tmp_path, capsys):
     asked = "bench engines --rounds 1 --engine native --cases rssr --parts work".split()
     assert main.main([*asked, "--json", "-", "--out", str(tmp_path)]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -332,7 +333,7 @@ def test_command_and_report_of_a_run(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("one_thread")
-def test_bench_named_engine_missing_has_status_2(monkeypatch, capsys):
+def test_bench_missing_engine_has_status_2(monkeypatch, capsys):
     found = measured()  # of an engine "gone" too
     there = [each for each in found.entries if each.engine != "gone"]
     for name, status in (("gone", 2), ("native", 0)):
@@ -358,7 +359,7 @@ def test_run_refuses_invalid_benchmark_file(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("one_thread")
-def test_plain_bench_is_everything(monkeypatch, tmp_path):
+def test_bench_without_arguments_measures_everything(monkeypatch, tmp_path):
     asked = {}
     found = measured()
     monkeypatch.setattr(
@@ -373,7 +374,7 @@ def test_plain_bench_is_everything(monkeypatch, tmp_path):
     assert found["formulation"]["case"] == "mcpherson_strut"
 
 
-def test_linear_algebra_has_one_thread(monkeypatch):
+def test_bench_restarts_with_one_thread(monkeypatch):
     for name in THREADS:
         monkeypatch.delenv(name, raising=False)
     started = []
@@ -391,7 +392,7 @@ def test_linear_algebra_has_one_thread(monkeypatch):
 
 
 @pytest.mark.usefixtures("one_thread")
-def test_bad_options_are_named(tmp_path, capsys):
+def test_bench_refuses_bad_options(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     for options, said in (
         (["--cases", "rsr"], "'rssr'"),

@@ -63,6 +63,7 @@ def found(case):
         (lambda a, M: 1.0 * a, 0),
         (lambda a, M: 2.0 * a, 3),
     ],
+    ids=["dot", "turn", "matrices", "cross", "chain", "sums", "by one", "by two"],
 )
 def test_executed_operations_are_all_counted(work, operations):
     tally = [0]
@@ -97,7 +98,7 @@ COUNTS = {
 
 
 @pytest.mark.parametrize(("line", "operations"), COUNTS.items(), ids=str)
-def test_counts(found, line, operations):
+def test_operation_counts_of_conditions(found, line, operations):
     assert by_way(found.operations)[line].general_axes == operations
 
 
@@ -110,7 +111,7 @@ def test_unit_axes_of_native_rows(found):
             assert each.unit_axes.jacobian <= each.general_axes.jacobian
 
 
-def test_table_3_is_printed_beside_every_condition(found):
+def test_operation_counts_include_table_3(found):
     printed = {
         each.condition: each.general_axes for each in found.operations if each.way == TABLE_3
     }
@@ -157,7 +158,7 @@ def test_tracing_shares_operations_between_rows():
 # Round-off
 
 
-def test_the_order_of_the_sum_keeps_the_digits(found):
+def test_sum_order_keeps_digits(found):
     """Printed (22) loses as many digits as the distance has; with r_j - r_i first no style loses
     any.
     """
@@ -208,7 +209,7 @@ def test_round_off_depends_on_seed_only(monkeypatch):
     assert bench_formulation.measure_roundoff(1, 1) != first
 
 
-def test_all_ways_get_the_same_inputs(rng):
+def test_round_off_inputs_are_equal(rng):
     """Displacement and position are the same to the last digit, though a million metres away."""
     for distance in bench_formulation.DISTANCES:
         known = bench_formulation._states(rng, 50, distance, turning=False)
@@ -230,7 +231,7 @@ def test_all_ways_get_the_same_inputs(rng):
 # The whole mechanism
 
 
-def test_programs_are_those_the_solver_runs(found, case):
+def test_program_sizes_equal_solver(found, case):
     sizes = {each.style: each for each in found.programs}
     whole, places = (
         solve(case.mechanism, "stroke", [0.0], order=order).details["program"] for order in (2, 0)
@@ -285,7 +286,7 @@ def few(monkeypatch):
 
 
 @pytest.mark.usefixtures("few")
-def test_command_writes_tables_json_and_page(tmp_path, capsys):
+def test_bench_formulation_command_files(tmp_path, capsys):
     assert main.main(f"bench formulation --seed 7 --json - --out {tmp_path / 'new'}".split()) == 0
     captured = capsys.readouterr()
     found = json.loads(captured.out)
@@ -307,7 +308,7 @@ def test_command_writes_tables_json_and_page(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("few")
-def test_missing_mpmath_is_named(monkeypatch, capsys):
+def test_bench_names_missing_mpmath(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "mpmath", None)
     assert main.main(["bench", "formulation"]) == 2
     said = capsys.readouterr().err
@@ -315,7 +316,7 @@ def test_missing_mpmath_is_named(monkeypatch, capsys):
     assert "Traceback" not in said
 
 
-def test_bad_destinations_are_named_before_the_work(tmp_path, monkeypatch, capsys):
+def test_bad_destination_stops_before_measuring(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(bench_formulation, "measure", lambda *_: pytest.fail("worked"))
     (tmp_path / "file").write_text("")
     (tmp_path / "bench_formulation.html").mkdir()
@@ -328,7 +329,7 @@ def test_bad_destinations_are_named_before_the_work(tmp_path, monkeypatch, capsy
         assert "file" in capsys.readouterr().err
 
 
-def test_page_escapes():
+def test_study_page_escapes():
     section = Section("<b>", ["<i>"], ["&"], ["<u>", "n"], 1, [["<script>", "1"]])
     html = page(Report("x", "<title>", ["<s>"], [section]))
     assert "<script>" not in html

@@ -26,7 +26,7 @@ from ..support.loads import loaded
 TOL = 1e-12
 
 
-def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
+def test_native_efforts_grow_in_precision(monkeypatch):
     # twice four predict to 3e-9
     monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)
     case = cases.load("rssr")
@@ -57,7 +57,7 @@ def test_levels_compute_requested_orders_only():
     assert found[precision.NUMPY].loop == "python"
 
 
-def test_forces_are_a_level_of_cases_with_masses():
+def test_force_level_needs_masses():
     case = cases.load("double_cardan")
     assert precision.levels(case) == precision.LEVELS
     case = replace(case, mechanism=loaded(case.mechanism))
@@ -67,7 +67,7 @@ def test_forces_are_a_level_of_cases_with_masses():
     assert [*found.bodies] == [body.name for body in case.mechanism.moving]
 
 
-def test_loops_alone_reach_every_sample_or_say_so():
+def test_loops_alone_solve_every_sample():
     pytest.importorskip("llvmlite")
     case = cases.load("mcpherson_strut")
     assert np.isfinite(precision.loops_alone(case, TOL)()).all()
@@ -76,7 +76,7 @@ def test_loops_alone_reach_every_sample_or_say_so():
         precision.loops_alone(out_of_reach, TOL)()
 
 
-def test_flops_of_a_sample():
+def test_flops_per_sample():
     size = precision.program_size(cases.load("rssr"))
     once, twice = (size.of_sample(n) for n in (1.0, 2.0))
     assert twice - once == size.flops["newton"]
@@ -85,7 +85,7 @@ def test_flops_of_a_sample():
     )
 
 
-def test_the_peak_kernel_does_its_arithmetic():
+def test_peak_kernel_arithmetic():
     pytest.importorskip("llvmlite")
     kernel = rounds.prepare()
     factor, term, *rest = kernel.memory.reshape(-1, kernel.width)[:, 0]
@@ -97,7 +97,7 @@ def test_the_peak_kernel_does_its_arithmetic():
     assert kernel.rate(rounds.spread([1.0, 2.0])) == kernel.flops
 
 
-def test_batches(monkeypatch):
+def test_batch_measurement_of_designs(monkeypatch):
     monkeypatch.setattr(designs, "SIZES", (1, 5))
     one, five = designs.measure_batches(cases.load("mcpherson_strut"), TOL, 1, None)
     assert (one.variants, five.variants) == (1, 5)
@@ -105,7 +105,7 @@ def test_batches(monkeypatch):
     assert max(one.error, five.error) < 1e-15
 
 
-def test_a_study_takes_turns_on_one_thread_and_on_two(monkeypatch):
+def test_study_measurement_by_threads(monkeypatch):
     pytest.importorskip("llvmlite")
     monkeypatch.setattr(designs, "VARIANTS", 128)
     monkeypatch.setattr(designs.os, "cpu_count", lambda: 4)
@@ -118,7 +118,7 @@ def test_a_study_takes_turns_on_one_thread_and_on_two(monkeypatch):
     assert (alone.variants, alone.peak_times) == (128, None)
 
 
-def test_chains_are_solved_until_they_take_too_long(monkeypatch):
+def test_chain_sizes_until_time_limit(monkeypatch):
     monkeypatch.setattr(size, "LOOPS", (1, 2))
     monkeypatch.setattr(size, "MANY", (3, 4))
     monkeypatch.setattr(size, "CRANKS", (4,))
@@ -137,7 +137,7 @@ def test_chains_are_solved_until_they_take_too_long(monkeypatch):
     assert second.message.startswith("not tried: 1 took")
 
 
-def test_costs_are_measured_with_residuals_and_errors():
+def test_scaling_rows_have_residual_and_error():
     rows = size.measure_scalings([3], TOL, rounds=1)
     assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [
         ("chain", 3, 7, 42),
@@ -148,7 +148,7 @@ def test_costs_are_measured_with_residuals_and_errors():
     assert all(row.us_per_value.median > 0.0 for row in rows)
 
 
-def test_growth_is_that_of_the_largest():
+def test_growth_of_largest_sizes():
     timed = [(1, 1.0), (100, 2.0), (1000, 9.0), (10000, 200.0)]
     of = dict.fromkeys(("mechanism", "engine", "mode", "loop", "message"), "")
     sizes = [size.Size(**of, loops=n, bodies=0, us_per_sample=rounds.spread([t])) for n, t in timed]
@@ -158,7 +158,7 @@ def test_growth_is_that_of_the_largest():
 
 
 @pytest.mark.nightly
-def test_processes(monkeypatch):
+def test_process_measurement(monkeypatch):
     name = "mcpherson_strut"
     found = processes.measure_processes(cases.load(name), name, [adapters.engine("native")], TOL, 1)
     by_name = {each.what: each for each in found}

@@ -34,24 +34,33 @@ def short(tmp_path, duration=0.3, samples=16):
     return file
 
 
-def measured(tmp_path, *options):
-    given = ["--case", str(short(tmp_path)), "--out", str(tmp_path / "site")]
-    assert main(["board", *given, "--steps", "60", *options]) == 0
-    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"]
+def board(folder, *options):
+    """Status of a board in `folder / "site"`."""
+    return main(["board", "--out", str(folder / "site"), *map(str, options)])
+
+
+def rows_of(folder):
+    return json.loads((folder / "site" / "board.json").read_text("utf-8"))["rows"]
+
+
+def measured(folder, *options, steps=60):
+    """The rows of a board of the four-bar and further cases."""
+    if not (folder / "four_bar.toml").exists():
+        short(folder)
+    assert board(folder, "--case", folder / "four_bar.toml", "--steps", steps, *options) == 0
+    return rows_of(folder)
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("the board")
-    given = ["--engine", "mujoco", "exudyn", "pinocchio", "--steps", "60"]
-    status = main(["board", *given, "--case", str(short(folder)), "--out", str(folder / "site")])
-    assert status == 0
+    measured(folder, "--engine", "mujoco", "exudyn", "pinocchio")
     return folder / "site"
 
 
 @pytest.fixture(scope="module")
 def rows(site):
-    found = json.loads((site / "board.json").read_text("utf-8"))["rows"]
+    found = rows_of(site.parent)
     return {(row["engine"], row["integrator"], row["column"]): row for row in found}
 
 
@@ -59,14 +68,14 @@ def errors(row):
     return [run["error"] for run in row["runs"]]
 
 
-def test_runge_kutta_of_stiff_mujoco_is_of_second_order(rows):
+def test_mujoco_runge_kutta_is_second_order(rows):
     # four-bar of the study: 7.8e-6, 1.9e-6, 4.5e-7
     row = rows["mujoco", "RK4", "best"]
     assert row["order"] == pytest.approx(2.0, abs=0.15)
     assert errors(row)[-1] < 1e-4
 
 
-def test_default_softness_is_a_floor(rows):
+def test_mujoco_softness_sets_floor(rows):
     row = rows["mujoco", "RK4", "default"]
     assert row["floor"] == min(errors(row))
     assert errors(row)[-1] > 30 * errors(rows["mujoco", "RK4", "best"])[-1]
@@ -94,7 +103,7 @@ def test_drake_without_loops_is_also_continuous(tmp_path):
     case.write_text(re.sub(r"\[joints\.D\]\n(.+\n)*", "", text).replace('"free_', '"chain_'))
     found = {
         (row["case"], row["integrator"]): row
-        for row in measured(tmp_path, "--engine", "drake", "--case", str(case))
+        for row in measured(tmp_path, "--engine", "drake", "--case", case)
     }
     chain = found["chain_four_bar", "runge_kutta3"]
     assert errors(chain)[-1] < 1e-9
@@ -114,16 +123,16 @@ def welded(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["exudyn", "drake"])
-def test_welded_body_of_the_tree_is_stepped(engine, tmp_path):
+def test_welded_body_is_stepped(engine, tmp_path):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine), exc_type=ImportError)
-    given = ["--engine", engine, "--case", str(welded(tmp_path))]
-    row = [each for each in measured(tmp_path, *given) if each["case"] == "welded_four_bar"][-1]
+    found = measured(tmp_path, "--engine", engine, "--case", welded(tmp_path))
+    row = [each for each in found if each["case"] == "welded_four_bar"][-1]
     *_, longer, shorter = row["runs"]
     for key in ("error", "reaction"):
         assert shorter[key] <= 0.6 * longer[key]
 
 
-def test_tree_of_the_board_hangs_on_fixed_bodies(tmp_path):
+def test_board_tree_merges_fixed_bodies(tmp_path):
     """The strut's chassis is fixed, and has a name of its own."""
     truth = truth_of(kincheck.load(short_strut(tmp_path)))
     files = adapters.stepper_files("drake", truth.case.mechanism, truth.twists)
@@ -131,7 +140,7 @@ def test_tree_of_the_board_hangs_on_fixed_bodies(tmp_path):
     assert found == {"lca": "ground", "knuckle": "lca", "strut": "knuckle"}
 
 
-def test_urdf_of_the_board_has_welded_bodies(tmp_path):
+def test_board_urdf_has_welded_bodies(tmp_path):
     truth = truth_of(kincheck.load(welded(tmp_path)))
     text = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)["model.urdf"]
     assert re.search(r'<joint name="plate joint" type="fixed">', text)
@@ -146,16 +155,16 @@ def short_strut(tmp_path):  # rod, spring, damper; a ball in the tree
     return strut
 
 
-def test_joint_forces_of_drake_leave_balls_out(tmp_path):
+def test_drake_forces_leave_balls_out(tmp_path):
     pytest.importorskip("pydrake.multibody.plant", exc_type=ImportError)
-    *_, row = measured(tmp_path, "--engine", "drake", "--case", str(short_strut(tmp_path)))
+    *_, row = measured(tmp_path, "--engine", "drake", "--case", short_strut(tmp_path))
     *_, longer, shorter = (run["reaction"] for run in row["runs"])
     assert shorter == pytest.approx(0.5 * longer, rel=0.1)
 
 
 def test_error_of_simbody_follows_its_accuracy(tmp_path):
     pytest.importorskip("opensim", exc_type=ImportError)
-    row, other = measured(tmp_path, "--engine", "simbody", "--case", str(short_strut(tmp_path)))
+    row, other = measured(tmp_path, "--engine", "simbody", "--case", short_strut(tmp_path))
     assert errors(other)[-1] < 1e-8
     found = errors(row)
     assert found == sorted(found, reverse=True)
@@ -176,13 +185,13 @@ def test_pinocchio_needs_its_proximal_setting(rows):
     assert best["loop"] == "Python"
 
 
-def test_energy_and_gap_follow_the_error(rows):
+def test_energy_and_gap_follow_error(rows):
     last = rows["exudyn", "GeneralizedAlpha", "best"]["runs"][-1]
     assert last["gap"] < 1e-10
     assert 0.1 * last["error"] < last["energy"] < 1e3 * last["error"]
 
 
-def test_joint_forces_of_engines_are_the_truths(rows):
+def test_stepper_forces_equal_truth(rows):
     def last(*key):
         return rows[key]["runs"][-1]["reaction"]
 
@@ -193,7 +202,7 @@ def test_joint_forces_of_engines_are_the_truths(rows):
     assert last("mujoco", "RK4", "default") > 0.1
 
 
-def test_undetermined_joint_forces_are_left_open():
+def test_undetermined_forces_are_left_open():
     truth = truth_of(replace(kincheck.load("bricard"), free=Free(0.01, 2)))
     assert np.isfinite(truth.reactions).all()
     assert truth.facts.forces
@@ -204,7 +213,7 @@ def test_undetermined_joint_forces_are_left_open():
     assert head.count(",") == 6 * len(truth.case.mechanism.joints) - 1
 
 
-def test_site_has_every_row_and_its_reproducer(site, rows):
+def test_board_site_has_every_row(site, rows):
     page = (site / "index.html").read_text("utf-8")
     for row in rows.values():
         folder = site / row["folder"]
@@ -215,10 +224,10 @@ def test_site_has_every_row_and_its_reproducer(site, rows):
     assert "://" not in page.replace("http://www.w3.org", "")
 
 
-def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
-    given = ["--engine", "mujoco", "--case", str(short(tmp_path, 0.02, 3)), "--steps", "2"]
+def test_board_keeps_row_history(tmp_path, capsys):
+    given = ["--engine", "mujoco", "--case", short(tmp_path, 0.02, 3)]
     file = tmp_path / "site" / "board.json"
-    assert main(["board", *given, "--out", str(file.parent)]) == 0
+    assert board(tmp_path, *given, "--steps", 2) == 0
     page = file.parent / "index.html"
     assert "History" not in page.read_text("utf-8")
     found = json.loads(file.read_text("utf-8"))
@@ -230,9 +239,9 @@ def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
     wrong = third["runs"][-1]["error"]
     old = tmp_path / "the old one.json"
     old.write_text(json.dumps(found), "utf-8")
-    assert main(["board", *given, "--out", str(file.parent), "--against", str(old)]) == 1
+    assert board(tmp_path, *given, "--steps", 2, "--against", old) == 1
     assert "mujoco implicitfast, default: measured, worse" in capsys.readouterr().err
-    one, two, three, *_ = json.loads(file.read_text("utf-8"))["rows"]
+    one, two, three, *_ = rows_of(tmp_path)
     assert one["since"] == "2025-01-01" < two["since"] == three["since"]
     assert not one["past"]
     assert [each["version"] for each in two["past"]] == ["3.9"]
@@ -243,19 +252,18 @@ def test_board_keeps_the_history_of_its_rows(tmp_path, capsys):
     for change in ("version 3.9 → ", "error alone", '<td class="number">2</td>'):
         assert change in text
     # the same again, and a board with other steps
-    assert main(["board", *given, "--out", str(file.parent)]) == 0
-    assert len(json.loads(file.read_text("utf-8"))["rows"][2]["past"]) == 1
-    more = [*given[:-1], "4", "--out", str(file.parent), "--against", str(old)]
-    assert main(["board", *more]) == 0
+    assert board(tmp_path, *given, "--steps", 2) == 0
+    assert len(rows_of(tmp_path)[2]["past"]) == 1
+    assert board(tmp_path, *given, "--steps", 4, "--against", old) == 0
     file.write_text("{}", "utf-8")
-    assert main(["board", *given, "--out", str(file.parent)]) == 2
-    assert main(["board", *given, "--out", str(file.parent), "--against", "none.json"]) == 2
+    assert board(tmp_path, *given) == 2
+    assert board(tmp_path, *given, "--against", "none.json") == 2
 
 
 @pytest.mark.parametrize(
     ("engine", "integrator"), [("mujoco", "RK4"), ("exudyn", "GeneralizedAlpha")]
 )
-def test_reproducer_runs_alone_and_repeats_the_row(site, rows, engine, integrator):
+def test_board_reproducer_repeats_row(site, rows, engine, integrator):
     row = rows[engine, integrator, "best"]
     folder = site / row["folder"]
     command = [sys.executable, "-P", "-S", "-c", ALONE, str(folder / "run.py")]
@@ -278,7 +286,7 @@ assert not any(name.startswith("kincheck") for name in sys.modules)
 """
 
 
-def test_truth_of_the_site_is_that_of_kincheck_free(site, rows):
+def test_board_truth_equals_free(site, rows):
     folder = site / rows["mujoco", "RK4", "best"]["folder"]
     with (folder / "truth.csv").open(encoding="utf-8") as file:
         table = list(csv.DictReader(file))
@@ -290,7 +298,7 @@ def test_truth_of_the_site_is_that_of_kincheck_free(site, rows):
     assert np.ptp(energy) < 1e-12  # of motion and weight, which nothing else works on
 
 
-def test_truth_of_a_turned_body_follows_its_points():
+def test_board_truth_of_turned_body():
     case = replace(kincheck.load("mcpherson_strut_loaded"), free=Free(0.05, 3))
     truth, found = truth_of(case), kincheck.free(case)
     place, _ = truth.frames["knuckle"].at([0.975, 0.715, 0.101])
@@ -313,7 +321,7 @@ def page_of(rows, **truth):
     return {section.title: section for section in report(board).sections}
 
 
-def test_page_groups_rows_and_says_messages_once():
+def test_board_page_groups_rows():
     reason = "no rods; pip install it"
     bad = Row(**GIVEN, column="default", state="unsupported", message=reason, folder="f")
     good = Row(**GIVEN, column="best", state="measured", runs=[Run(error=1.0)])
@@ -324,21 +332,21 @@ def test_page_groups_rows_and_says_messages_once():
 
 
 @pytest.mark.parametrize(("forces", "cell"), [(True, "not given"), (False, "open")])
-def test_page_says_why_forces_are_missing(forces, cell):
+def test_board_page_explains_missing_forces(forces, cell):
     row = Row(**GIVEN, column="best", state="measured", runs=[Run(error=1.0)])
     section = page_of([row], forces=forces)["a"]
     assert section.rows[1][section.columns.index("reaction [N]")] == cell
     assert forces != any("forces are compared" in each for each in section.verdict)
 
 
-def test_page_keeps_best_settings_where_defaults_are_nearer():
+def test_board_page_keeps_best_settings():
     row = Row(**GIVEN, column="best", state="measured", settings={"mu": 0.1}, by="me", on="today")
     nearer = replace_row(row, settings={}, case="other")
     ((*_, best, by),) = page_of([row, nearer])["Settings and measures"].rows
     assert (best, by) == ("mu 0.1", "me today")
 
 
-def test_best_is_best_by_error():
+def test_board_best_is_by_error():
     default = Row(**GIVEN, column="default", state="measured", runs=[Run(error=3e-4)])
     row = replace_row(default, column="best", settings={"mu": 0.1})
     worse, nearer = (replace_row(row, runs=[Run(error=each)]) for each in (4e-4, 2e-4))
@@ -349,7 +357,7 @@ def test_best_is_best_by_error():
     assert better(replace_row(default, runs=[]), worse) is worse
 
 
-def test_order_and_floor_of_halved_steps():
+def test_board_order_and_floor():
     def runs(*found):
         return [Run(step=0.5**k, error=error) for k, error in enumerate(found)]
 
@@ -368,14 +376,12 @@ FAKES = {
 }
 
 
-def test_fault_of_an_engine_costs_only_its_rows(tmp_path, monkeypatch):
+def test_engine_fault_costs_own_rows(tmp_path, monkeypatch):
     for name, (_, text) in FAKES.items():
         (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    file, out = short(tmp_path, 0.02, 3), tmp_path / "site"
-    given = ["--case", str(file), "--engine", *FAKES, "--timeout", "2"]
-    assert main(["board", *given, "--out", str(out)]) == 0
-    for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
+    short(tmp_path, 0.02, 3)
+    for row in measured(tmp_path, "--engine", *FAKES, "--timeout", 2, steps=1):
         assert row["state"] == FAKES[row["engine"]][0]
         assert row["message"]
 
@@ -389,19 +395,18 @@ def own_python(folder, text):
 
 
 def pybullet_row(tmp_path):
-    given = ["--case", str(short(tmp_path, 0.02, 3)), "--engine", "pybullet", "--steps", "2"]
-    assert main(["board", *given, "--out", str(tmp_path / "site")]) == 0
-    return json.loads((tmp_path / "site" / "board.json").read_text("utf-8"))["rows"][0]
+    short(tmp_path, 0.02, 3)
+    return measured(tmp_path, "--engine", "pybullet", steps=2)[0]
 
 
-def test_engine_runs_in_its_own_environment(tmp_path, monkeypatch):
+def test_board_engine_in_own_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("KINCHECK_ENVIRONMENTS", own_python(tmp_path, "echo own >&2\nexit 5"))
     row = pybullet_row(tmp_path)
     assert row["state"] == "crashed"
     assert row["message"].endswith("status 5; own")
 
 
-def test_missing_environment_is_told_with_its_remedy(tmp_path, monkeypatch, capsys):
+def test_missing_environment_names_remedy(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path))
     row = pybullet_row(tmp_path)
     remedy = f"python -m venv {tmp_path}/pybullet && {tmp_path}/pybullet/bin/pip install"
@@ -409,12 +414,12 @@ def test_missing_environment_is_told_with_its_remedy(tmp_path, monkeypatch, caps
     assert remedy in row["message"]
     assert remedy in (tmp_path / "site" / "index.html").read_text("utf-8").replace("&amp;", "&")
     monkeypatch.setenv("KINCHECK_ENVIRONMENTS", str(tmp_path / "none"))
-    assert main(["board", "--out", str(tmp_path / "site")]) == 2
+    assert board(tmp_path) == 2
     assert "KINCHECK_ENVIRONMENTS: there is no folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("engine", ["pybullet", "mjx", "mujoco-warp"])
-def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
+def test_environment_engines_share_error(engine, rows, tmp_path):
     if python_of(engine) == sys.executable:
         pytest.skip(f"KINCHECK_ENVIRONMENTS has no {engine}")
     (*_, best) = measured(tmp_path, "--engine", engine, "--timeout", "600")
@@ -427,7 +432,7 @@ def test_engines_in_environments_share_the_error(engine, rows, tmp_path):
         assert shorter == pytest.approx(0.5 * longer, rel=0.1)
 
 
-def test_urdf_of_the_board_is_the_model(site):
+def test_board_urdf_equals_model(site):
     pin = pytest.importorskip("pinocchio")
     truth = truth_of(kincheck.load(FOUR_BAR))
     files = adapters.stepper_files("pybullet", truth.case.mechanism, truth.twists)
@@ -442,15 +447,13 @@ def test_urdf_of_the_board_is_the_model(site):
         assert inertia.inertia == pytest.approx(np.array(body["inertia"]), abs=1e-15)
 
 
-def test_missing_constraint_is_a_row_with_its_reason(tmp_path):
+def test_unsupported_constraint_is_board_row(tmp_path):
     case = tmp_path / "rssr.toml"
     text = (Path(kincheck.__path__[0]) / "cases" / "rssr.toml").read_text("utf-8")
     text = text.replace("duration = 2.0", "duration = 0.02").replace("samples = 201", "samples = 3")
     case.write_text(text, "utf-8")
-    out = tmp_path / "site"
-    given = ["--engine", "pinocchio", "--case", str(case), "--out", str(out), "--steps", "1"]
-    assert main(["board", *given]) == 0
-    for row in json.loads((out / "board.json").read_text("utf-8"))["rows"]:
+    assert board(tmp_path, "--engine", "pinocchio", "--case", case, "--steps", 1) == 0
+    for row in rows_of(tmp_path):
         assert row["state"] == "unsupported"
         assert "distance" in row["message"]
 
@@ -458,11 +461,11 @@ def test_missing_constraint_is_a_row_with_its_reason(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--engine", "mujco"], "did you mean 'mujoco'"),
-        (["--case", "delta_robot"], "add [free] with duration"),
-        (["--case", "four_bra"], "four_bar"),
+        ("--engine mujco", "did you mean 'mujoco'"),
+        ("--case delta_robot", "add [free] with duration"),
+        ("--case four_bra", "four_bar"),
     ],
 )
-def test_wrong_options_are_told(options, message, tmp_path, capsys):
-    assert main(["board", "--out", str(tmp_path / "site"), *options]) == 2
+def test_board_refuses_wrong_options(options, message, tmp_path, capsys):
+    assert board(tmp_path, *options.split()) == 2
     assert message in capsys.readouterr().err

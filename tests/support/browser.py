@@ -1,4 +1,4 @@
-"""A browser without a window, and the script by which a test acts on a page."""
+"""A browser without a window."""
 
 import base64
 import json
@@ -19,36 +19,17 @@ CHROMIUM = (
 )
 AXE = Path(os.environ.get("KINCHECK_AXE", "node_modules/axe-core/axe.min.js"))
 """https://github.com/dequelabs/axe-core, MPL-2.0: `npm install axe-core`, or the path here."""
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-]
-FLAGS += [
-    "--disable-component-update",
-    "--disable-sync",
-    "--enable-logging=stderr",
-    "--v=0",
-    "--window-size=1200,4000",
-]
-
-# Waits for the page to be drawn, does what a test asks, and leaves what it returns in the document.
-ACT = """<script>
-addEventListener("load", async () => {
+FLAGS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run"
+    " --disable-background-networking --disable-component-update --disable-sync"
+    " --enable-logging=stderr --v=0"
+).split()
+HELPERS = """
   const pause = (ms = 100) => new Promise((done) => setTimeout(done, ms));
   const all = (what) => [...document.querySelectorAll(what)], one = (what) => document.querySelector(what);
   const keydown = (key) => new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
   const press = (key, on = document.body) => on.dispatchEvent(keydown(key));
-  while (!("ready" in document.documentElement.dataset)) await pause();
-  await pause(1000);
-  let told;
-  try { told = await (async () => { %s })(); } catch (error) { told = { error: String(error) }; }
-  document.body.dataset.told = JSON.stringify(told);
-});
-</script></body>"""  # noqa: E501
+"""  # noqa: E501
 
 
 class Browser:
@@ -57,8 +38,7 @@ class Browser:
     """
 
     def __init__(self, folder: Path, size: tuple[int, int] = (1400, 1000), *, dark: bool = False):
-        flags = [each for each in FLAGS if not each.startswith("--window-size")]
-        command = [str(CHROMIUM), *flags, "--remote-debugging-port=0", f"--user-data-dir={folder}"]
+        command = [str(CHROMIUM), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={folder}"]
         self.process = subprocess.Popen(
             [*command, "about:blank"], stderr=subprocess.PIPE, text=True
         )
@@ -111,8 +91,8 @@ class Browser:
         )
 
     def run(self, script: str) -> Any:
-        """Return what a script returns in the page."""
-        text = f"(async () => {{ {script} }})()"
+        """Return what a script returns in the page; it may use the helpers."""
+        text = f"(async () => {{ {HELPERS} {script} }})()"
         found = self("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")

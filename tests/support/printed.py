@@ -1,8 +1,9 @@
-"""Printed numbers against the numbers they stand for, and colours of a terminal."""
+"""Printed numbers against the numbers they stand for, colours of a terminal, and JUnit files."""
 
 import io
 import math
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 
@@ -58,3 +59,18 @@ def coloured(text: str) -> dict[str, list[str]]:
         colour: [each.strip() for each in re.findall(rf"\x1b\[{code}m(.*?)\x1b\[0m", text)]
         for colour, code in (("red", "1;31"), ("green", "32"))
     }
+
+
+def junit_tests(text: bytes | str) -> dict[str, list[tuple[str, str]]]:
+    """Return what the test cases of a JUnit file have, by class and name: kinds with messages."""
+    return {
+        f"{test.get('classname')} {test.get('name')}": [
+            (child.tag, child.get("message", "")) for child in test
+        ]
+        for test in ET.fromstring(text).iter("testcase")
+    }
+
+
+def junit_messages(text: bytes | str, kind: str) -> list[str]:
+    """Return the messages of a kind in a JUnit file."""
+    return [each.get("message", "") for each in ET.fromstring(text).iter(kind)]
