@@ -278,7 +278,7 @@ class Ready:
 
     def along(self, path: Path) -> Ready:
         """Return the same model on another path of the same drivers."""
-        return Ready(self.study, self.designs.along(path), path)
+        return Ready(self.study, self.designs.on_path(path), path)
 
     @property
     def lanes(self) -> int:
