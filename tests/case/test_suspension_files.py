@@ -20,10 +20,10 @@ from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import write_report
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
-from ..studies.test_vary import HEAD
 from ..support.case_texts import refused
 from ..support.rods_of_templates import solved
 from ..support.suspension_files import STRUT, TABLE, TOE, changed, loaded, unreferenced
+from ..support.variations import HEAD
 from ..support.written_again import written_again
 
 POINTS = STRUT["points"] | {"top": {"body": "chassis", "position": [1.0, 0.55, 0.6]}}

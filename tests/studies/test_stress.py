@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core import primitives as p
-from kincheck.core import solve
 from kincheck.core.algebra import ZERO, vec
 from kincheck.core.caches import clear_caches
 from kincheck.core.case.io.case_file import case_text, load_case
@@ -23,28 +22,29 @@ from kincheck.core.studies.stress.families import FAMILIES, Family, Specimen
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
 from kincheck.core.studies.stress.reduction import judge as judge_file
-from kincheck.core.studies.stress.reduction import rounded
+from kincheck.core.studies.stress.reduction import round_geometry
 from kincheck.core.studies.stress.report import report
 from kincheck.core.studies.stress.run import specimen, specimens, stress
 from kincheck.core.studies.stress.verdicts import (
     Verdict,
-    interpreted,
-    judged,
+    judge_answer,
     once,
     refused_description,
+    with_numpy_executor,
 )
 from kincheck.core.studies.truth.forces import known_forces
-from kincheck.core.studies.truth.motion import Reach, followed
+from kincheck.core.studies.truth.motion import Reach, follow_motion
 
 from ..support.engine_faults import changed
-from ..support.fakes import Fake
+from ..support.fakes import Fake, native_but, raising
 
 NATIVE = engine("native")
 # Of a family whose specimens are of one kind, few show it.
 FEWER = {"loops": 3, "folds": 3}
+STRESS_FILES = sorted((Path(__file__).parents[1] / "data" / "stress").glob("*.toml"))
 
 
-def test_corner_beside_small_loop_is_followed():
+def test_stress_corner_beside_small_loop():
     """A corner that is turned round between two samples; stepped over where one sigma is asked for
     all blocks of the rows.
     """
@@ -53,12 +53,14 @@ def test_corner_beside_small_loop_is_followed():
     made = FAMILIES["corners"].specimen(rng, samples)
     case = made.case
     assert "beside a loop of 0.014" in made.name
-    found = judged(made, case, made.truth(case), once(Pair(case, interpreted(NATIVE), made.tol)))
+    found = judge_answer(
+        made, case, made.truth(case), once(Pair(case, with_numpy_executor(NATIVE), made.tol))
+    )
     assert found.counts[Verdict.RIGHT] == samples
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_specimens_repeat_and_save_as_files(name, tmp_path):
+def test_stress_specimens_repeat_and_save(name, tmp_path):
     """The same numbers for the same seed, every kind of each family among them; a case file says
     all of them.
     """
@@ -81,7 +83,7 @@ def test_specimens_repeat_and_save_as_files(name, tmp_path):
         assert (read.sweep.values == case.sweep.values).all()
 
 
-def test_no_family_is_silently_wrong_in_the_native_engine():
+def test_native_engine_never_silently_wrong():
     """All families; the share of each in a run of 160 samples. Compiled: without machine code is
     another test.
     """
@@ -98,7 +100,7 @@ def test_no_family_is_silently_wrong_in_the_native_engine():
     ]
 
 
-def test_contradictions_of_rounding_only_are_accepted():
+def test_only_rounding_contradictions_are_accepted():
     found, _ = stress([FAMILIES["redundant"]], [NATIVE], samples=160, seed=0)
     accepted = [each for each in found.acceptances if each.accepted]
     assert accepted
@@ -116,7 +118,7 @@ def test_contradictions_of_rounding_only_are_accepted():
     ]
 
 
-def test_errors_do_not_grow_over_a_thousand_turns():
+def test_error_bounded_over_thousand_turns():
     made = specimen(FAMILIES["drift"], 0, 0, 4001)
     assert made.case is not None
     assert made.truth is not None
@@ -131,27 +133,19 @@ def test_errors_do_not_grow_over_a_thousand_turns():
 
 
 def test_numpy_solver_in_singular_family():
-    found, _ = stress([FAMILIES["singular"]], [interpreted(NATIVE)], samples=6, seed=0, prove=False)
+    found, _ = stress(
+        [FAMILIES["singular"]], [with_numpy_executor(NATIVE)], samples=6, seed=0, prove=False
+    )
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "four_bar_in_one_step",
-        "kite",
-        "loop_of_four_bodies",
-        "loop_of_eight_bodies",
-        "platform_nearly_singular",
-    ],
-)
-def test_former_silent_errors_stay_fixed(name):
+@pytest.mark.parametrize("file", [*STRESS_FILES], ids=lambda file: file.stem)
+def test_former_silent_errors_stay_fixed(file):
     """The smallest mechanisms found so far, a sample each."""
-    file = Path(__file__).parents[1] / "data" / "stress" / f"{name}.toml"
     assert judge_file(load_case(file), NATIVE, 1e-12).counts[Verdict.SILENTLY_WRONG] == 0
 
 
-def test_failing_family_costs_no_other():
+def test_failing_family_leaves_other_families():
     def defective(rng, samples):
         raise KincheckError("cannot be made")
 
@@ -200,25 +194,24 @@ def case():
 
 @pytest.fixture(scope="module")
 def truth(case):
-    return followed(case)
+    return follow_motion(case)
 
 
-def fake(change=lambda motion: motion, failures=(), fails=None):
+def fake(change=lambda motion: motion, failures=()):
     """An engine that answers with the native motion, changed."""
 
-    def answer(case):
-        if fails:
-            raise fails
-        found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
+    def answer(found, case):
         points = {name: change(motion) for name, motion in found.points.items()}
         solved = np.isfinite([motion.position for motion in points.values()]).all(axis=(0, 2))
         return replace(found, points=points, solved=solved, failures=failures)
 
-    return Fake("native", answer)
+    return native_but(answer)
 
 
 def judge(case, truth, engine, **about):
-    return judged(Specimen("one", case, **about), case, truth, once(Pair(case, engine, 1e-12)))
+    return judge_answer(
+        Specimen("one", case, **about), case, truth, once(Pair(case, engine, 1e-12))
+    )
 
 
 def moved(by, quantity="position", samples=slice(None)):
@@ -230,7 +223,7 @@ def moved(by, quantity="position", samples=slice(None)):
     return change
 
 
-def test_a_right_answer_is_right(case, truth):
+def test_verdict_on_right_answer(case, truth):
     found = judge(case, truth, NATIVE)
     assert found.counts[Verdict.RIGHT] == 5
     *motion, force = found.worst
@@ -241,18 +234,18 @@ def test_a_right_answer_is_right(case, truth):
 @pytest.mark.parametrize(
     ("quantity", "by"), [("position", 1e-12), ("velocity", 1e-10), ("acceleration", 1e-9)]
 )
-def test_an_error_beyond_round_off_is_silently_wrong(case, truth, quantity, by):
+def test_verdict_on_error_beyond_round_off(case, truth, quantity, by):
     found = judge(case, truth, fake(moved(by, quantity, slice(1, 3))))
     assert list(found.verdicts == Verdict.SILENTLY_WRONG) == [False, True, True, False, False]
     assert found.elsewhere == 0
     assert found.first(Verdict.SILENTLY_WRONG) == 1
 
 
-def test_other_assembly_is_counted_apart(case, truth):
+def test_verdict_on_other_assembly(case, truth):
     assert judge(case, truth, fake(moved(0.1))).elsewhere == 5
 
 
-def test_answer_beyond_reach_is_silently_wrong(case, truth):
+def test_verdict_on_answer_beyond_reach(case, truth):
     beyond = replace(truth, reach=np.array([Reach.BEYOND, *[Reach.REACHED] * 4]))
     found = judge(case, beyond, NATIVE)
     assert (found.counts[Verdict.SILENTLY_WRONG], found.elsewhere) == (1, 1)
@@ -262,7 +255,7 @@ def test_answer_beyond_reach_is_silently_wrong(case, truth):
     )
 
 
-def test_unknown_truth_is_not_judged(case, truth):
+def test_verdict_on_unknown_truth(case, truth):
     unknown = replace(truth, reach=np.array([*[Reach.REACHED] * 4, Reach.UNKNOWN]))
     assert judge(case, unknown, fake(moved(0.1))).counts == {
         **dict.fromkeys(Verdict, 0),
@@ -283,8 +276,12 @@ def test_unknown_truth_is_not_judged(case, truth):
         (False, [FailureKind.BELOW_ROUNDING], {"reasons": ROUNDING}, 0),
         (False, [FailureKind.FREE], {"reasons": ROUNDING, "excused": True}, 0),
     ],
+    ids=[
+        *("no singular pose", "singular pose", "no cause", "other cause", "excused", "no excuse"),
+        "other reason",
+    ],
 )
-def test_refusal_is_judged_by_its_reason(case, truth, singular, failures, about, right):
+def test_verdict_on_refusal_by_reason(case, truth, singular, failures, about, right):
     truth = replace(truth, singular=np.array([singular] * 2 + [False] * 3))
     found = judge(case, truth, fake(moved(np.nan, samples=slice(0, 2)), failures), **about)
     assert found.counts[Verdict.REFUSED_RIGHTLY] == right
@@ -292,17 +289,18 @@ def test_refusal_is_judged_by_its_reason(case, truth, singular, failures, about,
     assert found.counts[Verdict.RIGHT] == 3
 
 
-def test_errors_and_crashes_as_refusals(case):
+def test_verdict_on_errors_and_crashes(case):
     free = SolveError("a body can turn", FailureKind.FREE)
     reasons = frozenset({FailureKind.FREE})
-    assert judge(case, None, fake(fails=free), reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5
+    refusing = Fake("native", raising(free))
+    assert judge(case, None, refusing, reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5
     one = Specimen("one", case, None, reasons=reasons)
     for outcome, verdict in (
         (Outcome.CRASHED, Verdict.REFUSED_WRONGLY),
         (Outcome.UNSUPPORTED, Verdict.UNSUPPORTED),
     ):
         failure = Failure(outcome, "free", kind=FailureKind.FREE)
-        assert judged(one, case, None, failure).counts[verdict] == 5
+        assert judge_answer(one, case, None, failure).counts[verdict] == 5
     for refused, verdict in (
         (Specimen("one", free, None, reasons=reasons), Verdict.REFUSED_RIGHTLY),
         (Specimen("one", SolveError("odd"), None, reasons=reasons), Verdict.REFUSED_WRONGLY),
@@ -311,7 +309,7 @@ def test_errors_and_crashes_as_refusals(case):
         assert refused_description(refused, 3).counts[verdict] == 3
 
 
-def test_a_contradiction_must_be_told(case, truth):
+def test_verdict_on_unreported_contradiction(case, truth):
     answer = once(Pair(case, NATIVE, 1e-12))
     assert isinstance(answer, Answer)
     one, violated = (
@@ -319,8 +317,8 @@ def test_a_contradiction_must_be_told(case, truth):
         replace(truth, violated=np.array([0.0, 1e-10, 0.0, 0.0, 0.0])),
     )
     told = replace(answer, details={"redundant_residual": 5e-11})
-    assert judged(one, case, violated, answer).counts[Verdict.SILENTLY_WRONG] == 1
-    assert judged(one, case, violated, told).counts[Verdict.SILENTLY_WRONG] == 0
+    assert judge_answer(one, case, violated, answer).counts[Verdict.SILENTLY_WRONG] == 1
+    assert judge_answer(one, case, violated, told).counts[Verdict.SILENTLY_WRONG] == 0
 
 
 # Forces in the stress run: what is right, and every kind of mistake found
@@ -330,7 +328,7 @@ demand = importlib.import_module("kincheck.core.kinematics.forces.equations")
 FORCES = FAMILIES["forces"]
 # Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast arm, a driven slide.
 TWICE, FOUR_BAR, SPINNING, SLIDING = 21, 4, 5, 12
-INTERPRETED = interpreted(NativeEngine())
+INTERPRETED = with_numpy_executor(NativeEngine())
 
 
 @pytest.fixture(scope="module")
@@ -359,7 +357,7 @@ class Changed:
 def verdicts(made, number, change=lambda forces: forces):
     one, trajectory = made[number]
     answer = once(Pair(one.case, Changed(trajectory, change), 1e-12))
-    return judged(one.specimen, one.case, one.truth, answer)
+    return judge_answer(one.specimen, one.case, one.truth, answer)
 
 
 def joints(forces: Forces, change) -> Forces:
@@ -367,13 +365,13 @@ def joints(forces: Forces, change) -> Forces:
 
 
 @pytest.mark.parametrize("number", [TWICE, FOUR_BAR])
-def test_right_forces_are_right(made, number):
+def test_verdict_on_right_forces(made, number):
     found = verdicts(made, number)
     assert found.counts[Verdict.RIGHT] == len(found.verdicts)
     assert 0.0 < found.worst[3] < 0.1
 
 
-def test_some_are_determined_and_some_are_not(made):
+def test_known_forces_determined_and_undetermined(made):
     for one, _ in made.values():
         known = known_forces(one.case, one.truth).values()
         assert any(each.determined.all() for each in known)
@@ -401,10 +399,16 @@ def test_some_are_determined_and_some_are_not(made):
             Verdict.MISSING_FORCE,
         ),
     ],
+    ids=["drivers", "moments", "undetermined", "missing"],
 )
-def test_mistakes_are_named(made, change, verdict):
+def test_force_mistakes_are_named(made, change, verdict):
     found = verdicts(made, FOUR_BAR, change)
     assert found.counts[verdict] == len(found.verdicts)
+
+
+def judge_specimen(number):
+    one = specimen(FORCES, 0, number, 3)
+    return judge_answer(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
 
 
 def test_missing_gyroscopic_moment_is_found(monkeypatch):
@@ -416,12 +420,10 @@ def test_missing_gyroscopic_moment_is_found(monkeypatch):
             demand.inertia_of(body) @ demand.spin_of(body, at)[1]
         ),
     )
-    one = specimen(FORCES, 0, SPINNING, 3)
-    found = judged(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
-    assert found.counts[Verdict.WRONG_FORCE] > 0
+    assert judge_specimen(SPINNING).counts[Verdict.WRONG_FORCE] > 0
 
 
-def test_a_slide_driven_beside_its_axis_is_found(monkeypatch):
+def test_force_of_offset_drive_is_judged(monkeypatch):
     """Its force acts at the internal origin of the second body."""
     right = AxialJoint.measured
 
@@ -432,17 +434,15 @@ def test_a_slide_driven_beside_its_axis_is_found(monkeypatch):
         return p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
 
     monkeypatch.setattr(AxialJoint, "measured", wrong)
-    one = specimen(FORCES, 0, SLIDING, 3)
-    found = judged(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
-    assert found.counts[Verdict.WRONG_FORCE] == 3
+    assert judge_specimen(SLIDING).counts[Verdict.WRONG_FORCE] == 3
 
 
-def test_an_engine_without_forces_is_not_judged(made):
+def test_engine_without_forces_is_unjudged(made):
     found = verdicts(made, FOUR_BAR, lambda forces: None)
     assert found.counts[Verdict.UNSUPPORTED] == len(found.verdicts)
 
 
-def test_a_case_with_forces_is_judged_again_and_rounded(made):
+def test_force_case_is_rejudged_and_rounded(made):
     one, trajectory = made[FOUR_BAR]
     engine = Changed(
         trajectory, lambda f: joints(f, lambda each: replace(each, force=2.0 * each.force))
@@ -450,6 +450,6 @@ def test_a_case_with_forces_is_judged_again_and_rounded(made):
     assert judge_file(one.case, engine, 1e-12).counts[Verdict.WRONG_FORCE] == len(
         one.case.sweep.values
     )
-    short = rounded(one.case, 9)
+    short = round_geometry(one.case, 9)
     assert short is not None
     assert short.forces == one.case.forces

@@ -22,7 +22,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 from kincheck.core.studies.variation.varied_places import Geometry
 
 from ..support.rods_of_templates import solved
-from .test_vary import moved, vary, vary_file
+from ..support.variations import moved, vary, vary_file
 
 CAR = {"cg_height": "0.5", "wheelbase": "2.6", "brake_share": "0.6", "position": "front"}
 CORNER = Supplied(travel="0.04:3", **CAR)
@@ -52,6 +52,10 @@ def table(folder, name, rows, axes="forward,left,up"):
     return file
 
 
+def mcpherson(folder):
+    return load(table(folder, "mcpherson", rows_of("mcpherson")), CORNER)
+
+
 def case_of(file, supplied):
     """The case of a table, with the outputs that studies reduce."""
     case = load(file, supplied)
@@ -75,12 +79,15 @@ def tables(name):
 
 
 RIGHT = [[name, x, f"-{y}", z] for name, x, y, z in rows_of("mcpherson")]
-CASES = [(name, *each) for name in TEMPLATES for each in tables(name)]
-CASES.append(("mcpherson", RIGHT, CORNER))
+CASES = {
+    f"{name} {what}": (name, *each)
+    for name in TEMPLATES
+    for what, each in zip(("corner", "axle"), tables(name), strict=True)
+} | {"mcpherson right": ("mcpherson", RIGHT, CORNER)}
 
 
-@pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
-def test_variant_of_a_row_equals_moved_table(tmp_path, name, rows, supplied):
+@pytest.mark.parametrize(("name", "rows", "supplied"), CASES.values(), ids=CASES)
+def test_variant_of_row_equals_moved_table(tmp_path, name, rows, supplied):
     """Every row of every template, moved by a millimetre and more along the axes of the table."""
     move = (1.0, -1.3, 0.7)
     ready = study_of(tmp_path, case_of(table(tmp_path, name, rows), supplied))
@@ -121,8 +128,8 @@ def compared(ready):
     assert not known
 
 
-@pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
-def test_explain_of_a_table_equals_gradients(tmp_path, name, rows, supplied):
+@pytest.mark.parametrize(("name", "rows", "supplied"), CASES.values(), ids=CASES)
+def test_explain_of_table_equals_gradients(tmp_path, name, rows, supplied):
     case = case_of(table(tmp_path, name, rows), supplied)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
@@ -131,13 +138,13 @@ SUSPENSIONS = [name for name in cases.names() if name.startswith(("mcpherson", "
 
 
 @pytest.mark.parametrize("name", SUSPENSIONS)
-def test_explain_of_a_suspension_equals_gradients(tmp_path, name):
+def test_explain_of_suspension_equals_gradients(tmp_path, name):
     """Positions at one point move together in both, with the markers of the wheel."""
     case = cases.load(name)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
 
-def test_moves_are_along_the_axes_of_the_table(tmp_path):
+def test_row_moves_follow_table_axes(tmp_path):
     """With x to the right, y up and z rearward."""
     rows = [
         [name, *(repr(sign * float(at[k])) for k, sign in ((1, -1.0), (2, 1.0), (0, -1.0)))]
@@ -152,7 +159,7 @@ def test_moves_are_along_the_axes_of_the_table(tmp_path):
     np.testing.assert_allclose(
         there, np.add(case.mechanism.joint("lower_ball").point, found[place])
     )
-    iso = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    iso = mcpherson(tmp_path)
     by_number = [
         {
             each.number: each.by_sample
@@ -166,7 +173,7 @@ def test_moves_are_along_the_axes_of_the_table(tmp_path):
 
 
 def test_arm_axis_follows_its_two_rows(tmp_path):
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    case = mcpherson(tmp_path)
     ends = {"front": {"at": "lca_front", "sigma": 1.0}, "rear": {"at": "lca_rear", "sigma": 1.0}}
     variation = vary(tmp_path, case, **ends)
     places = {"joints.lca_pivot.point", "joints.lca_pivot.axis"}
@@ -177,7 +184,7 @@ def test_arm_axis_follows_its_two_rows(tmp_path):
 
 
 @pytest.mark.parametrize("at", ["lca_outer", "lower_ball", "joints.lower_ball.point", "Kugel"])
-def test_row_is_found_by_role_joint_and_place(tmp_path, at):
+def test_row_by_role_joint_or_place(tmp_path, at):
     """The user's own name of the row, its role, and the names of places as before."""
     rows = [
         ["Kugel" if row[0] == "lca_outer" else row[0], *row[1:]] for row in rows_of("mcpherson")
@@ -192,14 +199,14 @@ def test_row_is_found_by_role_joint_and_place(tmp_path, at):
     assert not any("." in number for number in numbers)
 
 
-def test_both_sides_of_an_axle_follow_a_row(tmp_path):
+def test_row_moves_both_axle_sides(tmp_path):
     case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), replace(CORNER, axle="heave"))
     found = moved(vary(tmp_path, case, ball={"at": "lca_outer", "sigma": 1.0}), ball__y=1e-3)
     assert [*found["joints.left_lower_ball.point"]] == pytest.approx([0, 1e-3, 0], abs=1e-15)
     assert [*found["joints.right_lower_ball.point"]] == pytest.approx([0, -1e-3, 0], abs=1e-15)
 
 
-def test_designs_of_python_move_rows(tmp_path):
+def test_python_designs_move_rows(tmp_path):
     """The places that follow, for `solve_designs`, against the table moved."""
     rows = rows_of("double_wishbone")
     case = load(table(tmp_path, "double_wishbone", rows), CORNER)
@@ -240,7 +247,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("points", "message"), FAULTS)
-def test_wrong_row_is_told(tmp_path, points, message):
+def test_invalid_row_is_refused(tmp_path, points, message):
     rows = [*rows_of("double_wishbone"), ["damper_lower", "0", "450", "130"]]
     case = load(table(tmp_path, "double_wishbone", rows), CORNER)
     with pytest.raises(CaseError) as caught:
@@ -248,22 +255,22 @@ def test_wrong_row_is_told(tmp_path, points, message):
     assert message in str(caught.value)
 
 
-def test_line_that_follows_already_is_accepted(tmp_path):
+def test_line_of_following_axis_is_accepted(tmp_path):
     """Variation files of tables had to state it, when axes did not follow by themselves."""
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    case = mcpherson(tmp_path)
     ends = {"foot": {"at": "strut_lower", "sigma": 1.0}, "top": {"at": "strut_top", "sigma": 1.0}}
     line = {"axis": "joints.strut_slide.axis", "through": ["strut_slide", "strut_top"]}
     offsets = {"foot__x": 1e-3, "top__y": 2e-3}
-    found = moved(vary(tmp_path, case, lines={"strut": line}, **ends), **offsets)
+    found = moved(vary(tmp_path, case, tables={"lines": {"strut": line}}, **ends), **offsets)
     for place, change in moved(vary(tmp_path, case, **ends), **offsets).items():
         np.testing.assert_allclose(found[place], change, atol=1e-15)
     other = {"axis": "joints.strut_slide.axis", "through": ["strut_top", "strut_slide"]}
     axis = {"at": "joints.strut_slide.axis", "sigma": 0.1}
     with pytest.raises(CaseError, match="varies by itself"):
-        vary(tmp_path, case, lines={"strut": other}, axis=axis)
+        vary(tmp_path, case, tables={"lines": {"strut": other}}, axis=axis)
 
 
-def test_sensitivities_of_a_table_name_its_rows(tmp_path, capsys):
+def test_sensitivities_of_table_name_rows(tmp_path, capsys):
     """Toe by the wheel centre was 1000 times too large: the wheel's axis stayed behind."""
     text = sample_table(TEMPLATES["mcpherson"])
     file, out = tmp_path / "car.csv", tmp_path / "found.json"
@@ -292,9 +299,9 @@ def test_explain_names_coincident_places(capsys):
     assert "moved together: joints.ball.point = points.lower_ball.position, " in told
 
 
-def test_case_file_of_a_table_keeps_points_of_the_wheel(tmp_path):
+def test_case_file_of_table_keeps_wheel(tmp_path):
     """The radius and the axis of rotation follow their points in a case file too."""
-    case = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    case = mcpherson(tmp_path)
     file = tmp_path / "case.toml"
     file.write_text(case_text(case))
     again = load(file)

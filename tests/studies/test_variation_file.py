@@ -13,34 +13,7 @@ from kincheck.core.studies.variation.variation import Law
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank
-
-HEAD = {"schema": "kincheck-vary/1", "units": {"length": "mm", "angle": "deg"}}
-
-
-def vary_file(folder, hardpoints, mode="monte_carlo", **tables):
-    """A file of these hardpoints, in millimetres and degrees."""
-    path = folder / "vary.json"
-    path.write_text(json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, **tables}))
-    return path
-
-
-def vary(tmp_path, case, mode="monte_carlo", lines=None, **hardpoints):
-    """The variation that a file of these hardpoints gives."""
-    return read_variation(vary_file(tmp_path, hardpoints, mode, lines=lines or {}), case)
-
-
-def moved(variation, **offsets):
-    """Values of the places that move, with these offsets of coordinates [SI]; dots are written as
-    two underscores.
-    """
-    names = [each.name.replace(".", "__") for each in variation.coordinates]
-    column = np.array([offsets.pop(name, 0.0) for name in names])
-    assert not offsets
-    before = variation.values(np.zeros(len(names)))
-    return {
-        place: np.subtract(value, before[place])
-        for place, value in variation.values(column).items()
-    }
+from ..support.variations import HEAD, moved, vary
 
 
 def test_coincident_places_move_together(tmp_path):
@@ -55,7 +28,7 @@ def test_coincident_places_move_together(tmp_path):
     assert set(alone.places) == {"joints.ball.point"}
 
 
-def test_markers_go_with_the_wheel_centre(tmp_path):
+def test_markers_follow_wheel_centre(tmp_path):
     """Else the wheel's axis of rotation, which goes through both, would turn."""
     found = moved(
         vary(tmp_path, load("mcpherson_suspension"), wc={"at": "wheel_center", "sigma": 1.0}),
@@ -68,7 +41,7 @@ def test_markers_go_with_the_wheel_centre(tmp_path):
     assert all(np.allclose(change, [0, 0.5, 0], atol=1e-15) for change in found.values())
 
 
-def test_units_laws_and_kinds_of_places(tmp_path):
+def test_variation_units_laws_and_kinds(tmp_path):
     found = vary(
         tmp_path,
         load("modelica_four_bar_distance"),
@@ -85,7 +58,7 @@ def test_units_laws_and_kinds_of_places(tmp_path):
     )
 
 
-def test_a_length_varies_by_one_number(tmp_path):
+def test_length_varies_by_one_number(tmp_path):
     case = load("modelica_four_bar_distance")
     joints = [
         replace(joint, length=1.1) if joint.name == "rod" else joint
@@ -108,7 +81,7 @@ def test_a_length_varies_by_one_number(tmp_path):
         vary(tmp_path, rod, "grid", rod={"at": "joints.rod.length", "values": [[1], [1], [1]]})
 
 
-def test_a_line_follows_the_positions_it_goes_through(tmp_path):
+def test_line_follows_its_positions(tmp_path):
     """The strut's slide goes from its foot to its top, and is as long as that in the case file."""
     ends = {"foot": {"at": "strut_slide", "sigma": 1.0}, "top": {"at": "strut_top", "sigma": 1.0}}
     line = {"axis": "joints.strut_slide.axis", "through": ["strut_slide", "strut_top"]}
@@ -116,7 +89,8 @@ def test_a_line_follows_the_positions_it_goes_through(tmp_path):
     offsets = {"foot__x": 0.01, "foot__z": -0.02, "top__y": 0.03}
     for through in (line["through"], line["through"][::-1]):
         found = moved(
-            vary(tmp_path, case, lines={"strut": {**line, "through": through}}, **ends), **offsets
+            vary(tmp_path, case, tables={"lines": {"strut": {**line, "through": through}}}, **ends),
+            **offsets,
         )
         np.testing.assert_allclose(
             found["joints.strut_slide.axis"], [-0.01, 0.03, 0.02], atol=1e-12
@@ -124,7 +98,7 @@ def test_a_line_follows_the_positions_it_goes_through(tmp_path):
     assert "joints.strut_slide.axis" not in moved(vary(tmp_path, case, **ends), **offsets)
 
 
-def test_a_grid_has_every_combination_once(tmp_path):
+def test_grid_has_each_combination_once(tmp_path):
     ends = {
         "tip": {"at": "tip", "values": [[-1, 0, 1], [0, 2], [0.5]]},
         "pivot": {"at": "pivot", "half_width": [5, 0, 0], "steps": 5},
@@ -142,7 +116,7 @@ def test_a_grid_has_every_combination_once(tmp_path):
     assert huge.count == 10**24
 
 
-def test_one_at_a_time_begins_with_the_nominal_design(tmp_path):
+def test_one_at_a_time_begins_at_nominal(tmp_path):
     points = {
         "tip": {"at": "tip", "sigma": [1, 0, 2]},
         "pivot": {"at": "pivot", "values": [[-3, 0, 3], [4], [5]]},
@@ -312,7 +286,7 @@ def test_ambiguous_place_is_refused(tmp_path):
         vary(tmp_path, load("mcpherson_strut"), rod={"at": "tie_rod", "sigma": 1.0})
 
 
-def test_absolute_driver_of_varied_point_is_refused(tmp_path):
+def test_absolute_driver_of_varied_point_refused(tmp_path):
     """Its value is another distance from the design for every variant."""
     case = load("mcpherson_strut")
     drivers = [replace(case.mechanism.driver("stroke"), relative=False)]
