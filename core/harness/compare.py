@@ -68,10 +68,10 @@ def output_series(
     if isinstance(output, ForceMeasure):
         return _force_series(output, trajectory, moved)
     trajectory = moved
-    at = {name: _moving(trajectory.points[name]) for name in output.points}
+    at = {name: _point_jets(trajectory.points[name]) for name in output.points}
     # NaN marks unknown values, and spreads to all results that depend on them
     with np.errstate(all="ignore"):
-        design = {name: _standing(case.mechanism.point(name).position) for name in output.points}
+        design = {name: _fixed_jets(case.mechanism.point(name).position) for name in output.points}
         jet = counted(case.mechanism, case.sweep.path, output, at, design)
     solved = trajectory.solved
     position, *rates = (
@@ -99,12 +99,12 @@ def _force_series(output: ForceMeasure, trajectory: Trajectory, moved: Trajector
     if given is None or not given.has(output.forces):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
     if output.placed:
-        output = output.located({name: _moving(moved.points[name]) for name in output.points})
+        output = output.located({name: _point_jets(moved.points[name]) for name in output.points})
     values = np.where(trajectory.solved, output.values(given), np.nan)
     return Series(values, reason=output.undetermined(given))
 
 
-def _moving(motion: PointMotion) -> Vec3:
+def _point_jets(motion: PointMotion) -> Vec3:
     """Return a point's position as jets, with NaN for derivatives missing from the engine."""
     given = (motion.position, motion.velocity, motion.acceleration)
     x, v, a = (
@@ -118,7 +118,7 @@ def _moving(motion: PointMotion) -> Vec3:
     return Vec3(*(Jet(x[:, k], v[:, k], a[:, k]) for k in range(3)))
 
 
-def _standing(position: Vector) -> Vec3:
+def _fixed_jets(position: Vector) -> Vec3:
     return Vec3(*(Jet(np.array(x), np.zeros(()), np.zeros(())) for x in position))
 
 
