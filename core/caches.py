@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, wraps
 from threading import Lock, local
 from typing import Any, ParamSpec, TypeVar
 from weakref import WeakSet
@@ -26,7 +26,7 @@ _lock = Lock()
 
 
 def cache_last(
-    count: int, *, per_thread: bool = False
+    count: int, *, per_thread: bool = False, when: Callable[..., bool] | None = None
 ) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
     """Return a decorator to keep the last results of a function by its hashable arguments.
 
@@ -35,10 +35,19 @@ def cache_last(
     Args:
         count: number of results.
         per_thread: keep them for each thread, because a thread changes them in place.
+        when: whether the result of given arguments is kept; by default always.
     """
 
-    def keep(function: Callable[Arguments, Result]) -> Any:
-        return _OfThread(count, function) if per_thread else _kept(count, function)
+    def keep(function: Any) -> Any:
+        recent: Any = _OfThread(count, function) if per_thread else _cache_results(count, function)
+        if (is_kept := when) is None:
+            return recent
+
+        @wraps(function)
+        def call(*args: Any) -> Any:
+            return (recent if is_kept(*args) else function)(*args)
+
+        return call
 
     return keep
 
@@ -54,7 +63,7 @@ def clear_caches() -> None:
         each.cache_clear()
 
 
-def _kept(count: int, function: Callable[..., Any]) -> Any:
+def _cache_results(count: int, function: Callable[..., Any]) -> Any:
     kept = lru_cache(maxsize=count)(function)
     with _lock:
         _results.add(kept)
@@ -90,7 +99,7 @@ class _OfThread(local):
     """A function with results of each thread, which end with the thread."""
 
     def __init__(self, count: int, function: Callable[..., Any]) -> None:
-        self._call = _kept(count, function)
+        self._call = _cache_results(count, function)
 
     def __call__(self, *args: Hashable) -> Any:
         return self._call(*args)

@@ -59,7 +59,7 @@ def mechanism_of(file):
     units = read_units(data)
     places, _ = read_places(data, units)
     marker = read_markers(data, units)[CENTRE]
-    place = marker.place.seen_from(places[marker.part])
+    place = marker.place.relative_to(places[marker.part])
     x, y, z, w = Rotation.from_matrix(place.axes).as_quat()
     (body,) = found.bodies
     body = replace(body, origin=tuple(place.origin), euler_parameters=(w, x, y, z))

@@ -20,10 +20,9 @@ from ...core.joints import Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.simulation import SteppedTree, Stepping, Tie
-from ..shared.tree_forces import NO_MASS, mass_properties
+from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Link
-from ..shared.tree_simulator import Mass
 
 # DART puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -112,7 +111,7 @@ class DartModel(TreeModel):
                 found[first : first + BALL] = START
         return found
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         self.skeleton.setPositions(self.q)
         self.skeleton.setVelocities(dx)
         self.skeleton.integratePositions(1.0)

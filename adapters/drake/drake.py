@@ -26,10 +26,9 @@ from ...core.joints import Fixed, Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.simulation import SimulationEndedError, SteppedTree, Stepping, Tie
-from ..shared.tree_forces import mass_properties
+from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import Chain, Link, Relation
-from ..shared.tree_simulator import Mass
 
 # Drake puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -140,7 +139,7 @@ class DrakeModel(TreeModel):
         found[self.turning] = v
         return found
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         self.plant.SetPositions(self.context, self.q)
         q = self.q + self.plant.MapVelocityToQDot(self.context, self.full(dx))
         for ball in self.balls:

@@ -28,7 +28,7 @@ from ...core.trajectory import Array, PointMotion, Trajectory
 from .equivalents import own_frame
 from .force_solution import places, solved_forces
 from .projection import RANK_TOLERANCE
-from .projection_model import ProjectionModel
+from .projection_model import ProjectionModel, SolvedPose
 
 # As in the native walk: the ratio of two corrections that proves a solution nearby (Kantorovich),
 # a correction whose square is round-off, and round-off.
@@ -43,19 +43,13 @@ SHORTEST = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
-    """A configuration in equilibrium; see `force_solution.Solved`."""
+class Rest(SolvedPose):
+    """A configuration in equilibrium, with the case's points, shape (points, 3); residual in SI."""
 
-    saved: Any
-    c: Array
-    v: Array
-    a: Array
     points: Array
-    iterations: int
-    residual: float
 
 
-def loaded(case: Case, sample: int) -> Case:
+def with_loads(case: Case, sample: int) -> Case:
     """Return the case with the loads of a sample as force elements of its mechanism."""
     assert case.balance is not None
     further = list[ForceElement]()
@@ -90,7 +84,7 @@ def equilibria(
     efforts, residual = {name: unknown.copy() for name in names}, 0.0
     messages = list[str]()
     for group in groups.values():
-        found, forces, message = solve(loaded(case, group[0]), group)
+        found, forces, message = solve(with_loads(case, group[0]), group)
         messages += [message] if message else []
         for k, each in found.items():
             points[k], count[k], residual = (
@@ -158,7 +152,7 @@ class Walk:
             if not self._advance(start, to, 1.0):
                 messages.append(f"no equilibrium on the way to sample {k}")
                 continue
-            found[k], self.iterations = self._here(to), 0
+            found[k], self.iterations = self._rest(to), 0
             near.append((to, found[k].saved))
         freedoms = self.unknowns - self.rank
         forces = Forces({}, {}, {}, np.zeros(0), np.zeros(0))
@@ -166,13 +160,13 @@ class Walk:
             forces = solved_forces(self.model, self.case, found, self.frame.unit, freedoms)
         return found, forces, "; ".join(filter(None, [*messages[:1], forces.message]))
 
-    def _here(self, c: Array) -> Rest:
+    def _rest(self, c: Array) -> Rest:
         still, unit = np.zeros(self.unknowns), self.frame.unit
         residual = float(np.abs(self.model.residual(c)).max(initial=0.0))
         points = [self.frame.back(x) for x, _, _ in self.model.points(still, still)]
         return Rest(
-            *(self.model.save(), c, still, still, np.array(points).reshape(-1, 3)),
-            *(self.iterations, unit * residual),
+            *(self.model.save(), c, still, still, self.iterations, unit * residual),
+            np.array(points).reshape(-1, 3),
         )
 
     def _advance(self, start: Array, to: Array, share: float) -> bool:
@@ -242,7 +236,7 @@ class Walk:
         multipliers = self._multipliers(J, demand)
         saved = self.model.save()
 
-        def along(way: Array) -> Array:
+        def unbalance_rate(way: Array) -> Array:
             """Return the derivative of the forces that are out of balance."""
             ends = list[Array]()
             for h in (DIFFERENCE, -DIFFERENCE):
@@ -252,14 +246,19 @@ class Walk:
                 ends.append(demand - J.T @ multipliers)
             return (ends[0] - ends[1]) / (2.0 * DIFFERENCE)
 
-        stiffness = free.T @ np.array([along(way) for way in free.T]).reshape(-1, len(vh)).T
+        stiffness = (
+            free.T @ np.array([unbalance_rate(way) for way in free.T]).reshape(-1, len(vh)).T
+        )
         left = demand - J.T @ multipliers
         if length := float(np.linalg.norm(closing)):
-            left = left + length * along(closing / length)
+            left = left + length * unbalance_rate(closing / length)
         self.model.restore(saved)
         values = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))
         try:
             step = closing - free @ np.linalg.solve(stiffness, free.T @ left)
         except np.linalg.LinAlgError:
-            raise SolveError("the stiffness is singular: nothing holds a body") from None
+            raise SolveError(
+                "nothing holds a body: the stiffness is singular. Add a joint, a spring or a"
+                " bushing"
+            ) from None
         return step, int((values < 0.0).sum())

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from ...core.case.case import Case
 from ...core.forces import Forces, Multipliers, Reaction, in_wrenches
 from ...core.joints import Joint
 from ...core.joints.base import unit
-from ...core.mechanism.curves import Curve
 from ...core.mechanism.loads import (
     Axes,
     Bushing,
+    Curve,
     Force,
     ForceElement,
     Law,
@@ -32,8 +32,8 @@ from ...core.mechanism.loads import (
 )
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .constraints import BodyFrame, by_frame, closing
-from .projection_model import Dynamics, ProjectionModel
+from .constraints import BodyFrame, by_frame, closure_conditions
+from .projection_model import Dynamics, ProjectionModel, SolvedPose
 from .tree_plan import ends_of
 
 
@@ -195,19 +195,6 @@ def axis_of(each: ForceElement, mechanism: Mechanism) -> Array:
     return np.array([*unit(joint.axis)])
 
 
-class Solved(Protocol):
-    """A solved sample: the saved configuration, driver values in the unit of the rows, rates."""
-
-    @property
-    def saved(self) -> Any: ...
-    @property
-    def c(self) -> Array: ...
-    @property
-    def v(self) -> Array: ...
-    @property
-    def a(self) -> Array: ...
-
-
 @dataclass(frozen=True, eq=False)
 class _Given:
     """The rows at a sample, those left out last, the drivers' columns, and the dynamics."""
@@ -217,7 +204,7 @@ class _Given:
     dynamics: Dynamics
 
 
-def reacting(case: Case) -> list[str]:
+def reacting_joints(case: Case) -> list[str]:
     """Return the names of the joints whose reactions are needed: of outputs, or of all where rows
     are left out within digits; see `in_wrenches`.
     """
@@ -228,7 +215,7 @@ def reacting(case: Case) -> list[str]:
 def solved_forces(
     model: ProjectionModel,
     case: Case,
-    samples: Mapping[int, Solved],
+    samples: Mapping[int, SolvedPose],
     unit: float,
     freedoms: int = 0,
 ) -> Forces:
@@ -243,13 +230,13 @@ def solved_forces(
     n, wanted = len(path.times), set(case.forces)
     force, torque = unit, unit**2  # kg unit/s^2 in N, kg unit^2/s^2 in N m
     names = [each.name for each in mechanism.drivers]
-    joints = reacting(case)
+    joints = reacting_joints(case)
     scales = np.array([torque if each.turns else force for each in mechanism.drivers])
     turning = {f.name for f in mechanism.forces if isinstance(f, TorsionSpringDamper | Torque)}
     efforts, power, largest = np.full((n, len(names)), np.nan), *np.full((2, n), np.nan)
     amounts = {each.name: np.full(n, np.nan) for each in mechanism.forces if each.name in wanted}
     solved = sorted(samples)
-    given = [_given(model, samples[k]) for k in solved]
+    given = [_evaluate(model, samples[k]) for k in solved]
     found = _multipliers(given, freedoms)
     wrenches = {name: np.full((n, 6), np.nan) for name in joints}
     free = {name: np.full((n, 6, found.free.shape[2]), np.nan) for name in joints}
@@ -292,7 +279,7 @@ def solved_forces(
     )
 
 
-def _given(model: ProjectionModel, at: Solved) -> _Given:
+def _evaluate(model: ProjectionModel, at: SolvedPose) -> _Given:
     model.restore(at.saved)
     model.residual(at.c)
     J, columns = np.array(model.jacobian()), np.array(model.driver_columns())
@@ -336,12 +323,12 @@ class LeftOut:
     Attributes:
         of: name of the joint that they belong to, as given.
         joint: a joint with these conditions.
-        frames: of a simulator on its bodies; see `constraints.Frame`.
+        frames: of a simulator on its two bodies.
     """
 
     of: str
     joint: Joint
-    frames: Sequence[Any]
+    frames: tuple[BodyFrame, BodyFrame]
 
     def rows(self, first: int) -> tuple[Array, list[RowWrench]]:
         """Return the rows of the conditions, and what unit multipliers exert on the bodies.
@@ -349,29 +336,28 @@ class LeftOut:
         Args:
             first: index of the first row.
         """
-        i, j = (
-            BodyFrame(each.body, None, each.position, each.rotation, each.jacobian)
-            for each in self.frames
-        )
         found, exerted = list[Array](), list[RowWrench]()
-        for condition in closing(type(self.joint), self.joint, i, j):
+        for condition in closure_conditions(type(self.joint), self.joint, *self.frames):
             found.append(np.atleast_2d(condition.rows()[1]))
             rows = slice(first, first := first + len(found[-1]))
             exerted += [
                 RowWrench(rows, frame.body, frame.position, wrenches)
-                for frame, wrenches in zip((i, j), by_frame(condition, (i, j)), strict=True)
+                for frame, wrenches in zip(
+                    self.frames, by_frame(condition, self.frames), strict=True
+                )
             ]
         return np.vstack(found), exerted
 
 
-def left_out_of(mechanism: Mechanism, frame: Callable[[str, Vector], Any]) -> list[LeftOut]:
+def left_out_of(mechanism: Mechanism, frame: Callable[[str, Vector], BodyFrame]) -> list[LeftOut]:
     """Return the conditions left out of a mechanism.
 
     Args:
         frame: returns a frame on a body, at a point, global at design.
     """
-    return [
-        LeftOut(each.joint.name, joint, [*map(frame, joint.bodies, ends_of(mechanism, joint))])
-        for each in mechanism.reduced
-        for joint in each.left_out
-    ]
+    found = list[LeftOut]()
+    for each in mechanism.reduced:
+        for joint in each.left_out:
+            i, j = map(frame, joint.bodies, ends_of(mechanism, joint))
+            found.append(LeftOut(each.joint.name, joint, (i, j)))
+    return found

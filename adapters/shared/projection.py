@@ -33,7 +33,7 @@ from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .equivalents import GLOBAL, OwnFrame
 from .force_solution import solved_forces
-from .projection_model import ProjectionModel
+from .projection_model import ProjectionModel, SolvedPose
 
 # Newton steps after one predictor of second order, by effort; None iterates to convergence.
 EFFORTS: Mapping[str, int | None] = {
@@ -93,21 +93,15 @@ LOST = PoseFailure(FailureKind.NOT_FOUND)
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class Sample(SolvedPose):
     """A solved pose with all data for the next step of the walk."""
 
     t: float
-    c: Array  # of the drivers
-    saved: Any
     x: Array
-    v: Array
-    a: Array
     rows: tuple[Array, Array, Array]
     jacobian: Array
     inverse: Array  # of the Jacobian
     corrected: Array
-    iterations: int
-    residual: float
 
 
 class Walk:
@@ -157,10 +151,9 @@ class Walk:
         if self.rank < self.unknowns:
             raise SolveError(
                 f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
-                " coordinates of the simulator's model are left free by joints and drivers at the"
-                " design position; add a driver or a joint; if their number is"
-                " right a driver does not move it there (a lock-up): give the design in another"
-                " pose",
+                " coordinates of the simulator's model are left free at the design position. Add a"
+                " driver or a joint. If their number is right, a driver cannot move it there (a"
+                " lock-up): give the design in another pose",
                 FailureKind.FREE,
             )
 
@@ -238,6 +231,7 @@ class Walk:
         done = self.newton(c)
         if done is None:
             return None
+        corrected, iterations, residual = done
         jacobian, columns = np.array(self.model.jacobian()), self.model.driver_columns()
         nu = columns @ c_t
         if (inverse := self.inverse(jacobian)) is None:
@@ -246,23 +240,25 @@ class Walk:
         gamma = columns @ c_tt - self.model.bias(v)
         a = inverse @ gamma
         # least squares would hide rates that do not satisfy the rows (a driver at a dead centre)
-        if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
+        if not (_satisfies(jacobian, v, nu) and _satisfies(jacobian, a, gamma)):
             self.lost = PoseFailure(FailureKind.DEAD_CENTRE)
             return None
         position, velocity, acceleration = (
             np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True)
         )
         return Sample(
-            t,
-            c,
             self.model.save(),
-            position.ravel(),
+            c,
             v,
             a,
+            iterations,
+            residual,
+            t,
+            position.ravel(),
             (position, velocity, acceleration),
             jacobian,
             inverse,
-            *done,
+            corrected,
         )
 
     def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
@@ -277,10 +273,14 @@ class Walk:
             to = t if abs(t - at.t) <= abs(h) else at.t + h
             dt = to - at.t
             self.model.restore(at.saved)
-            self.model.move(self.predicted(at, dt))
+            self.model.move(self.prediction(at, dt))
             new, whole = self.solve(path, to), step or abs(t - start.t)
             short = abs(dt) <= FOLD * whole
-            if new is not None and self.connected(at, new) and (short or self.regular(at, new)):
+            if (
+                new is not None
+                and self.is_connected(at, new)
+                and (short or self.is_regular(at, new))
+            ):
                 at, h = new, 2.0 * h
             else:
                 h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
@@ -289,11 +289,11 @@ class Walk:
         return at, True
 
     @staticmethod
-    def predicted(at: Sample, dt: float) -> Array:
+    def prediction(at: Sample, dt: float) -> Array:
         """Return the change of the unknowns over a time, to second order."""
         return dt * (at.v + (0.5 * dt) * at.a)
 
-    def connected(self, at: Sample, new: Sample) -> bool:
+    def is_connected(self, at: Sample, new: Sample) -> bool:
         """Return whether output points and coordinates moved between two poses by their rates.
 
         At rest they do not show full turns of a driver, so turns have a separate limit.
@@ -302,11 +302,11 @@ class Walk:
             return False
         dt = np.float64(new.t - at.t)
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
-        change = self.predicted(at, float(dt)) + new.corrected
+        change = self.prediction(at, float(dt)) + new.corrected
         everything = continuous(change, new.v, at.v, dt, self.size)
         return bool(watched & everything) and is_continuation(change, new.v, at.v, dt)
 
-    def regular(self, at: Sample, new: Sample) -> bool:
+    def is_regular(self, at: Sample, new: Sample) -> bool:
         """Return whether no singular value of the Jacobian can have been zero between two poses."""
         return regular_between(at.inverse @ new.jacobian)
 
@@ -353,7 +353,7 @@ class Walk:
         """Return the kind of a failure at the start."""
         return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
 
-    def reached(self, origin: Sample) -> Iterator[tuple[int, Sample]]:
+    def follow_samples(self, origin: Sample) -> Iterator[tuple[int, Sample]]:
         """Yield the samples reached from a pose, outwards; `ended` and `failures` have the ends."""
         path, times = self.path, self.path.times
         step = (
@@ -365,7 +365,7 @@ class Walk:
             for k in side:
                 at, reached = self.advance(path, at, float(times[k]), step)
                 if not reached:
-                    self.ended.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
+                    self.ended.append(path.end_message(at.t, float(times[k]), last, str(self.lost)))
                     self.failures.append(self.lost.kind)
                     break
                 last = float(times[k])
@@ -384,7 +384,7 @@ class Walk:
             self.ended.append(message)
             self.failures.append(self.kind_at_start)
         else:
-            for k, at in self.reached(origin):
+            for k, at in self.follow_samples(origin):
                 motion[:, k] = at.rows
                 iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
                 samples[k] = at
@@ -423,6 +423,6 @@ class Walk:
         )
 
 
-def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
+def _satisfies(jacobian: Array, v: Array, wanted: Array) -> bool:
     # a millionth: far above round-off, far below the error of an unsatisfied row
     return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))

@@ -29,6 +29,26 @@ class Dynamics:
     left_out: Array
 
 
+@dataclass(frozen=True, eq=False)
+class SolvedPose:
+    """A pose of a model that a walk has found.
+
+    Attributes:
+        saved: the saved configuration.
+        c: values of the drivers, in the unit of the rows.
+        v, a: rates and accelerations of the unknowns.
+        iterations: number of Newton's steps.
+        residual: largest of the rows, in the unit of the walk's caller.
+    """
+
+    saved: Any
+    c: Array
+    v: Array
+    a: Array
+    iterations: int
+    residual: float
+
+
 class ProjectionModel(Protocol):
     """A simulator's kinematics: unknowns x (tree or body coordinates), and rows for closures and
     drivers.
@@ -46,6 +66,9 @@ class ProjectionModel(Protocol):
 
     @property
     def case(self) -> Case: ...
+
+    @property
+    def unknowns(self) -> int: ...
 
     @property
     def details(self) -> Mapping[str, Any]: ...

@@ -385,13 +385,13 @@ def size(case: Case) -> float:
     compared = [name for name in case.points if not name.startswith(MARKER)] or named
     points = [case.mechanism.point(name).position for name in compared]
     points += [position for joint in case.mechanism.joints for position in joint.points_on()]
-    shifts = values[~turning(case)]
+    shifts = values[~turning_drivers(case)]
     shift = float((shifts.max(axis=1) - shifts.min(axis=1)).max(initial=0.0))
     extent = max(*(max(each) - min(each) for each in zip(*points, strict=True)), shift)
     return extent if extent > _COINCIDE * float(np.abs(points).max()) else NO_SIZE
 
 
-def turning(case: Case) -> NDArray[np.bool_]:
+def turning_drivers(case: Case) -> NDArray[np.bool_]:
     """Return whether each moving driver turns, shape (drivers,)."""
     return np.array(
         [case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_
@@ -402,7 +402,7 @@ def turning(case: Case) -> NDArray[np.bool_]:
 def pace(case: Case) -> float:
     """Return the pace of the mechanism [1/s]: the largest rate of a driver over a radian,
     or over the mechanism's size; see `harness.compare`."""
-    path, turns = case.sweep.path, turning(case)
+    path, turns = case.sweep.path, turning_drivers(case)
     _, rates, seconds = path.drive(list(path.motions), path.times)
     extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))

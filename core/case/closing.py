@@ -37,8 +37,8 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
     if not found.mechanism.reduced:
         return case
     names = ", ".join(str(each.joint) for each in found.mechanism.reduced)
-    if not _driven(less):
-        if not _driven(case):
+    if not _is_driven(less):
+        if not _is_driven(case):
             return case
         note = (
             f"rows of {names} are redundant within {tolerance:.3g} m ({why}), but without them the"
@@ -46,7 +46,7 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
         )
         return replace(case, assembly=(*case.assembly, note))
     left = _residual_left(less)
-    if left <= _TOL * found.unit and _driven(case):
+    if left <= _TOL * found.unit and _is_driven(case):
         return case
     if left <= found.limit:
         note = (
@@ -55,7 +55,7 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
         )
         closure = Closure(tolerance, tuple(carrying), note)
         return replace(less, assembly=(*case.assembly, note), closure=closure)
-    if _driven(case):  # no digits: beside a singular pose
+    if _is_driven(case):  # no digits: beside a singular pose
         return case
     raise MechanismError(
         f"rows of {names} are redundant at the start within {tolerance:.3g} m"
@@ -65,7 +65,7 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
     )
 
 
-def _driven(case: Case) -> bool:
+def _is_driven(case: Case) -> bool:
     return degrees_of_freedom(case.mechanism) == len(case.mechanism.drivers)
 
 

@@ -81,17 +81,17 @@ class Printed:
         return np.where(values == 0.0, fixed, 0.5 * 10.0 ** (first + 1.0 - self.significant))
 
 
-def even(values: Array) -> bool:
+def is_even_grid(values: Array) -> bool:
     """Return whether the values are an even grid, which somebody chose and nobody rounded."""
-    return even_steps(np.diff(values))
+    return are_even_steps(np.diff(values))
 
 
-def even_steps(steps: Array) -> bool:
+def are_even_steps(steps: Array) -> bool:
     """Return whether steps are those of an even grid."""
     return len(steps) < 2 or float(np.ptp(steps)) <= _EVEN * float(np.abs(steps).max())
 
 
-def multiples(values: Array, decimals: int) -> bool:
+def have_common_factor(values: Array, decimals: int) -> bool:
     """Return whether the values, in units of their last decimal, have a common factor, so that
     somebody set them.
     """
@@ -110,7 +110,7 @@ _WINDOW = 0.02
 _BLOCK, _NEAR = 64, 40
 
 
-def matched(rows: Array, at: Array, allowed: float) -> NDArray[np.intp] | None:
+def match_rows(rows: Array, at: Array, allowed: float) -> NDArray[np.intp] | None:
     """Return the row of each sample, -1 where there is none; None if a row is at no sample.
 
     Args:
@@ -130,7 +130,7 @@ def matched(rows: Array, at: Array, allowed: float) -> NDArray[np.intp] | None:
     return found
 
 
-def interpolated(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
+def interpolate(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
     """Return values of the cubic spline through a curve, and their error, at samples within it.
 
     The error is that of rows predicted from the others, by splines through every second row: the
@@ -160,7 +160,7 @@ def interpolated(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
     return spline(x, y)(at), largest
 
 
-def bounded(x: Array, half: Array, at: Array, within: NDArray[np.bool_]) -> Array:
+def bound_rounding(x: Array, half: Array, at: Array, within: NDArray[np.bool_]) -> Array:
     """Return by how much the spline through a curve changes at most, if each row changes by up to
     half a unit of its last digit; zero at samples outside.
 

@@ -79,11 +79,11 @@ class ForceMeasure(Measure):
         """Return the body it acts on, and the body's point, global at design [m]."""
 
     @property
-    def placed(self) -> bool:
-        """Whether the value needs the places of points at the samples; see `located`."""
+    def follows_points(self) -> bool:
+        """Whether the value needs the places of points at the samples; see `with_points`."""
         return False
 
-    def located(self, at: Mapping[str, Vec3]) -> Self:
+    def with_points(self, at: Mapping[str, Vec3]) -> Self:
         """Return the measure at samples.
 
         Args:
@@ -186,7 +186,7 @@ class _JointReaction(ForceMeasure):
         elif bodies[1] != GROUND:
             frame = Pose.of(ZERO, quat(mechanism.body(bodies[1]).euler_parameters))
             axes = np.array([[*frame.turn(vec(each))] for each in np.eye(3).tolist()])
-        x, y, z = (np.array(self.place(mechanism)[1]) + self.along @ axes).tolist()
+        x, y, z = (np.array(self.place(mechanism)[1]) + self.unit_direction @ axes).tolist()
         return replace(self, bodies=bodies, tip=(x, y, z))
 
     @property
@@ -203,13 +203,13 @@ class _JointReaction(ForceMeasure):
         return [*found, Point(self.points[1], self.place(mechanism)[0], self.tip)]
 
     @property
-    def placed(self) -> bool:
+    def follows_points(self) -> bool:
         """Whether direction or point move."""
         return self.frame != Frame.GLOBAL or self.about is not None
 
-    def located(self, at: Mapping[str, Vec3]) -> Self:
+    def with_points(self, at: Mapping[str, Vec3]) -> Self:
         """Return the measure with its direction and its moment's arm at the samples."""
-        if not self.placed:
+        if not self.follows_points:
             return self
         places = [np.stack([jet.x for jet in at[name]], axis=1) for name in self.points]
         now = places[1] - places[0] if self.frame != Frame.GLOBAL else None
@@ -220,7 +220,7 @@ class _JointReaction(ForceMeasure):
         return _joint_place(mechanism, self.joint)
 
     @property
-    def along(self) -> Vector:
+    def unit_direction(self) -> Vector:
         """The direction, global unit vector [-]."""
         if self.component is not None:
             return AXES[self.component]
@@ -232,7 +232,7 @@ class _JointReaction(ForceMeasure):
     @property
     def sense(self) -> str:
         """Which body exerts it on which, about which point, along which direction."""
-        along = self.component or f"[{', '.join(f'{x:.6g}' for x in self.along)}]"
+        along = self.component or f"[{', '.join(f'{x:.6g}' for x in self.unit_direction)}]"
         first, second = self.bodies
         where = {
             Frame.GLOBAL: "global",
@@ -246,14 +246,16 @@ class _JointReaction(ForceMeasure):
 
     def values(self, forces: Forces) -> Array:
         reaction = forces.joints[self.joint]
-        if self.placed and self.now is None and self.arm is None:
+        if self.follows_points and self.now is None and self.arm is None:
             raise SolveError(
                 f"output {self.name!r} turns with a body or is about a point, which this study does"
                 ' not follow; give frame = "global" without about'
             )
         if self.arm is not None:
             reaction = reaction.about(self.arm)
-        return reaction.along(self.along if self.now is None else self.now, moment=self.turns)
+        return reaction.along(
+            self.unit_direction if self.now is None else self.now, moment=self.turns
+        )
 
     def undetermined(self, forces: Forces) -> str:
         reaction = forces.joints[self.joint]
@@ -356,11 +358,11 @@ class DriverEffort(ForceMeasure):
         return [*super().markers(mechanism), *own]
 
     @property
-    def placed(self) -> bool:
+    def follows_points(self) -> bool:
         """Whether rates convert the effort."""
         return self.at is not None
 
-    def located(self, at: Mapping[str, Vec3]) -> Self:
+    def with_points(self, at: Mapping[str, Vec3]) -> Self:
         """Return the measure with the ratio of rates at the samples; NaN at a dead centre."""
         if not self.rates:
             return self

@@ -123,7 +123,7 @@ def specimen(of: type[_Tested]) -> _Tested:
     if issubclass(of, Coupler) and of.count is None:  # a list for as many joints
         between["factors"] = (1.0, NUMBER)
     try:
-        return fitting(of, {"name": "tested", **between}, map(_made_of_pair, PAIRS))
+        return make_fitting(of, {"name": "tested", **between}, map(_maker_of_pair, PAIRS))
     except MechanismError as refused:
         raise MechanismError(
             f"{of.__name__}: no specimen can be made, it refuses axes at right angles and at 40"
@@ -131,7 +131,7 @@ def specimen(of: type[_Tested]) -> _Tested:
         ) from refused
 
 
-def fitting(
+def make_fitting(
     of: type[_Tested], given: Mapping[str, Any], makers: Iterable[Callable[[Field[Any]], Any]]
 ) -> _Tested:
     """Return an instance with the given fields, and the other required ones by the first maker
@@ -142,7 +142,7 @@ def fitting(
     """
     refused: MechanismError | None = None
     for make in makers:
-        values = {each.name: make(each) for each in required(of) if each.name not in given}
+        values = {each.name: make(each) for each in required_fields(of) if each.name not in given}
         try:
             return of(**given, **values)
         except MechanismError as error:
@@ -151,14 +151,14 @@ def fitting(
     raise refused
 
 
-def required(of: type[Joint] | type[Coupler]) -> list[Field[Any]]:
+def required_fields(of: type[Joint] | type[Coupler]) -> list[Field[Any]]:
     """Return the fields without a default."""
     return [
         each for each in fields(of) if each.default is MISSING and each.default_factory is MISSING
     ]
 
 
-def _made_of_pair(pair: Any) -> Callable[[Field[Any]], Any]:
+def _maker_of_pair(pair: Any) -> Callable[[Field[Any]], Any]:
     values = {
         Kind.POSITION: POINT,
         Kind.POSITIONS: (POINT, LINK),

@@ -76,7 +76,7 @@ def no_output_depends_on_a_closure(case: Case) -> bool:
     An output of the coordinate that is driven reads nothing else either.
     """
     mechanism = case.mechanism
-    placed = _placed_by_drivers(mechanism)
+    placed = _driven_bodies(mechanism)
     if all(body.name in placed for body in mechanism.moving):
         return False
     driven = [each for each in mechanism.drivers if isinstance(each, PointCoordinate)]
@@ -96,7 +96,7 @@ def no_output_depends_on_a_closure(case: Case) -> bool:
     )
 
 
-def _placed_by_drivers(mechanism: Mechanism) -> set[str]:
+def _driven_bodies(mechanism: Mechanism) -> set[str]:
     """Return the bodies that joints from the ground place, all of whose freedoms are driven."""
     placed = {GROUND, *(body.name for body in mechanism.bodies if body.fixed)}
     driven = {

@@ -62,10 +62,10 @@ def smallest(e: Sequence[Jet], within: float = 0.0) -> list[Jet]:
     Args:
         within: a rotation that is larger by no more than this keeps its sign [rad].
     """
-    return signed(np.where(floats(e)[0] < -0.5 * within, -1.0, 1.0), e)
+    return with_signs(np.where(floats(e)[0] < -0.5 * within, -1.0, 1.0), e)
 
 
-def signed(sign: Array, e: Sequence[Jet]) -> list[Jet]:
+def with_signs(sign: Array, e: Sequence[Jet]) -> list[Jet]:
     """Return Euler parameters with another sign at the samples."""
     return [sign * each for each in e]
 
@@ -105,10 +105,10 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
 def _select(which: NDArray[Any], jets: Sequence[Jet]) -> Jet:
     """Return the jet that is chosen in each lane, by its index."""
 
-    def chosen(order: str) -> Any:
+    def pick(order: str) -> Any:
         return np.choose(which, [getattr(jet, order) for jet in jets])
 
-    return Jet(*(chosen(order) for order in ("x", "v", "a")))
+    return Jet(*(pick(order) for order in ("x", "v", "a")))
 
 
 NAMES: Mapping[str, str] = {
@@ -397,9 +397,9 @@ class Distance(Measure):
         return self.between
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        return self._apart(at) - self._apart(design) if self.relative else self._apart(at)
+        return self._distance(at) - self._distance(design) if self.relative else self._distance(at)
 
-    def _apart(self, at: Mapping[str, Vec3]) -> Jet:
+    def _distance(self, at: Mapping[str, Vec3]) -> Jet:
         first, second = (at[name] for name in self.between)
         size = np.maximum(*(doubles(norm(each, 0.0)) for each in (first, second)))
         return norm(second - first, size)
@@ -451,9 +451,9 @@ class Angle(Measure):
         return found
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        return self._between(at) - self._between(design) if self.relative else self._between(at)
+        return self._angle(at) - self._angle(design) if self.relative else self._angle(at)
 
-    def _between(self, at: Mapping[str, Vec3]) -> Jet:
+    def _angle(self, at: Mapping[str, Vec3]) -> Jet:
         first, a, second, b = (at[name] for name in self.points)
         a, b = a - first, b - second
         size = np.sqrt(doubles(a @ a) * doubles(b @ b))

@@ -24,11 +24,11 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import Array
 from .measures import JointAngle, Orientation
-from .pose_measures import angular_velocity, floats, signed
+from .pose_measures import angular_velocity, floats, with_signs
 from .quantity import Quantity
 
 
-def counted(
+def count_output_turns(
     mechanism: Mechanism,
     path: Path,
     output: Quantity,
@@ -42,7 +42,7 @@ def counted(
         at, design: see `Quantity.of`; samples along the first axis.
     """
     if isinstance(output, Orientation):
-        return oriented(mechanism, path, output, at, design)
+        return orient_from_design(mechanism, path, output, at, design)
     angle = output.of(at, design)
     if not output.period:
         return angle
@@ -72,7 +72,7 @@ def turns_of(
     count = turns(x, v, output.period, part)
     if near_design(mechanism, path) and not in_doubt(x + output.period * count, v, part.times):
         return count
-    near = _reached(followed_angle(mechanism, path, output.joint), samples, part.times)
+    near = _fill_unreached(followed_angle(mechanism, path, output.joint), samples, part.times)
     if near is None:
         return count
     near = near.reshape(-1, *(1,) * (x.ndim - 1))
@@ -80,7 +80,7 @@ def turns_of(
     return turns(x - near, np.full_like(x, np.nan), output.period, part)
 
 
-def oriented(
+def orient_from_design(
     mechanism: Mechanism,
     path: Path,
     output: Orientation,
@@ -102,11 +102,11 @@ def oriented(
     values = floats(e)
     sign, doubt = signs(values, angular_velocity(e), part)
     if not mechanism.is_fixed(output.body) and (doubt or not near_design(mechanism, path)):
-        near = _reached(followed_attitude(mechanism, path, output.body), samples, part.times)
+        near = _fill_unreached(followed_attitude(mechanism, path, output.body), samples, part.times)
         if near is not None:
             near = near.T.reshape(4, -1, *(1,) * (values.ndim - 2))
             sign = np.where((near * values).sum(axis=0) < 0.0, -1.0, 1.0)
-    return output.component_of(signed(sign, e))
+    return output.component_of(with_signs(sign, e))
 
 
 def _at(path: Path, samples: NDArray[np.intp] | slice) -> Path:
@@ -117,7 +117,7 @@ def _at(path: Path, samples: NDArray[np.intp] | slice) -> Path:
     return path if whole else replace(path, times=path.times[samples])
 
 
-def _reached(
+def _fill_unreached(
     followed: Array | None, samples: NDArray[np.intp] | slice, times: Array
 ) -> Array | None:
     """Return followed values at samples, those not reached like the reached ones nearest in time;

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, cast
 
 from ..joints import Kind
 from ..mechanism.body import Dimension, dimension_of
-from ..mechanism.curves import dimensions_of, scaled
+from ..mechanism.loads import dimensions_of, scaled
 from ..mechanism.motions import Measure
 
 Convert: TypeAlias = Callable[[float], float]

@@ -127,7 +127,9 @@ class MeasureCompliance(Isolated):
         if self.csv is not None:
             write("--csv", self.csv, views.table(results).encode())
         if engines:
-            results = replace(results, checked=self._checked(engines, results.cases, problems))
+            results = replace(
+                results, checked=self._check_engines(engines, results.cases, problems)
+            )
         checked = results.checked
         if self.out is not None:
             if checked is not None:
@@ -152,7 +154,7 @@ class MeasureCompliance(Isolated):
         native = registry.baseline(found)
         return [native, *found] if native is not None else found
 
-    def _checked(
+    def _check_engines(
         self,
         engines: Sequence[Engine],
         cases: Sequence[Case],

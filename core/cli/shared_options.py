@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
 from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
-from ..options import option, options, positive, whole
+from ..options import (
+    ONE_CASE,
+    argument,
+    group,
+    joint_types,
+    option,
+    options,
+    positive,
+    whole,
+)
 from .parser import Command
 
 if TYPE_CHECKING:
@@ -37,6 +46,16 @@ SCHEDULER = (
     "solve on the workers of this dask.distributed scheduler instead; it exchanges pickles: whoever"
     " runs or reaches it runs code as you, here and on the workers"
 )
+
+
+@options
+class OfCase(Command):
+    """A command on one case."""
+
+    LAST = ("joint_type", "supplied")
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
 
 
 ISOLATION = "isolation"
@@ -169,7 +188,7 @@ def driver_value(text: str | None, case: Case) -> float | None:
         ) from None
 
 
-def judged(
+def with_references(
     cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
 ) -> tuple[list[Case], list[str]]:
     """Return the cases with the references in these files, and notes on how a curve was read.
@@ -179,7 +198,7 @@ def judged(
     """
     from ..case.io.reference import PROVED
     from ..case.io.reference_curve import with_curve
-    from ..case.io.reference_file import judged_by
+    from ..case.io.reference_file import with_proved_references
 
     curves = [file for file in files if file.suffix.lower() != PROVED]
     proved = [file for file in files if file not in curves]
@@ -189,7 +208,7 @@ def judged(
             " measured curve and its case alone. Run them one by one."
         )
     if not curves:
-        return judged_by(cases, proved, unused), []
+        return with_proved_references(cases, proved, unused), []
     case, notes = with_curve(cases[0], curves[0], curve)
     return [case], notes
 

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
-from ..case.turns import counted
+from ..case.turns import count_output_turns
 from ..errors import CaseError, number_of
 from ..jet import Jet
 from ..mechanism.mechanism import Vector
@@ -72,7 +72,7 @@ def output_series(
     # NaN marks unknown values, and spreads to all results that depend on them
     with np.errstate(all="ignore"):
         design = {name: _fixed_jets(case.mechanism.point(name).position) for name in output.points}
-        jet = counted(case.mechanism, case.sweep.path, output, at, design)
+        jet = count_output_turns(case.mechanism, case.sweep.path, output, at, design)
     solved = trajectory.solved
     position, *rates = (
         np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)
@@ -98,8 +98,10 @@ def _force_series(output: ForceMeasure, trajectory: Trajectory, moved: Trajector
     # a simulator may replace a joint by an equivalent, which gives no reaction of the joint
     if given is None or not given.has(output.forces):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
-    if output.placed:
-        output = output.located({name: _point_jets(moved.points[name]) for name in output.points})
+    if output.follows_points:
+        output = output.with_points(
+            {name: _point_jets(moved.points[name]) for name in output.points}
+        )
     values = np.where(trajectory.solved, output.values(given), np.nan)
     return Series(values, reason=output.undetermined(given))
 

@@ -176,7 +176,7 @@ def _forces(case: Case) -> list[SceneForce]:
     found: list[SceneForce] = []
     for output in case.outputs:
         if isinstance(output, JointForce):
-            direction = output.along
+            direction = output.unit_direction
         elif isinstance(output, DriverEffort) and isinstance(
             driver := case.mechanism.driver(output.driver), PointCoordinate
         ):

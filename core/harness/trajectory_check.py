@@ -229,7 +229,11 @@ def balance_tolerance(case: Case, forces: Forces, solved: Mask) -> float:
     """
     paced, left = pace(case), [0.0]
     for output in case.outputs:
-        if isinstance(output, ForceMeasure) and not output.placed and forces.has(output.forces):
+        if (
+            isinstance(output, ForceMeasure)
+            and not output.follows_points
+            and forces.has(output.forces)
+        ):
             values = output.values(forces)
             known = values[np.isfinite(values)]
             lever = 1.0 if output.turns else size(case)

@@ -10,15 +10,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, field, fields
+from enum import Enum
 from functools import cache, partial
 from inspect import get_annotations
 from typing import Any, ClassVar, Self
 
-from ..algebra import ZERO, Vec3, vec
+from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError, Phrase
+from ..failures import FailureKind
 from ..input_checks import held, plain, require_direction, require_finite, triple
 from ..primitives import (
+    GROUND_POSE,
     Dot12,
     Dot20,
     DrivenAngle,
@@ -27,24 +30,98 @@ from ..primitives import (
     Primitive,
 )
 from ..primitives import Spherical as SphericalCondition
-from .axes import require_perpendicular, triad, unit
-from .geometry_fields import Kind, direction, directions, length, position, positions
 
-__all__ = [
-    "Attachment",
-    "AxialJoint",
-    "Joint",
-    "Kind",
-    "direction",
-    "directions",
-    "length",
-    "position",
-    "positions",
-    "register",
-    "require_perpendicular",
-    "triad",
-    "unit",
-]
+
+class Kind(Enum):
+    """Kind of a geometry field of a joint; it sets the shape and the unit for a reader."""
+
+    POSITION = "a point [x, y, z]"
+    DIRECTION = "a direction [x, y, z]"
+    POSITIONS = "two points [[x, y, z] on the first body, [x, y, z] on the second]"
+    DIRECTIONS = "two directions [[x, y, z] on the first body, [x, y, z] on the second]"
+    LENGTH = "a length"
+    NUMBER = "a number"
+
+    @property
+    def pair(self) -> bool:
+        """Whether the field has one value on each body."""
+        return self is not self.single
+
+    @property
+    def single(self) -> Kind:
+        """Kind of each value of a pair; the kind itself if it is no pair."""
+        return _SINGLE.get(self, self)
+
+
+_SINGLE = {Kind.POSITIONS: Kind.POSITION, Kind.DIRECTIONS: Kind.DIRECTION}
+
+
+def _geometry(kind: Kind, **options: Any) -> Any:
+    return field(metadata={"kind": kind}, **options)
+
+
+def position(**options: Any) -> Any:
+    """Return a field: a point common to both bodies, global at design [m]."""
+    return _geometry(Kind.POSITION, **options)
+
+
+def direction() -> Any:
+    """Return a field: a direction common to both bodies, global at design, not zero [-]."""
+    return _geometry(Kind.DIRECTION)
+
+
+def positions() -> Any:
+    """Return a field: a point on each body, global at design [m]."""
+    return _geometry(Kind.POSITIONS)
+
+
+def directions() -> Any:
+    """Return a field: a direction on each body, global at design, of non-zero length [-]."""
+    return _geometry(Kind.DIRECTIONS)
+
+
+def length(**options: Any) -> Any:
+    """Return a field: a length [m]."""
+    return _geometry(Kind.LENGTH, **options)
+
+
+def unit(a: Sequence[Scalar]) -> Vec3:
+    """Return the direction of a, length one."""
+    v = vec(a)
+    return (1.0 / root(v @ v)) * v
+
+
+# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more
+# is a mistake in the table. Within it the axes keep their design angle, as the two hinges of a
+# simulator do.
+ROUNDED_RIGHT_ANGLE = 1e-2
+
+
+def require_perpendicular(joint: object, axes: Sequence[Sequence[float]]) -> None:
+    """Raise MechanismError unless the two axes are perpendicular up to the rounding of a table."""
+    cosine = unit(axes[0]) @ unit(axes[1])
+    if abs(cosine) > ROUNDED_RIGHT_ANGLE:
+        raise MechanismError(
+            f"{joint}: the axes are not perpendicular, the cosine of their angle is {cosine:.3g}; "
+            "expected 0 up to rounding of the table; give the two axes of the cross",
+            kind=FailureKind.WRONG_ANGLE,
+        )
+
+
+def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:
+    """Return f, g, h: right-handed orthonormal, h along the axis (f x g = h)."""
+    h = unit(axis)
+    # the global axis most nearly perpendicular to h gives the best conditioned f
+    nearest = X
+    for e in (Y, Z):
+        nearest = vec(
+            [
+                where_larger(nearest @ h, e @ h, new, old)
+                for new, old in zip(e, nearest, strict=True)
+            ]
+        )
+    f = unit(tuple(cross(nearest, h)))
+    return f, cross(h, f), h
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,3 +375,13 @@ def _geometry_fields(joint: type[Joint]) -> Sequence[tuple[str, Kind]]:
 
 def _times(factor: float, value: float | Sequence[float]) -> Any:
     return tuple(factor * x for x in value) if isinstance(value, Sequence) else factor * value
+
+
+def gap(joint: Joint) -> float:
+    """Return the largest residual of a joint at the design position [m]; zero unless lengths
+    contradict points.
+    """
+    here = Attachment(ZERO)
+    return max(
+        abs(x) for each in joint.primitives(here, here) for x in each.phi(GROUND_POSE, GROUND_POSE)
+    )

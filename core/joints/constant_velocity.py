@@ -31,19 +31,19 @@ class ConstantVelocity(Joint):
         # beyond a right angle no such joint transmits, and at 180 degrees it has no zero twist
         if cosine <= 0.0:
             raise MechanismError(
-                f"{self}: the shafts enclose {cosine:.3g} as cosine, expected it positive; let both"
-                " axes point the same way on, from the driving to the driven side",
+                f"{self}: the cosine of the angle between its axes is {cosine:.3g}, expected a"
+                " positive one; let both point from the driving to the driven side",
                 kind=FailureKind.WRONG_ANGLE,
             )
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
         P, (f, g, h) = vec(self.point), triad(self.axes[0])
         k = unit(self.axes[1])
-        twistless = (_carried(f, h, k), _carried(g, h, k))
+        twistless = (_carry(f, h, k), _carry(g, h, k))
         return p.Spherical(i.arm(P), j.arm(P)), p.ConstantVelocity(f, g, *twistless)
 
 
-def _carried(a: Vec3, h: Vec3, k: Vec3) -> Vec3:
+def _carry(a: Vec3, h: Vec3, k: Vec3) -> Vec3:
     """a turned by the shortest rotation that takes h to k (Rodrigues)."""
     n = cross(h, k)
     return a + cross(n, a) + (1.0 / (1.0 + h @ k)) * cross(n, cross(n, a))

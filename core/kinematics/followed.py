@@ -96,12 +96,14 @@ def _counted(
     return found, not doubtful.any()
 
 
+def _is_builtin(_: Mechanism, path: Path, *__: object) -> bool:
+    """Return whether a path may be kept: motions of other classes may change, or have no hash."""
+    return path.is_builtin
+
+
+@cache_last(8, when=_is_builtin)  # asked for each angle and attitude of a motion
 def near_design(mechanism: Mechanism, path: Path) -> bool:
     """Return whether the drivers go from the design to all samples in short steps."""
-    return (_recent_near if path.is_builtin else _is_near)(mechanism, path)
-
-
-def _is_near(mechanism: Mechanism, path: Path) -> bool:
     times = path.times[np.isfinite(path.times)]
     if not len(times) or not path.motions:  # a free motion is known at all its steps
         return True
@@ -112,21 +114,13 @@ def _is_near(mechanism: Mechanism, path: Path) -> bool:
     return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
 
 
-# asked for each angle and attitude of a motion
-_recent_near = cache_last(8)(_is_near)
-
-
+@cache_last(32, when=_is_builtin)
 def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     """Return values at the samples of a path, turns counted on the way from the design; NaN if a
     sample is not reached or its turns are in doubt.
 
     None if the native solver has no solution of the mechanism.
     """
-    # motions of other classes may change, or have no hash
-    return (_recent if path.is_builtin else _finer)(mechanism, path, what)
-
-
-def _finer(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     found: Array | None = None
     for part in PARTS:
         try:
@@ -138,17 +132,14 @@ def _finer(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     return found
 
 
-_recent = cache_last(32)(_finer)
-
-
 def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> tuple[Array, bool]:
     """Return the values by further samples, and whether no number of turns is in doubt."""
-    fine = (_recent_fine if path.is_builtin else _fine)(mechanism, path, part)
+    fine = _fine(mechanism, path, part)
     motion = _motion(mechanism, fine, what)
     taken = motion.details.get("start", {"time": 0.0, "lead": {}})
     at_start, sure = what.at_design, True
     if any(taken["lead"].values()):
-        lead = (_recent_lead if path.is_builtin else _lead)(mechanism, path, taken["time"], part)
+        lead = _lead(mechanism, path, taken["time"], part)
         led = _motion(mechanism, lead, what)
         values, sure = _counted(what, mechanism, lead.times, led, 0.0, at_start)
         at_start = np.asarray(values[-1])
@@ -156,6 +147,10 @@ def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> 
     return found[: len(path.times)], sure and certain
 
 
+# The same samples serve all that is followed along a path.
+
+
+@cache_last(4, when=_is_builtin)
 def _fine(mechanism: Mechanism, path: Path, part: float) -> Path:
     """Return a path with further samples."""
     times = _sorted(path, start_of(mechanism, path).time)
@@ -163,14 +158,11 @@ def _fine(mechanism: Mechanism, path: Path, part: float) -> Path:
     return replace(path, times=np.concatenate([path.times, _divided(mechanism, path, times, part)]))
 
 
+@cache_last(4, when=_is_builtin)
 def _lead(mechanism: Mechanism, path: Path, to: float, part: float) -> Path:
     """Return the way from the design to a time of a path, with further samples."""
     lead = path.lead_in(to)
     return replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
-
-
-# the same for all that is followed along a path
-_recent_fine, _recent_lead = cache_last(4)(_fine), cache_last(4)(_lead)
 
 
 def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
@@ -178,14 +170,12 @@ def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
     bodies = tuple(body.name for body in mechanism.moving)
     if len(bodies) * len(path.times) > MOST_POSES:
         bodies = what.bodies(mechanism)
-    return (_recent_motion if path.is_builtin else _solved)(mechanism, path, bodies)
+    return _solved(mechanism, path, bodies)
 
 
+@cache_last(2, when=_is_builtin)
 def _solved(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajectory:
     return prepare_motion(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
-
-
-_recent_motion = cache_last(2)(_solved)
 
 
 def _sorted(path: Path, start: float) -> Array:

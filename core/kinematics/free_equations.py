@@ -97,7 +97,7 @@ class FreeEquations:
         at = formulation.configuration(state)
         still = dict.fromkeys(formulation.bodies, GROUND_ACCELERATION)
         states = BodyStates(self.frame, at.poses, formulation.twists(at, v), still)
-        equations = ForceEquations.traced(self.mechanism, formulation, at, states)
+        equations = ForceEquations.with_angles(self.mechanism, formulation, at, states)
         gravity, power = vec(self.mechanism.gravity), list[Any]()
         mass = dict[tuple[int, int], Any]()
         for body in self.mechanism.moving:

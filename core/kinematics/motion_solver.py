@@ -24,7 +24,7 @@ from ..failures import FailureKind
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import Trajectory
-from .compiled.compiled_model import is_builtin
+from .compiled.compiled_model import is_known
 from .compiled.request import Request
 from .compiled.routes import recent_route
 from .continuation.sweep import follow
@@ -60,8 +60,7 @@ def prepare_motion(mechanism: Mechanism, request: Request, path: Path) -> Solver
     """
     if not in_blocks(mechanism, request):
         return partial(follow, recent_route(mechanism, request, path))
-    known = is_builtin(mechanism) and path.is_builtin
-    return (_recent_blocks if known else by_blocks)(mechanism, request)(path)
+    return _recent_blocks(mechanism, request)(path)
 
 
 def by_blocks(
@@ -86,11 +85,15 @@ def by_blocks(
         by_components = 0 < max(map(len, parts), default=0) <= COMPONENT
     lanes = _lanes(mechanism, request, parts) if by_components else SparseLanes(mechanism, request)
 
-    def along(path: Path) -> Solver:
+    @cache_last(1, when=_is_builtin)
+    def prepare(path: Path) -> Solver:
         return BlockSweep(lanes, path).solve
 
-    again = cache_last(1)(along)
-    return lambda path: (again if path.is_builtin else along)(path)
+    return prepare
+
+
+def _is_builtin(path: Path) -> bool:
+    return path.is_builtin
 
 
 def _lanes(
@@ -115,4 +118,6 @@ def _lanes(
 
 
 # One only, and of its paths the last: they fill much of the memory. A thread solves it in place.
-_recent_blocks = cache_last(1, per_thread=True)(by_blocks)
+@cache_last(1, per_thread=True, when=is_known)
+def _recent_blocks(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver]:
+    return by_blocks(mechanism, request)

@@ -258,7 +258,7 @@ class _Rows:
         lines = _force_rows(self.mechanism, rated, np.zeros(count))
         formulation, unit = lines.formulation, lines.frame.unit
         at = formulation.configuration(self._turned({**lines.equations.at.state}))
-        return [unit * each for each, _ in islice(lines.left(at), self.orders)]
+        return [unit * each for each, _ in islice(lines.remainders(at), self.orders)]
 
     def _turned(self, state: dict[str, Any]) -> dict[str, Any]:
         """Return a state with all turns of coupled joints."""

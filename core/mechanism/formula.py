@@ -97,7 +97,7 @@ class _Parser:
             value = value + (-other if minus else other)
         return value
 
-    def nested(self, part: Callable[[], Any]) -> Any:
+    def nest(self, part: Callable[[], Any]) -> Any:
         self.depth += 1
         if self.depth > DEEPEST:
             raise MechanismError(f"found more than {DEEPEST} nested parentheses, expected fewer")
@@ -106,13 +106,13 @@ class _Parser:
         return value
 
     def product(self) -> Any:
-        value = self.signed()
+        value = self.factor()
         while self.follows("*", "/"):
-            over, other = self.take() == "/", self.signed()
+            over, other = self.take() == "/", self.factor()
             value = _quotient(value, other) if over else value * other
         return value
 
-    def signed(self) -> Any:
+    def factor(self) -> Any:
         signs = 1.0
         while self.follows("+", "-"):
             signs = -signs if self.take() == "-" else signs
@@ -127,20 +127,20 @@ class _Parser:
         minus = self.follows("-")
         if self.follows("+", "-"):
             self.take()
-        exponent = self.nested(self.power)
-        return _powered(base, -exponent if minus else exponent)
+        exponent = self.nest(self.power)
+        return _power(base, -exponent if minus else exponent)
 
     def atom(self) -> Any:
         token = self.take()
         if token == "(":
-            value = self.nested(self.sum)
+            value = self.nest(self.sum)
             self.take(")")
             return value
         if token[0].isdigit() or token[0] == ".":
             try:
                 return number(token)
             except ValueError:
-                raise MechanismError(f"found {token!r}, expected a number of a size") from None
+                raise MechanismError(f"found {token!r}, expected a number below 1.8E308") from None
         name = token.upper()
         if not token[0].isalpha():
             raise MechanismError(f"found {token!r}, expected a number or a name")
@@ -149,9 +149,9 @@ class _Parser:
         arguments: list[Any] = []
         if self.follows("("):
             self.take()
-            arguments.append(self.nested(self.sum))
+            arguments.append(self.nest(self.sum))
             while self.take(",", ")") == ",":
-                arguments.append(self.nested(self.sum))
+                arguments.append(self.nest(self.sum))
         return self.call(name, arguments)
 
     def call(self, name: str, arguments: Sequence[Any]) -> Any:
@@ -161,8 +161,7 @@ class _Parser:
             raise
         except TypeError:
             raise MechanismError(
-                f"found {name} with {len(arguments)} arguments, of which some are no numbers or"
-                " too many or few; expected them as Adams has them"
+                f"found {name} with {len(arguments)} arguments that do not fit; give those of Adams"
             ) from None
         except (ArithmeticError, ValueError):
             raise MechanismError(f"found {name} of numbers that it is not defined for") from None
@@ -176,20 +175,20 @@ def _quotient(value: Any, other: Any) -> Any:
     if isinstance(other, float) and other == 0.0:
         raise MechanismError("found a division by zero")
     if isinstance(other, Jet):
-        return value * _powered(other, -1.0)
+        return value * _power(other, -1.0)
     try:
         return value / other
     except OverflowError:
         raise MechanismError("found a number beyond all limits") from None
 
 
-def _powered(base: Any, exponent: Any) -> Any:
+def _power(base: Any, exponent: Any) -> Any:
     """Return a power with a constant exponent."""
     if not isinstance(exponent, float):
         raise MechanismError("found an exponent that varies, expected a number")
     if isinstance(base, Jet):
         n = exponent
-        return _composed(
+        return _compose(
             base,
             base.x**n,
             n * base.x ** (n - 1.0) if n else np.zeros_like(base.x),
@@ -204,7 +203,7 @@ def _powered(base: Any, exponent: Any) -> Any:
     return value
 
 
-def _composed(x: Jet, value: Any, slope: Any, bend: Any) -> Jet:
+def _compose(x: Jet, value: Any, slope: Any, bend: Any) -> Jet:
     """Return a function of a jet by its value and first two derivatives there."""
     return Jet(value, slope * x.v, slope * x.a + bend * x.v**2)
 
@@ -223,7 +222,7 @@ def _curve(value: Function, derivatives: Callable[[Any, Any], tuple[Any, Any]]) 
                 raise ValueError
             return found
         at = value(x.x)
-        return _composed(x, at, *derivatives(x.x, at))
+        return _compose(x, at, *derivatives(x.x, at))
 
     return curve
 
@@ -233,12 +232,14 @@ def step(x: Any, x0: Any, h0: Any, x1: Any, h1: Any) -> Any:
     if not (isinstance(x, Jet) and isinstance(x0, float) and isinstance(x1, float)):
         raise TypeError
     if not x1 > x0:
-        raise MechanismError(f"found a step from {x0:g} to {x1:g}, expected it to go on")
+        raise MechanismError(
+            f"found a step from {x0:g} to {x1:g}, expected its end beyond its start"
+        )
     width = x1 - x0
     s = np.clip((x.x - x0) / width, 0.0, 1.0)
     inside = (x.x >= x0) & (x.x <= x1)
     slope, bend = 6.0 * s * (1.0 - s), (6.0 - 12.0 * s) * inside
-    part = _composed(x, s * s * (3.0 - 2.0 * s), slope / width, bend / width**2)
+    part = _compose(x, s * s * (3.0 - 2.0 * s), slope / width, bend / width**2)
     return h0 + (h1 - h0) * part
 
 

@@ -17,9 +17,8 @@ from ..caches import ByContent
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import finite_numbers, held
 from ..joints import Distance
-from ..joints.base import AxialJoint, Joint, Kind, unit
+from ..joints.base import AxialJoint, Joint, Kind, gap, unit
 from ..joints.coupler import Coupler
-from ..joints.gap import gap
 from ..trajectory import MARKER
 from .body import Body, Vector
 from .loads import Bushing, ForceElement, TorsionSpringDamper
@@ -237,7 +236,7 @@ class Mechanism(ByContent):
         Raises:
             MechanismError: there is none.
         """
-        known = self._named["bodies" if what == "body" else f"{what}s"]
+        known = self._members["bodies" if what == "body" else f"{what}s"]
         if name in known:
             return known[name]
         names = [GROUND, *known] if what == "body" else known
@@ -368,7 +367,7 @@ class Mechanism(ByContent):
         return self._member("forces", "force element", name)
 
     def _member(self, kind: str, what: str, name: str) -> Any:
-        named = self._named[kind]
+        named = self._members[kind]
         try:
             return named[name]
         except (KeyError, TypeError):
@@ -468,7 +467,7 @@ class Mechanism(ByContent):
         return extent(self._places) or extent([*self._places, *points]) or 1.0
 
     @cached_property
-    def _named(self) -> Mapping[str, Mapping[str, Any]]:
+    def _members(self) -> Mapping[str, Mapping[str, Any]]:
         """Members by kind and name."""
         all_of = {
             "bodies": self.bodies,

@@ -39,7 +39,7 @@ class Measure(Enum):
     TEXT = "text"
 
 
-def measured(measure: Measure, **options: Any) -> Any:
+def measure(measure: Measure, **options: Any) -> Any:
     """Return a field of a motion [m or rad, rad, Hz, s]."""
     return field(metadata={"measure": measure}, **options)
 
@@ -70,7 +70,7 @@ class Ramp(Motion):
     """value = rate * t; rate in driver units per second."""
 
     type = "ramp"
-    rate: float = measured(Measure.DRIVER_RATE)
+    rate: float = measure(Measure.DRIVER_RATE)
 
     def __post_init__(self) -> None:
         _finite("ramp", rate=self.rate)
@@ -84,9 +84,9 @@ class Sine(Motion):
     """value = amplitude * sin(2 pi frequency t + phase); frequency in Hz, phase an angle."""
 
     type = "sine"
-    amplitude: float = measured(Measure.DRIVER)
-    frequency: float = measured(Measure.FREQUENCY)
-    phase: float = measured(Measure.ANGLE, default=0.0)
+    amplitude: float = measure(Measure.DRIVER)
+    frequency: float = measure(Measure.FREQUENCY)
+    phase: float = measure(Measure.ANGLE, default=0.0)
 
     def __post_init__(self) -> None:
         _finite("sine", amplitude=self.amplitude, frequency=self.frequency, phase=self.phase)
@@ -106,8 +106,8 @@ class Table(Motion):
     """
 
     type = "table"
-    times: tuple[float, ...] = measured(Measure.TIME)
-    values: tuple[float, ...] = measured(Measure.DRIVER)
+    times: tuple[float, ...] = measure(Measure.TIME)
+    values: tuple[float, ...] = measure(Measure.DRIVER)
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):  # lists and arrays may change, motions do not
@@ -150,10 +150,10 @@ class Formula(Motion):
     """
 
     type = "formula"
-    formula: str = measured(Measure.TEXT)
-    scale: float = measured(Measure.DRIVER, default=1.0)
-    offset: float = measured(Measure.DRIVER, default=0.0)
-    second: float = measured(Measure.TIME, default=1.0)
+    formula: str = measure(Measure.TEXT)
+    scale: float = measure(Measure.DRIVER, default=1.0)
+    offset: float = measure(Measure.DRIVER, default=0.0)
+    second: float = measure(Measure.TIME, default=1.0)
 
     def __post_init__(self) -> None:
         _finite("formula", scale=self.scale, offset=self.offset, second=self.second)
@@ -258,7 +258,7 @@ class Path(ByContent):
             f"{name} = {self.design.get(name, 0.0) + value:.9g}" for name, value in named
         )
 
-    def ended(self, here: float, wanted: float, last: float | None, reason: str) -> str:
+    def end_message(self, here: float, wanted: float, last: float | None, reason: str) -> str:
         """Return the message of a motion that cannot reach a time: its limit, and the last reached
         sample, if any.
         """

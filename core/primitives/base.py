@@ -116,7 +116,7 @@ class Row(NamedTuple):
     rj: Vec3
     pj: Vec3
 
-    def along(self, body: str, twist: Twist) -> Scalar:
+    def part(self, body: str, twist: Twist) -> Scalar:
         """Return the part of row . velocity of one body, "i" or "j"."""
         return (
             self.ri @ twist.v + self.pi @ twist.w
@@ -191,7 +191,7 @@ class Primitive(ABC):
         else:
             pair = traced.i, traced.j
             speeds = [
-                row.along("i", traced.vi) + row.along("j", traced.vj) - value
+                row.part("i", traced.vi) + row.part("j", traced.vj) - value
                 for row, value in zip(
                     traced.primitive.rows(*pair), traced.primitive.nu(*pair), strict=True
                 )
@@ -282,9 +282,9 @@ class _Derivation:
             x: {0: sum((k * motion[n] for n, k in slopes.items()), 0.0)}
             for x, slopes in self.slopes.items()
         }
-        self.primitive: Primitive = self._lifted(primitive)
+        self.primitive: Primitive = self._lift(primitive)
         if hasattr(primitive, "drive"):
-            self.primitive = replace(self.primitive, drive=self._driven(primitive.drive))
+            self.primitive = replace(self.primitive, drive=self._lift_drive(primitive.drive))
 
     @property
     def phi(self) -> tuple[Scalar, ...]:
@@ -306,7 +306,7 @@ class _Derivation:
     def _vector(self, a: Vec3) -> Vec3:
         return vec([*map(self._input, a)])
 
-    def _driven(self, drive: Drive) -> Drive:
+    def _lift_drive(self, drive: Drive) -> Drive:
         given = {each.name: self._input(getattr(drive, each.name)) for each in fields(drive)}
         driven = Drive(**given)
         half = 0.5 * driven.c_t
@@ -319,7 +319,7 @@ class _Derivation:
             self.speeds[x] = {0: speed}
         return driven
 
-    def _lifted(self, value: Any) -> Any:
+    def _lift(self, value: Any) -> Any:
         """Return a value with its numbers of other kinds, such as those of varied geometry, as
         inputs.
         """
@@ -328,9 +328,9 @@ class _Derivation:
         if hasattr(value, "__truediv__"):
             return self._input(value)
         if isinstance(value, tuple):
-            return tuple(map(self._lifted, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+            return tuple(map(self._lift, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         if is_dataclass(value) and not isinstance(value, type):
             parts = {each.name: getattr(value, each.name) for each in fields(value)}
-            lifted = {name: self._lifted(part) for name, part in parts.items()}
+            lifted = {name: self._lift(part) for name, part in parts.items()}
             return replace(value, **{k: x for k, x in lifted.items() if x is not parts[k]})
         return value

@@ -5,7 +5,7 @@
 2. `elimination`: trace the solution of a linear system. Literal and lone pivots come first, then
    dense cores with partial pivoting by compare-and-select.
 3. `straight_line`: collect the operations of some outputs into a `Program`. `Prepared` moves terms
-   of the geometry alone into a program of its own. `lowered` fuses products and sums, so compiled
+   of the geometry alone into a program of its own. `lower` fuses products and sums, so compiled
    and interpreted programs give equal bits; `bytecode` runs without compilation.
 4. `plan`: a `Plan` names the programs of a model, the slots of a lane, and the order of an attempt:
    predict, iterate Newton, test. An executor binds it to lanes; a track follows one motion.

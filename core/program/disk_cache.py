@@ -172,7 +172,7 @@ def _not_followed(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0))
 
 
-def known(content: bytes) -> bool:
+def contains(content: bytes) -> bool:
     """Return whether the cache has an entry of the content."""
     entry = _entry(content)
     return entry is not None and entry.exists()

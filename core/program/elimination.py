@@ -339,7 +339,7 @@ def _blocks(
 ) -> list[tuple[list[int], list[int]]]:
     """Return rows and columns of the blocks; each block needs only earlier ones."""
     # scipy.sparse.csgraph has this, but its import takes longer than all other imports here
-    row_of = _matched({i: list(entries[i]) for i in rows})
+    row_of = _match({i: list(entries[i]) for i in rows})
     column_of = {i: j for j, i in row_of.items()}
     place = {i: k for k, i in enumerate(rows)}
     needs = np.eye(len(rows))
@@ -355,7 +355,7 @@ def _blocks(
     return [(block, sorted(column_of[i] for i in block)) for block in found.values()]
 
 
-def _matched(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
+def _match(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
     """Return the matched row of each column, from the columns of each row (Kuhn's augmenting
     paths).
     """

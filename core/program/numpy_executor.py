@@ -223,12 +223,12 @@ class NumpyExecutor:
         past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
         alive = np.ones(self.lanes, dtype=np.bool_)
         for k, sample in enumerate(samples.T):
-            accepted = self._accepted("extend", sample) if k >= NODES else ~alive
+            accepted = self._try_sample("extend", sample) if k >= NODES else ~alive
             if (alive & ~accepted).any():
                 if k >= NODES:
                     self.go_back(samples[:, k - 1, None])
                     self.carry()
-                accepted = self._accepted("predict", sample)
+                accepted = self._try_sample("predict", sample)
             alive &= accepted
             out[:, first + step * k] = np.where(alive, block[kept], np.nan)
             self._worsen(worst)
@@ -246,7 +246,7 @@ class NumpyExecutor:
         np.maximum(largest, self.block[list(self.plan.largest)], out=largest)
         np.minimum(smallest, self.block[list(self.plan.smallest)], out=smallest)
 
-    def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:
+    def _try_sample(self, start: str, sample: Array) -> NDArray[np.bool_]:
         self.block[list(self.plan.sampled)] = sample[:, None]
         self.settle(start, self.plan.alone)
         return self.block[self.plan.slots[MARGIN]] > 0.0
@@ -272,7 +272,7 @@ class NumpyExecutor:
                 row = parts.base + member * len(plan.kept)
                 parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
                 self._worsen(parts.worst)
-                for slot, k in plan.left:
+                for slot, k in plan.fixed_targets:
                     parts.ahead[member, k] = block[slot, -1]
 
         return call
@@ -334,7 +334,7 @@ class NumpyTrack:
         extrapolates = plan.extrapolates(lanes)
         carried, moved = (
             np.array(each).T
-            for each in (plan.carried, plan.moved if extrapolates else plan.carried)
+            for each in (plan.carried, plan.moves if extrapolates else plan.carried)
         )
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]

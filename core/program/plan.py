@@ -101,13 +101,13 @@ class Plan:
         return self.continued or self.carried
 
     @property
-    def left(self) -> Sequence[tuple[int, int]]:
+    def fixed_targets(self) -> Sequence[tuple[int, int]]:
         """Carried slots with a fixed target, and its position in `fixed`."""
         place = {slot: k for k, slot in enumerate(self.fixed)}
         return [(source, place[target]) for source, target in self.carried if target in place]
 
     @property
-    def moved(self) -> Sequence[tuple[int, int]]:
+    def moves(self) -> Sequence[tuple[int, int]]:
         """Slots of `carried_on` to copy before `extrapolate`, which puts out the rest itself."""
         return [
             pair for pair in self.carried_on if pair[1] not in self.programs["extrapolate"].outputs

@@ -1,6 +1,6 @@
 """Straight-line programs: the operations of a tape that the outputs need, in executable order.
 
-`lowered` fuses a product and a sum into one operation, rounded once. It decides the fusion, not the
+`lower` fuses a product and a sum into one operation, rounded once. It decides the fusion, not the
 compiler: compiled and interpreted programs give the same numbers to the last bit.
 
 `bytecode` writes a program as a table of integers for the interpreter: it runs without compilation.
@@ -182,7 +182,7 @@ if either is.
 """
 
 
-def lowered(program: Program) -> Program:
+def lower(program: Program) -> Program:
     """Return the same program, with each product of a single sum or difference fused into it."""
     nodes = program.nodes
     operated = [operands(node) for node in nodes]
@@ -223,7 +223,7 @@ def counts(size: int, *uses: Iterable[int]) -> list[int]:
     return found
 
 
-def unrolled(program: Program) -> Program:
+def unroll(program: Program) -> Program:
     """Return a repeated program written out."""
     nodes, outputs = list(program.nodes), dict(program.outputs)
     for k in range(1, program.times):
@@ -272,7 +272,7 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     A value goes directly into its output slot if the program does not read this slot; otherwise
     into a cell, which is free again after its last reader.
     """
-    program = lowered(unrolled(program))
+    program = lower(unroll(program))
     nodes, vector = [*program.nodes], 8 * width
     # an input that goes to another slot must survive the output that overwrites its own
     inputs = {k for k in program.outputs.values() if nodes[k][0] == "input"}
@@ -315,14 +315,14 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     return Bytecode(np.array([*words, 0, 0], np.uint32), cells - slots)
 
 
-def packed(tables: Mapping[str, Bytecode]) -> bytes:
+def pack(tables: Mapping[str, Bytecode]) -> bytes:
     """Return tables by name as bytes."""
     return msgspec.msgpack.encode(
         {name: (each.cells, each.words.tobytes()) for name, each in tables.items()}
     )
 
 
-def unpacked(whole: bytes) -> dict[str, Bytecode]:
+def unpack(whole: bytes) -> dict[str, Bytecode]:
     """Return the tables of `packed`."""
     tables = msgspec.msgpack.decode(whole, type=dict[str, tuple[int, bytes]])
     return {

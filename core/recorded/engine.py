@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ..case.case import TIME, Case, Quantity, Series, Sweep, Truth
 from ..case.io.case_file import case_text
 from ..case.io.document import fault
+from ..case.io.reference_samples import RATES
 from ..case.measures import ForceMeasure
 from ..errors import CaseError, KincheckError, SolveError, UnsupportedError, number_of
 from ..harness.compare import output_series
@@ -34,12 +35,12 @@ from ..harness.native_engine import NativeEngine
 from ..harness.record import ROWS
 from ..harness.trajectory_check import Reported
 from ..trajectory import QUANTITIES, Array, Trajectory
-from .explain import Stated, explained
+from .explain import Stated, explain_slips
 from .judgement import judge_forces, judge_rows
 from .meaning import Accuracy, Meaning, Reader, inputs_of, unit_of
 from .readers import Head, read_recording
 from .samples import Samples, jet_of, point_motion, samples_of
-from .sweep import Resampled, as_is
+from .sweep import Resampled, at_own_samples
 
 TOL = 1e-12
 
@@ -105,8 +106,8 @@ class RecordedEngine:
         judged = judge_rows(case, self.samples, self.accuracy)
         standard = {**self._native, **case.reference}
         columns = {name: each.values for name, each in self.samples.numbers.items()}
-        values = self.resampled.lead, self.resampled.values, self._solved
-        slips = explained(case, outputs, columns, standard, self._columns, *values)
+        values = self.resampled.lead, self.resampled.values, self._solve_sweep
+        slips = explain_slips(case, outputs, columns, standard, self._columns, *values)
         notes = [*slips, *self.samples.notes, *self.resampled.notes]
         if gaps := self.samples.gaps:
             listed = ", ".join(f"{name} at {number_of(n, 'sample')}" for name, n in gaps.items())
@@ -137,12 +138,9 @@ class RecordedEngine:
 
     def _series(self, case: Case, output: Quantity) -> Series:
         """Return an output of its columns, or else of the recorded poses."""
-        own, count = self.samples.numbers.get(output.name), self.samples.count
-        if own is not None:
-            columns = [
-                own,
-                *(self.samples.numbers.get(f"{output.name}.{q}") for q in QUANTITIES[1:]),
-            ]
+        count = self.samples.count
+        if output.name in self.samples.numbers:
+            columns = [self.samples.numbers.get(output.name + ending) for ending in RATES]
             values = [None if each is None else each.values for each in columns]
             halves = [np.zeros(count) if each is None else each.half for each in columns]
         else:
@@ -158,7 +156,7 @@ class RecordedEngine:
             position = position + output.period * np.round(np.nan_to_num(turns))
         uncertainty = {
             quantity: half
-            + self._driven(output.name, quantity)
+            + self._driver_digits(output.name, quantity)
             + self.accuracy.of_output(output, quantity, x)
             for quantity, x, half in zip(QUANTITIES, values, halves, strict=True)
             if x is not None
@@ -204,7 +202,7 @@ class RecordedEngine:
             found[name] = Stated(column.head.name, use.sign, offset, unit, size, use.si)
         return found
 
-    def _solved(self, sweep: Sweep) -> Mapping[str, Series]:
+    def _solve_sweep(self, sweep: Sweep) -> Mapping[str, Series]:
         return native_outputs(replace(self.resampled.case, sweep=sweep))
 
     @cached_property
@@ -214,9 +212,9 @@ class RecordedEngine:
 
     @cached_property
     def _variants(self) -> list[Mapping[str, Series]]:
-        return [*map(self._solved, self.resampled.variants)]
+        return [*map(self._solve_sweep, self.resampled.variants)]
 
-    def _driven(self, name: str, quantity: str) -> Array:
+    def _driver_digits(self, name: str, quantity: str) -> Array:
         """Return the share of the digits of time and drivers in an output of native."""
         total = np.zeros(self.samples.count)
         base: Array | None = getattr(self._native.get(name), quantity, None)
@@ -303,7 +301,7 @@ class ProgramEngine:
         later.
         """
         try:
-            written(case)
+            case_for_program(case)
         except CaseError as error:
             return str(error)
         return None
@@ -324,7 +322,7 @@ class ProgramEngine:
                 name: Path(folder) / f"{name}.{'toml' if name == 'case' else 'csv'}"
                 for name in FILES
             }
-            files["case"].write_text(written(case), encoding="utf-8")
+            files["case"].write_text(case_for_program(case), encoding="utf-8")
             write_samples(case, files["samples"])
             said = self._run({name: str(file) for name, file in files.items()})
             if not files["out"].is_file():
@@ -351,7 +349,7 @@ class ProgramEngine:
         return said
 
 
-def written(case: Case) -> str:
+def case_for_program(case: Case) -> str:
     """Return the case file of a case without its reference; uneven samples stand in their own file
     alone.
     """
@@ -367,7 +365,7 @@ def write_samples(case: Case, file: Path) -> None:
     names = [driver.name for driver in mechanism.drivers]
     heads, columns = [TIME], [path.times]
     for name, (x, v, a) in zip(names, path.drive(names, path.times).swapaxes(0, 1), strict=True):
-        heads += [name, f"{name}.velocity", f"{name}.acceleration"]
+        heads += [f"{name}{ending}" for ending in RATES]
         columns += [x + mechanism.design_value(name), v, a]
     with file.open("w", encoding="utf-8", newline="") as stream:
         table = csv.writer(stream)
@@ -399,5 +397,5 @@ def read_answer(name: str, case: Case, file: Path) -> Reported:
     solved = np.atleast_1d(np.isfinite(values).any(axis=0))
     lost = number_of(int((~solved).sum()), "sample")
     message = "" if solved.all() else f"{name} gives no values at {lost}"
-    engine = RecordedEngine(name, samples, as_is(case))
+    engine = RecordedEngine(name, samples, at_own_samples(case))
     return engine.report(case, solved, message)

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from ..case.case import TIME, Case, Quantity, Series, Sweep
-from ..case.io.reference_samples import DERIVATIVES
+from ..case.io.reference_samples import RATES
 from ..errors import shortened
 from ..harness.compare import Curve, curve_of, deviation
 from ..harness.suspects import slips
@@ -84,7 +84,7 @@ class _Off:
         return found - period * np.round((found - start) / period)
 
 
-def explained(
+def explain_slips(
     case: Case,
     found: Mapping[str, Series],
     columns: Mapping[str, Array],
@@ -180,7 +180,7 @@ class _Change:
                         continue
                     zeros = self._zeros(factor * x, reach)
                 for zero in zeros:
-                    if found := self.refined(unit, factor, zero, reach * max(1.0, abs(factor))):
+                    if found := self.refine_zero(unit, factor, zero, reach * max(1.0, abs(factor))):
                         yield found
 
     def _zeros(self, x: Array, reach: float) -> list[float]:
@@ -207,10 +207,10 @@ class _Change:
             if each.output.name not in curves:
                 return math.inf
             curve = np.interp(at, dense, curves[each.output.name].position)
-            total += self._signed(each, curve)[1] / (float(np.ptp(each.values)) or 1.0)
+            total += self._better_sign(each, curve)[1] / (float(np.ptp(each.values)) or 1.0)
         return float(np.nan_to_num(total, nan=np.inf))
 
-    def _signed(self, each: _Off, curve: Array) -> tuple[float, float]:
+    def _better_sign(self, each: _Off, curve: Array) -> tuple[float, float]:
         """Return the better sign of an output for a curve, and its rest."""
         free = self.free and each.column
         sizes = {
@@ -221,14 +221,14 @@ class _Change:
         sign = min(sizes, key=lambda k: float(np.nan_to_num(sizes[k], nan=np.inf)))
         return sign, sizes[sign]
 
-    def refined(self, unit: str, factor: float, first: float, reach: float) -> str:
+    def refine_zero(self, unit: str, factor: float, first: float, reach: float) -> str:
         """Return a phrase on the best zero within reach of the first, by Newton on exact curves;
         empty if an output is still out of tolerance.
         """
         zero = first
         for _ in range(_STEPS):
             # outputs that no motion has would send it thousands of turns away
-            rest = self._rest(factor, zero) if abs(zero - first) <= reach else None
+            rest = self._rests(factor, zero) if abs(zero - first) <= reach else None
             if rest is None:
                 return ""
             if all(each.fits(left - offset) for each, _, offset, left, _ in rest):
@@ -239,7 +239,7 @@ class _Change:
             zero += self.sweep.rate * float(row @ right) / (float(row @ row) or 1.0)
         return ""
 
-    def _rest(
+    def _rests(
         self, factor: float, zero: float
     ) -> list[tuple[_Off, float, float, Array, Array]] | None:
         """Return of each output its sign, its offset, its rest before the offset, and its rate;
@@ -251,7 +251,7 @@ class _Change:
             curve = curves.get(each.output.name)
             if curve is None or curve.velocity is None or not np.isfinite(curve.position).all():
                 return None
-            sign, _ = self._signed(each, curve.position)
+            sign, _ = self._better_sign(each, curve.position)
             left = each.left(curve.position, sign)
             offset = 0.5 * float(left.max() + left.min()) if self.free and each.column else 0.0
             rest.append((each, sign, offset, left, sign * curve.velocity))
@@ -268,7 +268,7 @@ class _Change:
         places = [math.remainder(exact, turn)] * (own.si == "rad") + [exact]
         for offset, decimals in product(dict.fromkeys(places), range(13)):
             short = round(offset, decimals)
-            rest = self._rest(factor, rate * (short * size - factor * own.offset))
+            rest = self._rests(factor, rate * (short * size - factor * own.offset))
             if rest is None:
                 continue
             maps = [_map(own, self.lead, factor * own.sign, short, unit)]
@@ -286,7 +286,7 @@ class _Change:
                     if sign < 0.0 or total != column.offset / column.size:
                         part = each.output.name, sign * column.sign, total, column.unit
                         maps.append(_map(column, *part))
-                    for key in (f"{each.output.name}{ending}" for ending in DERIVATIVES):
+                    for key in (f"{each.output.name}{ending}" for ending in RATES if ending):
                         if sign < 0.0 and (own_rate := self.stated.get(key)):
                             maps.append(_map(own_rate, key, -own_rate.sign, 0.0, own_rate.unit))
                 fits = fits and each.fits(left - middle)

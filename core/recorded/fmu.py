@@ -22,6 +22,7 @@ import numpy as np
 
 from ..case.case import TIME, Case
 from ..case.io.document import fault, read_bytes
+from ..case.io.reference_samples import RATES
 from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, KincheckError, brief, shortened
 from ..extras import how_to_install, installed_version
@@ -32,7 +33,7 @@ from .engine import RecordedEngine
 from .meaning import MAP, Meaning, Reader, Use, inputs_of, unit_of
 from .readers import Column, Head, Recording
 from .samples import samples_of
-from .sweep import as_is
+from .sweep import at_own_samples
 
 LARGEST_FMU, LARGEST_DESCRIPTION = 1_000_000_000, 64_000_000
 _REALS = ("Real", "Float64")
@@ -55,14 +56,15 @@ class FmuEngine:
     """An FMU behind the protocol of engines; see `Engine`.
 
     Attributes:
-        meaning: variables as drivers and outputs of the case.
+        inputs, outputs: variables as drivers and as outputs of the case, by their names.
         stepping: whether it is driven as a co-simulation, and not as a model.
     """
 
     file: Path
     case: Case
     variables: Sequence[Variable]
-    meaning: Meaning
+    inputs: Mapping[str, Use]
+    outputs: Mapping[str, Use]
     fmi: int
     tool: str
     token: str
@@ -81,12 +83,9 @@ class FmuEngine:
     def settings(self) -> Mapping[str, Any]:
         """File, kind, and variables by their meaning."""
         kind = "co-simulation" if self.stepping else "model exchange"
-        named = {name: self.variables[use.column].head.name for name, use in self._uses.items()}
+        uses = {**self.inputs, **self.outputs}
+        named = {name: self.variables[use.column].head.name for name, use in uses.items()}
         return {"file": self.file.name, "fmi": self.fmi, "kind": kind, "variables": named}
-
-    @property
-    def _uses(self) -> Mapping[str, Use]:
-        return self.meaning.numbers
 
     def version(self) -> str | None:
         """Return the tool behind the FMU, or None without FMPy."""
@@ -106,12 +105,11 @@ class FmuEngine:
         path = case.sweep.path
         order = np.argsort(path.times, kind="stable")
         times = path.times[order]
-        driven = [name for name in self._uses if name in inputs_of(case)]
         # a case of one driver has no time of its own, and few tools start before zero
-        start = float(times[0]) if driven else 0.0
+        start = float(times[0]) if self.inputs else 0.0
         found = self._run(case, times, start)
         half = np.zeros_like(found)
-        notes = self._notes(case, driven)
+        notes = self._notes()
         if self.stepping and len(times) > 1:
             between = np.sort(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
             finer = self._run(case, between, start)[::2]
@@ -120,33 +118,31 @@ class FmuEngine:
                 notes.append(f"{self.name}: half the step changes {self._changes(half)}")
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        outputs = {name: use for name, use in self._uses.items() if name not in driven}
         columns = {
             use.column: Column(self.variables[use.column].head, found[back, k], half[back, k])
-            for k, use in enumerate(outputs.values())
+            for k, use in enumerate(self.outputs.values())
         }
         recording = Recording(self.file, columns, self.tool, notes=notes)
-        samples = samples_of(case, recording, Meaning(outputs, {}), whole=True)
-        return RecordedEngine(self.name, samples, as_is(case)).report(case)
+        samples = samples_of(case, recording, Meaning(self.outputs, {}), whole=True)
+        return RecordedEngine(self.name, samples, at_own_samples(case)).report(case)
 
-    def _notes(self, case: Case, driven: Sequence[str]) -> list[str]:
+    def _notes(self) -> list[str]:
         """Return notes on inputs at their start values, and drivers without an input."""
-        taken = {self._uses[name].column for name in driven}
+        taken = {use.column for use in self.inputs.values()}
         left = [v.head.name for k, v in enumerate(self.variables) if v.free and k not in taken]
         notes = list[str]()
         if left:
             listed = shortened(left, MOST_NAMED)
             notes.append(f"{self.name}: inputs without a driver keep their start values: {listed}")
-        if not driven:
+        if not self.inputs:
             notes.append(f"{self.name}: no driver is an input: it moves by time alone")
         return notes
 
     def _changes(self, half: Array) -> str:
         """Return by how much half the step changes each output."""
-        names = [name for name in self._uses if name not in inputs_of(self.case)]
         sizes = (half.max(axis=0) / _SAFE).tolist()
-        each = zip(names, sizes, strict=True)
-        texts = [f"{n} by {value_text(f'{x:.2g}', self._uses[n].si)}" for n, x in each if x]
+        each = zip(self.outputs.items(), sizes, strict=True)
+        texts = [f"{n} by {value_text(f'{x:.2g}', use.si)}" for (n, use), x in each if x]
         return f"{shortened(texts, MOST_NAMED)}: twice as much is allowed"
 
     def _run(self, case: Case, times: Array, start: float) -> Array:
@@ -156,11 +152,7 @@ class FmuEngine:
         be one sample late.
         """
         reals, values = self._inputs(case, times)
-        wanted = [
-            self.variables[use.column].reference
-            for name, use in self._uses.items()
-            if name not in inputs_of(case)
-        ]
+        wanted = [self.variables[use.column].reference for use in self.outputs.values()]
         fmpy: Any = import_module("fmpy")
         module: Any = import_module(f"fmpy.fmi{self.fmi}")
         kind = f"FMU{self.fmi}{'Slave' if self.stepping else 'Model'}"
@@ -210,11 +202,10 @@ class FmuEngine:
         mechanism, path = case.mechanism, case.sweep.path
         references, values = list[int](), list[Array]()
         for driver in mechanism.drivers:
-            endings = ("", ".velocity", ".acceleration")
             orders = path.drive([driver.name], times)[:, 0]
             design = (mechanism.design_value(driver.name), 0.0, 0.0)
-            for ending, x, zero in zip(endings, orders, design, strict=True):
-                use = self._uses.get(driver.name + ending)
+            for ending, x, zero in zip(RATES, orders, design, strict=True):
+                use = self.inputs.get(driver.name + ending)
                 if use is not None:
                     variable = self.variables[use.column]
                     _, size, offset = unit_of(self.file, variable.head, use)
@@ -246,9 +237,9 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
     kinds = {
         kind: each.attributes.get("modelIdentifier", "")
         for kind in ("ModelExchange", "CoSimulation")
-        for each in root.only(kind)
+        for each in root.findall(kind)
     }
-    states = any(True for s in root.only("ModelStructure") for _ in _states(s, fmi))
+    states = any(True for s in root.findall("ModelStructure") for _ in _states(s, fmi))
     stepping = "CoSimulation" in kinds and (states or "ModelExchange" not in kinds)
     if not stepping and (states or "ModelExchange" not in kinds):
         problem = (
@@ -257,8 +248,10 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
         raise fault(file, "", f"{problem}; export it for co-simulation")
     variables = _variables(root)
     meaning = Reader(file, case, [each.head for each in variables]).read(maps)
-    inputs = inputs_of(case)
     numbers = {name: use for name, use in meaning.numbers.items() if name != TIME}
+    known = inputs_of(case)
+    inputs = {name: use for name, use in numbers.items() if name in known}
+    outputs = {name: use for name, use in numbers.items() if name not in known}
     for name, use in numbers.items():
         head = variables[use.column].head
         if name in inputs and not variables[use.column].free:
@@ -268,12 +261,12 @@ def read_fmu(file: Path, case: Case, maps: Sequence[str]) -> FmuEngine:
             problem = f"found no unit of {head.name}, expected one of {use.si}"
             raise fault(file, MAP, f'{problem}; say {MAP} "{head.name}={name} [UNIT]"')
         unit_of(file, head, use)
-    if not {*numbers} - {*inputs}:
-        known = shortened([v.head.name for v in variables if not v.free], MOST_NAMED)
-        problem = f"found no output of the case among {known}, expected one"
+    if not outputs:
+        listed = shortened([v.head.name for v in variables if not v.free], MOST_NAMED)
+        problem = f"found no output of the case among {listed}, expected one"
         raise fault(file, MAP, f'{problem}; say {MAP} "VARIABLE=OUTPUT"')
     identifier = kinds["CoSimulation" if stepping else "ModelExchange"]
-    found = tuple(variables), Meaning(numbers, {}), fmi, tool, token, identifier, stepping
+    found = tuple(variables), inputs, outputs, fmi, tool, token, identifier, stepping
     return FmuEngine(file, case, *found)
 
 
@@ -309,20 +302,20 @@ def _require_binary(file: Path, names: Sequence[str], fmi: int) -> None:
 
 def _states(structure: Element, fmi: int) -> Sequence[Element]:
     if fmi == 2:
-        return [u for each in structure.only("Derivatives") for u in each.only("Unknown")]
-    return [*structure.only("ContinuousStateDerivative")]
+        return [u for each in structure.findall("Derivatives") for u in each.findall("Unknown")]
+    return [*structure.findall("ContinuousStateDerivative")]
 
 
 def _variables(root: Element) -> list[Variable]:
     """Return the numbers of an FMU that change over time."""
     units = {
         kind.attributes.get("name", ""): real.attributes.get("unit", "")
-        for types in root.only("TypeDefinitions")
+        for types in root.findall("TypeDefinitions")
         for kind in types.children
-        for real in ([kind] if kind.tag == "Float64Type" else kind.only("Real"))
+        for real in ([kind] if kind.tag == "Float64Type" else kind.findall("Real"))
     }
     found = list[Variable]()
-    for each in (v for variables in root.only("ModelVariables") for v in variables.children):
+    for each in (v for variables in root.findall("ModelVariables") for v in variables.children):
         kinds = [each] if each.tag in _REALS else [e for e in each.children if e.tag in _REALS]
         own = each.attributes
         if not kinds or own.get("causality") in ("parameter", "calculatedParameter", "independent"):

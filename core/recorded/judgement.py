@@ -20,7 +20,7 @@ from ..kinematics import Needed, Residuals, Worst, needed_forces, replayed
 from ..mechanism.mechanism import Mechanism
 from ..trajectory import PER_TIME, QUANTITIES, Array, BodyMotion
 from ..unit_text import value_text
-from .meaning import REACTIONS, Accuracy, Meaning, readings
+from .meaning import REACTIONS, Accuracy, Meaning, all_readings
 from .samples import Samples, driven_angles, samples_of
 
 # A wrong reading leaves far more than a right one: the digits of those that leave less than this
@@ -62,7 +62,7 @@ def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
         left: Array = getattr(found, quantity)
         largest[quantity] = float(np.nanmax(np.abs(left)))
         if worst.value > worst.allowed:
-            fits = _fitting(case, samples, allowed["position"]) if not faults else ""
+            fits = _fitting_readings(case, samples, allowed["position"]) if not faults else ""
             faults.append(
                 _sentence(found, quantity, worst, allowed[quantity], f"m{per_time}") + fits
             )
@@ -118,7 +118,7 @@ def _sentence(found: Residuals, quantity: str, worst: Worst, tolerance: float, u
     return text + (": suspect the recording" if count == 1 else "")
 
 
-def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
+def _fitting_readings(case: Case, samples: Samples, tolerance: float) -> str:
     """Return a phrase with all other readings of the attitudes, and units of the positions, with
     which the poses satisfy the rows; empty without any.
     """
@@ -128,7 +128,7 @@ def _fitting(case: Case, samples: Samples, tolerance: float) -> str:
     meaning = samples.meaning
     changes = dict[str, Meaning]()
     for count in {len(pose.groups["attitude"]) for pose in meaning.bodies.values()}:
-        for reading in readings(count):
+        for reading in all_readings(count):
             bodies = {
                 name: replace(pose, reading=reading)
                 if len(pose.groups["attitude"]) == count
@@ -195,9 +195,9 @@ def judge_forces(
     # a kinematic analysis has a motion for each freedom, whatever the model says
     unforced = () if samples.recording.kinematic else case.unforced
     drivers = [each for each in mechanism.drivers if each.name not in unforced]
-    judge = _Judge(replace(mechanism, drivers=drivers), samples, whole)
+    forces = _Judge(replace(mechanism, drivers=drivers), samples, whole)
     share = CONSTRAINED + accuracy.shares.get("acceleration", 0.0)
-    return judge.judged(share, size(case))
+    return forces.judge(share, size(case))
 
 
 class _Judge:
@@ -221,7 +221,7 @@ class _Judge:
             at[name] = BodyMotion(m.r[rows], m.p[rows], m.v[rows], m.a[rows])
         return needed_forces(self.mechanism, at, self.times[rows])
 
-    def judged(self, share: float, extent: float) -> tuple[dict[str, float], list[str]]:
+    def judge(self, share: float, extent: float) -> tuple[dict[str, float], list[str]]:
         """Return the largest differences and the faults.
 
         Args:
@@ -268,14 +268,14 @@ class _Judge:
 
     def _digits(self, what: str, rows: Rows) -> Array:
         """Return by how much the digits of the recorded motion move a difference at samples."""
-        base = self._named(self.motions, what, rows)
+        base = self._difference(self.motions, what, rows)
         total = np.zeros(len(rows))
         for name, moved in self.samples.moved.items():
             for motion in moved if name in self.motions else ():
-                total += np.abs(self._named({**self.motions, name: motion}, what, rows) - base)
+                total += np.abs(self._difference({**self.motions, name: motion}, what, rows) - base)
         return np.nan_to_num(total)
 
-    def _named(self, motions: Mapping[str, BodyMotion], what: str, rows: Rows) -> Array:
+    def _difference(self, motions: Mapping[str, BodyMotion], what: str, rows: Rows) -> Array:
         found = self._differences(self._at(motions, rows), rows)
         return next(values for name, _, values, _ in found if name == what)
 

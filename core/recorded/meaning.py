@@ -20,8 +20,8 @@ import numpy as np
 from ..algebra import Quat, Vec3, X, Y, Z, quat
 from ..case.case import TIME, Case, Quantity
 from ..case.io.document import decimal, fault, require_known, shown, unknown_name
-from ..case.io.reference_samples import DERIVATIVES, known_columns
-from ..case.io.table import read_unit, required_unit
+from ..case.io.reference_samples import RATES, known_columns
+from ..case.io.table import read_unit, require_unit
 from ..errors import MOST_NAMED, brief, shortened
 from ..trajectory import QUANTITIES, Array
 from .readers import Column, Head, Recording
@@ -80,7 +80,7 @@ class Reading:
             return found / np.linalg.norm(found, axis=1)[:, None]
 
 
-def readings(count: int) -> list[Reading]:
+def all_readings(count: int) -> list[Reading]:
     """Return all readings of three angles or of four parts of a quaternion."""
     flags = (False, True)
     if count == 4:
@@ -91,8 +91,8 @@ def readings(count: int) -> list[Reading]:
 MAP = "--map"
 EVENT = "event"
 _AXES = {"x": "1", "y": "2", "z": "3"}
-_RATES = {"velocity": "m/s", "omega": "rad/s", "acceleration": "m/s^2", "alpha": "rad/s^2"}
-_UNITS = {"position": "m", "attitude": "rad", **_RATES}
+_OF_MOTION = {"velocity": "m/s", "omega": "rad/s", "acceleration": "m/s^2", "alpha": "rad/s^2"}
+_UNITS = {"position": "m", "attitude": "rad", **_OF_MOTION}
 _ADAMS = {
     "position": ("X", "Y", "Z"),
     "attitude": ("PSI", "THETA", "PHI"),
@@ -184,8 +184,7 @@ def inputs_of(case: Case) -> dict[str, str]:
     units = {TIME: "s"}
     for driver in case.mechanism.drivers:
         si = "rad" if driver.turns else "m"
-        rates = zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
-        units |= {driver.name + ending: si + per for ending, per in rates}
+        units |= {driver.name + ending: si + per for ending, per in RATES.items()}
     return units
 
 
@@ -232,8 +231,8 @@ class Reader:
                 name, use = self._number(text, left, right)
                 numbers[name] = use
         taken = {use.column for use in Meaning(numbers, bodies).uses}
-        numbers |= self._named(numbers, taken)
-        bodies |= {name: pose for name, pose in self._posed(prefixes) if name not in bodies}
+        numbers |= self._columns_by_name(numbers, taken)
+        bodies |= {name: pose for name, pose in self._poses_by_name(prefixes) if name not in bodies}
         for body, prefix in prefixes.items():
             if prefix != body and body not in bodies:
                 problem = f"found no pose of {body} in columns of known names below {shown(prefix)}"
@@ -248,7 +247,7 @@ class Reader:
     def _fault(self, problem: str) -> Exception:
         return fault(self.file, MAP, problem)
 
-    def _named(self, stated: Collection[str], taken: Collection[int]) -> dict[str, Use]:
+    def _columns_by_name(self, stated: Collection[str], taken: Collection[int]) -> dict[str, Use]:
         """Return the columns with names of quantities, but for capitals and separators."""
         found = dict[str, Use]()
         names = {_normal(name): name for name in self.targets}
@@ -318,7 +317,7 @@ class Reader:
             if key in ("euler", "quaternion"):
                 reading, names = self._reading(key, names)
                 what, si, count = "attitude", *(("rad", 3) if reading.angles else ("1", 4))
-            elif key in _RATES:
+            elif key in _OF_MOTION:
                 turned += [key] * ("body" in names)
                 names = [name for name in names if name != "body"]
             elif key != "position":
@@ -356,7 +355,7 @@ class Reader:
             raise self._fault(f"found frame {shown(' '.join(words))}, expected {expected}")
         return found
 
-    def _posed(self, prefixes: Mapping[str, str]) -> Iterator[tuple[str, Pose]]:
+    def _poses_by_name(self, prefixes: Mapping[str, str]) -> Iterator[tuple[str, Pose]]:
         """Yield the poses of columns by their names: of Adams, or PREFIX.x, .y, .z with the
         parts of a quaternion; the prefix of a body is its name, or that of --map.
         """
@@ -419,7 +418,7 @@ def unit_of(file: Path, head: Head, use: Use, angle: str = "") -> tuple[str, flo
     """
 
     def size_of(unit: str) -> float:
-        return required_unit(file, "", head.name, unit, use.si).convert(1.0)
+        return require_unit(file, "", head.name, unit, use.si).convert(1.0)
 
     own = head.unit or use.si.replace("rad", angle or "rad")
     stated = use.unit or own
@@ -483,7 +482,7 @@ def read_accuracy(file: Path, case: Case, texts: Sequence[str]) -> Accuracy:
                 file, ACCURACY, f"found {shown(text)}, expected a positive number; {ACCURACY_FORM}"
             )
         if unit.strip():
-            sizes[name] = required_unit(file, ACCURACY, name, unit.strip(), units[name]).convert(
+            sizes[name] = require_unit(file, ACCURACY, name, unit.strip(), units[name]).convert(
                 found
             )
         else:

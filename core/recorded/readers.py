@@ -20,7 +20,7 @@ import numpy as np
 
 from ..case.curves import Printed
 from ..case.io.document import decimal, fault, read_bytes, read_text, shown
-from ..case.io.reference_samples import layout_of, read_table, samples_of
+from ..case.io.reference_samples import RATES, layout_of, read_table, samples_of
 from ..case.io.table import Table, unit_of_head
 from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, CaseError, brief, remedy, shortened
@@ -105,7 +105,7 @@ def _of_mat(file: Path, choose: Choose) -> Recording:
         raise fault(file, "", "found a MAT-file of version 7.3; in MATLAB: save(..., '-v7')")
     try:
         # scipy tells the level so
-        if data[:4].count(0) == 0 and _unpacked(data) > LARGEST_FILE:
+        if data[:4].count(0) == 0 and _unpacked_size(data) > LARGEST_FILE:
             raise fault(file, "", f"found more than {LARGEST_FILE} bytes when unpacked; {LESS}")
         scipy_io: Any = import_module("scipy.io")  # slow to import
         found: dict[str, Any] = scipy_io.loadmat(io.BytesIO(data), chars_as_strings=False)
@@ -122,7 +122,7 @@ def _of_mat(file: Path, choose: Choose) -> Recording:
     return Recording(file, columns, "Modelica" if modelica else "MATLAB")
 
 
-def _unpacked(data: bytes) -> int:
+def _unpacked_size(data: bytes) -> int:
     """Return the size of the compressed elements of level 5, unpacked to just above the largest.
 
     Raises:
@@ -279,7 +279,7 @@ def read_recording(
 
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     opensim = file.suffix.lower() in _OPENSIM
-    table = _widened(read_table(file, sheet, "--sheet NAME", _END if opensim else ""))
+    table = _wide_table(read_table(file, sheet, "--sheet NAME", _END if opensim else ""))
     layout = layout_of(table)
     chosen = choose([Head(*unit_of_head(file, layout.where, text)) for text in layout.heads])
     samples = samples_of(table, chosen, remarks=True, gaps=True)
@@ -301,7 +301,7 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
     return Recording(file, columns, "OpenSim", angle, [note, *notes])
 
 
-def _widened(table: Table) -> Table:
+def _wide_table(table: Table) -> Table:
     """Return a table with a row for each output, as `run --csv --long` writes, with a row for each
     sample; others as they are.
 
@@ -317,7 +317,7 @@ def _widened(table: Table) -> Table:
         at = dict(zip(heads, map(str, cells), strict=False))
         name, unit = at["output"], at["unit"]
         found = {f"{at['driver']} [{at['driver_unit']}]": at["driver_value"]}
-        for what, time in zip(("", ".velocity", ".acceleration"), ("", "/s", "/s^2"), strict=True):
+        for what, time in RATES.items():
             value = at[what.removeprefix(".") or "position"]
             if value or not what:
                 found[f"{name}{what} [{unit}{time}]"] = value
@@ -346,8 +346,8 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
         raise root.fault("found another document, expected <Results> of Adams; give its .res")
     found = {
         (analysis.attributes.get("name", ""), data.attributes.get("name", "")): (analysis, data)
-        for analysis in root.only("Analysis")
-        for data in analysis.only("Data")
+        for analysis in root.findall("Analysis")
+        for data in analysis.findall("Data")
         if not data.attributes.get("name", "").startswith(_NO_MOTION)
     }
     names = {key: key[1] for key in found}
@@ -360,7 +360,7 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
         raise fault(file, "--analysis", f"found the analyses {listed}, expected one; {advice}")
     analysis, data = found[chosen[0]]
     heads = _heads(analysis)
-    steps = [(step, step.text.split()) for step in data.only("Step")]
+    steps = [(step, step.text.split()) for step in data.findall("Step")]
     for step, numbers in steps:
         if len(numbers) < max(heads, default=0):
             problem = f"found {len(numbers)} numbers, expected {max(heads)}, one a component"
@@ -379,14 +379,14 @@ def _of_adams(file: Path, choose: Choose, wanted: str | None) -> Recording:
 def _heads(analysis: Element) -> Mapping[int, Head]:
     """Return the heads of components by their ids."""
     found = dict[int, Head]()
-    for entity in (each for map_ in analysis.only("StepMap") for each in map_.only("Entity")):
+    for entity in (each for map_ in analysis.findall("StepMap") for each in map_.findall("Entity")):
         name = entity.attributes.get("name", "")
         part = (
             entity.attributes.get("entity", ""),
             name.removesuffix(_POSE),
             f"PART_{entity.attributes.get('objectId', '')}",
         )
-        for each in entity.only("Component"):
+        for each in entity.findall("Component"):
             number = each.attributes.get("id", "")
             if not (number.isascii() and number.isdigit() and 0 < len(number) < 9 and int(number)):
                 problem = f"id: found {shown(number)}, expected a whole number from 1"

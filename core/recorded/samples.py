@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..algebra import ZERO, Vec3, cross, quat, vec
 from ..case.case import TIME, Case, Quantity
-from ..case.curves import even_steps, multiples
+from ..case.curves import are_even_steps, have_common_factor
 from ..case.io.document import fault, shown
 from ..case.measures import coordinate_of
 from ..case.quantity import with_markers
@@ -94,8 +94,8 @@ def samples_of(
     notes = [*recording.notes]
     kept = recording
     if not whole:
-        notes += _assumed(recording, meaning)
-        kept = replace(recording, columns=_kept(case, recording, meaning, notes))
+        notes += _notes_on_units(recording, meaning)
+        kept = replace(recording, columns=_columns_of_samples(case, recording, meaning, notes))
     numbers = {name: si_values(kept, use) for name, use in meaning.numbers.items()}
     motions = dict[str, BodyMotion]()
     moved = dict[str, list[BodyMotion]]()
@@ -115,7 +115,7 @@ def samples_of(
                 if pose.frame is None and what in ("position", "attitude"):
                     moved[name].append(motion_of(body, pose, given, changed))
     found = Samples(kept, meaning, numbers, motions, moved, [*dict.fromkeys(notes)])
-    there = _driven(case, found)
+    there = _known_drivers(case, found)
     if whole or there.all() or not there.any():
         return found
     rows = np.flatnonzero(there)
@@ -126,7 +126,7 @@ def samples_of(
     return samples_of(case, rest, meaning, digits=digits)
 
 
-def _assumed(recording: Recording, meaning: Meaning) -> Iterator[str]:
+def _notes_on_units(recording: Recording, meaning: Meaning) -> Iterator[str]:
     """Yield a note on columns whose unit neither the file nor --map states."""
     bare = {
         recording.columns[use.column].head.name: use.si
@@ -146,7 +146,7 @@ def _assumed(recording: Recording, meaning: Meaning) -> Iterator[str]:
         yield f"{recording.file}: columns without a unit are taken in {units}: {names}"
 
 
-def _driven(case: Case, samples: Samples) -> NDArray[np.bool_]:
+def _known_drivers(case: Case, samples: Samples) -> NDArray[np.bool_]:
     """Return at which samples all drivers are known whose motion the poses tell."""
     there = np.ones(samples.count, dtype=np.bool_)
     for driver in case.mechanism.drivers:
@@ -156,7 +156,7 @@ def _driven(case: Case, samples: Samples) -> NDArray[np.bool_]:
     return there
 
 
-def _kept(
+def _columns_of_samples(
     case: Case, recording: Recording, meaning: Meaning, notes: list[str]
 ) -> Mapping[int, Column]:
     """Return the columns without samples that have no time or driver value, and with one row at
@@ -188,24 +188,24 @@ def _kept(
             notes.append(f"{file}: merged {number_of(again.size, 'row')} at the time of another")
     if not len(rows):
         raise fault(file, "", "found no samples, expected rows of numbers; record the motion anew")
-    exact = {k for k in leading if _set(columns[k])}
+    exact = {k for k in leading if _is_set(columns[k])}
     return {
         k: Column(c.head, c.values[rows], c.half[rows] * (k not in exact))
         for k, c in columns.items()
     }
 
 
-def _set(column: Column) -> bool:
+def _is_set(column: Column) -> bool:
     """Return whether somebody set the values of time or a driver, so that they are not rounded: an
     even grid, forth or back, or multiples of one number.
     """
     steps = np.abs(np.diff(column.values))
     steps = steps[steps > 0.0]
-    if len(steps) >= FEWEST and even_steps(steps):
+    if len(steps) >= FEWEST and are_even_steps(steps):
         return True
     known, half = column.values[np.isfinite(column.values)], column.half[column.half > 0.0]
     decimals = round(-math.log10(2.0 * half.min())) if half.size else 0
-    return len(known) >= MANY and multiples(known, decimals)
+    return len(known) >= MANY and have_common_factor(known, decimals)
 
 
 def _require_equal(
@@ -236,13 +236,13 @@ def motion_of(
         first: those whose first sample is the design pose, if the frame is known by it.
     """
 
-    def placed(numbers: Mapping[str, Sequence[Array]]) -> tuple[Array, Array]:
+    def frame_pose(numbers: Mapping[str, Sequence[Array]]) -> tuple[Array, Array]:
         return np.stack(numbers["position"], axis=-1), pose.reading.parameters(numbers["attitude"])
 
-    r, p = placed(given)
+    r, p = frame_pose(given)
     r_0, p_0 = body.origin, body.euler_parameters
     if pose.frame is None:
-        r_all, p_all = placed(first or given)
+        r_all, p_all = frame_pose(first or given)
         k = int(np.argmax(np.isfinite(r_all).all(axis=1) & np.isfinite(p_all).all(axis=1)))
         r_0, p_0 = r_all[k].tolist(), p_all[k].tolist()
     elif pose.frame:

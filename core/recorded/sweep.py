@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import TIME, Case, Series, Sweep, Truth
-from ..case.curves import matched
+from ..case.curves import match_rows
 from ..case.io.document import fault, shown
+from ..case.io.reference_samples import RATES
 from ..case.io.schema import MOST_SAMPLES
 from ..kinematics import TURN, begun_turns
 from ..mechanism.motions import Absolute, JointDriver, Motion, Table
@@ -87,7 +88,7 @@ class Resampled:
     values: Sweep
 
 
-def as_is(case: Case) -> Resampled:
+def at_own_samples(case: Case) -> Resampled:
     """Return a case at its own samples."""
     return Resampled(case, True, (), (), "", case.sweep)
 
@@ -124,7 +125,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
         found = replace(sweep, values=start + rate * time.values)
         notes.append(f"{file}: drivers at the recorded times{words}")
         moved = replace(found, values=found.values + rate * time.half)
-        return _swept(Resampled(case, True, [moved], notes, TIME, found), found)
+        return _with_sweep(Resampled(case, True, [moved], notes, TIME, found), found)
     if lead not in followed:
         problem = f"found no motion of a driver, expected time, the driver {lead}, or the poses"
         raise fault(file, "", f'{problem} of its bodies; say {MAP} "{lead}=COLUMN"')
@@ -137,7 +138,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
     if alone and (time is None or rates or samples.count == 1):
         moved = [replace(values, values=values.values + drive.halves[0])]
         rated = not timed and (rates or time is None)
-        return _swept(Resampled(case, rated, moved, notes, column, values), values)
+        return _with_sweep(Resampled(case, rated, moved, notes, column, values), values)
     lacking = [] if timed else [name for name in sweep.motions if name not in followed]
     if lacking:
         problem = f"found no motion of the driver {lacking[0]}, expected that of all"
@@ -153,7 +154,7 @@ def at_samples(case: Case, samples: Samples) -> Resampled:
         for name, each in followed.items()
         for order in range(len(each.orders))
     ]
-    return _swept(Resampled(case, rated, variants, notes, column, values), found)
+    return _with_sweep(Resampled(case, rated, variants, notes, column, values), found)
 
 
 def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
@@ -161,10 +162,7 @@ def _drives(case: Case, samples: Samples) -> dict[str, Drive]:
     found = dict[str, Drive]()
     begun = begun_turns(case.mechanism, samples.motions)
     for driver in case.mechanism.drivers:
-        columns = [
-            samples.numbers.get(driver.name + ending)
-            for ending in ("", ".velocity", ".acceleration")
-        ]
+        columns = [samples.numbers.get(driver.name + ending) for ending in RATES]
         known = [each for each in columns if each is not None]
         if columns[0] is not None:
             known = known if len(known) == 3 else known[:1]
@@ -230,13 +228,13 @@ def _motions(
     return found
 
 
-def _swept(whole: Resampled, sweep: Sweep) -> Resampled:
+def _with_sweep(whole: Resampled, sweep: Sweep) -> Resampled:
     """Return the case with a sweep, and with its reference if that has all its samples."""
     case = whole.case
     found = replace(case, sweep=sweep)
     if case.reference:
         allowed = SAME * float(np.abs(case.sweep.values).max())
-        index = matched(sweep.values, case.sweep.values, allowed)
+        index = match_rows(sweep.values, case.sweep.values, allowed)
         if sweep.driver != case.sweep.driver or index is None:
             note = f"{case.name}: its reference is at other samples, and is not interpolated"
             found = replace(found, reference={}, origin=None, truth=Truth.CONSENSUS_ONLY)

@@ -20,7 +20,7 @@ from ..algebra import Vec3
 from ..case.case import HELD_BUT, Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..case.measures import Orientation
-from ..case.turns import oriented, turns_of
+from ..case.turns import orient_from_design, turns_of
 from ..forces import DETERMINED, Forces, Reaction
 from ..harness.compare import output_series
 from ..jet import Jet
@@ -365,7 +365,9 @@ def _counted(
 ) -> Jet:
     """Return an output, an angle or an orientation with its turns along the path."""
     if isinstance(output, Orientation):
-        return oriented(case.mechanism, case.sweep.path, output, at, design, np.array(proved))
+        return orient_from_design(
+            case.mechanism, case.sweep.path, output, at, design, np.array(proved)
+        )
     jet = output.of(at, design)
     if not output.period:
         return jet

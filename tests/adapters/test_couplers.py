@@ -7,12 +7,12 @@ import kincheck
 import numpy as np
 import pytest
 from kincheck import adapters
+from kincheck.cases.jet import Jet, cos, sin, steady
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.models.undriven import undriven_case, undriven_file
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import (
-    ConstantVelocity,
     Cylindrical,
     Distance,
     Gear,
@@ -20,7 +20,6 @@ from kincheck.core.joints import (
     RackPinion,
     Revolute,
     Screw,
-    Spherical,
     Translational,
     Universal,
 )
@@ -35,21 +34,23 @@ from ..support.engine_motion import (
     assert_motion,
     installed,
     mechanism_of,
+    planar,
     rotation,
     solved,
     tolerances,
 )
+from ..support.mechanisms import ORIGIN, X, Z
 
 TURNS = np.linspace(-7.0, 7.0, 29)
-AXIS, TIP, Z = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4]), (0.0, 0.0, 1.0)
+AXIS, TIP = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4])
 
 
 @ENGINES
-def test_a_nut_that_a_guide_keeps_from_turning(engine):
+def test_screw_with_guided_nut_moves_exactly(engine):
     """A shaft in bearings drives a nut: of the 15 rows of the loop four say what others say."""
     joints = [
-        Revolute("bearing", "ground", "shaft", (0.0, 0.0, 0.0), AXIS),
-        Screw("thread", "nut", "shaft", (0.0, 0.0, 0.0), AXIS, 0.1),
+        Revolute("bearing", "ground", "shaft", ORIGIN, AXIS),
+        Screw("thread", "nut", "shaft", ORIGIN, AXIS, 0.1),
         Translational("guide", "ground", "nut", (0.2, 0.0, 0.1), AXIS),
     ]
     mechanism = mechanism_of(joints, {"tip": ("nut", TIP)}, [JointAngle("turn", "bearing")])
@@ -59,16 +60,16 @@ def test_a_nut_that_a_guide_keeps_from_turning(engine):
 
 
 @IN_TREE_OR_CUT
-def test_a_train_of_gears_with_a_rack(engine, closing):
+def test_gear_train_with_rack_moves_exactly(engine, closing):
     """A bearing that names its shaft first has the other sign of rotation. The last wheel slides
     too, as driven.
     """
     cut = ["b", "c", "rail"] if closing else []
     joints = [
-        Revolute("a", "ground", "A", (0.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
+        Revolute("a", "ground", "A", ORIGIN, (0.0, 0.0, 2.0)),
         Revolute("b", "B", "ground", (0.4, 0.0, 0.0), (0.0, 0.0, 2.0)),
-        Cylindrical("c", "ground", "C", (1.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
-        Translational("rail", "ground", "R", (1.0, 0.2, 0.0), (1.0, 0.0, 0.0)),
+        Cylindrical("c", "ground", "C", X, (0.0, 0.0, 2.0)),
+        Translational("rail", "ground", "R", (1.0, 0.2, 0.0), X),
     ]
     ends = {"A": (0.1, 0.0, 0.0), "B": (0.6, 0.0, 0.0), "C": (1.0, 0.1, 0.0), "R": (1.0, 0.2, 0.0)}
     couplers = [
@@ -96,62 +97,29 @@ def test_a_train_of_gears_with_a_rack(engine, closing):
 
 @ENGINES
 @pytest.mark.parametrize("ratio", [2.0, -0.3])
-def test_planetary_gear(ratio, engine):
+def test_planetary_gear_turns_exactly(ratio, engine):
     """The planet turns on its carrier, and rolls on a fixed sun: by the ratio more than it."""
-    hub, tip = (0.3, 0.0, 0.0), (0.4, 0.0, 0.0)
+    hub, tip = np.array([0.3, 0.0, 0.0]), np.array([0.4, 0.0, 0.0])
     joints = [
-        Revolute("main", "ground", "carrier", (0.0, 0.0, 0.0), Z),
-        Revolute("hub", "carrier", "planet", hub, Z),
+        Revolute("main", "ground", "carrier", ORIGIN, Z),
+        Revolute("hub", "carrier", "planet", tuple(hub), Z),
     ]
-    mechanism = mechanism_of(
-        joints,
-        {"tip": ("planet", tip)},
-        [JointAngle("turn", "main")],
-        [Gear("teeth", ("hub", "main"), ratio)],
-    )
-    spin = rotation(Z, (1.0 + ratio) * TURNS) @ np.subtract(tip, hub)
-    expected = rotation(Z, TURNS) @ hub + spin
+    gear, driver = Gear("teeth", ("hub", "main"), ratio), JointAngle("turn", "main")
+    mechanism = mechanism_of(joints, {"tip": ("planet", tip)}, [driver], [gear])
+    expected = rotation(Z, TURNS) @ hub + rotation(Z, (1.0 + ratio) * TURNS) @ (tip - hub)
     assert_motion(solved(engine, mechanism, TURNS).points["tip"], expected)
 
 
 @IN_TREE_OR_CUT
-def test_a_steering_gear(engine, closing):
-    """The pinion moves the rack, each end of which turns a wheel by a tie rod that cannot spin."""
-    joints = [
-        Revolute("column", "ground", "pinion", (0.2, 0.1, 0.3), (1.0, 0.2, 0.5)),
-        Translational("rail", "rack", "ground", (0.2, 0.0, 0.2), (0.0, 1.0, 0.0)),
-    ]
-    points = {"end": ("rack", (0.2, 0.35, 0.2))}
-    for side in (-1.0, 1.0):
-        wheel, rod = f"wheel {side:g}", f"rod {side:g}"
-        inner, outer = (0.2, 0.35 * side, 0.2), (0.15, 0.65 * side, 0.15)
-        pin = (0.0, 0.7 * side, 0.1), (-0.1, -0.2 * side, 1.0)
-        axes = ((0.0, side, 0.0), tuple(np.subtract(outer, inner)))
-        joints += [
-            Revolute(f"kingpin {side:g}", "ground", wheel, *pin),
-            ConstantVelocity(f"inner {side:g}", "rack", rod, inner, axes),
-            Spherical(f"outer {side:g}", rod, wheel, outer),
-        ]
-        points[wheel] = wheel, (0.1, 0.8 * side, 0.0)
-        points[rod] = rod, (0.2, 0.5 * side, 0.3)
-    gear = RackPinion("gear", ("column", "rail"), 0.008)
-    mechanism = mechanism_of(joints, points, [JointAngle("turn", "column")], [gear])
-    turn = np.linspace(-6.0, 6.0, 13)
-    found = assert_as_native(engine, mechanism, turn, cut=["rail"] if closing else [])
-    expected = np.array([0.2, 0.35, 0.2]) - np.outer(0.008 * turn, [0.0, 1.0, 0.0])
-    assert_motion(found.points["end"], expected)
-
-
-@IN_TREE_OR_CUT
 @pytest.mark.parametrize("bodies", [("spindle", "nut"), ("nut", "spindle")])
-def test_a_spindle_lifts_a_lever(bodies, engine, closing):
+def test_screw_in_loop_moves_as_native(bodies, engine, closing):
     """A thread in a closed loop in space, between two Hooke's joints that let the spindle swing;
     over several turns.
 
     With the thread cut, bodies that turn about several moving axes carry it: the only place where
     its angle has a bias.
     """
-    along, eye, foot = (0.1, 0.2, 1.0), (0.05, 0.1, 0.5), (0.0, 0.0, 0.0)
+    along, eye, foot = (0.1, 0.2, 1.0), (0.05, 0.1, 0.5), ORIGIN
     joints = [
         Universal("base", "ground", "housing", foot, ((1.0, 0.0, -0.1), (0.02, 1.0, 0.2))),
         Revolute("bearing", "housing", "spindle", foot, along),
@@ -177,13 +145,13 @@ def train(reverse):
     pinion on it, and its rack.
     """
     joints = [
-        Revolute("carrier", "ground", "frame", (0.0, 0.0, 0.0), Z),
+        Revolute("carrier", "ground", "frame", ORIGIN, Z),
         Revolute("input", "frame", "wheel", (0.2, 0.0, 0.0), Z),
         Revolute("middle", "frame", "double", (0.5, 0.0, 0.0), Z),
-        Translational("guide", "frame", "rack", (0.5, -0.05, 0.0), (1.0, 0.0, 0.0)),
+        Translational("guide", "frame", "rack", (0.5, -0.05, 0.0), X),
     ]
     joints = [joint.reversed() if joint.name in reverse else joint for joint in joints]
-    points = {"wheel": (0.3, 0.0, 0.0), "double": (0.5, 0.2, 0.1), "rack": (0.4, -0.05, 0.0)}
+    points = {"wheel": (0.3, 0.0, 0.0), "double": (0.5, 0.2, 0.0), "rack": (0.4, -0.05, 0.0)}
     sign = {name: -1.0 if name in reverse else 1.0 for name in ("input", "middle", "guide")}
     couplers = [
         Gear("mesh", ("input", "middle"), -2.0 * sign["input"] * sign["middle"]),
@@ -196,7 +164,7 @@ def train(reverse):
 @ENGINES
 @pytest.mark.parametrize("reverse", [(), ("input",), ("middle", "guide")])
 @pytest.mark.parametrize("driver", ["in", "middle", "rack"])
-def test_gears_and_a_rack_on_a_carrier(driver, reverse, engine):
+def test_gears_and_rack_on_turning_carrier(driver, reverse, engine):
     """Driven at the input, in the middle and from the rack; the carrier turns with it, which adds
     to all wheels alike.
     """
@@ -211,42 +179,29 @@ def test_gears_and_a_rack_on_a_carrier(driver, reverse, engine):
     mechanism = replace(mechanism, drivers=[swept, *mechanism.drivers])
     motions = {"turn": Sine(0.5, 0.1)}
     found = solved(engine, mechanism, factor * angle, factor, motions=motions)
-    swing = np.stack(Sine(0.5, 0.1).at(angle))
-    one, none = np.ones_like(angle), np.zeros_like(angle)
-
-    def turning(arm, turn):
-        """Position, velocity, acceleration of arm e^(i turn) as complex numbers."""
-        return (
-            arm * np.exp(1j * turn[0]) * np.stack([one, 1j * turn[1], 1j * turn[2] - turn[1] ** 2])
-        )
-
-    wheel, double = swing + [angle, one, none], swing + [-0.5 * angle, -0.5 * one, none]
-    s, s_t, rack = 0.4 - 0.025 * angle - 0.05j, -0.025, turning(1.0, swing)
+    turn, swing = steady(angle, 1.0), Jet(*Sine(0.5, 0.1).at(angle))
+    c, s, wheel, double = cos(swing), sin(swing), swing + turn, swing - 0.5 * turn
+    x = 0.4 - 0.025 * turn
     expected = {
-        "wheel": turning(0.2, swing) + turning(0.1, wheel),
-        "double": turning(0.5, swing) + turning(0.2j, double),
-        "rack": (rack[0] * s, rack[1] * s + rack[0] * s_t, rack[2] * s + 2.0 * rack[1] * s_t),
+        "wheel": planar(0.2 * c + 0.1 * cos(wheel), 0.2 * s + 0.1 * sin(wheel)),
+        "double": planar(0.5 * c - 0.2 * sin(double), 0.5 * s + 0.2 * cos(double)),
+        "rack": planar(x * c + 0.05 * s, x * s - 0.05 * c),
     }
+    # round-off of angles of 8 rad and of a rack that tells its pinion's angle by 20 rad/m
+    atol = (1e-12, 1e-12, 1e-11 if engine != "exudyn" else 1e-10)
     for name, motion in found.points.items():
-        for values, true, tolerance in zip(
-            (motion.position, motion.velocity, motion.acceleration),
-            expected[name],
-            # round-off of angles of 8 rad and of a rack that tells its pinion's angle by 20 rad/m
-            (1e-12, 1e-12, 1e-11 if engine != "exudyn" else 1e-10),
-            strict=True,
-        ):
-            assert np.abs(values[:, 0] + 1j * values[:, 1] - true).max() <= tolerance
+        assert_motion(motion, *expected[name], atol=atol)
 
 
 @ENGINES
-def test_coarse_steps_of_a_fast_pinion(engine):
+def test_rack_pinion_in_coarse_steps(engine):
     """A crank that pushes a rack, in steps of 30 degrees: the pinion turns by up to 10 rad a step,
     and its speed changes.
     """
     joints = [
-        Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Z),
+        Revolute("pivot", "ground", "crank", ORIGIN, Z),
         Distance("rod", "crank", "rack", ((0.1, 0.0, 0.0), (0.5, 0.0, 0.0))),
-        Translational("guide", "ground", "rack", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Translational("guide", "ground", "rack", (0.5, 0.0, 0.0), X),
         Revolute("axle", "ground", "pinion", (0.5, 0.05, 0.0), Z),
     ]
     teeth = RackPinion("teeth", ("axle", "guide"), 0.005)
@@ -341,7 +296,7 @@ def differential(folder):
 
 
 @pytest.mark.parametrize("engine", ["native", *SIMULATORS])
-def test_three_coupled_joints_keep_their_sum(engine, tmp_path):
+def test_linear_coupler_of_three_joints_passes(engine, tmp_path):
     case = differential(tmp_path)
     if engine != "native":
         installed(engine)
@@ -349,7 +304,7 @@ def test_three_coupled_joints_keep_their_sum(engine, tmp_path):
     assert found.outcome.value == "pass", found
 
 
-def test_linear_coupler_is_written_and_read_again(tmp_path):
+def test_linear_coupler_in_written_files(tmp_path):
     case = differential(tmp_path)
     (file := tmp_path / "again.toml").write_text(case_text(case))
     assert load_case(file).mechanism.couplers == case.mechanism.couplers
@@ -371,6 +326,6 @@ def test_linear_coupler_is_written_and_read_again(tmp_path):
         ((("a",), (1.0,)), "two names or more"),
     ],
 )
-def test_linear_coupler_without_sense_is_refused(given, said):
+def test_linear_coupler_bad_arguments_are_refused(given, said):
     with pytest.raises(MechanismError, match=said):
         LinearCoupler("sum", *given)

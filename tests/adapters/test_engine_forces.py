@@ -7,9 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
-from kincheck.core.case.case import TIME, Case, Sweep, Truth
-from kincheck.core.case.quantity import with_markers
+from kincheck import cases
+from kincheck.core.case.case import TIME, Sweep
 from kincheck.core.joints import (
     Cylindrical,
     Fixed,
@@ -38,9 +37,11 @@ from ..support.driven_chains import (
     heavy,
     pushed_slide,
 )
-from ..support.engine_forces import Beside, every_force, force_case, pushed, values
-from ..support.joint_loops import TYPES, crank_only, on_crank
+from ..support.engine_forces import Beside, force_case, pushed, sweep_case, values
+from ..support.engine_motion import cutting, installed
+from ..support.joint_loops import TYPES, on_crank
 from ..support.loads import loaded
+from ..support.mechanisms import ORIGIN
 
 TIMES = np.array([-0.5, 0.0, 0.7])
 # Of the travel for which the mechanism is made: most meet no singular pose there.
@@ -64,15 +65,7 @@ def random_case(seed):
         driver.name: Swing(NEAR * reach * rng.uniform(0.5, 1.0), rng.uniform(0.5, 3.0))
         for driver in mechanism.drivers
     }
-    outputs = every_force(mechanism)
-    return Case(
-        f"random {seed}",
-        "made here",
-        Truth.CONSENSUS_ONLY,
-        with_markers(mechanism, outputs),
-        Sweep(TIME, TIMES, motions=motions),
-        outputs,
-    )
+    return sweep_case(mechanism, Sweep(TIME, TIMES, motions=motions))
 
 
 def _near(mechanism, body):
@@ -109,22 +102,29 @@ def _curved(rng, mechanism):
 
 ENGINES = ["exudyn", "mujoco", "pinocchio", "dart", "drake", "simbody"]
 # Of the largest force. Exudyn has no acceleration: it is a difference of Jacobians.
-AGREE = dict.fromkeys(ENGINES, 1e-12) | {"exudyn": 1e-9}
-
-
-def here(engine):
-    if adapters.engine(engine).version() is None:
-        pytest.skip(f"{engine} is not installed")
-    return engine
+AGREE = dict.fromkeys(["native", *ENGINES], 1e-12) | {"exudyn": 1e-9}
+OF_ENGINES = pytest.mark.parametrize("engine", ENGINES)
 
 
 @cache
-def specimen(kind, bodies):
-    """A joint of that kind in a loop, with masses and force elements of all types, and its forces
-    by the native engine.
-    """
-    case = force_case(pushed(loaded(on_crank(kind, *bodies))), (-0.3, 0.0, 0.2), rate=2.0)
+def natively(make, *given):
+    case = make(*given)
     return case, values(case, "native")[0]
+
+
+def assert_as_native(engine, make, *given, least=0.0):
+    """The forces are those of the native engine; return both, and the engine's trajectory."""
+    case, native = natively(make, *given)
+    found, solution = values(case, engine)
+    compared = Beside(native, found)
+    assert compared.same_missing
+    assert compared.worst <= max(AGREE[engine], least)
+    return compared, solution
+
+
+def joint_case(kind, bodies):
+    """A joint of that kind in a loop, with masses and force elements of all types."""
+    return force_case(pushed(loaded(on_crank(kind, *bodies))), (-0.3, 0.0, 0.2), rate=2.0)
 
 
 NIGHTLY = pytest.mark.nightly  # the other order of bodies, in the engines on the shared tree
@@ -133,33 +133,27 @@ NIGHTLY = pytest.mark.nightly  # the other order of bodies, in the engines on th
 @pytest.mark.parametrize(
     ("engine", "bodies"),
     [
-        *((engine, ("A", "B")) for engine in ENGINES),
-        *((engine, ("B", "A")) for engine in ENGINES[:3]),
-        *(pytest.param(engine, ("B", "A"), marks=NIGHTLY) for engine in ENGINES[3:]),
+        *((engine, "AB") for engine in ENGINES),
+        *((engine, "BA") for engine in ENGINES[:3]),
+        *(pytest.param(engine, "BA", marks=NIGHTLY) for engine in ENGINES[3:]),
     ],
 )
 @pytest.mark.parametrize("kind", TYPES)
-def test_reactions_of_every_joint_are_those_of_the_native_engine(kind, bodies, engine):
-    case, native = specimen(kind, bodies)
-    found, solution = values(case, here(engine))
-    compared = Beside(native, found)
-    assert compared.same_missing
-    assert compared.worst <= AGREE[engine]
+def test_joint_reactions_equal_native(kind, bodies, engine):
+    _, solution = assert_as_native(engine, joint_case, kind, bodies)
     assert solution.details["forces"]["power_missing"] <= 1e-10
     assert solution.details["forces"]["computed_by"]
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio"])
 @pytest.mark.parametrize("kind", TYPES)
-def test_cut_joints_have_the_reactions_of_tree_joints(kind, engine, monkeypatch):
-    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", crank_only)
-    case, native = specimen(kind, ("A", "B"))
-    compared = Beside(native, values(case, here(engine))[0])
-    assert compared.same_missing
-    assert compared.worst <= AGREE[engine]
+def test_reactions_of_cut_joints_equal_native(kind, engine):
+    joints = natively(joint_case, kind, "AB")[0].mechanism.joints
+    with cutting(*(joint.name for joint in joints if joint.name != "crank")):
+        assert_as_native(engine, joint_case, kind, "AB")
 
 
-def pendulum(length=0.75, at=(0.0, 0.0, 0.0)):
+def pendulum(length=0.75, at=ORIGIN):
     """A pendulum about y, its mass beside the hinge along x at design; gravity along -z."""
     x, y, z = at
     body = Body("arm", at, mass=2.0, center_of_mass=(x + length, y, z), inertia=(1, 1, 1, 0, 0, 0))
@@ -171,20 +165,20 @@ def pendulum(length=0.75, at=(0.0, 0.0, 0.0)):
     )
 
 
-@pytest.mark.parametrize("engine", ["native", *ENGINES])
-@pytest.mark.parametrize(("length", "at"), [(0.75, (0.0, 0.0, 0.0)), (96.0, (1e3, 0.0, -5e2))])
-def test_pendulum(engine, length, at):
+@pytest.mark.parametrize("engine", AGREE)
+@pytest.mark.parametrize(("length", "at"), [(0.75, ORIGIN), (96.0, (1e3, 0.0, -5e2))])
+def test_reactions_of_pendulum_are_exact(engine, length, at):
     """F = m (a - g); the torque lifts the mass."""
     angle, rate = np.array([-0.5, 0.0, 1.0]), 3.0
     case = force_case(pendulum(length, at), angle, rate)
-    found = values(case, here(engine))[0]
+    found = values(case, engine)[0]
     m, g = 2.0, 10.0
     pull = -m * length * rate**2
     expected = np.zeros((7, 3))
     expected[0], expected[2] = pull * np.cos(angle), pull * np.sin(angle) + m * g
     expected[6] = m * g * length * np.cos(angle)
     largest = np.abs(expected).max()
-    np.testing.assert_allclose(found, expected, rtol=0, atol=AGREE.get(engine, 1e-12) * largest)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=AGREE[engine] * largest)
 
 
 def geared():
@@ -201,7 +195,7 @@ def geared():
         "geared",
         bodies,
         [
-            Revolute("first", GROUND, "pinion", point=(0.0, 0.0, 0.0), axis=y),
+            Revolute("first", GROUND, "pinion", point=ORIGIN, axis=y),
             Revolute("second", "wheel", GROUND, point=(0.5, 0.0, 0.0), axis=y),
             Translational("guide", GROUND, "rack", **along),
             Fixed("weld", "plate", "rack"),
@@ -215,63 +209,47 @@ def geared():
     )
 
 
-@cache
-def gear_train():
-    case = force_case(pushed(loaded(geared())), (-0.4, 0.0, 7.0), rate=2.0)
-    return case, values(case, "native")[0]
+def gear_case():
+    return force_case(pushed(loaded(geared())), (-0.4, 0.0, 7.0), rate=2.0)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_gears_racks_and_welds(engine):
-    case, native = gear_train()
-    compared = Beside(native, values(case, here(engine))[0])
-    assert compared.same_missing
-    assert compared.worst <= AGREE[engine]
+@OF_ENGINES
+def test_reactions_of_gear_train_equal_native(engine):
+    assert_as_native(engine, gear_case)
 
 
-@cache
-def few_samples(name):
+def built_in_case(name):
     case = cases.load(name)
     few = case.sweep.values[:: len(case.sweep.values) // 4]
-    judged = force_case(loaded(case.mechanism), few, case.sweep.rate)
-    judged = replace(judged, sweep=replace(case.sweep, values=few))
-    return judged, values(judged, "native")[0]
+    return sweep_case(loaded(case.mechanism), replace(case.sweep, values=few))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@OF_ENGINES
 @pytest.mark.parametrize("name", ["four_bar", "bennett", "mcpherson_strut"])
-def test_redundant_rows_leave_the_same_undetermined(name, engine):
-    case, native = few_samples(name)
-    compared = Beside(native, values(case, here(engine))[0])
-    assert compared.same_missing
+def test_undetermined_reactions_equal_native(name, engine):
+    compared, _ = assert_as_native(engine, built_in_case, name)
     assert np.isnan(compared.native).any() == (name != "mcpherson_strut")
-    assert compared.worst <= AGREE[engine]
 
 
-@cache
 def wound_up():
+    """The hinge that closes the loop turns round twice; its spring is wound up."""
     case = cases.load("four_bar")
     spring = TorsionSpringDamper("clock", "crank_pin", 2.0, damping=0.3, free_angle=0.2)
     mechanism = replace(loaded(case.mechanism), forces=[spring])
-    judged = force_case(mechanism, np.linspace(0.0, 9.0, 19), case.sweep.rate, names=["crank_pin"])
-    return judged, values(judged, "native")[0]
+    return force_case(mechanism, np.linspace(0.0, 9.0, 19), case.sweep.rate, names=["crank_pin"])
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_springs_on_cut_joints_count_turns(engine):
-    """The hinge that closes the loop turns round twice; its spring is wound up."""
-    case, native = wound_up()
-    compared = Beside(native, values(case, here(engine))[0])
-    assert compared.worst <= AGREE[engine]
+@OF_ENGINES
+def test_spring_on_cut_joint_counts_turns(engine):
+    compared, _ = assert_as_native(engine, wound_up)
     assert np.ptp(compared.native[-1]) > 2.0 * 2.0 * np.pi
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_model_without_outputs_of_forces_has_none(engine):
-    plain, given = cases.load("mcpherson_suspension"), adapters.engine(here(engine))
+@OF_ENGINES
+def test_forces_absent_without_force_outputs(engine):
+    plain, given = cases.load("mcpherson_suspension"), installed(engine)
     case = replace(plain, mechanism=loaded(plain.mechanism))
-    found = given.solve(given.build(case), case, 1e-12)
-    bare = given.solve(given.build(plain), plain, 1e-12)
+    found, bare = (given.solve(given.build(each), each, 1e-12) for each in (case, plain))
     assert found.forces is None
     assert found.details == bare.details
     for name, motion in bare.points.items():
@@ -311,11 +289,16 @@ def unshared(right):
 
 
 MISTAKES = {
-    "gravity upwards, pinocchio": ("pinocchio.pinocchio.PinocchioModel.set_loads", upwards),
-    "gravity upwards, mujoco": ("mujoco.mujoco.MuJoCoModel.set_loads", upwards),
-    "gravity upwards, dart": ("dart.dart.DartModel.set_loads", upwards),
-    "gravity upwards, drake": ("drake.drake.DrakeModel.set_loads", upwards),
-    "gravity upwards, simbody": ("simbody.simbody.SimbodyModel.set_loads", upwards),
+    **{
+        f"gravity upwards, {name}": (f"{name}.{name}.{model}.set_loads", upwards)
+        for name, model in {
+            "pinocchio": "PinocchioModel",
+            "mujoco": "MuJoCoModel",
+            "dart": "DartModel",
+            "drake": "DrakeModel",
+            "simbody": "SimbodyModel",
+        }.items()
+    },
     "no gyroscopic term, drake": ("shared.tree_forces.demand_of", still),
     "no gyroscopic term, simbody": ("shared.tree_forces.demand_of", still),
     "inertia in other axes, pinocchio": ("pinocchio.pinocchio.mass_properties", other_axes),
@@ -342,9 +325,10 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_planted_mistake_is_found(mistake, monkeypatch):
-    engine, (where, wrong) = here(mistake.split(", ")[1]), MISTAKES[mistake]
-    case, native = specimen("universal", ("A", "B"))
+def test_planted_force_mistake_is_found(mistake, monkeypatch):
+    engine, (where, wrong) = mistake.split(", ")[1], MISTAKES[mistake]
+    installed(engine)
+    case, native = natively(joint_case, "universal", "AB")
     target = f"kincheck.adapters.{where}"
     monkeypatch.setattr(target, wrong(resolve_name(target)))
     assert Beside(native, values(case, engine)[0]).worst > 1e-4
@@ -353,7 +337,6 @@ def test_a_planted_mistake_is_found(mistake, monkeypatch):
 # Where drivers and couplers act in every engine, against free-body diagrams
 
 
-AGREE_ACTION = {"native": 1e-12} | AGREE
 HINGE = Link(Revolute)
 DRIVEN = {
     "translational": Link(Translational),
@@ -361,70 +344,37 @@ DRIVEN = {
     "screw, by its turn": Link(Screw),
     "screw, by its slide": Link(Screw, screws_by="translation"),
 }
+CHAINS = {
+    "planar joint": chain([Link(Planar, flipped=True), HINGE]),
+    "pushed point": pushed_slide(Link(Translational)),
+    "pushed point, flipped": pushed_slide(Link(Translational, flipped=True)),
+}
+for name, link in DRIVEN.items():
+    CHAINS[name] = chain([HINGE, link, HINGE], size=2.0)
+    CHAINS[f"{name}, flipped"] = chain([HINGE, replace(link, flipped=True), HINGE], size=2.0)
+for name, (one, other, coupling) in COUPLINGS.items():
+    CHAINS[name] = chain([HINGE, replace(one, flipped=True), other], coupling, size=0.8)
 
 
-def forces(made, engine):
-    outputs = every_force(made.mechanism)
+@pytest.mark.parametrize("engine", AGREE)
+@pytest.mark.parametrize("name", CHAINS)
+def test_driver_efforts_equal_free_bodies(name, engine):
+    made = CHAINS[name]
     sweep = Sweep(TIME, made.path.times, motions=made.path.motions)
-    mechanism = with_markers(made.mechanism, outputs)
-    case = Case("chain", "made here", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
-    given = adapters.engine(here(engine))
-    assert given.unsupported(case) is None
-    found = given.solve(given.build(case), case, 1e-12)
-    assert found.solved.all(), found.message
-    return found.forces
-
-
-@pytest.mark.parametrize("engine", AGREE_ACTION)
-@pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-@pytest.mark.parametrize("kind", DRIVEN)
-def test_a_driven_slide(kind, flipped, engine):
-    made = chain([HINGE, replace(DRIVEN[kind], flipped=flipped), HINGE], size=2.0)
-    assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
-
-
-@pytest.mark.parametrize("engine", AGREE_ACTION)
-def test_a_driven_turn_of_a_planar_joint(engine):
-    made = chain([Link(Planar, flipped=True), HINGE])
-    assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
-
-
-@pytest.mark.parametrize("engine", AGREE_ACTION)
-@pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-def test_a_pushed_point(flipped, engine):
-    made = pushed_slide(Link(Translational, flipped=flipped))
-    assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
-
-
-@pytest.mark.parametrize("engine", AGREE_ACTION)
-@pytest.mark.parametrize("name", COUPLINGS)
-def test_a_coupled_joint(name, engine):
-    one, other, coupling = COUPLINGS[name]
-    links = [HINGE, replace(one, flipped=True), other]
-    made = chain(links, coupling, size=0.8)
-    assert deviation(made, forces(made, engine)) < AGREE_ACTION[engine]
+    _, solution = values(sweep_case(made.mechanism, sweep), engine)
+    assert deviation(made, solution.forces) < AGREE[engine]
 
 
 # Forces of random mechanisms with slides, screws, racks and polynomials, in every engine
 
 
-# Of the largest force: round-off over a smallest singular value of a hundredth.
-AGREE_MECHANISMS = {name: max(limit, 1e-11) for name, limit in AGREE.items()}
 # Arms and loops; racks in 1, 21 and 37, polynomials in 9, 27, 45 and 63, a gear in 45.
 SEEDS = (0, 1, 9, 21, 24, 27, 32, 37, 45, 63)
 
 
-@cache
-def native(seed):
-    case = random_case(seed)
-    return case, values(case, "native")[0]
-
-
-@pytest.mark.parametrize("engine", AGREE_MECHANISMS)
+@OF_ENGINES
 @pytest.mark.parametrize("seed", SEEDS)
-def test_forces_are_those_of_the_native_engine(seed, engine):
-    case, expected = native(seed)
-    compared = Beside(expected, values(case, here(engine))[0])
-    assert np.isfinite(expected).all()
-    assert compared.same_missing
-    assert compared.worst < AGREE_MECHANISMS[engine]
+def test_forces_of_random_mechanisms_equal_native(seed, engine):
+    # of the largest force: round-off over a smallest singular value of a hundredth
+    compared, _ = assert_as_native(engine, random_case, seed, least=1e-11)
+    assert np.isfinite(compared.native).all()

@@ -1,11 +1,12 @@
 """Equilibria by each simulator's own kinematics, gravity and rows, against closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.core.case.case import TIME, Balance, Case, Output, Sweep, Truth
+from kincheck.core.case.case import Balance
 from kincheck.core.case.measures import ElementForce
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.execution import Pair, attempt
@@ -17,82 +18,79 @@ from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from ..support.engine_motion import SIMULATORS, installed
+from ..support.engine_motion import SIMULATORS, installed, motion_case
+from ..support.mechanisms import Z
 
-ORIGIN, Z = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+ORIGIN, Z = (0.0, 0.0, 0.0), Z
 STOP = ((-0.1, -100.0), (0.0, 0.0), (0.1, 100.0), (0.1001, 120.0), (0.2, 18100.0))
 PROGRESSIVE = PchipInterpolator(*np.array(STOP).T)
 ENGINES = pytest.mark.parametrize("name", ["native", *SIMULATORS, "exudyn-static"])
 
 
 def engine_of(name):
-    if name not in adapters.SIMULATIONS or name in adapters.ENGINES:
-        return installed(name)
-    engine = adapters.engine(name, "simulate")
-    return engine if engine.version() else pytest.skip(f"{name} is not installed")
+    return installed(name, "projection" if name in adapters.ENGINES else "simulate")
 
 
 def held_in(mechanism, place, force):
     """Return equilibria under forces on a point, shape (n, 3)."""
     force = np.array(force, dtype=float)
     loads = {place.name: np.hstack([force, np.zeros_like(force)])}
-    outputs = [
-        Output(k, place.name, axis, False, 1e-12, 0.0, "round-off")
-        for k, axis in zip("xyz", np.eye(3).tolist(), strict=True)
-    ]
+    case = motion_case(mechanism, np.arange(len(force)), 0.0)
     amount = ElementForce("amount", 1e-9, 0.0, "round-off", force=mechanism.forces[0].name)
-    outputs.append(amount.bound(mechanism))
-    mechanism = with_markers(mechanism, outputs)
-    sweep = Sweep(TIME, np.arange(len(force), dtype=float), 0.0)
-    at = LoadPoint(place.name, place.body, place.position)
-    facts = (mechanism.name, "closed form", Truth.CONSENSUS_ONLY, mechanism, sweep, tuple(outputs))
-    return Case(*facts, balance=Balance((at,), loads))
+    outputs = *case.outputs, amount.bound(mechanism)
+    return replace(
+        case,
+        mechanism=with_markers(mechanism, outputs),
+        outputs=outputs,
+        balance=Balance((LoadPoint(place.name, place.body, place.position),), loads),
+    )
+
+
+def progressive(x):
+    return PROGRESSIVE(min(x, 0.2))
+
+
+def balance(moment, force):
+    """The angle at which a force on the arm of 0.4 m that keeps its direction has a moment."""
+    ends = {"a": -0.1, "b": 1.2, "xtol": 1e-16, "rtol": 1e-15}
+    return brentq(lambda turn: moment(turn) - 0.4 * force * math.cos(turn), **ends)
 
 
 @ENGINES
 @pytest.mark.parametrize(
-    ("element", "load", "angle"),
+    ("element", "load", "moment"),
     [
-        # k sin(th) = F a cos(th)
         (
             Bushing("t", GROUND, "arm", ORIGIN, turning_stiffness=(0.0, 0.0, 500.0)),
             300.0,
-            math.atan(300.0 * 0.4 / 500.0),
+            lambda turn: 500.0 * math.sin(turn),
         ),
-        # k th = F a cos(th)
         (
             Bushing("t", GROUND, "arm", ORIGIN, turning_stiffness=500.0, law="cardan"),
             300.0,
-            brentq(lambda x: 500.0 * x - 120.0 * math.cos(x), 0.0, 1.5, xtol=1e-15),
+            lambda turn: 500.0 * turn,
         ),
-        # k b sin(th) b cos(th) = F a cos(th)
         (
             Bushing("s", GROUND, "arm", (0.25, 0.0, 0.0), stiffness=(0.0, 2e5, 0.0)),
             8000.0,
-            math.asin(8000.0 * 0.4 / (2e5 * 0.25**2)),
+            lambda turn: 2e5 * 0.25**2 * math.sin(turn) * math.cos(turn),
         ),
-        # k (th - free) = F a cos(th)
         (
             TorsionSpringDamper("c", "hinge", 500.0, free_angle=0.1),
             900.0,
-            brentq(lambda x: 500.0 * (x - 0.1) - 360.0 * math.cos(x), 0.0, 1.5, xtol=1e-15),
+            lambda turn: 500.0 * (turn - 0.1),
         ),
-        # progressive(th) = F a cos(th), beyond its stop
-        (
-            TorsionSpringDamper("c", "hinge", curve=STOP),
-            1000.0,
-            brentq(lambda x: PROGRESSIVE(x) - 400.0 * math.cos(x), 0.0, 0.2, xtol=1e-16),
-        ),
-        # progressive(b sin(th)) b cos(th) = F a cos(th), beyond the stop
+        # beyond the stop
+        (TorsionSpringDamper("c", "hinge", curve=STOP), 1000.0, progressive),
         (
             Bushing("b", GROUND, "arm", (0.25, 0.0, 0.0), curve=((), STOP, ())),
             400.0,
-            math.asin(brentq(lambda x: PROGRESSIVE(x) * 0.25 - 160.0, 0.0, 0.2, xtol=1e-16) / 0.25),
+            lambda turn: progressive(0.25 * math.sin(turn)) * 0.25 * math.cos(turn),
         ),
     ],
     ids=["torsion", "cardan", "side", "coil", "coil stop", "stop"],
 )
-def test_loaded_arm_turns_as_closed_form(name, element, load, angle):
+def test_equilibrium_of_loaded_arm(name, element, load, moment):
     arm = Mechanism(
         "arm",
         [Body("arm")],
@@ -102,14 +100,12 @@ def test_loaded_arm_turns_as_closed_form(name, element, load, angle):
     )
     found = engine_of(name).equilibria(held_in(arm, tip, [[0.0, load, 0.0], [0.0, 0.0, 0.0]]))
     assert found.solved.all()
-    (x, y, _), (x0, y0, _) = found.points["tip"].position
-    assert math.atan2(y, x) == pytest.approx(angle, abs=1e-13)
-    at_rest = 0.1 if getattr(element, "free_angle", 0.0) else 0.0
-    assert math.atan2(y0, x0) == pytest.approx(at_rest, abs=1e-13)
+    for (x, y, _), force in zip(found.points["tip"].position, (load, 0.0), strict=True):
+        assert math.atan2(y, x) == pytest.approx(balance(moment, force), abs=1e-13)
 
 
 @pytest.mark.parametrize("name", SIMULATORS)
-def test_snap_through_is_no_equilibrium(name):
+def test_equilibrium_beyond_snap_through(name):
     """Beyond the limit load plain Newton lands at the far side, its residual zero."""
     engine, at, limit = engine_of(name), (0.0, 0.0, 0.06), 90.57442209975467
     springs = [
@@ -128,13 +124,13 @@ def test_snap_through_is_no_equilibrium(name):
     assert (z > 0.0344).all()
 
 
-def test_body_that_nothing_holds_is_an_error():
+def test_equilibrium_of_loose_body_fails():
     loose = Mechanism(
         "loose",
         [Body("arm", mass=1.0)],
         [Revolute("hinge", GROUND, "arm", point=ORIGIN, axis=Z)],
         [tip := Point("tip", "arm", (0.4, 0.0, 0.0))],
-        forces=[SpringDamper("s", "arm", GROUND, (ORIGIN, (0.0, 0.0, 1.0)), 1e5)],
+        forces=[SpringDamper("s", "arm", GROUND, (ORIGIN, Z), 1e5)],
     )
     found = attempt(Pair(held_in(loose, tip, [[0.0, 1.0, 0.0]]), engine_of("mujoco"), 1e-12))
     assert "nothing holds a body" in found.result.message

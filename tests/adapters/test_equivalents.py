@@ -7,14 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.core import Body, Joint, JointAngle, Mechanism, Point, Revolute, Translational
+from kincheck.cases.jet import cos, sin, sqrt, steady
+from kincheck.core import Body, Joint, JointAngle, Revolute, Translational
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
-from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.joints import Planar
 from kincheck.core.joints.base import directions, position, triad, unit
 from kincheck.core.mechanism.mechanism import with_equivalents
+
+from ..support.engine_motion import assert_motion, installed, mechanism_of, motion_case, planar
 
 UP, ALONG = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 CRANK, PIVOT, REACH, RATE = 0.3, -1.0, 1.4, 2.0
@@ -49,64 +51,52 @@ Slotted.type = "slotted"  # set here, it is not registered for case files
 
 def quick_return(joint=Slotted):
     """Whitworth's mechanism: the pin of a crank slides in the slot of a rocker."""
-    mechanism = Mechanism(
-        "quick_return",
-        [Body("crank"), Body("rocker")],
-        [
-            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), UP),
-            Revolute("bearing", "ground", "rocker", (PIVOT, 0.0, 0.0), UP),
-            joint("slot", "rocker", "crank", (CRANK, 0.0, 0.0), (ALONG, UP)),
-        ],
-        [Point("tip", "rocker", (PIVOT + REACH, 0.0, 0.0))],
-        [JointAngle("turn", "pivot")],
-    )
-    outputs = (Output("x", "tip", ALONG, False, 0.0, 0.0, ""),)
-    sweep = Sweep("turn", np.linspace(-1.5, 2.0, 36), RATE)
-    return Case("quick_return", "test", Truth.CLOSED_FORM, mechanism, sweep, outputs)
+    joints = [
+        Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), UP),
+        Revolute("bearing", "ground", "rocker", (PIVOT, 0.0, 0.0), UP),
+        joint("slot", "rocker", "crank", (CRANK, 0.0, 0.0), (ALONG, UP)),
+    ]
+    points = {"tip": ("rocker", (PIVOT + REACH, 0.0, 0.0))}
+    mechanism = mechanism_of(joints, points, [JointAngle("turn", "pivot")])
+    return motion_case(mechanism, np.linspace(-1.5, 2.0, 36), RATE)
 
 
 def motion():
-    """Position, velocity and acceleration of the tip, by complex numbers."""
-    turned = CRANK * np.exp(1j * np.linspace(-1.5, 2.0, 36))
-    arm, rate, rate_t = turned - PIVOT, 1j * RATE * turned, -(RATE**2) * turned
-    ratio = rate / arm
-    spin, spin_t = ratio.imag, (rate_t / arm - ratio**2).imag
-    e = REACH * arm / abs(arm)
-    found = PIVOT + e, 1j * spin * e, (1j * spin_t - spin**2) * e
-    return [np.stack([z.real, z.imag, 0.0 * z.real], axis=1) for z in found]
+    """Position, velocity and acceleration of the tip, by jets."""
+    turn = steady(np.linspace(-1.5, 2.0, 36), RATE)
+    x, y = CRANK * cos(turn) - PIVOT, CRANK * sin(turn)
+    length = sqrt(x * x + y * y)
+    return planar(PIVOT + REACH * x / length, REACH * y / length)
 
 
-def solved(engine, case):
-    if engine.version() is None:
-        pytest.skip("not installed")
+def solved(engine):
+    case = quick_return()
     assert engine.unsupported(case) is None
     found = engine.solve(engine.build(case), case, 1e-12)
     assert found.solved.all(), found.message
-    tip = found.points["tip"]
-    return found, [tip.position, tip.velocity, tip.acceleration]
+    return found
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
-def test_a_joint_of_one_file_is_solved_by_every_engine(name):
-    found, series = solved(adapters.engine(name), quick_return())
-    for values, right, atol in zip(series, motion(), (1e-12, 1e-11, 1e-10), strict=True):
-        np.testing.assert_allclose(values, right, atol=atol)
+def test_user_joint_solved_by_every_engine(name):
+    found = solved(installed(name))
+    assert_motion(found.points["tip"], *motion(), atol=(1e-12, 1e-11, 1e-10))
     expected = None if name == "native" else {"slot": ["translational", "revolute"]}
     assert found.details.get("equivalents") == expected
 
 
 @pytest.mark.parametrize(("name", "atol"), [("mujoco", 1e-4), ("exudyn-static", 1e-9)])
-def test_a_simulator_simulates_the_equivalent(name, atol):
-    _, series = solved(adapters.engine(name, "simulate"), quick_return())
-    np.testing.assert_allclose(series[0], motion()[0], atol=atol)
+def test_user_joint_equivalent_is_simulated(name, atol):
+    found = solved(installed(name, "simulate"))
+    assert_motion(found.points["tip"], motion()[0], atol=(atol,))
 
 
 @pytest.mark.parametrize("name", adapters.WRITERS)
-def test_a_written_model_has_the_equivalent(name):
+def test_written_model_holds_joint_equivalent(name):
     assert "slot_block" in "".join(written(quick_return(), adapters.writer(name)).values())
 
 
-def test_a_subclass_with_other_primitives_inherits_no_equivalent():
+def test_subclass_with_other_primitives_is_refused():
     class Narrow(Slotted):
         """A pin that does not turn in the slot."""
 
@@ -121,7 +111,7 @@ def test_a_subclass_with_other_primitives_inherits_no_equivalent():
     assert engine.unsupported(quick_return(Renamed)) is None
 
 
-def test_equivalents_have_equivalents():
+def test_nested_equivalents_are_expanded():
     class Nested(Slotted):
         """A slot whose equivalent is a slot."""
 
@@ -142,7 +132,7 @@ def test_equivalents_have_equivalents():
     assert types == [["translational", "revolute"], ["slotted"]]
 
 
-def test_known_joints_stay():
+def test_known_joints_keep_their_type():
     mechanism = quick_return().mechanism
     assert with_equivalents(mechanism, {Slotted, Revolute}) is mechanism
     unlike = quick_return(lambda *given: Planar(*given[:4], UP)).mechanism

@@ -2,26 +2,21 @@
 
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.adapters.shared.poses import at_start
 from kincheck.core import (
-    GROUND,
-    Body,
     Gear,
     JointAngle,
     KincheckError,
-    Mechanism,
     Point,
     Polynomial,
     Revolute,
     SolveError,
     Spherical,
 )
-from kincheck.core.case.case import Case
 from kincheck.core.case.io.model_writer import way_to, written
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.joint_probe import probes
@@ -29,18 +24,18 @@ from kincheck.core.case.models.files import load
 from kincheck.core.cli import main
 from kincheck.core.cli.files import FORMATS
 from kincheck.core.kinematics import NativeSolver, largest_residual
-from kincheck.core.mechanism.tree import Branch, SpanningTree, spanning_tree
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
 
 from ..oracles.naive import A
+from ..support.engine_motion import cutting, mechanism_of
 from ..support.exported import READERS, read
 from ..support.mechanisms import mcpherson, slider_crank
 from ..support.written_mechanisms import CASES, Z, assert_read, case, coupled_loop, way
 
 
 @pytest.mark.parametrize("to", adapters.WRITERS)
-def test_a_joint_without_counterpart_is_named(to):
+def test_export_names_joint_without_counterpart(to):
     class Mine(Spherical):
         pass
 
@@ -55,59 +50,49 @@ def test_a_joint_without_counterpart_is_named(to):
         adapters.writer(to)(mine, way("mcpherson", False), {})
 
 
-def test_names_that_a_format_keeps_or_needs_twice_are_refused():
-    mechanism, path = slider_crank(), dict(way("slider_crank", False))
-    world = replace(
-        mechanism,
-        bodies=[
-            replace(body, name=body.name.replace("crank", "world")) for body in mechanism.bodies
-        ],
-        joints=[
-            replace(each, i=each.i.replace("crank", "world"), j=each.j.replace("crank", "world"))
-            for each in mechanism.joints
-        ],
-        points=[
-            replace(each, body=each.body.replace("crank", "world")) for each in mechanism.points
-        ],
-    )
-    with pytest.raises(KincheckError, match="'world' is taken"):
-        adapters.writer("mjcf")(world, path | {"world": path["crank"]}, {})
-    twice = replace(
-        mechanism, points=[*mechanism.points, Point("rod.first", "crank", (0.0, 0.0, 0.0))]
-    )
-    with pytest.raises(KincheckError, match=r"'rod\.first' is taken"):
-        adapters.writer("mjcf")(twice, path, {})
+def renamed(mechanism, **names):
+    """The mechanism with other names of bodies."""
 
+    def new(member, *keys):
+        found = {key: getattr(member, key) for key in keys}
+        return replace(member, **{key: names.get(name, name) for key, name in found.items()})
 
-def test_names_with_blanks_are_read_by_simulators_that_have_none(tmp_path):
-    """OpenSim ends the process at a name with a blank."""
-    one = slider_crank()
-    names = {"crank": "left crank", "rod": "rod/2"}
+    path = {names.get(name, name): motion for name, motion in way(mechanism.name, True).items()}
     other = replace(
-        one,
-        bodies=[replace(body, name=names.get(body.name, body.name)) for body in one.bodies],
-        joints=[
-            replace(each, i=names.get(each.i, each.i), j=names.get(each.j, each.j))
-            for each in one.joints
-        ],
-        points=[replace(each, body=names.get(each.body, each.body)) for each in one.points],
+        mechanism,
+        bodies=[new(each, "name") for each in mechanism.bodies],
+        joints=[new(each, "i", "j") for each in mechanism.joints],
+        points=[new(each, "body") for each in mechanism.points],
     )
-    path = {names.get(name, name): motion for name, motion in way("slider_crank", True).items()}
-    for to in ("osim", "sdf"):
-        found = read(to, adapters.writer(to)(other, path, {}), other, tmp_path)
-        assert_read(found, other, path, True)
+    return other, path
 
 
-def test_a_joint_of_sdf_that_would_mimic_two_others_is_refused():
+def test_export_refuses_taken_names():
+    world = renamed(slider_crank(), crank="world")
+    with pytest.raises(KincheckError, match="'world' is taken"):
+        adapters.writer("mjcf")(*world, {})
+    mechanism, path = renamed(slider_crank())
+    twice = [*mechanism.points, Point("rod.first", "crank", (0.0, 0.0, 0.0))]
+    with pytest.raises(KincheckError, match=r"'rod\.first' is taken"):
+        adapters.writer("mjcf")(replace(mechanism, points=twice), path, {})
+
+
+@pytest.mark.parametrize("to", ["osim", "sdf"])
+def test_export_of_names_with_blanks(to, tmp_path):
+    """OpenSim ends the process at a name with a blank."""
+    other, path = renamed(slider_crank(), crank="left crank", rod="rod/2")
+    assert_read(read(to, adapters.writer(to)(other, path, {}), other, tmp_path), other, path, True)
+
+
+def test_sdf_export_refuses_two_mimics():
     mechanism = coupled_loop()
-    third = Gear("third", ("A", "A2"), 1.0)
-    fourth = Gear("fourth", ("A", "A2"), 1.0)
-    mechanism = replace(mechanism, couplers=[*mechanism.couplers, third, fourth])
+    again = [Gear(name, ("A", "A2"), 1.0) for name in ("third", "fourth")]
+    mechanism = replace(mechanism, couplers=[*mechanism.couplers, *again])
     with pytest.raises(KincheckError, match="mimics one other"):
         adapters.writer("sdf")(mechanism, way("coupled_loop", False), {})
 
 
-def test_a_start_that_cannot_be_reached_says_how_far_it_goes():
+def test_export_start_out_of_reach_fails():
     with pytest.raises(
         SolveError, match=r"no way from the design to stroke = 0\.5: .*beyond stroke = 0\.29"
     ):
@@ -127,7 +112,7 @@ def test_a_start_that_cannot_be_reached_says_how_far_it_goes():
         ("osim", [".osim"]),
     ],
 )
-def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch, capsys):
+def test_export_command_writes_files(to, endings, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main.main(["export", "mcpherson_strut", "--to", to, "--at", "30mm"]) == 0
     names = [f"mcpherson_strut{ending}" for ending in endings]
@@ -153,7 +138,7 @@ def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch
         ),
     ],
 )
-def test_what_cannot_be_exported_is_said(argv, said, tmp_path, monkeypatch, capsys):
+def test_export_command_refuses_bad_arguments(argv, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mcpherson_strut.xml").write_text("mine")
     assert main.main(["export", "mcpherson_strut", *argv]) == 2
@@ -161,7 +146,7 @@ def test_what_cannot_be_exported_is_said(argv, said, tmp_path, monkeypatch, caps
     assert (tmp_path / "mcpherson_strut.xml").read_text() == "mine"
 
 
-def test_help_names_the_formats_that_there_are(capsys):
+def test_export_help_lists_formats(capsys):
     assert tuple(FORMATS) == adapters.WRITERS
     for command in ("export", "assemblies"):
         assert main.main([command, "--help"]) == 0
@@ -184,7 +169,7 @@ NOT_WRITTEN = {"polynomial": NO_CURVE, "spline": NO_CURVE | {"mjcf": "MJCF"}}
 @pytest.mark.parametrize("elsewhere", [False, True], ids=["design", "elsewhere"])
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("to", READERS)
-def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere, tmp_path):
+def test_written_model_closes_at_native_pose(to, name, elsewhere, tmp_path):
     if refused := NOT_WRITTEN.get(name, {}).get(to):
         with pytest.raises(KincheckError, match=f"has no counterpart in {refused}"):
             reading(to, name, tmp_path, elsewhere)
@@ -193,59 +178,42 @@ def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere
     assert_read(found, CASES[name].mechanism, path, elsewhere)
 
 
-def test_polynomials_count_from_the_start():
+def test_polynomial_coupler_shifted_to_start():
     """With y = x + 0.2 x^2, and x = 0.5 at the start."""
     hinges = [
         Revolute(name, "ground", name.upper(), (k, 0.0, 0.0), Z) for k, name in enumerate("ab")
     ]
     cam = Polynomial("cam", ("b", "a"), (0.0, 1.0, 0.2))
-    bodies, turn = [Body("A"), Body("B", (1.0, 0.0, 0.0))], JointAngle("turn", "a")
-    mechanism = Mechanism("cams", bodies, hinges, [], [turn], [cam])
+    mechanism = mechanism_of(hinges, {}, [JointAngle("turn", "a")], [cam])
     (moved,) = at_start(mechanism, way_to(case(mechanism, 0.5), 0.5)).couplers
     np.testing.assert_allclose(moved.coefficients, [0.0, 1.2, 0.2], rtol=0.0, atol=1e-15)
 
 
-def cut_elsewhere(mechanism, first=()):
-    """The tree without the joint that is probed: what it carried is free, and it closes the
-    loop.
-    """
-    tree = spanning_tree(mechanism, first)
-    tested = [
-        joint
-        for joint in mechanism.joints
-        if joint.name in ("tested", "second") and joint not in tree.cut
-    ]
-    branches = [
-        Branch(GROUND, each.child, None) if each.joint in tested else each for each in tree.branches
-    ]
-    return SpanningTree(tuple(branches), (*tree.cut, *tested))
-
-
 @pytest.mark.parametrize("name", [each.name for each in probes()])
 @pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf", "osim"])
-def test_a_joint_closes_a_loop_as_it_carries_a_body(to, name, tmp_path, monkeypatch):
+def test_written_joint_closes_loop(to, name, tmp_path):
+    """As it carries a body elsewhere."""
     if to in NOT_WRITTEN.get(name, ()):
         return  # refused above
-    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", cut_elsewhere)
-    found, path = reading(to, name, tmp_path)
-    assert_read(found, CASES[name].mechanism, path, True)
+    mechanism = CASES[name].mechanism
+    with cutting(*(each.name for each in mechanism.joints if each.name in ("tested", "second"))):
+        found, path = reading(to, name, tmp_path)
+    assert_read(found, mechanism, path, True)
 
 
-def test_the_cases_move_and_count_turns():
+def test_written_cases_move_over_turns():
     for name in CASES:
-        assert (
-            max(
-                np.abs(motion.r[-1] - motion.r[0]).max() + np.abs(motion.p[-1] - motion.p[0]).max()
-                for motion in way(name, True).values()
-            )
-            > 0.01
-        )
+        changes = [
+            max(np.ptp(motion.r[[0, -1]], axis=0).max(), np.ptp(motion.p[[0, -1]], axis=0).max())
+            for motion in way(name, True).values()
+        ]
+        assert max(changes) > 0.01
     # 150 rad of 0.01 m a turn
     assert abs(way("gear_train", True)["nut"].r[-1, 2] - 0.3 + 1.5 / (2.0 * np.pi)) <= 1e-14
 
 
 @pytest.mark.parametrize("to", READERS)
-def test_a_start_of_another_mechanism_is_seen(to, tmp_path):
+def test_written_model_shows_wrong_start(to, tmp_path):
     """The tie rod a millimetre longer than where the poses are from."""
     mechanism = mcpherson()
     rod = mechanism.joint("tie_rod")
@@ -274,18 +242,17 @@ STEP = 0.02
 """End of the motion [rad or m]: far from any singular pose of the built-in cases."""
 
 
-def exported(case: Case, kind: str, folder: Path) -> Path:
+def exported(case, kind, folder):
     """Write a model and the files beside it; return its file."""
     texts = written(case, adapters.writer(kind))
-    files = [folder / f"model{ending}" for ending in texts]
-    for file, text in zip(files, texts.values(), strict=True):
-        file.write_text(text)
-    return files[0]
+    for ending, text in texts.items():
+        (folder / f"model{ending}").write_text(text)
+    return folder / f"model{next(iter(texts))}"
 
 
-def read_again(case: Case, file: Path) -> Case:
+def read_again(case, file):
     """Return the case of a model, driven by the first joint of the original that moves it."""
-    reasons: list[str] = []
+    reasons = []
     for joint in case.mechanism.joints:
         for name in (joint.name, f"{joint.name}.rotation", f"{joint.name}.1"):
             try:
@@ -295,26 +262,25 @@ def read_again(case: Case, file: Path) -> Case:
     raise AssertionError(reasons)
 
 
-def carried(case: Case, again: Case) -> dict[str, BodyMotion]:
+def carried(case, again):
     """Return the motions of the bodies of a case, from those of the frames of another one."""
     names = tuple(body.name for body in again.mechanism.moving)
     solver = NativeSolver(order=0, compiled=False)
     found = solver.prepare(again.mechanism, again.sweep.path, bodies=names)(1e-12)
     assert found.solved.all(), found.message
-    motions: dict[str, BodyMotion] = {}
+    motions = {}
     for body in case.mechanism.moving:
         other, motion = again.mechanism.body(body.name), found.bodies[body.name]
         turns = [A(p) @ A(np.array(other.euler_parameters)).T for p in motion.p]
-        arm = np.subtract(body.origin, other.origin)
-        r = np.array([at + turn @ arm for at, turn in zip(motion.r, turns, strict=True)])
-        at_design = A(np.array(body.euler_parameters))
-        p = Rotation.from_matrix([turn @ at_design for turn in turns]).as_quat(scalar_first=True)
+        r = motion.r + np.array(turns) @ np.subtract(body.origin, other.origin)
+        turns = np.array(turns) @ A(np.array(body.euler_parameters))
+        p = Rotation.from_matrix(turns).as_quat(scalar_first=True)
         motions[body.name] = BodyMotion(r, p, None, None)
     return motions
 
 
 @pytest.mark.parametrize(("name", "kind"), PAIRS)
-def test_an_export_is_read_and_moves_alike(name: str, kind: str, tmp_path: Path):
+def test_export_read_again_moves_alike(name, kind, tmp_path):
     case = cases.load(name)
     again = read_again(case, exported(case, kind, tmp_path))
     motions = carried(case, again)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.harness.execution import Pair
 from kincheck.core.kinematics import continuous, is_continuation, regular_between
@@ -17,19 +16,13 @@ from kincheck.core.studies.stress.verdicts import Verdict, judged, once
 from kincheck.core.studies.truth.fold import first_fold
 from kincheck.core.studies.truth.motion import Reach, followed
 
+from ..support.engine_motion import SIMULATORS, installed, rotation
+
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
-SIMULATORS = ["mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody"]
-
-
-def installed(name):
-    engine = adapters.engine(name)
-    if engine.version() is None:
-        pytest.skip(f"{name} is not installed")
-    return engine
 
 
 @pytest.mark.parametrize("name", ["native", *SIMULATORS])
-def test_a_fold_just_after_a_sample_ends_the_motion(name):
+def test_fold_after_sample_ends_motion(name):
     """The rates beside the fold are so large that they seem to lead to another assembly."""
     engine, case = installed(name), load_case(BEYOND)
     found = engine.solve(engine.build(case), case, 1e-12)
@@ -39,7 +32,7 @@ def test_a_fold_just_after_a_sample_ends_the_motion(name):
     assert np.isnan(found.points["P"].position[2]).all()
 
 
-def test_two_continuations_find_the_same_fold():
+def test_fold_by_two_continuations_agrees():
     """By arclength, and by steps of the driver in extended precision."""
     case = load_case(BEYOND)
     assert followed(case).reach.tolist() == [Reach.REACHED, Reach.REACHED, Reach.BEYOND]
@@ -47,7 +40,7 @@ def test_two_continuations_find_the_same_fold():
     assert first_fold(case, 0.053) is None
 
 
-def test_the_end_of_a_stroke_is_a_fold():
+def test_fold_at_end_of_stroke():
     """A slider-crank driven at its slider, where the rod is stretched and where it is folded."""
     crank, rod = 0.3, 1.0
     b = polar(crank, 0.4)
@@ -69,7 +62,7 @@ def past_folds():
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", SIMULATORS)
-def test_no_simulator_steps_over_a_fold(name, past_folds):
+def test_simulator_steps_over_no_fold(name, past_folds):
     """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples
     15000`. In this process, because workers take longer to begin than to solve.
     """
@@ -83,10 +76,6 @@ def test_no_simulator_steps_over_a_fold(name, past_folds):
 # What is asked of a step
 
 
-def turned(angle):
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
 @pytest.mark.parametrize(
     ("ratio", "regular"),
     [
@@ -95,8 +84,8 @@ def turned(angle):
         (np.diag([1.0, 1.0, 0.4]), False),
         (np.diag([1.0, 1.0, -1.0]), False),  # one that passed zero
         (-np.eye(2), False),  # two, and the sign of the determinant is as it was
-        (turned(0.3), True),
-        (turned(2.0), False),  # no eigenvalue is near the negative axis
+        (rotation((0, 0, 1), 0.3), True),
+        (rotation((0, 0, 1), 2.0), False),  # no eigenvalue is near the negative axis
         (np.array([[1.1, 1e6], [1e-7, 0.9]]), True),  # unknowns of very different units
         (np.array([[1.1, 1e6], [1e-5, 0.9]]), False),
         (np.array([[1.1, 1e9], [0.0, 0.9]]), True),  # blocks: one is solved after the other
@@ -105,11 +94,11 @@ def turned(angle):
         (np.diag([1.0, 1e300]), False),
     ],
 )
-def test_a_jacobian_stays_regular_where_it_changes_by_less_than_half_of_itself(ratio, regular):
+def test_regular_between_small_jacobian_changes(ratio, regular):
     assert regular_between(ratio) == regular
 
 
-def test_a_step_is_compared_with_itself_and_not_with_its_rates():
+def test_continuation_criterion_beside_fold():
     """Beside a fold the rates are very large: half their sum over the step may be any change."""
     dt, before, now = 0.02, np.array([60.0]), np.array([2.0])
     assert continuous(np.array([0.49]), now, before, dt, 1.0)
@@ -120,7 +109,7 @@ def test_a_step_is_compared_with_itself_and_not_with_its_rates():
 
 
 @pytest.mark.parametrize(("seed", "number", "passed"), [(101, 364, 0), (109, 192, 2)])
-def test_a_singular_pose_that_the_motion_passes_is_no_fold(seed, number, passed):
+def test_passed_singular_pose_is_no_fold(seed, number, passed):
     """Rates stay finite there, and `trace` goes on through a branch point or without an event."""
     truth = specimen(FAMILIES["folds"], seed, number, 4).truth
     assert truth.reach[passed] == Reach.UNKNOWN

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.constraints import CLOSURES
 from kincheck.core.joints import (
     ConstantVelocity,
     Cylindrical,
@@ -21,6 +20,7 @@ from kincheck.core.joints import (
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 
 from ..support.engine_motion import (
+    BOTH_ORDERS,
     ENGINES,
     IN_TREE_OR_CUT,
     SIMULATORS,
@@ -29,6 +29,7 @@ from ..support.engine_motion import (
     assert_consistent,
     assert_motion,
     mechanism_of,
+    ordered,
     rotation,
     solved,
     tolerances,
@@ -41,14 +42,10 @@ from ..support.joint_loops import (
     assert_moves_natively,
     on_crank,
 )
+from ..support.mechanisms import ORIGIN, X
 
 TURNS = np.linspace(-7.0, 7.0, 29)
 AXIS, TIP = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4])
-BOTH_ORDERS = pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
-
-
-def ordered(joint, mirrored):
-    return joint.reversed() if mirrored else joint
 
 
 def all_loops():
@@ -68,7 +65,7 @@ def all_loops():
 
 
 @pytest.mark.parametrize(("engine", "kind", "bodies", "closing"), all_loops())
-def test_joint_in_a_loop_moves_natively(engine, kind, bodies, closing):
+def test_joint_in_loop_moves_as_native(engine, kind, bodies, closing):
     mechanism = on_crank(kind, *bodies)
     found = solved(engine, mechanism, TURN, RATE, ["tested"] if closing else [])
     assert_moves_natively(found, kind, tuple(bodies), tolerances(engine))
@@ -80,10 +77,6 @@ def test_joint_in_a_loop_moves_natively(engine, kind, bodies, closing):
         # a screw is a slide and a turn tied by a row, a constant-velocity joint four by two
         spare = {"screw": 1, "constant_velocity": 2}.get(kind, 0)
         assert found.details["unknowns"] == 7 - mechanism.joint("tested").rows + spare
-
-
-def test_every_joint_type_has_a_closure():
-    assert {each.type for each in CLOSURES} == set(TYPES)
 
 
 def on_screw(theta, axis, point, lead, rate):
@@ -105,15 +98,15 @@ def on_screw(theta, axis, point, lead, rate):
 @BOTH_ORDERS
 @pytest.mark.parametrize("lead", [0.05, -9.0])
 @pytest.mark.parametrize("driver", [JointAngle, JointDisplacement, PointCoordinate])
-def test_screw_over_turns_is_a_helix(driver, lead, mirrored, engine, closing):
+def test_screw_over_turns_is_helix(driver, lead, mirrored, engine, closing):
     """By either of its coordinates or a point, with a lead above and below one radian a metre."""
-    thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), AXIS, lead)
+    thread = Screw("thread", "ground", "nut", ORIGIN, AXIS, lead)
     by_point = driver is PointCoordinate
     # exchanged bodies measure the spindle from the nut; a point is where it is
     sign, unit = -1.0 if mirrored else 1.0, 1.0 if driver is JointAngle else lead / (2.0 * math.pi)
     mechanism = mechanism_of(
         [ordered(thread, mirrored)],
-        {"tip": ("nut", TIP), "hub": ("nut", (0.0, 0.0, 0.0))},
+        {"tip": ("nut", TIP), "hub": ("nut", ORIGIN)},
         [PointCoordinate("drive", "hub", AXIS) if by_point else driver("drive", "thread")],
     )
     values = unit * TURNS * (sign if by_point else 1.0)
@@ -126,8 +119,8 @@ def test_screw_over_turns_is_a_helix(driver, lead, mirrored, engine, closing):
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("swept", ["turn", "push"])
-def test_both_coordinates_of_a_sleeve(swept, mirrored, engine, closing):
-    sleeve = Cylindrical("sleeve", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
+def test_cylindrical_joint_with_two_drivers(swept, mirrored, engine, closing):
+    sleeve = Cylindrical("sleeve", "ground", "rod", ORIGIN, AXIS)
     drivers = [JointAngle("turn", "sleeve"), JointDisplacement("push", "sleeve")]
     mechanism = mechanism_of(
         [ordered(sleeve, mirrored)],
@@ -152,12 +145,12 @@ CLOSED_BY = {
 
 @ENGINES
 @BOTH_ORDERS
-def test_driven_joint_that_closes_a_loop(mirrored, engine):
+def test_driven_joint_closes_loop(mirrored, engine):
     """Two sleeves on one axis, the angle of one and the displacement of the other driven; a hinge
     that a screw without lead repeats.
     """
-    two = Cylindrical("two", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
-    joints = [Cylindrical("one", "ground", "rod", (0.0, 0.0, 0.0), AXIS), ordered(two, mirrored)]
+    two = Cylindrical("two", "ground", "rod", ORIGIN, AXIS)
+    joints = [Cylindrical("one", "ground", "rod", ORIGIN, AXIS), ordered(two, mirrored)]
     drivers = [JointAngle("turn", "two"), JointDisplacement("push", "one")]
     mechanism = mechanism_of(joints, {"tip": ("rod", TIP)}, drivers)
     found = solved(engine, mechanism, TURNS, motions={"push": Sine(0.3, 0.05)})
@@ -168,7 +161,7 @@ def test_driven_joint_that_closes_a_loop(mirrored, engine):
         (name, text), *_ = found.details["closures"].items()
         assert (name, len(found.details["closures"])) == ("two", 1)
         assert CLOSED_BY.get(engine, "on a copy of ") in text
-    joints[1] = ordered(Screw("flat", "ground", "rod", (0.0, 0.0, 0.0), AXIS, 0.0), mirrored)
+    joints[1] = ordered(Screw("flat", "ground", "rod", ORIGIN, AXIS, 0.0), mirrored)
     mechanism = mechanism_of(joints, {"tip": ("rod", TIP)}, [JointAngle("turn", "one")])
     assert_motion(
         solved(engine, mechanism, TURNS, 2.0).points["tip"],
@@ -180,16 +173,16 @@ def test_driven_joint_that_closes_a_loop(mirrored, engine):
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
-def test_constant_velocity_of_two_shafts(bend, mirrored, engine, closing):
+def test_constant_velocity_joint_over_turns(bend, mirrored, engine, closing):
     """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no
     universal joint does.
     """
     # else the bearings carry both shafts, and the joint between them is cut
     cut = [] if closing else ["out"]
     k = (math.cos(bend), 0.6 * math.sin(bend), 0.8 * math.sin(bend))
-    joint = ConstantVelocity("joint", "a", "b", (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), k))
+    joint = ConstantVelocity("joint", "a", "b", ORIGIN, (X, k))
     joints = [
-        Revolute("in", "ground", "a", (-0.5, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Revolute("in", "ground", "a", (-0.5, 0.0, 0.0), X),
         ordered(joint, mirrored),
         Revolute("out", "ground", "b", tuple(0.5 * np.array(k)), k),
     ]
@@ -204,7 +197,7 @@ def test_constant_velocity_of_two_shafts(bend, mirrored, engine, closing):
 @IN_TREE_OR_CUT
 @BOTH_ORDERS
 @pytest.mark.parametrize("rounding", [0.0, 8e-3])
-def test_universal_joint_turns_as_hooke_found(rounding, mirrored, engine, closing):
+def test_universal_joint_follows_hooke(rounding, mirrored, engine, closing):
     """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or
     not. With the second bearing cut, a body that turns about two moving axes carries a closure: the
     only place where a direction has a bias from the angular acceleration.
@@ -212,10 +205,10 @@ def test_universal_joint_turns_as_hooke_found(rounding, mirrored, engine, closin
     b, values, rate = 0.6, np.linspace(0.0, np.pi, 145), 6.0
     first, second = np.array([0.0, 0.0, 1.0]), np.array([-math.sin(b), math.cos(b), rounding])
     axes = (tuple(first), tuple(second))
-    cross = Universal("cross", "driving", "driven", (0.0, 0.0, 0.0), axes)
+    cross = Universal("cross", "driving", "driven", ORIGIN, axes)
     joints = [
-        Revolute("in", "ground", "driving", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        Revolute("out", "ground", "driven", (0.0, 0.0, 0.0), (math.cos(b), math.sin(b), 0.0)),
+        Revolute("in", "ground", "driving", ORIGIN, X),
+        Revolute("out", "ground", "driven", ORIGIN, (math.cos(b), math.sin(b), 0.0)),
         ordered(cross, mirrored),
     ]
     tip = second / np.linalg.norm(second)
@@ -234,7 +227,7 @@ def test_universal_joint_turns_as_hooke_found(rounding, mirrored, engine, closin
 
 @ENGINES
 @pytest.mark.parametrize("second", [Distance, Fixed, Revolute, Spherical, Universal])
-def test_second_joint_between_the_same_bodies(second, engine):
+def test_second_joint_between_same_bodies(second, engine):
     """Rows of a constraint within one rigid body, or on an axis that is there already: zeros, which
     OpenSim and MuJoCo treat apart.
     """
@@ -242,9 +235,9 @@ def test_second_joint_between_the_same_bodies(second, engine):
     how = {
         Distance: (((0.1, 0.0, 0.0), (0.2, 0.1, 0.0)),),
         Revolute: (place, z),
-        Universal: (place, (z, (1.0, 0.0, 0.0))),
+        Universal: (place, (z, X)),
     }.get(second, (place,))
-    pivot = Revolute("pivot", "ground", "a", (0.0, 0.0, 0.0), z)
+    pivot = Revolute("pivot", "ground", "a", ORIGIN, z)
     glued = [pivot, Fixed("glue", "a", "b", (0.1, 0.0, 0.0)), second("again", "a", "b", *how)]
     tip, turn = (0.5, 0.2, 0.1), np.linspace(-1.0, 2.0, 7)
     hinged = [pivot, second("again", "ground", "a", *how)]

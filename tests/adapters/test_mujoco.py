@@ -26,16 +26,17 @@ from ..support.engine_motion import (
     solved,
     with_joints,
 )
+from ..support.mechanisms import X
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
 
-def test_rows_are_the_derivatives_of_one_another():
+def test_mujoco_rows_are_consistent_derivatives():
     """Off the solution too, for connects, a weld, a tendon, a joint equality and a point driver."""
     brace = Distance("brace", "ground", "slider", ((0.5, 0.4, 0.3), (0.2, 0.0, 0.0)))
     extra = Spherical("extra", "peg", "ground", (0.1, 0.3, 0.3))
     groove = Inline("groove", "rod", "ground", (0.3, 0.1, 0.2), (1.0, 2.0, 0.0))
-    thread = Screw("pivot", "ground", "crank", (0.0, 0.1, 0.12), (1.0, 0.0, 0.0), 0.3)
+    thread = Screw("pivot", "ground", "crank", (0.0, 0.1, 0.12), X, 0.3)
     drivers = (PointCoordinate("crank", "peg", (1.0, 2.0, -2.0)),)
     mechanism = with_joints(slider_crank(), brace, extra, groove, thread, drivers=drivers)
     with cutting("gudgeon"):
@@ -62,7 +63,7 @@ def test_rows_are_the_derivatives_of_one_another():
     )
 
 
-def test_closures_that_mujoco_leaves_out():
+def test_mujoco_degenerate_closures_are_solved():
     """A weld inside one rigid body, a rod between fixed bodies, and a bearing on the crank's axis:
     rows of zeros or nearly so.
     """
@@ -81,11 +82,11 @@ def test_closures_that_mujoco_leaves_out():
     assert "no assembly at the design position" in failed.message
 
 
-def test_a_rod_square_to_a_slider():
+def test_mujoco_rod_at_dead_centre():
     """At its dead centre MuJoCo leaves the rod's row out; the row is zero there, its rate v^2 /
     span.
     """
-    guide = Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    guide = Translational("guide", "ground", "slider", (0.0, 0.0, 0.0), X)
     rod = Distance("rod", "ground", "slider", ((0.0, 0.3, 0.0), (0.4, 0.0, 0.0)))
     mechanism = mechanism_of([guide, rod], {}, [JointDisplacement("push", "guide")])
     model = adapter.MuJoCoModel(adapter.mujoco(), motion_case(mechanism, [0.0]))

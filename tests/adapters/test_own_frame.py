@@ -6,47 +6,36 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
-from kincheck.adapters.native import Native
 from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
 from kincheck.adapters.shared.projection import Walk
-from kincheck.core import (
-    Body,
-    JointAngle,
-    Mechanism,
-    Point,
-    RackPinion,
-    Revolute,
-    Screw,
-    Translational,
-)
+from kincheck.core import JointAngle, RackPinion, Revolute, Screw, Translational
 from kincheck.core.errors import SolveError
 from kincheck.core.joints import Kind
 
 from ..kinematics.test_equivalence import case_of, motion
 from ..kinematics.test_invariance import snapped
-from ..support.mechanisms import mcpherson, placed
+from ..support.engine_motion import installed, mechanism_of
+from ..support.mechanisms import ORIGIN, X, Z, mcpherson, placed
 from .test_projection import Crank
 
+SIMULATORS = ["mujoco", "pinocchio", "exudyn"]
+OF_SIMULATORS = pytest.mark.parametrize("engine", SIMULATORS)
 STROKES, TURNS = np.linspace(-0.0625, 0.0625, 9), np.linspace(-2.0, 2.0, 9)
-Z = (0.0, 0.0, 1.0)
 
 
-def jack(radius=0.25, lead=0.125):
+def jack():
     """A pinion drives a rack, and carries a nut on its thread: a coupler and a joint with a
     length.
     """
-    return Mechanism(
-        "jack",
-        [Body("pinion"), Body("rack"), Body("nut")],
+    return mechanism_of(
         [
             Revolute("bearing", "ground", "pinion", (0.5, 0.25, 0.0), Z),
-            Translational("rail", "ground", "rack", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-            Screw("thread", "ground", "nut", (0.5, 0.25, 0.75), Z, lead=lead),
+            Translational("rail", "ground", "rack", ORIGIN, X),
+            Screw("thread", "ground", "nut", (0.5, 0.25, 0.75), Z, lead=0.125),
         ],
-        [Point("tooth", "rack", (0.5, 0.0, 0.0)), Point("mark", "nut", (1.0, 0.25, 0.75))],
+        {"tooth": ("rack", (0.5, 0.0, 0.0)), "mark": ("nut", (1.0, 0.25, 0.75))},
         [JointAngle("turn", "bearing"), JointAngle("nut", "thread")],
-        [RackPinion("mesh", ("bearing", "rail"), radius)],
+        [RackPinion("mesh", ("bearing", "rail"), 0.25)],
     )
 
 
@@ -70,9 +59,9 @@ def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
     )
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
+@OF_SIMULATORS
 @pytest.mark.parametrize("exponent", [-40, -20, 20])
-def test_size_does_not_matter(engine, exponent):
+def test_simulator_motion_scales_with_size(engine, exponent):
     """To the last bit: from a picometre to a thousand kilometres, by powers of two."""
     factor = 2.0**exponent
     for mechanism, values, scale in ((mcpherson(), STROKES, factor), (jack(), TURNS, 1.0)):
@@ -85,8 +74,8 @@ def test_size_does_not_matter(engine, exponent):
             assert (x == factor / scale**k * expected).all()
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
-def test_place_does_not_matter(engine):
+@OF_SIMULATORS
+def test_simulator_motion_at_far_place(engine):
     """Four thousand kilometres away: only the sum with the position rounds."""
     offset = np.array((2.0**22, -(2.0**21), 0.0))
     for mechanism, values in ((mcpherson(), STROKES), (jack(), TURNS)):
@@ -98,21 +87,16 @@ def test_place_does_not_matter(engine):
         assert (there[1:] == here[1:]).all()
 
 
-def test_residuals_are_in_metres():
-    for engine in (
-        Native(),
-        *filter(
-            lambda each: each.version(), map(adapters.engine, ("mujoco", "pinocchio", "exudyn"))
-        ),
-    ):
-        residuals = list[float]()
-        for factor in (1.0, 2.0**-40):
-            case = case_of(moved(mcpherson(), factor), factor * STROKES)
-            residuals.append(engine.solve(engine.build(case), case, 1e-12).residual / factor)
-        assert 0.0 < residuals[0] == residuals[1] < 1e-12
+@pytest.mark.parametrize("engine", ["native", *SIMULATORS])
+def test_residual_is_in_metres(engine):
+    given, residuals = installed(engine), []
+    for factor in (1.0, 2.0**-40):
+        case = case_of(moved(mcpherson(), factor), factor * STROKES)
+        residuals.append(given.solve(given.build(case), case, 1e-12).residual / factor)
+    assert 0.0 < residuals[0] == residuals[1] < 1e-12
 
 
-def test_a_mechanism_in_its_own_frame_is_as_large_as_one_and_there():
+def test_own_frame_has_unit_size():
     case = case_of(moved(jack(), 2.0**-30, (2.0**-9, 0.0, 2.0**-8)), TURNS)
     frame, own = own_frame(case), in_own_frame(case)
     assert frame.unit == 2.0**-30
@@ -134,12 +118,10 @@ def test_a_mechanism_in_its_own_frame_is_as_large_as_one_and_there():
     )
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
-def test_a_model_of_another_mechanism_is_refused(engine):
+@OF_SIMULATORS
+def test_model_of_other_mechanism_is_refused(engine):
     """The numbers of a model have no names: those of another length of the sweep were wrong."""
-    chosen = adapters.engine(engine)
-    if not chosen.version():
-        pytest.skip(f"{engine} is not installed")
+    chosen = installed(engine)
     case = case_of(moved(mcpherson(), 1.0), STROKES)
     model = chosen.build(case)
     shorter = case_of(moved(mcpherson(), 1.0), STROKES[::2])

@@ -4,25 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.adapters.shared.projection import solve_by_projection
-from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, SolveError
-from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core import JointAngle, Revolute, SolveError
+from kincheck.core.case.case import Sweep
 from kincheck.core.mechanism.motions import Sine
 
-CASE = Case(
-    name="crank",
-    source="made up",
-    truth=Truth.CONSENSUS_ONLY,
-    mechanism=Mechanism(
-        "crank",
-        [Body("crank")],
-        [Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
-        [Point("pin", "crank", (1.0, 0.0, 0.0))],
+from ..support.engine_motion import installed, mechanism_of, motion_case
+from ..support.mechanisms import ORIGIN, X, Z
+
+CASE = motion_case(
+    mechanism_of(
+        [Revolute("pivot", "ground", "crank", ORIGIN, Z)],
+        {"pin": ("crank", X)},
         [JointAngle("turn", "pivot")],
     ),
-    sweep=Sweep("turn", np.linspace(0.0, 1.0, 21)),
-    outputs=(Output("x", "pin", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "made up"),),
+    np.linspace(0.0, 1.0, 21),
 )
 
 
@@ -69,26 +65,27 @@ class Crank:
         ]
 
 
-def test_a_steady_motion_is_followed_to_its_end():
-    found = solve_by_projection(Crank(lambda c: 1.0), CASE, 1e-12)
-    assert found.solved.all()
-    assert found.message == ""
-    assert np.abs(found.points["pin"].position[:, 0] - np.cos(CASE.sweep.values)).max() <= 1e-15
+@pytest.mark.parametrize(
+    ("beyond", "message"),
+    [
+        (1.0, ""),
+        (-1.0, "jumps to another assembly; last reachable sample at turn = 0.5"),
+        (np.nan, "last reachable sample at turn = 0.5"),
+    ],
+    ids=["steady", "jump", "nan"],
+)
+def test_projection_ends_at_hidden_jump(beyond, message):
+    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else beyond), CASE, 1e-12)
+    reached = CASE.sweep.values < (0.52 if message else 2.0)
+    assert found.solved.tolist() == reached.tolist()
+    assert message in found.message
+    assert bool(message) == bool(found.message)
+    x = found.points["pin"].position[:, 0]
+    assert np.abs(x - np.cos(CASE.sweep.values))[reached].max() <= 1e-15
+    assert np.isnan(x[~reached]).all()
 
 
-def test_a_jump_that_no_output_sees_ends_the_motion():
-    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else -1.0), CASE, 1e-12)
-    assert found.solved.tolist() == [value < 0.52 for value in CASE.sweep.values]
-    assert "jumps to another assembly; last reachable sample at turn = 0.5" in found.message
-    assert np.isnan(found.points["pin"].position[~found.solved]).all()
-
-
-def test_residuals_that_are_not_numbers_end_the_motion():
-    found = solve_by_projection(Crank(lambda c: 1.0 if c < 0.52 else np.nan), CASE, 1e-12)
-    assert found.solved.sum() == 11
-
-
-def test_freedom_that_is_left_is_refused():
+def test_undriven_freedom_is_refused():
     class Loose(Crank):
         def jacobian(self):
             return np.diag([1.0, 0.0])
@@ -97,7 +94,7 @@ def test_freedom_that_is_left_is_refused():
         solve_by_projection(Loose(lambda c: 1.0), CASE, 1e-12)
 
 
-def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
+def test_repeated_sample_out_of_reach():
     """No step between samples says how small a part of one may be."""
     case = replace(CASE, sweep=Sweep("turn", np.array([0.5, 0.5])))
     found = solve_by_projection(Crank(lambda c: 1.0), case, 1e-12)
@@ -109,7 +106,7 @@ def test_samples_that_are_all_one_end_the_walk_where_they_cannot_be_reached():
     assert np.isnan(jumps.residual)
 
 
-def test_a_first_sample_whose_rates_cannot_be_met_is_told():
+def test_unreachable_rates_at_first_sample():
     """The pose is reached on the way there, where the drivers move otherwise."""
 
     class Stuck(Crank):
@@ -131,7 +128,7 @@ def test_a_first_sample_whose_rates_cannot_be_met_is_told():
 @pytest.mark.parametrize("defect", [1e-4, 1e-9])
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
+def test_near_parallelogram_keeps_its_branch(name, loops, defect):
     """Nearly a parallelogram: beside its change points, within parts of a step, the crossed linkage
     goes straight on.
 
@@ -139,51 +136,29 @@ def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
     side of the line between theirs. Of two on one crank, both fold at once, and the determinant of
     all rows keeps its sign.
     """
-    engine = adapters.engine(name)
-    if engine.version() is None:
-        pytest.skip(f"{name} is not installed")
-    axis, ground, coupler, rocker = (0.0, 0.0, 1.0), np.array([3.0, 0.0]), 3.0, 1.0 + defect
+    engine, ground, coupler, rocker = installed(name), 3.0, 3.0, 1.0 + defect
     turns = np.linspace(0.0, 3.2, 17)
-    pin = np.column_stack([np.cos(0.7 + turns), np.sin(0.7 + turns)])
+    pin = np.exp(1j * (0.7 + turns))
     apart = ground - pin
-    along = 0.5 * (1.0 + (coupler**2 - rocker**2) / (apart * apart).sum(axis=1))
-    off = -np.sqrt(coupler**2 / (apart * apart).sum(axis=1) - along**2)
-    truth = (
-        pin + along[:, None] * apart + off[:, None] * np.column_stack([-apart[:, 1], apart[:, 0]])
-    )
+    along = 0.5 * (1.0 + (coupler**2 - rocker**2) / abs(apart) ** 2)
+    truth = pin + (along - 1j * np.sqrt(coupler**2 / abs(apart) ** 2 - along**2)) * apart
 
-    def place(x):
-        return (*map(float, x), 0.0)
+    def place(z):
+        return z.real, z.imag, 0.0
 
-    mechanism = Mechanism(
-        "nearly a parallelogram",
-        [
-            Body("crank"),
-            *(Body(f"{name} {k}") for k in range(loops) for name in ("coupler", "rocker")),
-        ],
-        [
-            Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), axis),
-            *(
-                Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), axis)
-                for k in range(loops)
-            ),
-            *(
-                Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), axis)
-                for k in range(loops)
-            ),
-            *(
-                Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), axis)
-                for k in range(loops)
-            ),
-        ],
-        [Point("P", "coupler 0", place(truth[0]))],
-        [JointAngle("turn", "A")],
-    )
-    output = Output("y", "P", (0.0, 1.0, 0.0), False, 1e-9, 0.0, "made up")
-    case = replace(CASE, mechanism=mechanism, sweep=Sweep("turn", turns), outputs=(output,))
+    joints = [Revolute("A", "ground", "crank", ORIGIN, Z)]
+    for k in range(loops):
+        joints += [
+            Revolute(f"B {k}", "crank", f"coupler {k}", place(pin[0]), Z),
+            Revolute(f"C {k}", f"coupler {k}", f"rocker {k}", place(truth[0]), Z),
+            Revolute(f"D {k}", "ground", f"rocker {k}", place(ground), Z),
+        ]
+    points = {"P": ("coupler 0", place(truth[0]))}
+    case = motion_case(mechanism_of(joints, points, [JointAngle("turn", "A")]), turns)
     found = engine.solve(engine.build(case), case, 1e-12)
     assert found.solved.all(), found.message
-    np.testing.assert_allclose(found.points["P"].position[:, :2], truth, rtol=0, atol=1e-11)
+    P = found.points["P"].position
+    np.testing.assert_allclose(P[:, 0] + 1j * P[:, 1], truth, rtol=0, atol=1e-11)
 
 
 class Doubled(Crank):
@@ -232,7 +207,7 @@ class Doubled(Crank):
         (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),
     ],
 )
-def test_why_there_is_no_pose_is_told(gap, push, tol, message):
+def test_missing_design_pose_is_explained(gap, push, tol, message):
     found = solve_by_projection(Doubled(gap, push), CASE, tol)
     assert found.solved.all() == (not message)
     assert found.message.startswith(message)

@@ -9,44 +9,34 @@ from kincheck import adapters, cases
 from kincheck.core import JointAngle, Revolute, Spherical
 from kincheck.core.case.case import Sweep
 
-from ..support.engine_motion import mechanism_of, solved
+from ..oracles.naive import A
+from ..support.engine_motion import assert_motion, mechanism_of, rotation, solved
+from ..support.mechanisms import ORIGIN, Y
 
 pytest.importorskip("opensim", reason="OpenSim is not installed: pip install 'kincheck[simbody]'")
 
 from kincheck.adapters.shared.poses import euler_angles
-from kincheck.adapters.simbody.simbody import turned
+from kincheck.adapters.simbody.simbody import turn_parameters
 
 ENGINE = adapters.engine("simbody")
 
 
-def test_a_ball_passes_the_angles_where_euler_angles_lock():
+def test_spherical_joint_passes_gimbal_lock():
     """A body on a ball stops where its turn about y is a right angle: OpenSim's second angle."""
     corner = (0.8, 0.1, 0.5)
     joints = [
-        Spherical("ball", "ground", "door", (0.0, 0.0, 0.0)),
-        Revolute("hinge", "ground", "door", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        Spherical("ball", "ground", "door", ORIGIN),
+        Revolute("hinge", "ground", "door", ORIGIN, Y),
     ]
     mechanism = mechanism_of(joints, {"corner": ("door", corner)}, [JointAngle("turn", "hinge")])
     turn = 0.5 * math.pi * np.arange(-4, 5) / 2
     found = solved("simbody", mechanism, turn, 2.0, ["hinge"]).points["corner"]
-    c, s = np.cos(turn), np.sin(turn)
-    x, y, z = corner
-    expected = np.stack([c * x + s * z, 0.0 * c + y, c * z - s * x], axis=-1)
-    across = expected * [1.0, 0.0, 1.0]
-    rate = np.stack([c * z - s * x, 0.0 * c, -c * x - s * z], axis=-1)
-    np.testing.assert_allclose(found.position, expected, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(found.velocity, 2.0 * rate, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(found.acceleration, -4.0 * across, rtol=0, atol=1e-13)
+    expected, h = rotation(Y, turn) @ corner, np.array([0.0, 1.0, 0.0])
+    rates = 2.0 * np.cross(h, expected), 4.0 * np.cross(h, np.cross(h, expected))
+    assert_motion(found, expected, *rates, atol=(1e-14, 1e-13, 1e-13))
 
 
-def matrix(p):
-    """Return the rotation matrix of Euler parameters."""
-    e0, e = p[0], np.array(p[1:])
-    skew = np.cross(np.eye(3), e)
-    return (e0**2 - e @ e) * np.eye(3) + 2.0 * np.outer(e, e) + 2.0 * e0 * skew
-
-
-def test_euler_angles_give_the_rotation_back_at_any_angle():
+def test_euler_angles_restore_any_rotation():
     rng = np.random.default_rng(0)
     lock = math.sqrt(0.5)
     poses = [*rng.normal(size=(50, 4)), [lock, 0.0, lock, 0.0], [lock, 0.0, -lock, 0.0]]
@@ -55,20 +45,20 @@ def test_euler_angles_give_the_rotation_back_at_any_angle():
         p = np.array(p) / np.linalg.norm(p)
         R = np.eye(3)
         for angle, e in zip(euler_angles(p.tolist()), np.eye(3), strict=True):
-            R = R @ matrix([math.cos(angle / 2), *(math.sin(angle / 2) * e)])
-        np.testing.assert_allclose(R, matrix(p), rtol=0, atol=2e-15)
+            R = R @ A([math.cos(angle / 2), *(math.sin(angle / 2) * e)])
+        np.testing.assert_allclose(R, A(p), rtol=0, atol=2e-15)
 
 
-def test_turning_is_by_the_axes_of_the_parent():
+def test_turn_by_parent_axes():
     p, turn = np.array([0.5, 0.5, -0.5, 0.5]), np.array([0.4, -0.2, 0.9])
     angle = np.linalg.norm(turn)
     step = [math.cos(angle / 2), *(math.sin(angle / 2) / angle * turn)]
-    found = turned(p.tolist(), turn.tolist())
-    np.testing.assert_allclose(matrix(found), matrix(step) @ matrix(p), rtol=0, atol=1e-15)
-    assert turned(p.tolist(), [0.0, 0.0, 0.0]) == tuple(p)
+    found = turn_parameters(p.tolist(), turn.tolist())
+    np.testing.assert_allclose(A(found), A(step) @ A(p), rtol=0, atol=1e-15)
+    assert turn_parameters(p.tolist(), [0.0, 0.0, 0.0]) == tuple(p)
 
 
-def test_settings_and_floor_say_what_is_simbody_s_own():
+def test_simbody_settings_and_floor():
     case = cases.load("mcpherson_strut")
     assert ENGINE.settings["residual"].startswith("getQErr")
     floor = ENGINE.floor(replace(case, sweep=Sweep("stroke", np.linspace(-0.02, 0.02, 5))))

@@ -20,7 +20,7 @@ def thinned(rate):
     return replace(STRUT, sweep=sweep)
 
 
-def test_the_tendon_has_no_acceleration_of_its_own():
+def test_tendon_force_lacks_velocity_term():
     """At rest nothing is missing; the part without Jdot v grows with the square of the rate."""
     slow, fast = (rod_forces(thinned(rate), "tie_rod") for rate in (1e-3, 1.0))
     largest = np.abs(fast.rigid).max()
@@ -33,7 +33,7 @@ def test_the_tendon_has_no_acceleration_of_its_own():
     assert "off by up to" in report_lines(fast, "tie_rod")
 
 
-def test_wrong_input_is_told():
+def test_soft_constraints_bad_input_is_refused():
     with pytest.raises(CaseError, match="expected one of: tie_rod"):
         rod_forces(STRUT, "strut_top")
     with pytest.raises(CaseError, match="no output reads a force"):
@@ -45,7 +45,7 @@ def test_wrong_input_is_told():
         rod_forces(massless, "tie_rod")
 
 
-def test_command(tmp_path: Path, capsys):
+def test_soft_constraints_command_refuses_bad_arguments(tmp_path: Path, capsys):
     assert main([]) == 2
     assert main([str(tmp_path / "none.toml")]) == 2
     assert "error: " in capsys.readouterr().err

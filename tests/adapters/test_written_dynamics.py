@@ -8,38 +8,36 @@ import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.core import Body, Cylindrical, Mechanism, Point, Revolute, Translational
-from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.kinematics import free_motion
+
+from ..support.engine_motion import motion_case
+from ..support.mechanisms import ORIGIN
 
 mujoco = pytest.importorskip("mujoco")
 
 Z, DOWN = (0.0, 0.0, 1.0), (0.0, -9.80665, 0.0)
 TIMES = np.linspace(0.0, 0.5, 26)
 
-
-def bodies(*names):
-    given = {
-        "crank": (1.0, (0.0, 0.15, 0.0), (0.0075, 0.0004, 0.0075, 0, 0, 0)),
-        "coupler": (2.0, (0.4, 0.5, 0.0), (0.009, 0.06, 0.06, 0, 0, 0)),
-        "rocker": (1.5, (0.85, 0.35, 0.0), (0.06, 0.005, 0.06, 0, 0, 0)),
-    }
-    return [
-        Body(name, mass=given[name][0], center_of_mass=given[name][1], inertia=given[name][2])
-        for name in names
-    ]
+LINKS = [
+    Body(name, mass=mass, center_of_mass=center, inertia=(*inertia, 0, 0, 0))
+    for name, mass, center, inertia in (
+        ("crank", 1.0, (0.0, 0.15, 0.0), (0.0075, 0.0004, 0.0075)),
+        ("coupler", 2.0, (0.4, 0.5, 0.0), (0.009, 0.06, 0.06)),
+        ("rocker", 1.5, (0.85, 0.35, 0.0), (0.06, 0.005, 0.06)),
+    )
+]
 
 
 def four_bar():
     joints = [
-        Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), Z),
+        Revolute("A", "ground", "crank", ORIGIN, Z),
         Revolute("B", "crank", "coupler", (0.0, 0.3, 0.0), Z),
         Revolute("C", "coupler", "rocker", (0.8, 0.7, 0.0), Z),
         Revolute("D", "ground", "rocker", (0.9, 0.0, 0.0), Z),
     ]
     point = Point("P", "coupler", (0.8, 0.7, 0.0))
-    links = bodies("crank", "coupler", "rocker")
-    return Mechanism("four_bar", links, joints, [point], [], gravity=DOWN)
+    return Mechanism("four_bar", LINKS, joints, [point], [], gravity=DOWN)
 
 
 def wedges(last):
@@ -49,16 +47,15 @@ def wedges(last):
         last: the slide that closes it.
     """
     slides = {
-        "across": Translational("across", "ground", "crank", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        "across": Translational("across", "ground", "crank", ORIGIN, (1.0, 0.0, 0.0)),
         "slope": Translational("slope", "crank", "coupler", (0.2, 0.3, 0.0), (2.0, 1.0, 0.0)),
         "up": Translational("up", "coupler", "ground", (0.4, 0.5, 0.0), (0.0, 1.0, 0.0)),
     }
     closing = slides.pop(last)
     pin = Revolute("pin", "coupler", "rocker", (0.4, 0.5, 0.0), Z)
     point = Point("P", "rocker", (0.8, 0.7, 0.0))
-    links = bodies("crank", "coupler", "rocker")
     joints = [*slides.values(), closing, pin]
-    return Mechanism("wedges", links, joints, [point], [], gravity=DOWN)
+    return Mechanism("wedges", LINKS, joints, [point], [], gravity=DOWN)
 
 
 PLAIN = """<mujoco><option gravity="0 -9.80665 0"/><worldbody><body name="crank">
@@ -72,9 +69,7 @@ PLAIN = """<mujoco><option gravity="0 -9.80665 0"/><worldbody><body name="crank"
 
 
 def texts_of(mechanism, to):
-    sweep = Sweep("time", np.array([0.0, 1.0]))
-    case = Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    return written(case, adapters.writer(to))
+    return written(motion_case(mechanism, [0.0, 1.0]), adapters.writer(to))
 
 
 def text_of(mechanism):
@@ -97,13 +92,13 @@ def error(text, mechanism, dt=1e-3):
     return apart
 
 
-def test_written_hinge_loop_moves_as_plain_connect():
+def test_written_hinge_loop_moves_freely():
     mechanism = four_bar()
     assert error(text_of(mechanism), mechanism) < 1.05 * error(PLAIN, mechanism)
 
 
 @pytest.mark.parametrize("last", ["slope", "up"])
-def test_written_weld_shares_mass_and_moves_alike(last):
+def test_written_weld_loop_moves_freely(last):
     """With a link of 1e-6 kg under the weld the error is 2e-3 m."""
     mechanism = wedges(last)
     text = text_of(mechanism)
@@ -111,18 +106,22 @@ def test_written_weld_shares_mass_and_moves_alike(last):
     assert error(text, mechanism) < 1e-7
 
 
-@pytest.mark.parametrize("build", [four_bar, lambda: wedges("slope"), lambda: wedges("up")])
-def test_whole_masses_need_no_armature(build):
-    root = ET.fromstring(text_of(build()))
+@pytest.mark.parametrize(
+    "mechanism",
+    [four_bar(), wedges("slope"), wedges("up")],
+    ids=["hinges", "weld at slope", "weld at guide"],
+)
+def test_written_mjcf_has_no_armature(mechanism):
+    root = ET.fromstring(text_of(mechanism))
     assert "armature" not in {key for each in root.iter() for key in each.attrib}
     masses = [float(each.get("mass")) for each in root.iter("inertial")]
     assert sum(masses) == pytest.approx(4.5, abs=1e-15)
 
 
-def test_urdf_leaves_no_mass_to_simulators():
+def test_written_urdf_gives_every_mass():
     """Some take 1 kg for a link without a mass: points and links between freedoms too."""
-    joint = Cylindrical("guide", "ground", "crank", (0.0, 0.0, 0.0), Z)
-    mechanism = Mechanism("one", bodies("crank"), [joint], [Point("P", "crank", Z)], [])
+    joint = Cylindrical("guide", "ground", "crank", ORIGIN, Z)
+    mechanism = Mechanism("one", LINKS[:1], [joint], [Point("P", "crank", Z)], [])
     root = ET.fromstring(texts_of(mechanism, "urdf")[".urdf"])
     masses = {each.get("name"): each.find("inertial/mass") for each in root.iter("link")}
     assert masses.pop("ground") is None

@@ -18,7 +18,6 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import way_to, written
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
@@ -26,6 +25,10 @@ from kincheck.core.mechanism.loads import Bushing, Force, SpringDamper, Torque, 
 from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
 from scipy.spatial.transform import Rotation
+
+from ..support.engine_motion import motion_case
+from ..support.exported import IN_TREES, read
+from ..support.loads import six
 
 # The arm: masses [kg] and their places, global at design [m].
 MASSES = np.array([0.5, 0.75, 1.25, 0.3])
@@ -52,7 +55,7 @@ CENTER = MASSES @ PLACES / MASSES.sum()
 
 def arm(**more):
     about = cloud(CENTER)
-    entries = tuple(float(about[k]) for k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)))
+    entries = tuple(six(about))
     own = {"mass": float(MASSES.sum()), "center_of_mass": (*CENTER.tolist(),), "inertia": entries}
     return Mechanism(
         "pendulum",
@@ -140,8 +143,7 @@ def slowed(clock=SPRINGS[1]):
 
 
 def texts(to, mechanism):
-    case = Case("c", "s", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.array([ANGLE])), ())
-    return adapters.writer(to)(mechanism, way_to(case, ANGLE), {})
+    return adapters.writer(to)(mechanism, way_to(motion_case(mechanism, [ANGLE]), ANGLE), {})
 
 
 def started(text):
@@ -154,7 +156,7 @@ def started(text):
     return model, data
 
 
-def test_mujoco_begins_to_turn():
+def test_written_mjcf_loads_accelerate_arm():
     text = texts("mjcf", arm(forces=[*SPRINGS, *LOADS]))[".xml"]
     model, data = started(text)
     assert data.qacc[0] == pytest.approx(start(springs=True, loads=False), rel=STOOD_IN)
@@ -170,7 +172,7 @@ def test_mujoco_begins_to_turn():
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
 @pytest.mark.parametrize("law", ["euler_parameters", "cardan"])
-def test_exudyn_begins_to_turn(tmp_path, law, bodies):
+def test_written_exudyn_loads_accelerate_arm(tmp_path, law, bodies):
     exu = pytest.importorskip("exudyn")
     exu.config.printToConsole = False
     script = tmp_path / "model.py"
@@ -203,13 +205,13 @@ def test_exudyn_begins_to_turn(tmp_path, law, bodies):
     assert found == pytest.approx(start(springs=True, loads=True, bushing=soft), rel=1e-7)
     rigid = mbs.GetObject(model["bodies"]["arm"])
     about = cloud(np.array(ORIGIN))
-    expected = [about[k] for k in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))]
+    expected = [*np.diag(about), about[1, 2], about[0, 2], about[0, 1]]
     np.testing.assert_allclose(rigid["inertia"], expected, atol=1e-14)
     spring, clock = (mbs.GetObject(model["forces"][name]) for name in ("spring", "clock"))
     assert (spring["damping"], clock["damping"]) == (5.0, 0.25)
 
 
-def test_pinocchio_begins_to_turn():
+def test_written_urdf_inertia_accelerates_arm():
     pin = pytest.importorskip("pinocchio")
     found = texts("urdf", arm(forces=[*SPRINGS, *LOADS]))
     model = pin.buildModelFromXML(found[".urdf"])
@@ -225,7 +227,7 @@ def test_pinocchio_begins_to_turn():
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
 @pytest.mark.parametrize("to", ["sdf", "urdf"])
-def test_drake_begins_to_turn(to, bodies):
+def test_written_drake_loads_accelerate_arm(to, bodies):
     """URDF has no springs at hinges."""
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
     still = (0.0, 0.0, 0.0), (200.0, 200.0, 200.0)  # the same in any law
@@ -258,11 +260,11 @@ def test_drake_begins_to_turn(to, bodies):
 
 
 @pytest.mark.parametrize("turning", [0.0, 30.0])
-def test_written_urdf_has_the_same_bushing(tmp_path, turning):
+def test_written_urdf_bushing_is_kept(tmp_path, turning):
     """Its axes are oblique; the point and the numbers are as written, to the last digits."""
     soft = rubber("euler_parameters", (turning, 0.0, 5.0))
     mechanism = arm(forces=[*SPRINGS[:1], replace(soft, damping=(1.0, 2.0, 3.0))])
-    case = Case("c", "s", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.array([ANGLE])), ())
+    case = motion_case(mechanism, [ANGLE])
     for suffix, text in written(case, adapters.writer("urdf")).items():
         (tmp_path / f"arm{suffix}").write_text(text)
     spring, found = load(tmp_path / "arm.urdf", Supplied(drive=("pin:0:1",))).mechanism.forces
@@ -277,7 +279,7 @@ def test_written_urdf_has_the_same_bushing(tmp_path, turning):
 
 
 @pytest.mark.parametrize("bodies", [("ground", "arm"), ("arm", "ground")])
-def test_simbody_begins_to_turn(tmp_path, bodies):
+def test_written_osim_loads_accelerate_arm(tmp_path, bodies):
     o = pytest.importorskip("opensim", reason="opensim is not installed")
     o.Logger.setLevelString("Off")
     soft = rubber("cardan", bodies=bodies)
@@ -306,7 +308,7 @@ def test_simbody_begins_to_turn(tmp_path, bodies):
 @pytest.mark.parametrize(
     ("to", "names"), [("mjcf", "dead second"), ("sdf", "dead second short"), ("osim", "dead")]
 )
-def test_springs_without_a_place_are_named(to, names):
+def test_written_model_names_omitted_springs(to, names):
     """Between fixed bodies; a second one of a joint; of no free length, which Drake refuses."""
     forces = [
         TorsionSpringDamper("dead", "bolt", 1.0),
@@ -326,7 +328,7 @@ def test_springs_without_a_place_are_named(to, names):
 
 
 @pytest.mark.parametrize("to", adapters.WRITERS)
-def test_the_file_of_a_case_without_masses_has_none(to):
+def test_written_model_without_masses(to):
     """Gravity alone moves nothing: the file is that of the mechanism without."""
     plain = replace(arm(), bodies=[Body("arm", ORIGIN, TURNED)], gravity=(0.0, 0.0, 0.0))
     falling = replace(plain, gravity=(0.0, 0.0, -9.8))
@@ -335,7 +337,7 @@ def test_the_file_of_a_case_without_masses_has_none(to):
         assert "Left out" not in text
 
 
-def test_joints_that_carry_backwards_have_springs_of_the_same_sign():
+def test_written_spring_sign_in_reversed_joint():
     """The tree goes from ground to the joint's first body."""
     mechanism = arm()
     pin = replace(mechanism.joint("pin"), i="arm", j="ground")
@@ -371,172 +373,78 @@ def shift(axis, distance):
 
 
 ALONG = {"joint.translation": 0.3, "joint.rotation": -0.7}
+TURN, SHIFT = turn(AXIS_COORDINATES, 0.7, P), shift(AXIS_COORDINATES, 0.3)
+HELIX = SHIFT @ turn(AXIS_COORDINATES, -0.7, P)
 JOINTS = {
-    "revolute": (
-        lambda i, j: Revolute("joint", i, j, P, AXIS_COORDINATES),
-        {"joint": 0.7},
-        turn(AXIS_COORDINATES, 0.7, P),
-    ),
-    "translational": (
-        lambda i, j: Translational("joint", i, j, P, AXIS_COORDINATES),
-        {"joint": 0.3},
-        shift(AXIS_COORDINATES, 0.3),
-    ),
-    "cylindrical": (
-        lambda i, j: Cylindrical("joint", i, j, P, AXIS_COORDINATES),
-        ALONG,
-        shift(AXIS_COORDINATES, 0.3) @ turn(AXIS_COORDINATES, -0.7, P),
-    ),
-    "screw": (
-        lambda i, j: Screw("joint", i, j, P, AXIS_COORDINATES, -0.6 * np.pi / 0.7),
-        ALONG,
-        shift(AXIS_COORDINATES, 0.3) @ turn(AXIS_COORDINATES, -0.7, P),
-    ),
+    "revolute": (Revolute, (AXIS_COORDINATES,), {"joint": 0.7}, TURN),
+    "translational": (Translational, (AXIS_COORDINATES,), {"joint": 0.3}, SHIFT),
+    "cylindrical": (Cylindrical, (AXIS_COORDINATES,), ALONG, HELIX),
+    "screw": (Screw, (AXIS_COORDINATES, -0.6 * np.pi / 0.7), ALONG, HELIX),
     "universal": (
-        lambda i, j: Universal("joint", i, j, P, (AXIS_COORDINATES, ACROSS)),
+        Universal,
+        ((AXIS_COORDINATES, ACROSS),),
         {"joint.hinge1": 0.5, "joint.hinge2": -0.4},
         turn(AXIS_COORDINATES, 0.5, P) @ turn(ACROSS, -0.4, P),
     ),
-    "planar": (
-        lambda i, j: Planar("joint", i, j, P, AXIS_COORDINATES),
-        {"joint.rotation": 0.7},
-        turn(AXIS_COORDINATES, 0.7, P),
-    ),
+    "planar": (Planar, (AXIS_COORDINATES,), {"joint.rotation": 0.7}, TURN),
 }
 
 
 def case(kind, swapped, carried):
     """A body on the ground, or on a body that turns on it; first or second in its joint."""
-    build, _, _ = JOINTS[kind]
+    joint, axes, *_ = JOINTS[kind]
     bodies = [Body("arm", Q, (0.5, 0.5, -0.5, 0.5), mass=1.0, inertia=(1, 1, 1, 0, 0, 0))]
     joints, other = [], "ground"
     if carried:
         other = "carrier"
         bodies.append(Body("carrier", P, mass=2.0, inertia=(1, 2, 2, 0, 0, 0)))
         joints.append(Revolute("base", "ground", "carrier", Q, Z))
-    joints.append(build(*(("arm", other) if swapped else (other, "arm"))))
+    pair = ("arm", other) if swapped else (other, "arm")
+    joints.append(joint("joint", *pair, P, *axes))
     mechanism = Mechanism("driven", bodies, joints, [], [])
-    sweep = Sweep("time", np.array([0.0, 1.0]))
-    return Case("driven", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-
-
-def mujoco(texts, values, folder):
-    mj = importlib.import_module("mujoco")
-    model = mj.MjModel.from_xml_string(texts[".xml"])
-    data = mj.MjData(model)
-    for name, value in values.items():
-        data.joint(name).qpos[:] = value
-    mj.mj_kinematics(model, data)
-    return data.body("arm").xpos, data.body("arm").xmat.reshape(3, 3)
-
-
-def pinocchio(texts, values, folder):
-    pin = importlib.import_module("pinocchio")
-    model = pin.buildModelFromXML(texts[".urdf"])
-    data, q = model.createData(), pin.neutral(model)
-    for name, value in values.items():
-        q[model.idx_qs[model.getJointId(name)]] = value
-    pin.framesForwardKinematics(model, data, q)
-    place = data.oMf[model.getFrameId("arm", pin.FrameType.BODY)]
-    return of_link(place.homogeneous)
-
-
-def of_link(place):
-    """The body's pose from that of its link, which is at its joint and parallel to the ground."""
-    pose = np.array(place) @ shift(np.subtract(Q, P), np.linalg.norm(np.subtract(Q, P)))
-    return pose[:3, 3], pose[:3, :3] @ TURNED_COORDINATES
-
-
-def dart(texts, values, folder):
-    dartpy = importlib.import_module("dartpy")
-    (file := folder / "model.urdf").write_text(texts[".urdf"])
-    loaders = getattr(dartpy, "io", None) or dartpy.utils
-    skeleton = loaders.DartLoader().parseSkeleton(str(file))
-    for name, value in values.items():
-        skeleton.getJoint(name).setPosition(0, value)
-    return of_link(skeleton.getBodyNode("arm").getWorldTransform().matrix())
-
-
-def drake(texts, values, folder):
-    plants = importlib.import_module("pydrake.multibody.plant")
-    plant = plants.MultibodyPlant(1e-3)
-    parsing = importlib.import_module("pydrake.multibody.parsing")
-    parsing.Parser(plant).AddModelsFromString(texts[".sdf"], "sdf")
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    for name, value in values.items():
-        joint = plant.GetJointByName(name)
-        (joint.set_angle if joint.type_name() == "revolute" else joint.set_translation)(
-            context, value
-        )
-    pose = plant.GetFrameByName("arm").CalcPoseInWorld(context)
-    return pose.translation(), pose.rotation().matrix()
-
-
-def simbody(texts, values, folder):
-    o = importlib.import_module("opensim")
-    o.Logger.setLevelString("Off")
-    (file := folder / "model.osim").write_text(texts[".osim"])
-    model = o.Model(str(file))
-    state = model.initSystem()
-    for name, value in values.items():
-        model.getCoordinateSet().get(name).setValue(state, value, False)
-    model.realizePosition(state)
-    place = model.getBodySet().get("arm").getTransformInGround(state)
-    R = np.array([[place.R().get(i, k) for k in range(3)] for i in range(3)])
-    return place.p().to_numpy(), R
+    return motion_case(mechanism, [0.0, 1.0])
 
 
 # x -> y -> z -> x, by the Euler parameters of the arm
 TURNED_COORDINATES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-SIMULATORS = {
-    "mjcf": ("mujoco", mujoco),
-    "urdf": ("pinocchio", pinocchio),
-    "urdf in dart": ("dartpy", dart),
-    "sdf": ("pydrake", drake),
-    "osim": ("opensim", simbody),
-}
+
+
+def pose(to, case, values, folder, start=None):
+    texts = written(case, adapters.writer(to.split()[0]), start)
+    return read(to, texts, case.mechanism, folder, values).bodies["arm"]
 
 
 @pytest.mark.parametrize("carried", [False, True], ids=["on ground", "on a moving body"])
 @pytest.mark.parametrize("swapped", [False, True], ids=["second", "first"])
 @pytest.mark.parametrize("kind", JOINTS)
-@pytest.mark.parametrize("to", SIMULATORS)
-def test_written_joint_is_driven_as_in_case(to, kind, swapped, carried, tmp_path):
-    name, read = SIMULATORS[to]
-    pytest.importorskip(name, reason=f"{name} is not installed")
-    _, values, moved = JOINTS[kind]
-    texts = written(case(kind, swapped, carried), adapters.writer(to.split()[0]))
+@pytest.mark.parametrize("to", IN_TREES)
+def test_written_joint_coordinate_drives_body(to, kind, swapped, carried, tmp_path):
+    *_, values, T = JOINTS[kind]
+    if swapped:
+        T = np.linalg.inv(T)
     if carried:
-        values = values | WHERE
-    at, axes = read(texts, values, tmp_path)
-    T = np.linalg.inv(moved) if swapped else moved
-    if carried:
-        T = turn(Z, WHERE["base"], Q) @ T
+        values, T = values | WHERE, turn(Z, WHERE["base"], Q) @ T
+    at, axes = pose(to, case(kind, swapped, carried), values, tmp_path)
     np.testing.assert_allclose(at, T[:3, :3] @ Q + T[:3, 3], rtol=0, atol=EXACT)
     np.testing.assert_allclose(axes, T[:3, :3] @ TURNED_COORDINATES, rtol=0, atol=EXACT)
 
 
-STARTS = {"revolute": {"joint": 0.7}, "translational": {"joint": -0.3}}
-
-
 @pytest.mark.parametrize("swapped", [False, True], ids=["second", "first"])
-@pytest.mark.parametrize("kind", STARTS)
+@pytest.mark.parametrize(
+    ("kind", "driver", "start"),
+    [("revolute", JointAngle, 0.7), ("translational", JointDisplacement, -0.3)],
+)
 @pytest.mark.parametrize("to", ["mjcf", "osim"])
-def test_start_elsewhere_keeps_the_zeros(to, kind, swapped, tmp_path):
+def test_written_start_keeps_coordinate_zeros(to, kind, driver, start, swapped, tmp_path):
     """Driven to zero, the model is in the design pose; driven on, where the case is."""
-    name, read = SIMULATORS[to]
-    pytest.importorskip(name, reason=f"{name} is not installed")
-    driver = JointAngle if kind == "revolute" else JointDisplacement
     still = case(kind, swapped, carried=False)
     mechanism = replace(still.mechanism, drivers=[driver("drive", "joint")])
-    driven = replace(still, mechanism=mechanism, sweep=Sweep("drive", np.array([0.0, 0.7])))
-    (start,) = STARTS[kind].values()
-    texts = written(driven, adapters.writer(to), start)
-    _, values, moved = JOINTS[kind]
-    at, axes = read(texts, {"joint": 0.0}, tmp_path)
+    driven = motion_case(mechanism, [0.0, 0.7])
+    at, axes = pose(to, driven, {"joint": 0.0}, tmp_path, start)
     np.testing.assert_allclose(at, Q, rtol=0, atol=EXACT)
     np.testing.assert_allclose(axes, TURNED_COORDINATES, rtol=0, atol=EXACT)
-    T = np.linalg.inv(moved) if swapped else moved
-    at, _ = read(texts, values, tmp_path)
+    *_, values, T = JOINTS[kind]
+    if swapped:
+        T = np.linalg.inv(T)
+    at, _ = pose(to, driven, values, tmp_path, start)
     np.testing.assert_allclose(at, T[:3, :3] @ Q + T[:3, 3], rtol=0, atol=EXACT)

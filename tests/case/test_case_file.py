@@ -1,8 +1,6 @@
 """Case files: what they mean, motions of drivers, and their writing."""
 
 import json
-import os
-import stat
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +9,9 @@ import numpy as np
 import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Truth
-from kincheck.core.case.io.atomic_files import write_all, written
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
-from kincheck.core.cli.main import main
+from kincheck.core.case.quantity import Output
 from kincheck.core.joints import (
     Distance,
     Gear,
@@ -45,62 +42,48 @@ def same(a, b):
     assert a.reference.keys() == b.reference.keys()
 
 
-def test_all_examples_are_here():
+def test_example_case_files_count():
     assert len(EXAMPLES) == 6
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
-def test_examples_are_read(file):
+def test_example_case_file_is_read(file):
     text = tomllib.loads(file.read_text())
     case = load_case(str(file))
     assert case.name == file.stem
     assert case.truth is Truth.CONSENSUS_ONLY  # without a reference, whatever the file claims
-    assert {joint.name: joint.type for joint in case.mechanism.joints} == {
-        k: v["type"] for k, v in text["joints"].items()
-    }
+    types = {name: keys["type"] for name, keys in text["joints"].items()}
+    assert {joint.name: joint.type for joint in case.mechanism.joints} == types
     assert [output.name for output in case.outputs] == list(text["outputs"])
-    assert len(case.sweep.values) == text["sweep"]["steps"]
-    assert (case.sweep.values[0], case.sweep.values[-1]) == (
-        text["sweep"]["start"],
-        text["sweep"]["stop"],
-    )
+    start, stop, steps = (text["sweep"][key] for key in ("start", "stop", "steps"))
+    assert case.sweep.values.tolist() == np.linspace(start, stop, steps).tolist()
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
-def test_json_is_the_same(file, tmp_path):
+def test_json_case_equals_toml_case(file, tmp_path):
     data = json.dumps(tomllib.loads(file.read_text()))
     same(load_case(write(tmp_path, data, "case.json")), load_case(file))
     same(load_case(write(tmp_path, data, "case")), load_case(file))  # told by its brace
 
 
-def test_every_value_lands_where_it_belongs(tmp_path):
+def test_case_file_values(tmp_path):
     case = load_case(write(tmp_path, BASE + INLINE))
-    assert (case.name, case.source, case.truth) == (
-        "slider",
-        "made up for this test",
-        Truth.CLOSED_FORM,
-    )
+    why = "made up for this test"
+    assert (case.name, case.source, case.truth) == ("slider", why, Truth.CLOSED_FORM)
     assert case.mechanism.body("slider").origin == (1.0, 2.0, 3.0)
     assert case.mechanism.joint("guide").bodies == ("ground", "slider")
     assert case.mechanism.point("tip").position == (1.5, 2.0, 3.0)
     assert (case.sweep.driver, case.sweep.rate, case.sweep.design) == ("push", 2.0, 0.0)
     assert case.sweep.values.tolist() == [-0.1, 0.0, 0.1]
-    (output,) = case.outputs
-    assert (output.name, output.point, output.direction, output.relative) == (
-        "tip_x",
-        "tip",
-        (1.0, 0.0, 0.0),
-        False,
-    )
-    assert (output.atol, output.rtol, output.why) == (1e-9, 0.0, "made up for this test")
+    x = (1.0, 0.0, 0.0)
+    assert case.outputs == (Output("tip_x", "tip", x, False, 1e-9, 0.0, why),)
     series = case.reference["tip_x"]
     assert series.position.tolist() == [1.4, 1.5, 1.6]
-    assert series.velocity is not None
     assert series.velocity.tolist() == [2.0, 2.0, 2.0]
     assert series.acceleration is None
 
 
-def test_millimetres_and_degrees_are_the_same_case(tmp_path):
+def test_case_in_millimetres_equals_metres(tmp_path):
     """Four joints, both kinds of driver: every number of the millimetre file is 1000 times that of
     the metre file.
     """
@@ -170,70 +153,52 @@ def test_millimetres_and_degrees_are_the_same_case(tmp_path):
     assert tie.length == 0.52
 
 
-def test_displacements_are_lengths(tmp_path):
-    millimetres = load_case(
-        write(
-            tmp_path,
-            edited(("[bodies.slider]", '[units]\nlength = "mm"\nangle = "deg"\n[bodies.slider]')),
-        )
-    )
-    assert millimetres.sweep.values.tolist() == [-1e-4, 0.0, 1e-4]
-    assert millimetres.sweep.rate == 2e-3
+def test_displacement_sweep_in_millimetres(tmp_path):
+    text = edited(("[bodies.slider]", '[units]\nlength = "mm"\nangle = "deg"\n[bodies.slider]'))
+    sweep = load_case(write(tmp_path, text)).sweep
+    assert (sweep.values.tolist(), sweep.rate) == ([-1e-4, 0.0, 1e-4], 2e-3)
 
 
-def test_design_value_of_an_absolute_point_driver(tmp_path):
+def test_absolute_point_driver_design_value(tmp_path):
     absolute = 'type = "point_coordinate"\npoint = "tip"\ndirection = [0, 3, 4]\nrelative = false'
     text = edited(('type = "joint_displacement"\njoint = "guide"', absolute))
     case = load_case(write(tmp_path, text))
     assert case.sweep.design == pytest.approx((3 * 2.0 + 4 * 3.0) / 5, rel=1e-15)
-    assert (
-        load_case(write(tmp_path, text.replace("relative = false", "relative = true"))).sweep.design
-        == 0.0
-    )
+    case = load_case(write(tmp_path, text.replace("relative = false", "relative = true")))
+    assert case.sweep.design == 0.0
 
 
-def test_default_outputs_say_that_they_are(tmp_path):
+def test_default_outputs_of_points(tmp_path):
     case = load_case(write(tmp_path, BASE[: BASE.index("[outputs")]))
-    assert [output.name for output in case.outputs] == ["tip.x", "tip.y", "tip.z"]
-    assert [output.direction for output in case.outputs] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
-    assert all(
-        not output.relative and output.atol > 0 and "default" in output.why
-        for output in case.outputs
-    )
+    directions = {"tip.x": (1, 0, 0), "tip.y": (0, 1, 0), "tip.z": (0, 0, 1)}
+    assert {output.name: output.direction for output in case.outputs} == directions
+    for output in case.outputs:
+        assert not output.relative
+        assert (output.atol, output.why) == (DEFAULT_ATOL, DEFAULT_WHY)
 
 
-def test_an_output_without_tolerance_gets_the_default(tmp_path):
-    (output,) = load_case(
-        write(tmp_path, edited(('atol = 1e-9\nwhy = "made up for this test"', "")))
-    ).outputs
+def test_output_without_tolerance_gets_default(tmp_path):
+    text = edited(('atol = 1e-9\nwhy = "made up for this test"', ""))
+    (output,) = load_case(write(tmp_path, text)).outputs
     assert (output.atol, output.rtol, output.why) == (DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
 
 
 @pytest.mark.parametrize("where", ["named", "all"])
-def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path, where):
+def test_default_tolerance_of_small_mechanism(tmp_path, where):
     """The tip is 5 um from the joint: a nanometre would let pass what is wrong in the fourth
     digit.
     """
     text = BASE[: BASE.index("[outputs") if where == "all" else BASE.index("atol")]
-    for large, small in (
-        ("[1.5, 2.0, 3.0]", "[1.000005, 2.0, 3.0]"),
-        ("-0.1", "-1e-7"),
-        ("stop = 0.1", "stop = 1e-7"),
-    ):
-        text = text.replace(large, small)
+    small = ("[1.5, ", "[1.000005, "), ("-0.1", "-1e-7"), ("stop = 0.1", "stop = 1e-7")
+    text = edited(*small, base=text)
     assert load_case(write(tmp_path, text)).outputs[0].atol == pytest.approx(5e-12, rel=1e-9)
-
-
-def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path):
-    (output,) = load_case(write(tmp_path, BASE)).outputs
-    assert (output.atol, output.rtol) == (1e-9, 0.0)
 
 
 @pytest.mark.parametrize(
     ("start", "stop", "steps", "values"),
     [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.2", "1", [0.2])],
 )
-def test_sweeps_may_run_down_or_have_one_sample(tmp_path, start, stop, steps, values):
+def test_sweep_downwards_or_of_one_sample(tmp_path, start, stop, steps, values):
     text = edited(
         ("start = -0.1", f"start = {start}"),
         ("stop = 0.1", f"stop = {stop}"),
@@ -242,11 +207,11 @@ def test_sweeps_may_run_down_or_have_one_sample(tmp_path, start, stop, steps, va
     assert load_case(write(tmp_path, text)).sweep.values.tolist() == values
 
 
-def test_rate_is_one_unless_given(tmp_path):
+def test_sweep_rate_defaults_to_one(tmp_path):
     assert load_case(write(tmp_path, edited(("rate = 2.0\n", "")))).sweep.rate == 1.0
 
 
-def test_a_new_joint_type_can_be_named_at_once(tmp_path):
+def test_own_joint_type_in_case_file(tmp_path):
     @dataclass(frozen=True)
     class Offset(Spherical):
         type = "offset_of_test_casefile"
@@ -270,11 +235,9 @@ def test_a_new_joint_type_can_be_named_at_once(tmp_path):
         del Joint.registry[Offset.type]
 
 
-def test_byte_order_mark_and_windows_lines_are_read(tmp_path):
-    same(
-        load_case(write(tmp_path, "\ufeff" + BASE.replace("\n", "\r\n"))),
-        load_case(write(tmp_path, BASE, "b.toml")),
-    )
+def test_byte_order_mark_and_windows_lines(tmp_path):
+    marked = load_case(write(tmp_path, "\ufeff" + BASE.replace("\n", "\r\n")))
+    same(marked, load_case(write(tmp_path, BASE, "b.toml")))
 
 
 COUPLED = """
@@ -345,7 +308,13 @@ steps = 9
 """
 
 
-def test_couplers_and_joints_without_geometry(tmp_path):
+def solved(case):
+    found = Native().solve(Native().build(case), case, 1e-12)
+    assert found.solved.all()
+    return found
+
+
+def test_gear_rack_and_screw_move(tmp_path):
     """A steering column turns a pinion by a gear, that moves a rack, and lifts a nut by a
     thread.
     """
@@ -358,8 +327,7 @@ def test_couplers_and_joints_without_geometry(tmp_path):
         "thread", "column", "nut", (0.0, 0.0, 0.1), (0.0, 0.0, 1.0), 0.006
     )
     assert case.mechanism.joint("upright") == OrientationLock("upright", "ground", "nut")
-    found = Native().solve(Native().build(case), case, 1e-12)
-    assert found.solved.all()
+    found = solved(case)
     turn = case.sweep.values
     assert found.points["rack_end"].position[:, 0] == pytest.approx(
         0.16 - 0.02 * turn / -2.0, abs=1e-14
@@ -393,7 +361,7 @@ values = [10, 20]
 """
 
 
-def test_motions_are_in_the_units_of_the_file(tmp_path):
+def test_driver_motions_in_file_units(tmp_path):
     sweep = COUPLED[COUPLED.index("[sweep]") :]
     text = edited((sweep, MOTION + "start = 0\nstop = 1.5\nsteps = 4\n"), base=COUPLED)
     case = load_case(write(tmp_path, text))
@@ -412,7 +380,7 @@ def test_motions_are_in_the_units_of_the_file(tmp_path):
     same(named, case)
 
 
-def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path):
+def test_motion_table_covers_rounded_times(tmp_path):
     """2.1 m at 0.7 m/s take 3.0000000000000004 s, more than the table has."""
     motion = MOTION[MOTION.index("[drivers.hang]") :].replace("[0, 1.5]", "[-3, 3]")
     push = edited(
@@ -448,90 +416,12 @@ steps = 7
 """  # noqa: E501
 
 
-def test_a_polynomial_is_in_the_units_of_the_file(tmp_path):
+def test_polynomial_coupler_in_file_units(tmp_path):
     """Millimetres by powers of degrees, between the freedoms that the joints have."""
     case = load_case(write(tmp_path, CURVED))
     (knee,) = case.mechanism.couplers
     assert knee.freedoms == ("translation", "rotation")
     turn = np.linspace(0.0, 90.0, 7)
     shift = np.polynomial.Polynomial([0, 0.2, -0.006, 2e-5, 1e-7])(turn) / 1000.0
-    found = Native().solve(Native().build(case), case, 1e-12)
+    found = solved(case)
     assert found.points["pin"].position[:, 0] == pytest.approx(shift, abs=1e-15)
-
-
-def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
-    """One begins while the other is at it: what is there in the end is the whole of the one that
-    ended last.
-    """
-    file = tmp_path / "results.json"
-
-    def first(part):
-        part.write_bytes(10 * b"A")
-        assert written(file, lambda part: part.write_bytes(4 * b"B")) == []
-        assert file.read_bytes() == 4 * b"B"
-        with part.open("ab") as more:
-            more.write(10 * b"A")
-
-    assert written(file, first) == []
-    assert file.read_bytes() == 20 * b"A"
-    assert [each.name for each in tmp_path.iterdir()] == ["results.json"]
-
-
-def test_a_file_keeps_its_rights(tmp_path):
-    file = tmp_path / "secret.json"
-    file.write_text("old")
-    file.chmod(0o600)
-    assert written(file, b"new") == []
-    assert file.read_bytes() == b"new"
-    assert stat.S_IMODE(file.stat().st_mode) == 0o600
-
-
-def test_a_name_as_long_as_may_be(tmp_path):
-    file = tmp_path / (250 * "n" + ".json")
-    assert written(file, b"there") == []
-    assert file.read_bytes() == b"there"
-
-
-@pytest.mark.skipif(os.name != "posix", reason="pipes have no names in the file system")
-def test_a_pipe_takes_what_several_have_to_say(tmp_path):
-    named, end = tmp_path / "pipe", os.pipe()
-    os.mkfifo(named)
-    reader = os.open(named, os.O_RDONLY | os.O_NONBLOCK)
-    nameless = named.with_name("link")
-    # as a shell has it: what it leads to is a name of nothing
-    nameless.symlink_to(f"/proc/self/fd/{end[1]}")
-    assert write_all([(named, b"one "), (named, b"two"), (nameless, b"three")]) == []
-    assert os.read(reader, 100) == b"one two"
-    assert os.read(end[0], 100) == b"three"
-    for each in (reader, *end):
-        os.close(each)
-
-
-@pytest.mark.skipif(
-    not os.path.exists("/dev/full"), reason="there is no device that is always full"
-)
-@pytest.mark.parametrize(
-    "command",
-    ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"],
-)
-def test_a_full_disk_is_one_message(command, capsys):
-    assert main([*command.split(), "--json", "/dev/full"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(
-        "kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a"
-        " folder that "
-    )
-
-
-def test_two_options_that_name_one_pipe(tmp_path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    assert (
-        main(["run", "rssr", "--engine", "native", "--junit", str(pipe), "--markdown", str(pipe)])
-        == 0
-    )
-    text = os.read(reader, 100_000).decode()
-    os.close(reader)
-    assert "</testsuites>" in text
-    assert "| `rssr` |" in text

@@ -1,59 +1,60 @@
 """Joints of Drake in URDF and SDF: they move as Drake moves them."""
 
 import importlib
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.errors import CaseError
+from kincheck.core.case.models.files import load
 from scipy.spatial.transform import Rotation
 
-from ..support.model_poses import solution
-from .test_lost_loops import EXACT, GATE, read
+from ..support.case_texts import complains, write
+from ..support.model_files import driven
+from ..support.model_poses import EXACT, solution
+from .test_joining_elements import GATE
 
 JOINTS_OF_DRAKE = {
-    "ball": ("", 3),
-    "universal": ("", 2),
-    "planar": ('<axis xyz="0 1 0"/>', 3),
-    "screw": ('<axis xyz="0 0 1"/><drake:screw_thread_pitch value="0.5"/>', 1),
+    "ball": ("", "", 0),
+    "universal": ("", "q.2", 2),
+    "planar": ('<axis xyz="0 1 0"/>', "q.rotation", 3),
+    "screw": ('<axis xyz="0 0 1"/><drake:screw_thread_pitch value="0.5"/>', "q.rotation", 1),
 }
 
 
-@pytest.mark.parametrize(
-    ("kind", "inside", "freedoms"), [(kind, *each) for kind, each in JOINTS_OF_DRAKE.items()]
-)
-def test_a_joint_of_drake_moves_as_drake_moves_it(kind, inside, freedoms, tmp_path: Path):
-    """Its freedoms, and the place of the tip when the last one moves."""
+def assert_stands_as_in_drake(file, link, values, motion, base="world"):
+    """Compare the last pose of a link with Drake's, at these coordinates of its joint q."""
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
-    parsing = pytest.importorskip("pydrake.multibody.parsing")
+    plant = plants.MultibodyPlant(1e-3)
+    parsing = importlib.import_module("pydrake.multibody.parsing")
+    parsing.Parser(plant).AddModels(str(file))
+    if base != "world":
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base))
+    plant.Finalize()
+    context, joint = plant.CreateDefaultContext(), plant.GetJointByName("q")
+    assert joint.num_positions() == len(values)
+    positions, start = plant.GetPositions(context), joint.position_start()
+    positions[start : start + len(values)] = values
+    plant.SetPositions(context, positions)
+    pose = plant.GetFrameByName(link).CalcPoseInWorld(context)
+    assert motion.r[-1] == pytest.approx(pose.translation(), abs=EXACT)
+    assert np.abs(motion.p[-1] @ pose.rotation().ToQuaternion().wxyz()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("kind", JOINTS_OF_DRAKE)
+def test_drake_joint_in_urdf_matches_drake(kind, tmp_path):
+    """Its freedoms, and the place of the tip when the last one moves; a ball is held."""
+    inside, moving, freedoms = JOINTS_OF_DRAKE[kind]
     joint = (
         '<link name="tip"/>'
         f'<drake:joint name="q" type="{kind}"><parent link="base"/><child link="tip"/>'
         f'<origin xyz="0.3 0 0.2" rpy="0.1 0.2 0.3"/>{inside}</drake:joint>'
     )
-    case = read(tmp_path, GATE.format(joint))
-    between = {joint.name: joint for joint in case.mechanism.joints if joint.name.startswith("q")}
-    plant = plants.MultibodyPlant(1e-3)
-    parsing.Parser(plant).AddModels(str(tmp_path / "gate.urdf"))
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
-    plant.Finalize()
-    assert plant.GetJointByName("q").num_positions() == freedoms
-    if kind == "ball":
-        assert between["q"].type == "fixed"  # held
+    file = write(tmp_path, GATE.format(joint), "gate.urdf")
+    case = load(file, driven(f"{moving or 'drive'}:0:0.3:2", hold_rest=True))
+    if not moving:
+        assert case.mechanism.joint("q").type == "fixed"
         return
-    moving = {"universal": "q.2", "planar": "q.rotation", "screw": "q.rotation"}[kind]
-    supplied = Supplied(drive=(f"{moving}:0:0.3:2",), hold_rest=True)
-    found = solution(load(tmp_path / "gate.urdf", supplied)).bodies["tip"]
-    context = plant.CreateDefaultContext()
-    positions = plant.GetPositions(context)
-    positions[plant.GetJointByName("q").position_start() + freedoms - 1] = 0.3
-    plant.SetPositions(context, positions)
-    pose = plant.GetFrameByName("tip").CalcPoseInWorld(context)
-    assert found.r[-1] == pytest.approx(pose.translation(), abs=EXACT)
-    assert np.abs(found.p[-1] @ pose.rotation().ToQuaternion().wxyz()) == pytest.approx(1.0)
+    values = [0.0] * (freedoms - 1) + [0.3]
+    assert_stands_as_in_drake(file, "tip", values, solution(case).bodies["tip"], "base")
 
 
 PLANAR = """<sdf version="1.9"><model name="m"><link name="a"/>
@@ -69,30 +70,17 @@ MOVES = {"q.slide1": (0.5, 0, 0), "q.slide2": (0, 0.5, 0), "q.rotation": (0, 0, 
 
 
 @pytest.mark.parametrize("moved", MOVES)
-def test_a_planar_joint_of_drake_in_sdf_is_that_of_drake(moved: str, tmp_path: Path):
+def test_planar_joint_in_sdf_matches_drake(moved, tmp_path):
     """Along x and y of the parent's frame, and about its z; where Drake is, by Drake too."""
-    (tmp_path / "m.sdf").write_text(PLANAR)
+    file = write(tmp_path, PLANAR, "m.sdf")
     held = tuple(each for each in MOVES if each != moved)
-    supplied = Supplied(drive=(f"{moved}:0:0.5:2",), hold=("A", *held))
-    found = solution(load(tmp_path / "m.sdf", supplied)).bodies["b"]
+    found = solution(load(file, driven(f"{moved}:0:0.5:2", hold=("A", *held)))).bodies["b"]
     x, y, angle = MOVES[moved]
     frame = Rotation.from_euler("xyz", (0.3, 0, 0.4))
     assert found.r[-1] == pytest.approx(frame.apply((x, y, 0)) + (0.1, 0, 0.2), abs=EXACT)
-    e0, *e = found.p[-1]
     turned = frame * Rotation.from_euler("z", angle)
-    assert abs(turned.as_quat() @ (*e, e0)) == pytest.approx(1.0)
-    plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
-    plant = plants.MultibodyPlant(1e-3)
-    importlib.import_module("pydrake.multibody.parsing").Parser(plant).AddModels(
-        str(tmp_path / "m.sdf")
-    )
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    plant.GetJointByName("q").set_translation(context, [x, y])
-    plant.GetJointByName("q").set_rotation(context, angle)
-    pose = plant.GetFrameByName("b").CalcPoseInWorld(context)
-    assert found.r[-1] == pytest.approx(pose.translation(), abs=EXACT)
-    assert abs(found.p[-1] @ pose.rotation().ToQuaternion().wxyz()) == pytest.approx(1.0)
+    assert abs(turned.as_quat(scalar_first=True) @ found.p[-1]) == pytest.approx(1.0)
+    assert_stands_as_in_drake(file, "b", MOVES[moved], found)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +92,5 @@ def test_a_planar_joint_of_drake_in_sdf_is_that_of_drake(moved: str, tmp_path: P
         ("<drake:child>b<", "<drake:child>c<", "found the frame 'm::c'"),
     ],
 )
-def test_other_joints_of_drake_in_sdf_are_refused(old: str, new: str, said: str, tmp_path: Path):
-    (tmp_path / "m.sdf").write_text(PLANAR.replace(old, new))
-    with pytest.raises(CaseError, match=re.escape(said)):
-        read_tree(tmp_path / "m.sdf")
+def test_faulty_drake_joint_in_sdf(old, new, said, tmp_path):
+    complains(write(tmp_path, PLANAR.replace(old, new), "m.sdf"), said, driven())

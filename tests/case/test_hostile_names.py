@@ -52,45 +52,30 @@ def run(name):
     """Everything that is a name or a message is called so."""
 
     def renamed(record, **changes):
-        outputs = [
-            msgspec.structs.replace(each, unit=name, sense=name, reason=name)
-            for each in record.outputs.values()
-        ]
-        errors = [msgspec.structs.replace(each, reason=name) for each in record.errors.values()]
-        texts = {
-            "case": name,
-            "engine": name,
-            "version": name,
-            "message": name,
-            "loop": name,
+        (output, *_), (error, *_) = record.outputs.values(), record.errors.values()
+        texts = dict.fromkeys(("case", "engine", "version", "message", "loop"), name)
+        quantities = {
+            "outputs": {name: msgspec.structs.replace(output, unit=name, sense=name, reason=name)},
+            "errors": {name: msgspec.structs.replace(error, reason=name)},
+            "driver": {name: [*range(21)]},
             "settings": {name: name},
         }
-        return msgspec.structs.replace(
-            record,
-            **(
-                {
-                    "outputs": {name: outputs[0]},
-                    "errors": {name: errors[0]},
-                    "driver": {name: [*range(21)]},
-                }
-                | texts
-                | changes
-            ),
-        )
+        return msgspec.structs.replace(record, **quantities | texts | changes)
 
     made = results()
     records = [
         renamed(made.records[0]),
         renamed(made.records[1], mode="simulate"),
-        renamed(made.records[1], outcome=Outcome.ERROR, mode=name, outputs={}, errors={}),
+        renamed(
+            made.records[1], engine="other", outcome=Outcome.ERROR, mode=name, outputs={}, errors={}
+        ),
     ]
-    records[2] = msgspec.structs.replace(records[2], engine="other")
     about = {"source": name, "signs": name, "driver": {"name": name, "type": name, "point": name}}
     return Results(run={"cases": {name: about}, name: name, "command": name}, records=records)
 
 
 @pytest.mark.parametrize("show", [print_table, print_matrix])
-def test_terminals_show_names_and_obey_none(name, show):
+def test_hostile_name_in_terminal_table(name, show):
     show(run(name), text := io.StringIO())
     said = text.getvalue()
     assert all(line.isprintable() for line in said.replace("\t", " ").split("\n"))
@@ -99,33 +84,23 @@ def test_terminals_show_names_and_obey_none(name, show):
         assert name in said
 
 
-def test_messages_and_progress_are_lines_that_obey_nothing(name, capsys, tmp_path):
-    complain(
-        [
-            str(
-                fault(
-                    tmp_path / f"{name.replace('/', '')}.toml",
-                    name,
-                    "found nothing, expected something; add it",
-                )
-            ),
-            name,
-        ]
-    )
+def test_hostile_name_in_messages(name, capsys, tmp_path):
+    file = tmp_path / f"{name.replace('/', '')}.toml"
+    complain([str(fault(file, name, "found nothing, expected something; add it")), name])
     progress([])(run(name).records[0], 1, 2)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 3
     assert all(line.isprintable() for line in lines)
 
 
-def test_markdown_is_a_table_and_text_and_nothing_else(name):
+def test_hostile_name_in_markdown(name):
     text = to_markdown(run(name))
     text.encode()
     tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(text)
     kinds = [token.type for token in tokens]
     assert kinds.count("table_open") == 1
-    cells = len(re.findall(r"table_open.*?table_close", " ".join(kinds))[0].split("td_open")) - 1
-    assert cells == 3  # one case in two engines
+    table = kinds[kinds.index("table_open") : kinds.index("table_close")]
+    assert table.count("td_open") == 3  # one case in two engines
     inside = [child for token in tokens for child in token.children or ()]
     assert {child.type for child in inside} <= {"text", "code_inline", "softbreak"}
     assert not {
@@ -142,7 +117,7 @@ def test_markdown_is_a_table_and_text_and_nothing_else(name):
         assert shown.count(name) >= 3
 
 
-def test_junit_is_xml(name):
+def test_hostile_name_in_junit(name):
     root = ElementTree.fromstring(to_junit(run(name)))
     assert {element.tag for element in root.iter()} <= {
         "testsuites",
@@ -161,7 +136,7 @@ def plain_page():
     return Page(render(Material(run("name"), {}, {})))
 
 
-def test_pages_show_names_and_obey_none(name):
+def test_hostile_name_in_page(name):
     text = render(Material(run(name), {}, {}))
     page, plain = Page(text), plain_page()
     assert sorted(tag for tag, _ in page.tags) == sorted(tag for tag, _ in plain.tags)
@@ -173,31 +148,27 @@ def test_pages_show_names_and_obey_none(name):
     assert re.findall(r"(inner|outer)HTML *=|insertAdjacentHTML|document\.write", text) == []
 
 
-def test_json_is_read_again_as_it_was(name):
+def test_hostile_name_in_json(name):
     # UTF-8 cannot hold it; circumstances and messages are cleaned where they are made
     if name != NAMES["undecodable"]:
         assert msgspec.json.decode(to_json(run(name)), type=Results) == run(name)
 
 
-def test_spreadsheets_compute_nothing(name):
+def test_hostile_name_in_csv(name):
     _, row = csv.reader(io.StringIO(csv_text(["head"], [[name]])))
     assert len(row) == 1
     assert row[0][:1] not in ("=", "+", "-", "@", "\t", "\r")
     assert row[0].isprintable()
 
 
-def test_numbers_are_cells_as_they_are():
-    assert [cell(each) for each in (-1.5, None, 3, "a-b", "")] == [-1.5, None, 3, "a-b", ""]
-    assert [cell(each) for each in ("=1+1", "-1", "+a", "@b", "\t=1")] == [
-        "'=1+1",
-        "'-1",
-        "'+a",
-        "'@b",
-        "'\\t=1",
-    ]
+def test_csv_cell_of_number_and_formula():
+    plain = [-1.5, None, 3, "a-b", ""]
+    assert [*map(cell, plain)] == plain
+    assert [*map(cell, ("=1+1", "-1", "+a", "@b"))] == ["'=1+1", "'-1", "'+a", "'@b"]
+    assert cell("\t=1") == "'\\t=1"
 
 
-def test_what_prints_stays_as_it_is():
+def test_visible_keeps_printable_text():
     assert visible("é α 漢 ² |<>") == "é α 漢 ² |<>"
     assert visible("a\nb\tc\x1b", also="\n") == "a\nb\\tc\\x1b"
     assert visible("\u202e\udcff\U000e0001") == "\\u202e\\udcff\\U000e0001"
@@ -206,38 +177,26 @@ def test_what_prints_stays_as_it_is():
 @pytest.mark.parametrize(
     "name", [*NAMES.values(), "../escaped", "/tmp/escaped", "..", "a\\b", "C:a"]
 )
-def test_no_name_leads_out_of_a_folder(name, tmp_path):
+def test_file_name_stays_in_folder(name, tmp_path):
     file = tmp_path / f"{file_name(name)}.reference.json"
     assert file.resolve().parent == tmp_path.resolve()
     assert not re.search(r"[/\\:]", file_name(name))
 
 
-def test_a_reference_stays_in_its_folder(kincheck_main, tmp_path):
+def test_written_reference_stays_in_folder(kincheck_main, tmp_path):
     pytest.importorskip("flint")
     (tmp_path / "proofs").mkdir()
     case = replace(crank(reference=False), name="../escaped")
-    assert (
-        kincheck_main(
-            "reference",
-            "crank",
-            "--digits",
-            20,
-            "--out",
-            tmp_path / "proofs",
-            cases={"crank": case},
-        )
-        == 0
-    )
+    options = "--digits", 20, "--out", tmp_path / "proofs"
+    assert kincheck_main("reference", "crank", *options, cases={"crank": case}) == 0
     assert [each.relative_to(tmp_path) for each in tmp_path.rglob("*.json")] == [
         Path("proofs/.._escaped.reference.json")
     ]
 
 
-def test_two_names_of_one_file_are_refused_before_the_work(kincheck_main, tmp_path, capsys):
+def test_two_references_of_one_file(kincheck_main, tmp_path, capsys):
     cases = {name: replace(crank(reference=False), name=name) for name in ("a/b", "a:b")}
     assert kincheck_main("reference", *cases, "--out", tmp_path, cases=cases) == 2
-    assert (
-        "a_b.reference.json: found the file of a/b, expected one of its own"
-        in capsys.readouterr().err
-    )
+    told = "a_b.reference.json: found the file of a/b, expected one of its own"
+    assert told in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -34,7 +34,7 @@ def solved(case):
 
 
 @pytest.mark.parametrize("limits", [(-0.5, 0.5), (0.4, 2.9)])
-def test_evaluated_motions_grow_with_the_motors(limits, tmp_path, monkeypatch):
+def test_motion_evaluations_grow_linearly_with_motors(limits, tmp_path, monkeypatch):
     at, calls = Table.at, []
 
     def counted(self, t):
@@ -55,15 +55,20 @@ def test_evaluated_motions_grow_with_the_motors(limits, tmp_path, monkeypatch):
     assert each_one[0] == each_one[1]
 
 
-def test_freedoms_of_joints_apart_are_counted_apart(tmp_path):
+def test_freedoms_of_separate_joints(tmp_path):
     model = assemble(read_start(read_tree(board(tmp_path, 5)), ()), None)
     assert [part.basis.shape for part in model.free] == [(1, 1)] * 5
     freedom = Freedom(model, {})
     freedom.take("j2")
-    assert (freedom.dof, freedom.left, freedom.count("j2"), freedom.count("j3")) == (5, 4, 0, 1)
+    assert (freedom.dof, freedom.remaining, freedom.count("j2"), freedom.count("j3")) == (
+        5,
+        4,
+        0,
+        1,
+    )
 
 
-def test_caption_names_few_of_many_drivers():
+def test_axis_caption_of_many_drivers():
     driver = {"name": "d0", "type": "joint_angle"}
     record = SimpleNamespace(driver={f"d{k}": [0.0, 1.0] for k in range(100)})
     axis = driver_axis({"driver": driver}, [record], ())

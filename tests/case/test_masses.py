@@ -1,22 +1,26 @@
 """Masses of models: those of MuJoCo itself, of URDF and SDF alike, and what is not read of them."""
 
+from functools import partial
+
 import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.adapters.writers import mjcf, sdf
 from kincheck.core.algebra import vec
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.trees.tree import Mass, together
-from kincheck.core.errors import CaseError
+from kincheck.core.case.models.trees.tree import Mass, sum_of_masses
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
+
+from ..support.case_texts import complains, write
+from ..support.model_files import driven, edited
 
 mujoco = pytest.importorskip("mujoco")
 
 # Sums of some ten masses in metre-sized frames.
 EXACT = 1e-12
+near = partial(np.allclose, rtol=0, atol=EXACT)
 
 WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceinertia="true" inertiagrouprange="0 2"/>
 <default><geom density="500"/><default class="c"><geom type="capsule" size="0.1 0.2"/></default></default>
@@ -45,9 +49,8 @@ SETTINGS = {
 
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
-def test_masses_are_those_of_mujoco(tmp_path, settings):
-    file = tmp_path / "model.xml"
-    file.write_text(WEIGHED.replace("<default>", settings + "<default>", 1))
+def test_mjcf_masses_match_mujoco(tmp_path, settings):
+    file = edited(tmp_path, WEIGHED, ("<default>", settings + "<default>"))
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -59,10 +62,10 @@ def test_masses_are_those_of_mujoco(tmp_path, settings):
             axes = data.ximat[body].reshape(3, 3)
             inertia = axes @ np.diag(model.body_inertia[body]) @ axes.T
             parts.append(Mass(model.body_mass[body], vec(data.xipos[body]), inertia))
-        theirs = together(parts)
-        ours = together(tree.masses[joint.inner]).seen_in(tree.moving[joint.inner])
+        theirs = sum_of_masses(parts)
+        ours = sum_of_masses(tree.masses[joint.inner]).in_frame(tree.moving[joint.inner])
         assert ours.mass == pytest.approx(theirs.mass, rel=EXACT)
-        assert np.allclose([*ours.center], [*theirs.center], rtol=0, atol=EXACT)
+        assert near([*ours.center], [*theirs.center])
         size = np.abs(theirs.inertia).max()
         assert np.allclose(ours.inertia, theirs.inertia, rtol=0, atol=EXACT * size)
 
@@ -83,25 +86,23 @@ SDF = """<sdf version="1.11"><world name="w"><gravity>0 0 -9.81</gravity><model 
 <inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial></link>
 <joint name="J" type="revolute"><parent>world</parent><child>arm</child><axis><xyz>0 1 0</xyz></axis></joint>
 <joint name="t" type="fixed"><parent>arm</parent><child>tip</child></joint></model></world></sdf>"""  # noqa: E501
-DRIVEN = Supplied(drive=("J:-0.4:0.4:5",))
+DRIVEN = driven("J:-0.4:0.4:5")
 
 
 def case_of(tmp_path, text, supplied=DRIVEN):
     ending = {"<m": "xml", "<r": "urdf", "<s": "sdf"}[text[:2]]
-    file = tmp_path / f"robot.{ending}"
-    file.write_text(text)
-    return load(file, supplied)
+    return load(write(tmp_path, text, f"robot.{ending}"), supplied)
 
 
-def test_all_formats_have_the_same_masses(tmp_path):
+def test_masses_agree_across_formats(tmp_path):
     cases = [case_of(tmp_path, text) for text in (MJCF, URDF, SDF)]
     bodies = [case.mechanism.body("arm") for case in cases]
     for case, body in zip(cases, bodies, strict=True):
         assert case.mechanism.gravity == (0.0, 0.0, -9.81)
         assert "with the masses of its bodies" in case.source
         assert body.mass == 3.0
-        assert np.allclose(body.center_of_mass, bodies[0].center_of_mass, rtol=0, atol=EXACT)
-        assert np.allclose(body.inertia, bodies[0].inertia, rtol=0, atol=EXACT)
+        first, other = ((*x.center_of_mass, *x.inertia) for x in (bodies[0], body))
+        assert near(first, other)
 
 
 @pytest.mark.parametrize("text", [URDF, SDF], ids=["urdf", "sdf"])
@@ -112,7 +113,7 @@ def test_fixed_link_with_mass_is_output(tmp_path, text):
     assert case.outputs[3].point == "tip"
 
 
-def test_the_effort_of_a_robot_is_that_of_mujoco(tmp_path):
+def test_driver_effort_matches_mujoco(tmp_path):
     case = case_of(tmp_path, MJCF)
     found = NativeSolver(compiled=False).prepare(case.mechanism, case.sweep.path, forces=["J"])(
         1e-12
@@ -131,34 +132,42 @@ ROD = """<mujoco><worldbody><body name="a"><joint name="J" axis="0 1 0"/><inerti
 <equality><connect body1="rod" body2="c" anchor="4 0 0"/></equality></mujoco>"""  # noqa: E501
 
 
-def test_a_rod_has_its_mass_at_its_ends(tmp_path):
+def test_rod_mass_is_at_its_ends(tmp_path):
     """Two kilograms, a quarter of the length from its first end."""
     case = case_of(tmp_path, ROD)
     assert "moments of inertia of rods, whose masses are at their ends: rod" in case.source
-    masses = {body.name: body for body in case.mechanism.bodies}
-    assert masses.keys() == {"a", "c"}
-    assert masses["a"].mass == 2.5
-    assert masses["c"].mass == 1.5
+    assert {body.name: body.mass for body in case.mechanism.bodies} == {"a": 2.5, "c": 1.5}
     # the rod's weight at its centre, 1 m beside the crank's pin, is lifted by both
-    assert masses["a"].center_of_mass == pytest.approx((0.0, 0.0, (1.0 + 1.5 * 2.0) / 2.5))
+    center = case.mechanism.body("a").center_of_mass
+    assert center == pytest.approx((0.0, 0.0, (1.0 + 1.5 * 2.0) / 2.5))
 
 
+START, END = MJCF.index('<inertial pos="0.5'), MJCF.index('<body name="tip"')
+BOUNDED = (MJCF[:START] + MJCF[END:]).replace(
+    "<compiler angle", '<compiler inertiafromgeom="false" boundinertia="1" angle'
+)
 UNREADABLE = {
-    "a negative mass": (MJCF, 'mass="2"', 'mass="-2"', "arm"),
-    "no number": (URDF, 'value="2"', 'value="heavy"', "arm"),
-    "no rigid body": (URDF, 'ixx="0.4"', 'ixx="-4"', "arm"),
-    "of collisions": (SDF, "<inertial><pose>0.5", '<inertial auto="true"><pose>0.5', "arm"),
+    "a negative mass": (MJCF, 'mass="2"', 'mass="-2"'),
+    "no number": (URDF, 'value="2"', 'value="heavy"'),
+    "no rigid body": (URDF, 'ixx="0.4"', 'ixx="-4"'),
+    "of collisions": (SDF, "<inertial><pose>0.5", '<inertial auto="true"><pose>0.5'),
+    "moments without mass": (
+        BOUNDED,
+        'mass="1"',
+        'mass="0"',
+    ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "old", "new", "body"), UNREADABLE.values(), ids=UNREADABLE)
-def test_a_mass_that_cannot_be_read_never_stops_a_motion(tmp_path, text, old, new, body):
+@pytest.mark.parametrize("kind", UNREADABLE)
+def test_unreadable_mass_is_noted(tmp_path, kind):
+    text, old, new = UNREADABLE[kind]
     assert old in text
     case = case_of(tmp_path, text.replace(old, new))
-    assert f"masses that cannot be read, of {body}" in case.source
+    assert "masses that cannot be read, of arm" in case.source
 
 
-def test_a_mesh_has_an_unknown_mass(tmp_path):
+def test_mesh_has_unknown_mass(tmp_path):
     text = (
         '<mujoco><worldbody><body name="arm"><joint name="J"/><geom type="mesh" mesh="m"/></body>'
         "</worldbody></mujoco>"
@@ -168,42 +177,34 @@ def test_a_mesh_has_an_unknown_mass(tmp_path):
     assert case.mechanism.gravity == (0.0, 0.0, 0.0)  # as long as nothing has a mass
 
 
-def test_moments_without_a_mass_are_told(tmp_path):
-    text = MJCF.replace(
-        "<compiler angle", '<compiler inertiafromgeom="false" boundinertia="1" angle'
-    )
-    start, end = text.index('<inertial pos="0.5'), text.index('<body name="tip"')
-    case = case_of(tmp_path, text[:start] + text[end:].replace('mass="1"', 'mass="0"'))
-    assert "masses that cannot be read, of arm" in case.source
-    assert case.mechanism.body("arm").mass == 0.0
+def test_mistyped_mass_setting_is_refused(tmp_path):
+    file = edited(tmp_path, MJCF, ("<compiler", '<compiler inertiafromgeom="yes"'))
+    complains(file, "inertiafromgeom: found 'yes'", DRIVEN)
 
 
-def test_settings_of_masses_are_checked(tmp_path):
-    with pytest.raises(CaseError, match="inertiafromgeom: found 'yes'"):
-        case_of(tmp_path, MJCF.replace("<compiler", '<compiler inertiafromgeom="yes"'))
+STAND_INS = {"mjcf": (mjcf, ".xml"), "sdf": (sdf, ".sdf")}
 
 
-@pytest.mark.parametrize("writer", [mjcf, sdf], ids=["mjcf", "sdf"])
-def test_stand_ins_are_no_masses(tmp_path, writer):
-    """What kincheck writes for a mechanism without masses is read as one without masses."""
-    texts = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)
-    file = tmp_path / ("model" + next(iter(texts)))
-    file.write_text(next(iter(texts.values())))
-    case = load(file, Supplied(drive=("left_pivot:0:0.1:3",), hold_rest=True))
-    assert not any(body.mass for body in case.mechanism.bodies)
-    assert "with the masses" not in case.source
+@pytest.mark.parametrize(
+    ("form", "edit", "masses"),
+    [
+        ("mjcf", ("", ""), []),
+        ("sdf", ("", ""), []),
+        ("sdf", ("<mass>1e-06", "<mass>2e-06"), [2e-6]),
+        ("sdf", ("<ixx>1e-06", "<ixx>2e-06"), [1e-6]),
+    ],
+)
+def test_exported_stand_ins_are_no_masses(tmp_path, form, edit, masses):
+    """What kincheck writes for a mechanism without masses is read so; numbers unlike it count."""
+    writer, ending = STAND_INS[form]
+    text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)[ending]
+    file = edited(tmp_path, text, edit, name="model" + ending)
+    case = load(file, driven("left_pivot:0:0.1:3", hold_rest=True))
+    assert [body.mass for body in case.mechanism.bodies if body.mass] == masses
+    assert ("with the masses" in case.source) is bool(masses)
 
 
-@pytest.mark.parametrize(("key", "mass"), [("mass", 2e-6), ("ixx", 1e-6)])
-def test_small_masses_unlike_a_stand_in_count(tmp_path, key, mass):
-    text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), sdf.write)[".sdf"]
-    file = tmp_path / "model.sdf"
-    file.write_text(text.replace(f"<{key}>1e-06", f"<{key}>2e-06", 1))
-    case = load(file, Supplied(drive=("left_pivot:0:0.1:3",), hold_rest=True))
-    assert [body.mass for body in case.mechanism.bodies if body.mass] == [mass]
-
-
-def test_inertia_is_in_global_axes_at_design(tmp_path):
+def test_inertia_in_global_axes(tmp_path):
     """A bar along x in a body turned by 90 degrees about z lies along y."""
     text = (
         '<mujoco><option gravity="0 1 0"/><worldbody><body name="arm" euler="0 0 90">'
@@ -212,14 +213,13 @@ def test_inertia_is_in_global_axes_at_design(tmp_path):
     )
     case = case_of(tmp_path, text)
     body = case.mechanism.body("arm")
-    assert np.allclose(body.center_of_mass, [0, 1, 0], rtol=0, atol=EXACT)
-    assert np.allclose(inertia_matrix(body.inertia), np.diag([1, 0.1, 1]), rtol=0, atol=EXACT)
+    assert near(body.center_of_mass, [0, 1, 0])
+    assert near(inertia_matrix(body.inertia), np.diag([1, 0.1, 1]))
     assert case.mechanism.gravity == (0.0, 1.0, 0.0)
 
 
-def test_total_mass_of_a_setting_leaves_masses_unread(tmp_path):
+def test_settotalmass_leaves_masses_unread(tmp_path):
     """It scales all of them, below a kilogram too; zero or less is MuJoCo's word for none."""
     for total, unread in (("0.5", True), ("-1", False)):
-        file = tmp_path / "model.xml"
-        file.write_text(WEIGHED.replace("<compiler ", f'<compiler settotalmass="{total}" ', 1))
+        file = edited(tmp_path, WEIGHED, ("<compiler ", f'<compiler settotalmass="{total}" '))
         assert bool(read_tree(file).unweighed) is unread

@@ -21,6 +21,7 @@ from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.run import run
 from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.mechanism.motions import Ramp, Sine
+from scipy.spatial.transform import Rotation
 
 from ..support.case_texts import BASE, complains, edited, write
 from ..support.measure_cases import AXIS, RATE, arm
@@ -33,8 +34,8 @@ def series(case, *outputs):
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
     engine = Native()
     trajectory = engine.solve(engine.build(case), case, 1e-12)
-    found = [output_series(case, output, trajectory) for output in outputs]
-    return found[0] if len(found) == 1 else found
+    first, *others = (output_series(case, output, trajectory) for output in outputs)
+    return [first, *others] if others else first
 
 
 def close(found, position, velocity, acceleration, atol=1e-13):
@@ -45,51 +46,39 @@ def close(found, position, velocity, acceleration, atol=1e-13):
 
 TURNS = np.linspace(-4.0 * math.pi, 4.0 * math.pi, 33)
 """Of the driver: eight samples a turn, and the slide turns by 135 degrees the other way."""
+HINGE, BORE = (JointAngle(joint, *TOLERANCE, joint) for joint in ("hinge", "bore"))
 
 
-def test_joint_angles_count_turns_from_the_design():
-    driven, spun = series(
-        arm(TURNS), JointAngle("a", *TOLERANCE, "hinge"), JointAngle("b", *TOLERANCE, "bore")
-    )
-    close(driven, TURNS, RATE, 0.0)
-    close(spun, -3.0 * TURNS, -3.0 * RATE, 0.0)
+@pytest.mark.parametrize(
+    "values",
+    [TURNS, np.random.default_rng(1).permutation(TURNS), np.arange(-4, 5) * math.pi + 0.3],
+    ids=["in order", "unordered", "coarse, without the design"],
+)
+def test_joint_angle_counts_turns(values):
+    """By velocities where a turn and a half goes from sample to sample."""
+    driven, spun = series(arm(values), HINGE, BORE)
+    close(driven, values, RATE, 0.0)
+    close(spun, -3.0 * values, -3.0 * RATE, 0.0)
 
 
-def test_turns_are_counted_by_velocities_where_samples_are_coarse():
-    """A turn and a half from sample to sample, and no sample near the design."""
-    values = np.arange(-4, 5) * math.pi + 0.3
-    close(series(arm(values), JointAngle("b", *TOLERANCE, "bore")), -3.0 * values, -3.0 * RATE, 0.0)
-
-
-def test_turns_need_no_order_of_the_samples():
-    values = np.random.default_rng(1).permutation(TURNS)
-    close(series(arm(values), JointAngle("a", *TOLERANCE, "hinge")), values, RATE, 0.0)
-
-
-def test_an_angle_that_starts_away_from_the_design_is_the_smallest():
+def test_joint_angle_of_offset_start():
     """Its driver is a sine with a phase: at time zero it is not at the design."""
-    case = arm([0.0])
-    motions = {"turn": Sine(4.0, 1.0, 0.5), "spin": Ramp(0.0), "push": Ramp(0.0)}
-    times = np.linspace(0.0, 0.1, 9)
-    case = replace(case, sweep=Sweep("time", times, 1.0, 0.0, motions))
-    found = series(case, JointAngle("a", *TOLERANCE, "hinge"))
-    np.testing.assert_allclose(found.position, Sine(4.0, 1.0, 0.5).at(times)[0], atol=1e-12)
+    turn, times = Sine(4.0, 1.0, 0.5), np.linspace(0.0, 0.1, 9)
+    motions = {"turn": turn, "spin": Ramp(0.0), "push": Ramp(0.0)}
+    found = series(arm([0.0], sweep=Sweep("time", times, 1.0, 0.0, motions)), HINGE)
+    np.testing.assert_allclose(found.position, turn.at(times)[0], atol=1e-12)
 
 
-def test_joint_displacements_are_along_the_axis_of_the_first_body():
-    close(
-        series(arm(TURNS), JointDisplacement("d", *TOLERANCE, "bore")),
-        0.25 * TURNS / RATE,
-        0.25,
-        0.0,
-    )
+def test_joint_displacement_along_axis():
+    found = series(arm(TURNS), JointDisplacement("d", *TOLERANCE, "bore"))
+    close(found, 0.25 * TURNS / RATE, 0.25, 0.0)
 
 
-def test_the_reverse_joint_has_the_opposite_angle():
+def test_joint_angle_of_reversed_joint():
     case = arm(TURNS)
     hinge, *others = case.mechanism.joints
     mechanism = replace(case.mechanism, joints=[hinge.reversed(), *others])
-    found = series(replace(case, mechanism=mechanism), JointAngle("a", *TOLERANCE, "hinge"))
+    found = series(replace(case, mechanism=mechanism), HINGE)
     close(found, TURNS, RATE, 0.0)  # of the driver of the joint, which is reversed too
 
 
@@ -107,7 +96,7 @@ def rotated(angle, component):
 
 
 @pytest.mark.parametrize("component", Component)
-def test_euler_parameters_are_continuous_and_vectors_smallest(component):
+def test_orientation_components_over_turns(component):
     """Through half turns, whole ones, and the design, where the axis of a rotation is unknown."""
     angle = np.linspace(-3.0 * math.pi, 4.0 * math.pi, 71)
     found = series(arm(angle), Orientation("o", *TOLERANCE, "disc", component))
@@ -117,7 +106,7 @@ def test_euler_parameters_are_continuous_and_vectors_smallest(component):
 
 
 @pytest.mark.parametrize("beyond", [-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
-def test_round_off_at_half_a_turn_does_not_turn_the_vector(beyond):
+def test_rotation_vector_at_half_turn(beyond):
     """Beyond the tolerance, the smaller rotation is the one the other way round."""
     found = series(arm([math.pi + beyond]), Orientation("o", 1e-9, 0.0, "t", "disc", Component.Z))
     wanted = beyond - math.pi if beyond > 1e-9 else math.pi + beyond
@@ -125,12 +114,12 @@ def test_round_off_at_half_a_turn_does_not_turn_the_vector(beyond):
 
 
 @pytest.mark.parametrize("away", [1e-9, 1e-5, 0.0316, 0.0633, 0.0634, 1.0])
-def test_the_rotation_vector_is_as_exact_near_the_design(away):
+def test_rotation_vector_near_design(away):
     found = series(arm([away]), Orientation("o", *TOLERANCE, "disc", Component.Z))
     close(found, AXIS[2] / 3.0 * away, AXIS[2] / 3.0 * RATE, 0.0, atol=1e-13)
 
 
-def test_rates_of_vanishing_lengths_are_unknown():
+def test_rates_of_vanishing_lengths():
     """Directions that become opposite or parallel, points that meet: what is left is round-off."""
     case = arm([math.pi, 2.0 * math.pi, math.pi + 1e-8, 1.0])
     meeting = [Point("A", "ground", (1.0, 1.0, 0.0)), *case.mechanism.points[1:]]
@@ -147,18 +136,11 @@ def test_rates_of_vanishing_lengths_are_unknown():
     assert np.isnan(apart.velocity).tolist() == [False, True, False, False]
 
 
-def test_distances_and_angles():
+def test_distance_and_angle_measures():
     angle = np.linspace(0.2, 3.0, 15)
-    n = np.array(AXIS) / 3.0
-    start = np.array([0.0, 1.0, 0.0])
-    across = start - (n @ start) * n
-    place = np.array([1.0, 0.0, 0.0])
-    B = (
-        place
-        + (n @ start) * n
-        + np.cos(angle)[:, None] * across
-        + np.sin(angle)[:, None] * np.cross(n, across)
-    )
+    start, place = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    turn = Rotation.from_rotvec(np.outer(angle, AXIS) / 3.0)
+    B = place + turn.apply(start)
     length, change, opened = series(
         arm(angle),
         Distance("l", *TOLERANCE, ("A", "B")),
@@ -170,16 +152,18 @@ def test_distances_and_angles():
     np.testing.assert_allclose(change.position, expected - math.sqrt(2.0), atol=1e-14)
     np.testing.assert_allclose(opened.position, np.arccos((B - place) @ start), atol=1e-12)
     for each in (length, opened):  # the rates are those of the values
-        spline = np.gradient(each.position, angle / RATE, edge_order=2)
-        np.testing.assert_allclose(each.velocity[2:-2], spline[2:-2], atol=0.03)
-        spline = np.gradient(each.velocity, angle / RATE, edge_order=2)
-        np.testing.assert_allclose(each.acceleration[2:-2], spline[2:-2], atol=0.1)
+        for values, rates, atol in (
+            (each.position, each.velocity, 0.03),
+            (each.velocity, each.acceleration, 0.1),
+        ):
+            slopes = np.gradient(values, angle / RATE)
+            np.testing.assert_allclose(rates[2:-2], slopes[2:-2], atol=atol)
 
 
-def test_a_measure_of_a_mechanism_without_points_has_a_size():
-    mechanism = replace(arm([0.1]).mechanism, points=[])
-    case = replace(arm([0.1]), mechanism=mechanism)
-    close(series(case, JointAngle("a", *TOLERANCE, "hinge")), 0.1, RATE, 0.0)
+def test_measure_without_points():
+    case = arm([0.1])
+    case = replace(case, mechanism=replace(case.mechanism, points=[]))
+    close(series(case, HINGE), 0.1, RATE, 0.0)
 
 
 MEASURES = """
@@ -220,8 +204,9 @@ OUTPUT = (
 MM = BASE.replace(OUTPUT, '[units]\nlength = "mm"\nangle = "deg"\n')
 
 
-def test_a_case_file_has_all_measures(tmp_path):
+def test_measures_in_case_file(tmp_path):
     case = load_case(write(tmp_path, MM + MEASURES))
+    written_again(case, tmp_path)
     length, stroke, turn, e2, wide = case.outputs
     assert length == Distance("length", length.atol, 1e-9, length.why, ("home", "tip"), True)
     assert stroke == JointDisplacement("stroke", 5e-4, 0.0, "test", "guide")
@@ -235,11 +220,6 @@ def test_a_case_file_has_all_measures(tmp_path):
     assert outputs["e2"].position == [0.0, 0.0, 0.0]
     middle = 2e-3 * 1.5 / math.hypot(1.5, 2, 3)
     assert outputs["length"].velocity[1] == pytest.approx(middle, rel=1e-9)
-
-
-def test_measures_are_written_and_read_again(tmp_path):
-    case = load_case(write(tmp_path, MM + MEASURES))
-    written_again(case, tmp_path)
 
 
 FREE = ('"joint_displacement"\njoint = "guide"\natol', '"joint_angle"\njoint = "guide"\natol')
@@ -258,6 +238,6 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("change", "fragments"), WRONG)
-def test_wrong_measures_are_refused(tmp_path, change, fragments):
+@pytest.mark.parametrize(("change", "fragments"), WRONG, ids=str)
+def test_wrong_measure_is_refused(tmp_path, change, fragments):
     complains(write(tmp_path, edited(change, base=MM + MEASURES)), fragments)

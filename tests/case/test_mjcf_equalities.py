@@ -5,8 +5,8 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
-from ..support.mjcf_models import EXACT, agree, model, mujoco
-from ..support.model_poses import mujoco_errors
+from ..support.mjcf_models import agree, closes_in_mujoco, model
+from ..support.model_files import driven
 
 
 # A crank with a slide on it, whose end rides on the ground; the equality under test closes it.
@@ -63,17 +63,14 @@ EQUALITIES = {
 
 
 @pytest.mark.parametrize("kind", EQUALITIES)
-def test_equalities(tmp_path, kind):
+def test_equality_closes_as_in_mujoco(tmp_path, kind):
     """Each closes what it says: driven joints and residuals in MuJoCo."""
     equality, closed = EQUALITIES[kind]
     file = model(tmp_path, linkage(equality))
     swept = "reach" if kind in ("hinge by slide", "two slides", "tendon of slides") else "crank"
     values = ":0.02:0.15:5" if swept == "reach" else ":0.45:0.75:5"
     hold = tuple(name for name in EVERYTHING if name not in (*closed.split(), swept))
-    case = load(file, Supplied(drive=(swept + values,), hold=hold))
-    residual, distance = mujoco_errors(mujoco, file, case, range(5))
-    assert residual < EXACT
-    assert distance < EXACT
+    closes_in_mujoco(file, Supplied(drive=(swept + values,), hold=hold))
 
 
 BLOCK = """<body name="block" pos="0.4 0 0.4" quat="1 0 1 0"><joint name="x" type="slide" axis="0 0 1"/>
@@ -81,7 +78,7 @@ BLOCK = """<body name="block" pos="0.4 0 0.4" quat="1 0 1 0"><joint name="x" typ
 
 
 @pytest.mark.parametrize("kind", ["connect", "weld"])
-def test_sites(tmp_path, kind):
+def test_equality_between_sites(tmp_path, kind):
     """Sites that coincide at qpos0: the block follows the crank's pin, or it locks it."""
     text = linkage(f'<{kind} site1="pin" site2="hub"/>').replace('<body name="lever"', BLOCK)
     if kind == "weld":
@@ -94,13 +91,10 @@ def test_sites(tmp_path, kind):
             'name="x" type="hinge" axis="0 1 0" pos="0.4 0 -0.4"',
         )
     file = model(tmp_path, text)
-    case = load(file, Supplied(drive=("crank:0.5:0.8:4",), hold=EVERYTHING[1:]))
-    residual, distance = mujoco_errors(mujoco, file, case, range(4))
-    assert residual < EXACT
-    assert distance < EXACT
+    closes_in_mujoco(file, driven("crank:0.5:0.8:4", hold=EVERYTHING[1:]))
 
 
-def test_bodies_made_of_several_joints_are_no_others(tmp_path):
+def test_name_of_body_between_two_joints(tmp_path):
     """The body between two joints of one body has a name that none of the file has."""
     text = """
     <mujoco><worldbody>
@@ -111,16 +105,16 @@ def test_bodies_made_of_several_joints_are_no_others(tmp_path):
     assert list(tree.moving) == ["arm.x'2", "arm", "arm.x"]
     assert tree.joints["z"].inner == "arm.x"
     with pytest.raises(CaseError, match="the model has 3 degrees of freedom"):
-        load(model(tmp_path, text), Supplied(drive=("y:0:1",), hold=("x",)))
+        load(model(tmp_path, text), driven("y:0:1", hold=("x",)))
 
 
-def test_inactive_equalities_are_left_out(tmp_path):
+def test_inactive_equality_is_left_out(tmp_path):
     gear = '<joint joint1="lever" joint2="crank" active="false"/>'
     for text in (
         linkage(gear),
         linkage(gear.replace("false", "true"), '<option><flag equality="disable"/></option>'),
     ):
-        case = load(model(tmp_path, text), Supplied(drive=("crank:0.5:0.6",), hold=EVERYTHING[1:]))
+        case = load(model(tmp_path, text), driven("crank:0.5:0.6", hold=EVERYTHING[1:]))
         assert case.mechanism.couplers == ()
         assert "equalities that are not active (1)" in case.source
 
@@ -135,12 +129,10 @@ ROD = """
     </worldbody><equality><connect body1="rod" body2="slider" anchor="0.8 0.1 -0.4"/></equality></mujoco>"""  # noqa: E501
 
 
-def test_a_rod_on_a_ball_and_a_connect_does_not_spin(tmp_path):
+def test_rod_spin_is_left_out(tmp_path):
     """Its turn about itself, which nothing can drive, is left out; a free body can be held."""
     file = model(tmp_path, ROD)
-    case = load(file, Supplied(drive=("crank:0.2:0.9:6",), hold=("frame",)))
+    case = load(file, supplied := driven("crank:0.2:0.9:6", hold=("frame",)))
     assert case.mechanism.joint("ball").type == "distance"
     assert "body 'rod' and its turn about itself" in case.source
-    residual, distance = mujoco_errors(mujoco, file, case, range(6))
-    assert residual < EXACT
-    assert distance < EXACT
+    closes_in_mujoco(file, supplied)

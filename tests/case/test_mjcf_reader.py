@@ -2,56 +2,44 @@
 it may.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from kincheck.core.case.case import Truth
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.files import keep_texts
 from kincheck.core.cli.main import main
 
-from ..support.mjcf_models import EXACT, agree, model, mujoco
-from ..support.model_poses import mujoco_errors, solution
-
-GRIPPER = Path(__file__).parents[1] / "data" / "mjcf" / "robotiq_2f85.xml"
-CLOSING = Supplied(
-    drive=("right_driver_joint:0:0.8:17",),
-    hold=("right_spring_link_joint", "left_spring_link_joint"),
-)
+from ..support.mjcf_models import agree, closes_in_mujoco, model
+from ..support.model_files import DRIVEN, GRIPPER, SPRINGS, driven
+from ..support.model_poses import EXACT, solution
 
 
-def test_the_gripper_moves_as_mujoco_allows():
+def test_gripper_closes_in_mujoco():
     """A published model: two five-bars, closed by connects and geared, over the stroke that its
     file gives.
     """
-    case = load(GRIPPER, CLOSING)
+    case = load(GRIPPER, DRIVEN)
     assert case.truth is Truth.CONSENSUS_ONLY
     assert {point.name for point in case.mechanism.points} >= {
         "right_follower",
         "left_pad",
         "right_pad",
     }
-    residual, distance = mujoco_errors(mujoco, GRIPPER, case, range(17))
-    assert residual < EXACT
-    assert distance < EXACT
+    closes_in_mujoco(GRIPPER, DRIVEN)
 
 
-def test_the_gripper_moves_at_all_and_alike_on_both_sides():
-    found = solution(load(GRIPPER, CLOSING)).points
+def test_gripper_sides_move_symmetrically():
+    found = solution(load(GRIPPER, DRIVEN)).points
     right, left = found["right_pad"].position, found["left_pad"].position
     assert np.abs(right[-1] - right[0]).max() > 0.02
     assert np.abs(right * [-1, -1, 1] - left).max() < EXACT
 
 
-def test_what_is_lost_is_listed():
-    listed = load(GRIPPER, CLOSING).source.split(LEFT_OUT)[1].split(", ")
-    assert {
-        "ranges of joints (8)",
-        "armature of joints (2)",
-    } <= set(listed)
-    assert {"tendon: fixed (1)", "actuator: general (1)"} <= set(listed)
+def test_left_out_elements_are_listed():
+    listed = load(GRIPPER, DRIVEN).source.split(LEFT_OUT)[1].split(", ")
+    lost = "ranges of joints (8)", "armature of joints (2)"
+    assert {*lost, "tendon: fixed (1)", "actuator: general (1)"} <= {*listed}
 
 
 ORIENTATIONS = {
@@ -72,7 +60,7 @@ ORIENTATIONS = {
 @pytest.mark.parametrize("angle", ["degree", "radian"])
 @pytest.mark.parametrize("sequence", ["xyz", "zyx", "XYZ", "zXy"])
 @pytest.mark.parametrize("orientation", ORIENTATIONS.values(), ids=ORIENTATIONS)
-def test_orientations(tmp_path, orientation, sequence, angle):
+def test_orientations_match_mujoco(tmp_path, orientation, sequence, angle):
     text = f"""
     <mujoco><compiler angle="{angle}" eulerseq="{sequence}"/><worldbody>
       <body name="a" pos="0.1 0.2 0.3" {orientation}><joint name="j" axis="1 2 2" pos="0.3 0 0.1" ref="0.4"/>
@@ -85,7 +73,7 @@ def test_orientations(tmp_path, orientation, sequence, angle):
     agree(model(tmp_path, text))
 
 
-def test_classes_of_joints_and_bodies_without_joints(tmp_path):
+def test_default_classes_match_mujoco(tmp_path):
     """A joint takes what it lacks from its class, from the class of the body around it, or from the
     outermost class.
     """
@@ -110,13 +98,8 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
       </worldbody>
     </mujoco>"""  # noqa: E501
     tree = agree(model(tmp_path, text))
-    assert [joint.kind for joint in tree.joints.values()] == [
-        "hinge",
-        "slide",
-        "hinge",
-        "slide",
-        "ball",
-    ]
+    kinds = " ".join(joint.kind for joint in tree.joints.values())
+    assert kinds == "hinge slide hinge slide ball"
     assert tree.carriers["part"] == "by_body"
     assert tree.sites["tip"][0] == "by_body"
     assert tree.joints["own"].outer == "by_body"
@@ -124,34 +107,25 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
     assert tree.massless == {"own.own"}
 
 
-def test_what_was_exported_is_read(tmp_path):
+def test_exported_mjcf_is_read(tmp_path):
     """The strut: its tie rod is a tendon between two sites there, and a distance again here."""
     file = tmp_path / "strut.xml"
     assert main(["export", "mcpherson_strut", "--to", "mjcf", "--out", str(file)]) == 0
-    case = load(file, Supplied(drive=("lca_pivot:-0.1:0.1:3",)))
+    case = load(file, supplied := driven("lca_pivot:-0.1:0.1:3"))
     assert [joint.type for joint in case.mechanism.joints].count("distance") == 1
-    residual, distance = mujoco_errors(mujoco, file, case, range(3))
-    assert residual < EXACT
-    assert distance < EXACT
+    closes_in_mujoco(file, supplied)
 
 
-def test_a_name_that_is_a_path_is_no_place_to_write_to(tmp_path, monkeypatch):
+def test_model_name_with_path_in_export(tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     keep_texts({".xml": "<mujoco/>"}, "../../out of/here", None)
     assert [file.name for file in (tmp_path / "here").iterdir()] == [".._.._out of_here.xml"]
 
 
-def test_every_engine_reads_the_gripper_from_the_command_line(capsys):
-    options = [
-        "--drive",
-        "right_driver_joint:0:0.8:5",
-        "--hold",
-        "right_spring_link_joint",
-        "left_spring_link_joint",
-        str(GRIPPER),
-    ]
-    assert main(["run", "--jobs", "0", "--engine", "native", "mujoco", *options]) == 0
+def test_run_command_with_gripper(capsys):
+    options = "run --jobs 0 --engine native mujoco --drive right_driver_joint:0:0.8:5 --hold"
+    assert main([*options.split(), *SPRINGS, str(GRIPPER)]) == 0
     out, err = capsys.readouterr()
     assert "1 pass, 1 not judged" in out
     assert "with the masses of its bodies; left out: " in err

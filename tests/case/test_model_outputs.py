@@ -1,14 +1,12 @@
 """Outputs of every joint and body of a model, and whether closures enter them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import kincheck.cases
 import numpy as np
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.outputs import with_all_coordinates, with_all_motions
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.notes import notes
 from kincheck.core.harness.record import Outcome
@@ -18,6 +16,7 @@ from kincheck.core.mechanism.mechanism import Body
 
 from ..support.case_texts import write
 from ..support.measure_cases import AXIS, arm
+from ..support.model_files import driven
 
 FOUR_BAR = """
 <mujoco model="four bar"><compiler angle="radian"/><worldbody>
@@ -28,9 +27,9 @@ FOUR_BAR = """
 """
 
 
-def test_every_joint_and_body_of_a_model_is_compared_in_every_engine(tmp_path: Path):
+def test_model_outputs_in_every_engine(tmp_path):
     file = write(tmp_path, FOUR_BAR, "four_bar.xml")
-    case = load(file, Supplied(drive=("crank:-0.3:6.6:24",)))
+    case = load(file, driven("crank:-0.3:6.6:24"))
     names = [output.name for output in case.outputs]
     for each in ("crank", "rod", "rocker"):
         assert f"{each}.angle" in names
@@ -47,8 +46,8 @@ def test_every_joint_and_body_of_a_model_is_compared_in_every_engine(tmp_path: P
         np.testing.assert_allclose(2.0 * np.arctan2(e3, e0), rocker, atol=1e-9)
 
 
-def test_a_run_whose_outputs_no_closure_enters_says_so(tmp_path: Path):
-    case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), Supplied(drive=("crank:-0.3:0.3:7",)))
+def test_outputs_without_closure_are_noted(tmp_path):
+    case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), driven("crank:-0.3:0.3:7"))
     vacuous = tuple(each for each in case.outputs if each.name.startswith("crank"))
     (note,) = notes(replace(case, outputs=vacuous))
     assert "no output depends on a closure" in note
@@ -56,7 +55,7 @@ def test_a_run_whose_outputs_no_closure_enters_says_so(tmp_path: Path):
     assert notes(replace(case, outputs=rocking)) == []
 
 
-def test_a_coordinate_that_is_driven_is_no_result_of_a_closure():
+def test_driven_point_coordinate_without_closure_noted():
     case = load_case(kincheck.cases.FOLDER / "mcpherson_strut.toml")
     driven = case.mechanism.drivers[0]
     up = with_all_coordinates(case, [driven.point]).outputs[2]
@@ -65,11 +64,11 @@ def test_a_coordinate_that_is_driven_is_no_result_of_a_closure():
     assert not [n for n in notes(case) if "closure" in n]
 
 
-def test_an_open_chain_has_no_closure_to_depend_on():
+def test_open_chain_without_closure_note():
     assert notes(with_all_motions(arm([0.0, 1.0]))) == []
 
 
-def test_a_coupler_that_moves_the_design_is_told():
+def test_coupler_that_moves_design_is_noted():
     """In the file's unit; a coupler through zero is not."""
     for coefficients, told in (
         ((0.2, 0.5), ["'lever' begins at 0.2 rad, zero as given"]),

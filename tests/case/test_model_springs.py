@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load
 from kincheck.core.mechanism.loads import SpringDamper, TorsionSpringDamper
 
 from ..support.loads import solved
+from ..support.model_files import driven
 
 # All terms of the efforts are below 100 N or N m; the spring of the slide acts from 250 m behind
 # it, whose last digit is 6e-14 m at 90 N/m.
@@ -25,13 +26,13 @@ TREE = """<mujoco><compiler angle="{angle}"/><option gravity="1 2 -9"/><worldbod
 <tendon><spatial name="cord" {cord}><site site="here"/><site site="there"/></spatial></tendon>
 </mujoco>"""
 DEGREES = {"angle": "degree", "turn": "20 30 40", "ref": "30", "rest": "-50"}
-DRIVE = Supplied(drive=("hinge:0.2:1:4", "slide:-0.3:0.5:4"))
+DRIVE = driven("hinge:0.2:1:4", "slide:-0.3:0.5:4")
 
 
 @pytest.mark.parametrize(
     "cord", ['stiffness="20" damping="2" springlength="0.7"', 'damping="2" stiffness="0"', ""]
 )
-def test_efforts_are_those_of_inverse_dynamics(tmp_path: Path, cord: str):
+def test_spring_efforts_match_mujoco(tmp_path, cord):
     mujoco = pytest.importorskip("mujoco")
     file = tmp_path / "model.xml"
     file.write_text(TREE.format(cord=cord, **DEGREES))
@@ -54,7 +55,7 @@ def test_efforts_are_those_of_inverse_dynamics(tmp_path: Path, cord: str):
 def read(tmp_path: Path, text: str, name: str = "model.xml"):
     file = tmp_path / name
     file.write_text(text)
-    case = load(file, Supplied(drive=("hinge:0:0.1:2",), hold_rest=True))
+    case = load(file, driven("hinge:0:0.1:2", hold_rest=True))
     return case.mechanism.forces, case.source.split(LEFT_OUT)[1]
 
 
@@ -67,14 +68,14 @@ def read(tmp_path: Path, text: str, name: str = "model.xml"):
         ('springdamper="1 0.5" damping="1"', "springs of joints (1), damping of joints (1)"),
     ],
 )
-def test_what_is_not_linear_is_left_out(tmp_path: Path, springs: str, counted: str):
+def test_nonlinear_springs_are_left_out(tmp_path, springs, counted):
     text = f"""<mujoco><worldbody><body name="arm"><joint name="hinge" {springs}/>
 <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
     assert read(tmp_path, text) == ((), counted)
 
 
 @pytest.mark.parametrize(("flag", "left"), [("spring", 0.0), ("damper", 2.0), ("passive", None)])
-def test_what_a_model_switches_off_does_not_act(tmp_path: Path, flag: str, left: float | None):
+def test_disabled_passive_forces_are_absent(tmp_path, flag, left):
     text = f"""<mujoco><option><flag {flag}="disable"/></option><worldbody><body name="arm">
 <joint name="hinge" stiffness="2" damping="3"/></body></worldbody></mujoco>"""
     forces, _ = read(tmp_path, text)
@@ -100,7 +101,7 @@ CORD = """<mujoco><default><tendon stiffness="5"/></default><worldbody><body nam
         ('stiffness="0"', "", None),
     ],
 )
-def test_a_cord_has_one_rest_length(tmp_path: Path, cord: str, joint: str, length: float | None):
+def test_spring_tendon_rest_length(tmp_path, cord, joint, length):
     forces, counted = read(tmp_path, CORD.format(cord=cord, joint=joint))
     if length is None:
         assert not forces
@@ -112,7 +113,7 @@ def test_a_cord_has_one_rest_length(tmp_path: Path, cord: str, joint: str, lengt
         assert "tendon" not in counted
 
 
-def test_dynamics_of_other_formats_are_the_same(tmp_path: Path):
+def test_springs_of_urdf_and_sdf(tmp_path):
     urdf = """<robot name="a"><link name="base"/><link name="arm"/>
 <joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/>
 <dynamics damping="3" friction="1"/></joint></robot>"""

@@ -2,6 +2,7 @@
 
 import csv
 import xml.etree.ElementTree as ET
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from kincheck.core.cli.main import main
 
 # Euler's and the native equations agree to round-off; numbers of files are decimal.
 EXACT = 1e-12
+near = partial(np.allclose, rtol=0, atol=EXACT)
 LOOP = """<mujoco model="loop"><compiler angle="degree"/><worldbody>
 <body name="crank"><joint name="crank" axis="0 0 1" ref="40"/><geom size=".01"/>
  <body name="rod" pos=".1 0 0"><joint name="pin" axis="0 0 1" ref="-15"/><geom size=".01"/></body></body>
@@ -53,11 +55,11 @@ def test_qpos_outputs_close_loop_in_mujoco(model):
         data.qpos[:] = qpos
         mujoco.mj_forward(there, data)
         assert np.abs(data.efc_pos[:3]).max() < EXACT
-    assert np.allclose(numbers(found["crank.qpos"]), [0.6, 0.7, 0.8], rtol=0, atol=EXACT)
+    assert near(numbers(found["crank.qpos"]), [0.6, 0.7, 0.8])
     assert (numbers(found["rocker.qpos"]) > 2 * np.pi).all()
 
 
-def test_heads_say_what_joints_count_from(model, capsys):
+def test_csv_heads_name_zero_of_joints(model, capsys):
     heads, found = curves(model, *DRIVE)
     assert heads[-2:] == ["counts_from", "driver_counts_from"]
     for name, zero in (("crank.angle", "design"), ("crank.qpos", "model"), ("rod.x", "")):
@@ -72,11 +74,11 @@ def test_imported_case_keeps_zeros_of_model(model, tmp_path, capsys):
     assert main(["import", str(model), *DRIVE, "--out", str(case)]) == 0
     _, after = curves(case)
     for name in ("crank.qpos", "rocker.qpos", "pin.angle"):
-        assert np.allclose(numbers(after[name]), numbers(before[name]), rtol=0, atol=EXACT)
+        assert near(numbers(after[name]), numbers(before[name]))
     capsys.readouterr()
 
 
-def test_value_at_design_is_in_units_of_file(tmp_path):
+def test_value_at_design_in_file_units(tmp_path):
     (file := tmp_path / "slide.toml").write_text("""schema = "kincheck-case/1"
 name = "slide"
 source = "own"
@@ -104,7 +106,7 @@ at_design = 270
     assert np.allclose(np.degrees(numbers(found["angle"])), [270, 420, 570, 720], rtol=0, atol=1e-9)
 
 
-def test_models_that_start_at_zero_have_no_further_heads(model):
+def test_csv_heads_of_model_from_zero(model):
     text = LOOP
     for ref in ("40", "-15", "435"):
         text = text.replace(f' ref="{ref}"', "")
@@ -128,7 +130,7 @@ def test_exported_mjcf_keeps_zeros_of_model(model, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("to", ["urdf", "sdf", "exudyn"])
-def test_exports_with_another_zero_say_it(to, model, tmp_path):
+def test_exports_note_zero_of_case(to, model, tmp_path):
     out = tmp_path / "again"
     assert main(["export", str(model), *DRIVE, "--to", to, "--out", str(out)]) == 0
     (text,) = (each.read_text() for each in tmp_path.iterdir() if each.name == "again")

@@ -8,6 +8,8 @@ from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
+from ..support.model_files import driven
+
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
 <origin xyz="1 0 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="{3}" effort="1" velocity="1"/>
 </joint>"""
@@ -32,7 +34,7 @@ def test_motors_move_through_their_limits(tmp_path):
     assert any("shoulder, elbow move through their limits" in note for note in case.assembly)
 
 
-def test_one_motor_is_said_in_the_singular(tmp_path):
+def test_note_of_one_motor(tmp_path):
     note = "elbow moves through its limits"
     file = tmp_path / "arm.urdf"
     text = arm(tmp_path, "shoulder", "elbow").read_text()
@@ -40,7 +42,7 @@ def test_one_motor_is_said_in_the_singular(tmp_path):
     assert any(note in each for each in load(file).assembly)
 
 
-def test_joints_commanded_by_ros2_control_have_motors(tmp_path):
+def test_ros2_control_commands_are_motors(tmp_path):
     file = arm(tmp_path, "elbow")
     commanded = '<joint name="shoulder"><command_interface name="position"/></joint>'
     file.write_text(
@@ -77,7 +79,7 @@ def test_motor_of_tendon_moves_its_joints(tmp_path):
         (("elbow", "shoulder"), "-1", "its motors, of shoulder, elbow, have no limits at shoulder"),
     ],
 )
-def test_unused_motors_say_why(motors, upper, why, tmp_path):
+def test_unused_motors_give_reason(motors, upper, why, tmp_path):
     with pytest.raises(CaseError, match=rf"nothing says what drives it: {why}. Say"):
         load(arm(tmp_path, *motors, upper=upper))
 
@@ -99,23 +101,23 @@ def test_motor_in_parent_drives_its_joint(tmp_path):
     assert load(file).sweep.driver == "motor"
 
 
-def test_what_drives_a_model_is_not_left_out(tmp_path):
+def test_used_motors_are_not_left_out(tmp_path):
     (file := tmp_path / "wiper.xml").write_text(WIPER)
     case = load(file, Supplied(start=("keyframe:up",)))
     assert case.source.split(LEFT_OUT)[1] == "actuator: position (1), keyframe: key (1)"
     assert any("joint motor moves through its limits" in note for note in case.assembly)
     assert load(arm(tmp_path, "shoulder", "elbow")).source.endswith(f"{LEFT_OUT}nothing")
-    driven = load(file, Supplied(drive=("motor:0:1",))).source
+    source = load(file, driven("motor:0:1")).source
     assert {"ranges of joints (1)", "actuator: motor (1)"} < {
-        *driven.split(LEFT_OUT)[1].split(", ")
+        *source.split(LEFT_OUT)[1].split(", ")
     }
 
 
-def test_locked_joint_with_a_link_s_name_is_refused(tmp_path):
+def test_locked_joint_named_like_link(tmp_path):
     (file := tmp_path / "arm.xml").write_text(
         '<mujoco><worldbody><body name="upper"><joint name="arm"/><body name="arm" pos="1 0 0">'
         '<joint name="elbow" axis="0 1 0"/></body></body></worldbody>'
         '<equality><joint joint1="arm" polycoef="0 0"/></equality></mujoco>'
     )
     with pytest.raises(CaseError, match="found 'arm', which an equality of the file locks"):
-        load(file, Supplied(drive=("arm:0:1",), hold=("elbow",)))
+        load(file, driven("arm:0:1", hold=("elbow",)))

@@ -3,7 +3,7 @@ it.
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -11,16 +11,19 @@ import kincheck.cases
 import msgspec
 import numpy as np
 import pytest
-from kincheck.core.case.case import ORDERS, Truth
+from kincheck.core.case.case import ORDERS, Case, Sweep, Truth
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.reference_file import judged_by, read, series
-from kincheck.core.cli import main
-from kincheck.core.errors import CaseError, KincheckError
+from kincheck.core.case.io.outputs import with_all_coordinates
+from kincheck.core.case.io.reference_file import read, series, with_proved_references
+from kincheck.core.errors import KincheckError
 from kincheck.core.jet import arctan2
 from kincheck.core.program import ball_executor
 from kincheck.core.studies.verified_reference import prove_case
 
-from ..support.fakes import RADIUS, crank, exact
+from ..kinematics.test_chain import chain
+from ..kinematics.test_singular import BRANCH
+from ..support.case_texts import refused
+from ..support.fakes import RADIUS, crank
 
 flint = pytest.importorskip("flint")
 TOL = 1e-12
@@ -40,22 +43,19 @@ def file(made, tmp_path):
     return path
 
 
-def test_printed_numbers_are_the_closed_form_to_all_digits(made):
+def test_proved_digits_are_closed_form(made):
     case, (found, _) = crank(), made
-    before, flint.ctx.prec = flint.ctx.prec, 300
-    try:
-        for k, angle in enumerate(case.sweep.values.tolist()):
-            x = RADIUS * (flint.arb(angle).cos() - 1)
+    with flint.ctx.workprec(300):
+        for k, angle in enumerate(map(flint.arb, case.sweep.values.tolist())):
+            x = RADIUS * (angle.cos() - 1)
             assert abs(x - flint.arb(found.outputs["x"].position[k])) < 1e-40
-            y_tt = -RADIUS * flint.arb(case.sweep.rate) ** 2 * flint.arb(angle).sin()
+            y_tt = -RADIUS * flint.arb(case.sweep.rate) ** 2 * angle.sin()
             assert abs(y_tt - flint.arb(found.outputs["y"].acceleration[k])) < 1e-40
-    finally:
-        flint.ctx.prec = before
     assert all(radius < 1e-40 for each in found.outputs.values() for radius in each.radius)
     assert found.proved == len(case.sweep.values)
 
 
-def test_rows_are_chosen_for_the_sample_where_those_of_the_design_are_singular():
+def test_proof_changes_rows_at_sample():
     """The Bennett loop at quarter turns; at the second and the fourth they depend on each other.
     One solution, its rows said.
     """
@@ -80,22 +80,17 @@ def test_native_errors_are_round_off(made):
         assert all(0.0 <= each < 8.0 for each in error.ulps)
 
 
-def test_a_file_gives_the_nearest_doubles(made, file):
-    case = crank(reference=False)
-    (judged,) = judged_by([case], [file])
+def test_proved_file_gives_nearest_doubles(made, file):
+    (judged,) = with_proved_references([crank(reference=False)], [file])
     assert judged.truth is Truth.IN_HOUSE_ORACLE
-    for name, axis in (("x", 0), ("y", 1)):
-        for quantity, truth in zip(
-            ("position", "velocity", "acceleration"), exact(case), strict=True
-        ):
-            expected = truth[:, axis] - (RADIUS if (name, quantity) == ("x", "position") else 0.0)
-            np.testing.assert_allclose(
-                getattr(judged.reference[name], quantity), expected, rtol=0.0, atol=1e-15
-            )
+    for name, truth in crank().reference.items():
+        for quantity in ("position", "velocity", "acceleration"):
+            found, expected = (getattr(x, quantity) for x in (judged.reference[name], truth))
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-15)
     assert read(file) == made[0]
 
 
-def test_a_sample_without_proof_is_nan(made):
+def test_unproved_sample_is_nan(made):
     case, (found, _) = crank(), made
     x = found.outputs["x"]
     gap = msgspec.structs.replace(x, position=[None, *x.position[1:]])
@@ -105,132 +100,92 @@ def test_a_sample_without_proof_is_nan(made):
     assert np.isfinite(position[1:]).all()
 
 
-def _changed(**changes):
-    return lambda found: msgspec.structs.replace(found, **changes)
-
-
 @pytest.mark.parametrize(
-    ("change", "problem"),
+    ("changes", "problem"),
     [
-        (_changed(case="other"), "case: found 'other', expected one of the cases to be run: crank"),
-        (_changed(driver={"turn": [0.0]}), "driver: found other samples than those of the sweep"),
-        (_changed(outputs={}), "outputs: found none, expected outputs of the case"),
+        ({"case": "other"}, "case: found 'other', expected one of the cases to be run: crank"),
         (
-            lambda found: _changed(
-                outputs={"x": msgspec.structs.replace(found.outputs["x"], unit="rad")}
-            )(found),
-            "outputs.x: found another unit or convention of signs",
+            {"driver": {"turn": [0.0]}},
+            "driver: found other samples than those of the sweep",
         ),
-        (lambda found: {"schema": "kincheck-results/1"}, "expected a proved reference"),
+        ({"outputs": {}}, "outputs: found none, expected outputs of the case"),
+        ({"schema": "kincheck-results/1"}, "expected a proved reference"),
     ],
+    ids=str,
 )
-def test_a_reference_of_something_else_is_refused(made, tmp_path, change, problem):
-    path = tmp_path / "wrong.json"
-    path.write_bytes(msgspec.json.encode(change(made[0])))
-    with pytest.raises(CaseError, match=f"wrong.json: .*{problem}"):
-        judged_by([crank()], [path])
+def test_proved_reference_mismatch_is_refused(file, changes, problem):
+    file.write_text(json.dumps(json.loads(file.read_text()) | changes))
+    refused(
+        lambda: with_proved_references([crank()], [file]), f"crank.reference.json:  ... {problem}"
+    )
 
 
-def test_decimals_are_what_a_file_says():
+def test_proved_reference_of_other_unit(file):
+    file.write_text(file.read_text().replace('"unit":"m"', '"unit":"rad"', 1))
+    told = "outputs.x: found another unit or convention of signs"
+    refused(lambda: with_proved_references([crank()], [file]), told)
+
+
+def test_proof_with_decimal_numbers():
     """A sweep of tenths: its doubles are not tenths, its decimals are, however they were rounded on
     the way.
     """
     case = crank()
     tenths = replace(case, sweep=replace(case.sweep, values=np.linspace(-0.3, 0.3, 7)))
-    before, flint.ctx.prec = flint.ctx.prec, 200
-    try:
-        for numbers, is_tenth in (("decimal", True), ("double", False)):
-            found, _ = prove_case(tenths, digits=30, numbers=numbers, tol=TOL)
+    for numbers, is_tenth in (("decimal", True), ("double", False)):
+        found, _ = prove_case(tenths, digits=30, numbers=numbers, tol=TOL)
+        with flint.ctx.workprec(200):
             y = flint.arb(found.outputs["y"].position[5])
             assert (abs(y - RADIUS * (flint.arb(1) / 5).sin()) < 1e-30) is is_tenth
-    finally:
-        flint.ctx.prec = before
 
 
-@dataclass(frozen=True)
-class Angle:
-    """An output that is a formula: roots and angles of jets."""
-
-    name: str = "angle"
-    points: tuple = ("tip",)
-    unit: str = "rad"
-    signs: str = ""
-    orders: int = ORDERS
-    period: float = 0.0
-    facts = {}  # noqa: RUF012
-    forces = ()
-
-    def of(self, at, design):
-        tip = at["tip"]
-        return arctan2(tip.y, tip.x)
-
-
-def test_outputs_that_are_formulas_are_proved():
-    found, _ = prove_case(
-        replace(crank(), outputs=(Angle(),)), digits=30, numbers="double", tol=TOL
-    )
-    angle = found.outputs["angle"]
-    assert angle.reason is None
-    for text, value in zip(angle.position, crank().sweep.values.tolist(), strict=True):
-        assert abs(Fraction(text) - Fraction(value)) < Fraction(1, 10**30)
-    assert all(
-        abs(Fraction(text) - Fraction(crank().sweep.rate)) < Fraction(1, 10**30)
-        for text in angle.velocity
-    )
-
-
-def test_a_formula_that_balls_cannot_compute_says_so():
-    odd = SimpleNamespace(
-        name="odd",
+def formula(name, unit, of):
+    """An output that is a formula of the tip."""
+    return SimpleNamespace(
+        name=name,
         points=("tip",),
-        unit="m",
+        unit=unit,
         signs="",
+        orders=ORDERS,
+        period=0.0,
         facts={},
         forces=(),
-        of=lambda at, design: np.arccosh(at["tip"].x.x),
+        of=lambda at, design: of(at["tip"]),
     )
-    found, errors = prove_case(
-        replace(crank(), outputs=(odd,)), digits=30, numbers="double", tol=TOL
-    )
+
+
+def test_proof_of_formula_output():
+    """Roots and angles of jets."""
+    output = formula("angle", "rad", lambda tip: arctan2(tip.y, tip.x))
+    case = replace(crank(), outputs=(output,))
+    found, _ = prove_case(case, digits=30, numbers="double", tol=TOL)
+    angle = found.outputs["angle"]
+    assert angle.reason is None
+    rates = [case.sweep.rate] * len(angle.velocity)
+    for texts, values in ((angle.position, case.sweep.values.tolist()), (angle.velocity, rates)):
+        for text, value in zip(texts, values, strict=True):
+            assert abs(Fraction(text) - Fraction(value)) < Fraction(1, 10**30)
+
+
+def test_proof_of_unsupported_formula():
+    odd = formula("odd", "m", lambda tip: np.arccosh(tip.x.x))
+    case = replace(crank(), outputs=(odd,))
+    found, errors = prove_case(case, digits=30, numbers="double", tol=TOL)
     assert "what balls cannot" in found.outputs["odd"].reason
     assert errors == []
 
 
-# The command
-
-
-@pytest.fixture
-def kincheck_main(monkeypatch):
-    """main() with the crank as the only case."""
-    monkeypatch.setattr(kincheck.cases, "names", lambda: ("crank",))
-    monkeypatch.setattr(kincheck.cases, "load", lambda name: crank())
-    return lambda *argv: main.main([str(each) for each in argv])
-
-
-def test_the_command_writes_what_the_run_is_judged_by(kincheck_main, tmp_path, capsys):
+def test_reference_command_writes_usable_reference(kincheck_main, tmp_path, capsys):
     assert kincheck_main("reference", "crank", "--digits", 25, "--out", tmp_path) == 0
     assert "crank: 9 of 9 samples proved to 1e-25" in capsys.readouterr().out
     written = tmp_path / "crank.reference.json"
-    assert (
-        kincheck_main(
-            "run",
-            "crank",
-            "--engine",
-            "native",
-            "--reference",
-            written,
-            "--json",
-            tmp_path / "out.json",
-        )
-        == 0
-    )
+    options = "--engine", "native", "--json", tmp_path / "out.json", "--reference", written
+    assert kincheck_main("run", "crank", *options) == 0
     (record,) = json.loads((tmp_path / "out.json").read_text())["records"]
     assert record["errors"]["x"]["position"]["against"] == "in_house_oracle"
 
 
-def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(
-    kincheck_main, tmp_path, capsys, made, file
-):
+def test_reference_of_unreadable_case(kincheck_main, tmp_path, capsys, made, file):
     stray = tmp_path / "gone.json"
     stray.write_bytes(msgspec.json.encode(msgspec.structs.replace(made[0], case="gone")))
     (tmp_path / "gone.toml").write_text('schema = "kincheck-case/9"\n')
@@ -246,24 +201,23 @@ def test_a_reference_of_a_case_that_cannot_be_read_ends_no_run_of_others(
     assert not (tmp_path / "out.json").exists()
 
 
-def test_samples_without_proof_give_status_one(kincheck_main, monkeypatch, capsys):
-    two = replace(crank().sweep, values=np.array([0.0, 1.0]))
-    monkeypatch.setattr(
-        kincheck.cases, "load", lambda name: replace(crank(), sweep=two, reference={})
-    )
-    monkeypatch.setattr("kincheck.core.kinematics.verified.krawczyk.MOST_STEPS", 0)
-    assert kincheck_main("reference", "crank") == 1
+def test_unproved_samples_have_status_1(kincheck_main, capsys):
+    """At the pose in the middle all links are in line."""
+    mechanism = chain(1)
+    sweep = Sweep(mechanism.drivers[0].name, np.array([0.0, BRANCH, 3.0]))
+    case = Case("chain", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    assert kincheck_main("reference", "chain", cases={"chain": with_all_coordinates(case)}) == 1
     out = capsys.readouterr().out
-    assert "crank: 0 of 2 samples proved" in out
-    assert f"sample 1 ({two.driver} = 1) not proved: singular pose" in out
+    assert "chain: 2 of 3 samples proved" in out
+    assert f"sample 1 ({sweep.driver} = {BRANCH:.9g}) not proved: singular pose" in out
 
 
-def test_digits_that_make_no_sense_give_status_two(kincheck_main, capsys):
+def test_senseless_digits_have_status_2(kincheck_main, capsys):
     assert kincheck_main("reference", "crank", "--digits", "16") == 2
     assert "not a whole number from 17 to 1000" in capsys.readouterr().err
 
 
-def test_without_flint_there_is_one_message(kincheck_main, monkeypatch, capsys):
+def test_missing_flint_is_one_message(kincheck_main, monkeypatch, capsys):
     def missing(name):
         raise ImportError(name)
 
@@ -272,7 +226,7 @@ def test_without_flint_there_is_one_message(kincheck_main, monkeypatch, capsys):
         ball_executor.flint()
 
 
-def test_a_case_file_can_name_a_proved_reference(tmp_path):
+def test_case_file_with_proved_reference(tmp_path):
     """In degrees: the reference is in SI units, whatever those of the case file are."""
     text = (kincheck.cases.FOLDER / "rssr.toml").read_text().replace("steps = 181", "steps = 5")
     bare, file = tmp_path / "bare.toml", tmp_path / "case.toml"

@@ -1,17 +1,14 @@
 """The comparison of public robots, on small models of our own."""
 
-from pathlib import Path
-
 import pytest
 
 from ..fuzz import mjcf
+from ..support.model_poses import EXACT
 
 pytest.importorskip("mujoco")
 public_robots = pytest.importorskip("tests.oracles.public_robots")
 FOUR_BAR = mjcf.FOUR_BAR.decode()
 
-# Newton on both sides: round-off of metre-sized coordinates, some operations deep.
-EXACT = 1e-13
 PAIRED = """<robot name="r"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
 <link name="x"/><link name="y"/>
 <joint name="A" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>
@@ -30,7 +27,7 @@ joint_type: [UJOINT_YX]
 """
 
 
-def test_a_loop_agrees_with_mujoco_and_others_are_refused_or_skipped(tmp_path: Path):
+def test_public_mjcf_loop_agrees_with_mujoco(tmp_path):
     (tmp_path / "bars.xml").write_text(FOUR_BAR)
     (tmp_path / "open.xml").write_text(
         mjcf.FOUR_BAR.decode().replace('pos="4 0 0"><joint', "><joint")
@@ -47,7 +44,7 @@ def test_a_loop_agrees_with_mujoco_and_others_are_refused_or_skipped(tmp_path: P
     assert refused.cells[1].startswith("refused: ")
 
 
-def test_a_loop_in_an_included_file_is_found_once(tmp_path: Path):
+def test_loop_in_included_file_counts_once(tmp_path):
     whole = FOUR_BAR.replace("</mujoco>", '<include file="parts/loop.xml"/></mujoco>')
     start, end = whole.index("<equality>"), whole.index("</equality>") + len("</equality>")
     (tmp_path / "parts").mkdir()
@@ -58,7 +55,7 @@ def test_a_loop_in_an_included_file_is_found_once(tmp_path: Path):
     assert (row.cells[0], row.cells[3]) == ("bars.xml", "1")
 
 
-def test_a_paired_urdf_agrees_with_pinocchio(tmp_path: Path):
+def test_urdf_with_pairs_agrees_with_pinocchio(tmp_path):
     pytest.importorskip("pinocchio")
     pytest.importorskip("yaml")
     (tmp_path / "robot.urdf").write_text(PAIRED)
@@ -68,7 +65,7 @@ def test_a_paired_urdf_agrees_with_pinocchio(tmp_path: Path):
     assert all(0.0 < float(each) < EXACT for each in row.cells[6:])
 
 
-def test_a_difference_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_difference_from_mujoco_is_seen(tmp_path, monkeypatch):
     oracle = public_robots.MujocoNewton
     own = oracle.body
     monkeypatch.setattr(oracle, "body", lambda self, name: shifted(own(self, name)))

@@ -9,14 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.case import Truth
 from kincheck.core.case.curves import (
     Printed,
-    bounded,
-    even,
-    interpolated,
-    matched,
-    multiples,
+    bound_rounding,
+    have_common_factor,
+    interpolate,
+    is_even_grid,
+    match_rows,
     slopes,
 )
 from kincheck.core.case.io import reference_samples
@@ -47,18 +46,15 @@ DIALECTS = {
 
 
 @pytest.mark.parametrize("kind", DIALECTS)
-def test_dialects_of_spreadsheets(tmp_path, kind):
+def test_reference_dialects(tmp_path, kind):
     text = DIALECTS[kind]
     write(tmp_path, text, "tip.csv")
-    case = load_case(write(tmp_path, BASE + BY_FILE))
-    assert case.truth is Truth.CLOSED_FORM
-    series = case.reference["tip_x"]
+    series = load_case(write(tmp_path, BASE + BY_FILE)).reference["tip_x"]
     assert series.position.tolist() == [1.4, 1.5, 1.6]
-    assert series.velocity is not None
     assert series.velocity.tolist() == [2.0, 2.0, 2.0]
 
 
-def test_tables_of_recordings_have_gaps(tmp_path):
+def test_recording_table_with_gaps(tmp_path):
     """And lines above them, to a last one; without gaps, an empty cell is a fault."""
     text = "run 3\nversion=1\nendheader\ntime\ta\tb\n0\t1.5\n1\tNaN\t2\n"
     file = write(tmp_path, text, "run.sto")
@@ -71,7 +67,7 @@ def test_tables_of_recordings_have_gaps(tmp_path):
         reference_samples.samples_of(table)
 
 
-def test_outputs_may_lack_a_reference(tmp_path):
+def test_output_without_reference(tmp_path):
     more = '\n[outputs.tip_y]\npoint = "tip"\ncomponent = "y"\n'
     case = load_case(write(tmp_path, BASE + more + INLINE))
     assert [output.name for output in case.outputs] == ["tip_x", "tip_y"]
@@ -79,70 +75,45 @@ def test_outputs_may_lack_a_reference(tmp_path):
 
 
 REFERENCES = [
-    (GERMAN.replace("1,5", "1.5"), "tip.csv ... line 3 ... '1.5' ... '-0,1' above ... one decimal"),
-    (GERMAN.replace("1,5", "=B2"), "tip.csv ... line 3, column tip_x ... '=B2' ... correct it"),
-    ("%PDF-1.7", "tip.csv ... found a PDF document, expected text"),
+    (GERMAN.replace("1,5", "1.5"), "line 3 ... '1.5' ... '-0,1' above ... one decimal"),
+    (GERMAN.replace("1,5", "=B2"), "line 3, column tip_x ... '=B2' ... correct it"),
+    ("%PDF-1.7", "found a PDF document, expected text"),
     (
         CSV.replace("\n 0.0", "\n0.01"),
-        ("tip.csv ... line 5 ... 0.01 m ... the nearest is 0 m ... expected 4 rows ... found 3"),
+        ("line 5 ... 0.01 m ... the nearest is 0 m ... expected 4 rows ... found 3"),
     ),
-    (CSV.replace("1.5", "1_5"), "tip.csv ... line 5 ... column tip_x ... '1_5' ... correct it"),
-    (CSV.replace("1.5", "nan"), "tip.csv ... line 5 ... column tip_x ... 'nan' ... finite"),
+    (CSV.replace("1.5", "1_5"), "line 5 ... column tip_x ... '1_5' ... correct it"),
+    (CSV.replace("1.5", "nan"), "line 5 ... column tip_x ... 'nan' ... finite"),
     (
         CSV.replace("1.5", "1e308"),
-        "tip.csv ... line 5 ... column tip_x ... '1e308' ... at most 1e+100",
+        "line 5 ... column tip_x ... '1e308' ... at most 1e+100",
     ),
-    (CSV.replace("1.5", ""), "tip.csv ... line 5 ... column tip_x ... expected a finite number"),
-    (CSV.replace("1.5, ", ""), "tip.csv ... line 5 ... found 2 numbers ... expected 3"),
-    (CSV.replace("tip_x,", "tip_z,"), "tip.csv ... line 3 ... 'tip_z' ... did you mean 'tip_x'"),
+    (CSV.replace("1.5", ""), "line 5 ... column tip_x ... expected a finite number"),
+    (CSV.replace("1.5, ", ""), "line 5 ... found 2 numbers ... expected 3"),
+    (CSV.replace("tip_x,", "tip_z,"), "line 3 ... 'tip_z' ... did you mean 'tip_x'"),
     (
         CSV.replace("tip_x,", "tip_x.acceleration,"),
-        "tip.csv ... 'tip_x.acceleration' alone ... add the column 'tip_x'",
+        "'tip_x.acceleration' alone ... add the column 'tip_x'",
     ),
-    (CSV.replace("tip_x.velocity", "tip_x"), "tip.csv ... 'tip_x' twice"),
+    (CSV.replace("tip_x.velocity", "tip_x"), "'tip_x' twice"),
     (
         CSV.replace("push, ", "tip_x, "),
-        (
-            "tip.csv ... 'tip_x' first, the name of an output ... driver values ... "
-            "name it otherwise"
-        ),
+        ("'tip_x' first, the name of an output ... driver values ... name it otherwise"),
     ),
-    ("push\n-0.1\n0\n0.1\n", "tip.csv ... no column of an output"),
-    ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv ... line 1 ... '1.4' ... outputs of the case"),
-    ('push, "tip_x\n', "tip.csv ... not valid CSV"),
-    ("# nothing\n", "tip.csv ... no samples"),
+    ("push\n-0.1\n0\n0.1\n", "no column of an output"),
+    ("-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "line 1 ... '1.4' ... outputs of the case"),
+    ('push, "tip_x\n', "not valid CSV"),
+    ("# nothing\n", "no samples"),
 ]
 
 
 @pytest.mark.parametrize(("text", "fragments"), REFERENCES)
-def test_broken_reference_files(tmp_path, text, fragments):
+def test_broken_reference_is_refused(tmp_path, text, fragments):
     write(tmp_path, text, "tip.csv")
-    complains(write(tmp_path, BASE + BY_FILE), fragments)
+    complains(write(tmp_path, BASE + BY_FILE), f"tip.csv ... {fragments}")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "../tip.csv",
-        "/etc/passwd",
-        "sub/../../tip.csv",
-        "link.csv",
-        "nul\\u0000.csv",
-        "down/tip.csv",
-    ],
-)
-def test_references_outside_the_folder_are_refused(tmp_path, name):
-    folder = tmp_path / "case"
-    (folder / "sub").mkdir(parents=True)
-    write(tmp_path, CSV, "tip.csv")
-    (folder / "link.csv").symlink_to(tmp_path / "tip.csv")
-    (folder / "down").symlink_to(tmp_path)
-    text = BASE + BY_FILE.replace("tip.csv", name)
-    expected = "control characters" if "u0000" in name else "folder of the case file or below"
-    complains(write(folder, text), f"case.toml ... reference.file ... {expected}")
-
-
-def test_absolute_names_are_refused_even_inside_the_folder(tmp_path):
+def test_absolute_reference_path_is_refused(tmp_path):
     name = write(tmp_path, CSV, "tip.csv").as_posix()
     complains(
         write(tmp_path, BASE + BY_FILE.replace("tip.csv", name)),
@@ -150,16 +121,10 @@ def test_absolute_names_are_refused_even_inside_the_folder(tmp_path):
     )
 
 
-def test_references_below_the_folder_are_fine(tmp_path):
+def test_reference_below_folder_is_read(tmp_path):
     (tmp_path / "data").mkdir()
     write(tmp_path / "data", CSV, "tip.csv")
     assert load_case(write(tmp_path, BASE + BY_FILE.replace("tip.csv", "data/tip.csv"))).reference
-
-
-def test_a_large_reference_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(reference_samples, "LARGEST_FILE", 20)
-    write(tmp_path, CSV, "tip.csv")
-    complains(write(tmp_path, BASE + BY_FILE), "tip.csv ... larger than 20 bytes ... thin out")
 
 
 UNITS = {
@@ -173,7 +138,7 @@ UNITS = {
 
 @pytest.mark.parametrize("at", ["", 'at = "reference"'])
 @pytest.mark.parametrize("kind", UNITS)
-def test_units_of_columns(tmp_path, kind, at):
+def test_reference_column_units(tmp_path, kind, at):
     """They go before those of the case file, also for samples taken from the reference."""
     rows = "-100, 1400, 2000\n0, 1500, 2000\n100, 1600, 2000\n"
     write(tmp_path, f"{UNITS[kind]}\n{rows}", "tip.csv")
@@ -181,14 +146,12 @@ def test_units_of_columns(tmp_path, kind, at):
     case = load_case(write(tmp_path, base + BY_FILE))
     assert case.sweep.values.tolist() == [-0.1, 0.0, 0.1]
     assert case.reference["tip_x"].position.tolist() == [1.4, 1.5, 1.6]
-    velocity = case.reference["tip_x"].velocity
-    assert velocity is not None
-    assert velocity.tolist() == [2.0, 2.0, 2.0]
+    assert case.reference["tip_x"].velocity.tolist() == [2.0, 2.0, 2.0]
     assert case.origin
     assert case.origin.units == {"push": "mm", "tip_x": "mm"}
 
 
-def test_units_of_rows_in_the_case_file(tmp_path):
+def test_inline_reference_column_units(tmp_path):
     text = INLINE.replace('"push", "tip_x"', '"push [cm]", "tip_x [m]"').replace(
         "0.1, 1.", "10, 1."
     )
@@ -206,7 +169,7 @@ def test_units_of_rows_in_the_case_file(tmp_path):
         ("push, tip_y [mm]", "line 1 ... column 'tip_y [mm]' ... tip_x"),
     ],
 )
-def test_wrong_units_of_columns(tmp_path, head, fragments):
+def test_wrong_column_unit_is_refused(tmp_path, head, fragments):
     write(tmp_path, f"{head}\n-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), f"tip.csv ... {fragments}")
 
@@ -251,14 +214,22 @@ EVEN = "start = -1.0\nstop = 1.0\nsteps = 21"
 AT = 'at = "reference"'
 
 
-def case_of(folder, rows, sweep=EVEN, atol="1e-6", form="{:.6f}"):
-    lines = ["turn,x,y", *(",".join(form.format(value) for value in row) for row in rows)]
+def crank_text(sweep=EVEN, atol="1e-6"):
+    return CRANK.replace("SWEEP", sweep).replace("ATOL", atol)
+
+
+def crank_file(folder, rows, sweep=EVEN, atol="1e-6", form="{:.6f}"):
+    lines = ["turn,x,y", *(",".join(map(form.format, row)) for row in rows)]
     write(folder, "\n".join(lines) + "\n", "rig.csv")
-    return load_case(write(folder, CRANK.replace("SWEEP", sweep).replace("ATOL", atol)))
+    return write(folder, crank_text(sweep, atol))
 
 
-def curve(t, x=0.0, y=0.0):
-    return [(each, 100.0 * math.cos(each) + x, 100.0 * math.sin(each) + y) for each in t]
+def crank_case(*arguments, **options):
+    return load_case(crank_file(*arguments, **options))
+
+
+def curve(t):
+    return [(each, 100.0 * math.cos(each), 100.0 * math.sin(each)) for each in t]
 
 
 def judged(case):
@@ -266,12 +237,13 @@ def judged(case):
     return record
 
 
+GRID = np.linspace(-1.0, 1.0, 21)
 OWN = np.linspace(-1.03, 1.021, 53)
 """Driver values of a rig: none is at a sample."""
 
 
-def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
-    case = case_of(tmp_path, curve(OWN))
+def test_reference_on_own_grid(tmp_path):
+    case = crank_case(tmp_path, curve(OWN))
     record = judged(case)
     assert record.outcome is Outcome.PASS
     assert record.validated
@@ -293,9 +265,9 @@ def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
 
 
 @pytest.mark.parametrize(("reach", "beyond"), [(1.0, ""), (1.1, "2 rows"), (2.0, "19 rows")])
-def test_rows_beyond_the_sweep_are_counted(tmp_path, reach, beyond):
+def test_reference_rows_beyond_sweep(tmp_path, reach, beyond):
     rows = np.linspace(-reach, reach, 41) + 1e-3
-    grid = judged(case_of(tmp_path, curve(rows))).evidence.grid
+    grid = judged(crank_case(tmp_path, curve(rows))).evidence.grid
     if beyond:
         assert f"; {beyond} beyond the sweep not compared: widen it, or take" in grid
     else:
@@ -305,136 +277,138 @@ def test_rows_beyond_the_sweep_are_counted(tmp_path, reach, beyond):
 @pytest.mark.parametrize("sweep", [EVEN, AT])
 @pytest.mark.parametrize("noise", [0.0, 0.004])
 @pytest.mark.parametrize("first", [0, 20])
-def test_a_shift_of_two_tolerances_is_found(tmp_path, sweep, noise, first):
+def test_shifted_reference_fails(tmp_path, sweep, noise, first):
     """As measured: own grid, shorter than the sweep, noisy, and six digits."""
     rng = np.random.default_rng(7)
     rows = np.array(curve(OWN[first:]))
     rows[:, 1:] += rng.normal(scale=noise / 4.0, size=rows[:, 1:].shape)
     atol = "0.01" if noise else "1e-4"
-    right = judged(case_of(tmp_path, rows, sweep, atol, "{:.6g}"))
+    right = judged(crank_case(tmp_path, rows, sweep, atol, "{:.6g}"))
     assert right.outcome is Outcome.PASS
     tolerance = max(each.position.tolerance for each in right.errors.values())
     assert tolerance < (3e-5 if noise else 2e-6)
     rows[:, 2] += 2e3 * tolerance
-    wrong = judged(case_of(tmp_path, rows, sweep, atol, "{:.6g}"))
+    wrong = judged(crank_case(tmp_path, rows, sweep, atol, "{:.6g}"))
     assert wrong.outcome is Outcome.FAIL
     assert "y: position is off by" in wrong.message
 
 
-def test_a_shorter_reference_is_compared_where_it_is(tmp_path):
-    case = case_of(tmp_path, curve(np.linspace(-1.0, 1.0, 21)[3:18:2]), form="{:.17g}")
+def test_shorter_reference_is_compared(tmp_path):
+    case = crank_case(tmp_path, curve(GRID[3:18:2]), form="{:.17g}")
     assert np.flatnonzero(np.isfinite(case.reference["x"].position)).tolist() == [*range(3, 18, 2)]
     assert case.reference["x"].uncertainty == {}
     assert case.origin.grid == "rows for 8 of 21 samples"
     record = judged(case)
     assert record.outcome is Outcome.PASS
     assert "third-party data has no value at 13 of 21 samples" in record.message
-    wrong = curve(np.linspace(-1.0, 1.0, 21)[3:18:2])
-    wrong[2] = (wrong[2][0], wrong[2][1] + 1e-3, wrong[2][2])
-    failed = judged(case_of(tmp_path, wrong, form="{:.17g}"))
+    wrong = np.array(curve(GRID[3:18:2]))
+    wrong[2, 1] += 1e-3
+    failed = judged(crank_case(tmp_path, wrong, form="{:.17g}"))
     assert failed.errors["x"].position.worst_step == 7
 
 
-def test_samples_of_the_reference_are_taken_in_its_order(tmp_path):
+def test_sweep_at_unordered_reference(tmp_path):
     """Up and down, as a rig measures hysteresis; one value twice."""
     t = np.array([0.0, 0.31, 0.72, 0.9, 0.72, -0.2, -0.55])
-    case = case_of(tmp_path, curve(t), AT, form="{:.17g}")
+    case = crank_case(tmp_path, curve(t), AT, form="{:.17g}")
     assert case.sweep.values.tolist() == t.tolist()
     record = judged(case)
     assert record.outcome is Outcome.PASS
     assert record.errors["y"].position.max_abs < 1e-15
 
 
-def test_reversed_rows_are_at_the_samples_of_their_driver_values(tmp_path):
-    case = case_of(tmp_path, curve(np.linspace(-1.0, 1.0, 21))[::-1], form="{:.17g}")
+def test_reversed_reference_rows(tmp_path):
+    case = crank_case(tmp_path, curve(GRID)[::-1], form="{:.17g}")
     assert judged(case).outcome is Outcome.PASS
     assert case.origin.grid == ""
 
 
-def test_a_rounded_reference_on_the_grid_is_judged_by_its_digits(tmp_path):
-    rows = curve(np.linspace(-1.0, 1.0, 21))
-    case = case_of(tmp_path, rows, atol="1e-9", form="{:.6g}")
+def test_rounded_reference_on_grid(tmp_path):
+    rows = np.array(curve(GRID))
+    case = crank_case(tmp_path, rows, atol="1e-9", form="{:.6g}")
     assert judged(case).outcome is Outcome.PASS
     half = case.reference["x"].uncertainty["position"]
     assert half[0] == pytest.approx(5e-8)  # of 54.0302 mm
     assert half[10] == pytest.approx(5e-7)  # of 100 mm
-    rows[0] = (-1.0, rows[0][1] + 2e-4, rows[0][2])
-    off = judged(case_of(tmp_path, rows, atol="1e-9", form="{:.6g}"))
+    rows[0, 1] += 2e-4
+    off = judged(crank_case(tmp_path, rows, atol="1e-9", form="{:.6g}"))
     assert off.outcome is Outcome.FAIL
     assert off.errors["x"].position.worst_step == 0
 
 
-def test_a_slip_of_a_rounded_reference_is_named(tmp_path):
+def test_slip_of_rounded_reference_is_named(tmp_path):
     """Metres in a file of millimetres, with six digits: times 1000 it fits within a sixth digit."""
-    rows = [(t, x / 1000.0, y) for t, x, y in curve(np.linspace(-1.0, 1.0, 21))]
-    case = case_of(tmp_path, rows, atol="1e-9", form="{:.6g}")
+    rows = np.array(curve(GRID)) * [1.0, 1e-3, 1.0]
+    case = crank_case(tmp_path, rows, atol="1e-9", form="{:.6g}")
     results = run([case], [Native()], tol=1e-12)
     assert results.records[0].outcome is Outcome.FAIL
     assert "times 1000" in results.suspects["crank"].message
 
 
-WRONG = [
-    (
+WRONG = {
+    "few rows": (
         curve(OWN[:3]),
         EVEN,
         "rig.csv ... line 4 ... -0.951115 rad ... nearest is -1 rad",
     ),
-    (curve(OWN + 5.0), EVEN, "found driver values from 3.97 rad to ... -1 rad to 1 rad"),
-    (curve([*OWN, OWN[7]]), EVEN, "line 55 ... driver value ... twice ... at = "),
-    (curve(OWN), AT + "\nsteps = 3", "sweep.steps ... beside at ... remove steps or at"),
-    (curve(OWN), "start = 1\nstop = 2", 'sweep.steps ... missing ... at = "reference"'),
-    (curve(OWN), 'at = "rig"', "sweep.at ... 'rig' ... \"reference\""),
-]
+    "beyond the sweep": (
+        curve(OWN + 5.0),
+        EVEN,
+        "driver values from 3.97 rad to ... -1 rad to 1 rad",
+    ),
+    "twice": (curve([*OWN, OWN[7]]), EVEN, "line 55 ... driver value ... twice ... at = "),
+    "steps": (curve(OWN), AT + "\nsteps = 3", "sweep.steps ... beside at ... remove steps or at"),
+    "no steps": (curve(OWN), "start = 1\nstop = 2", 'sweep.steps ... missing ... at = "reference"'),
+    "at": (curve(OWN), 'at = "rig"', "sweep.at ... 'rig' ... \"reference\""),
+}
 
 
-@pytest.mark.parametrize(("rows", "sweep", "fragments"), WRONG)
-def test_wrong_grids_are_refused(tmp_path, rows, sweep, fragments):
-    case_text = CRANK.replace("SWEEP", sweep).replace("ATOL", "1e-6")
-    lines = ["turn,x,y", *(",".join(f"{value:.6f}" for value in row) for row in rows)]
-    write(tmp_path, "\n".join(lines), "rig.csv")
-    complains(write(tmp_path, case_text), fragments)
+@pytest.mark.parametrize(("rows", "sweep", "fragments"), WRONG.values(), ids=WRONG)
+def test_wrong_reference_grid_is_refused(tmp_path, rows, sweep, fragments):
+    complains(crank_file(tmp_path, rows, sweep), fragments)
 
 
-def test_samples_of_a_missing_reference_are_refused(tmp_path):
-    text = CRANK.partition("[reference]")[0].replace("SWEEP", AT).replace("ATOL", "1e-6")
+def test_sweep_at_missing_reference(tmp_path):
+    text = crank_text(AT).partition("[reference]")[0]
     complains(write(tmp_path, text), "sweep.at ... no [reference]")
 
 
 @pytest.mark.parametrize(
     ("texts", "half"),
     [
-        (["0.123457", "0.500000", "-12.345678"], [5e-7] * 3),
-        (["0.123457", "0.5", "-12.3457"], [5e-7, 5e-7, 5e-5]),
-        (["1.23457e-03", "5.00000e+02"], [5e-9, 5e-4]),
-        (["0.4", "0.412", "0.05"], [5e-4] * 3),  # a spreadsheet leaves out zeros at the end
-        (["12.3", "0.412", "1.57"], [5e-2, 5e-4, 5e-3]),
-        (["12.3", "0.412", "0.05", "1.571"], [5e-4] * 4),
-        (["1.5e-3", "2.25e-2"], [5e-5] * 2),
-        (["0.25", "0.5", "1.75"], [5e-3] * 3),
-        (["100", "1234", "1200"], [0.5] * 3),
-        (["1", "0", "-1"], [0.5] * 3),
-        (["123457", "7.5"], [0.05] * 2),
-        (["0", "0.0"], [0.0] * 2),  # no digit that anything could be rounded to
-        (["0.000", "0.000"], [5e-4] * 2),
-        (["0.1234567890123456", "0.5"], [0.0] * 2),
-        (["0.0", "0.00012"], [5e-6] * 2),
-        (["0.00000", "0.12345"], [5e-6, 5e-6]),
+        ("0.123457 0.500000 -12.345678", 5e-7),
+        ("0.123457 0.5 -12.3457", [5e-7, 5e-7, 5e-5]),
+        ("1.23457e-03 5.00000e+02", [5e-9, 5e-4]),
+        ("0.4 0.412 0.05", 5e-4),  # a spreadsheet leaves out zeros at the end
+        ("12.3 0.412 1.57", [5e-2, 5e-4, 5e-3]),
+        ("12.3 0.412 0.05 1.571", 5e-4),
+        ("1.5e-3 2.25e-2", 5e-5),
+        ("0.25 0.5 1.75", 5e-3),
+        ("100 1234 1200", 0.5),
+        ("1 0 -1", 0.5),
+        ("123457 7.5", 0.05),
+        ("0 0.0", 0.0),  # no digit that anything could be rounded to
+        ("0.000 0.000", 5e-4),
+        ("0.1234567890123456 0.5", 0.0),
+        ("0.0 0.00012", 5e-6),
+        ("0.00000 0.12345", 5e-6),
     ],
 )
-def test_printed_digits(texts, half):
-    column = Printed()
-    for text in texts:
+def test_half_unit_of_printed_digits(texts, half):
+    column, numbers = Printed(), texts.split()
+    for text in numbers:
         column.add(text)
-    assert column.half(np.array([*map(float, texts)])) == pytest.approx(half, rel=1e-9)
+    found = column.half(np.array(numbers, dtype=float))
+    np.testing.assert_allclose(found, half, rtol=1e-9)
 
 
-def test_driver_values_that_somebody_set_are_exact():
-    assert even(np.array([0.0625, 0.125, 0.1875]))
-    assert not even(np.round(np.arange(9) / 7.0, 6))
-    assert multiples(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
-    assert multiples(np.array([0.25, 0.5, 1.75]), 2)
-    assert not multiples(np.array([-79.9, -65.2, -5.1]), 1)
-    assert not multiples(np.array([1e60, 3e60]), 2)
+def test_even_and_multiple_driver_values():
+    assert is_even_grid(np.array([0.0625, 0.125, 0.1875]))
+    assert not is_even_grid(np.round(np.arange(9) / 7.0, 6))
+    assert have_common_factor(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
+    assert have_common_factor(np.array([0.25, 0.5, 1.75]), 2)
+    assert not have_common_factor(np.array([-79.9, -65.2, -5.1]), 1)
+    assert not have_common_factor(np.array([1e60, 3e60]), 2)
 
 
 def stripped(decimals):
@@ -454,33 +428,30 @@ ARM = np.array([97.31, 11.7])
 
 def rounded(folder, form, grid, shifts):
     """Return the verdict on the rounded curve of a tip at `ARM`, shifted in y."""
-    lines = ["turn,x,y"]
-    for t, shift in zip(grid, np.broadcast_to(shifts, len(grid)), strict=True):
-        cos, sin = math.cos(t), math.sin(t)
-        x, y = ARM[0] * cos - ARM[1] * sin, ARM[0] * sin + ARM[1] * cos
-        lines.append(f"{t:.17g},{form(x)},{form(y + shift)}")
-    write(folder, "\n".join(lines) + "\n", "rig.csv")
-    text = CRANK.replace("SWEEP", EVEN).replace("ATOL", "1e-6")
-    return judged(load_case(write(folder, text.replace("100, 0, 0", "97.31, 11.7, 0"))))
+    cos, sin = np.cos(grid), np.sin(grid)
+    x, y = ARM[0] * cos - ARM[1] * sin, ARM[0] * sin + ARM[1] * cos + shifts
+    rows = zip(map("{:.17g}".format, grid), map(form, x), map(form, y), strict=True)
+    crank_file(folder, rows, form="{}")
+    text = edited(("100, 0, 0", "97.31, 11.7, 0"), base=crank_text())
+    return judged(load_case(write(folder, text)))
 
 
 @pytest.mark.parametrize(("form", "decimals", "digits"), WRITERS.values(), ids=WRITERS)
-def test_a_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
+def test_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
     """And one that is off by a whole unit of a last digit fails, in one row or in all."""
-    grid = np.linspace(-1.0, 1.0, 21)
-    assert rounded(tmp_path, form, grid, 0.0).outcome is Outcome.PASS
+    assert rounded(tmp_path, form, GRID, 0.0).outcome is Outcome.PASS
     assert rounded(tmp_path, form, OWN, 0.0).outcome is Outcome.PASS
     place = 2 - digits if digits else -decimals  # numbers of the last rows have two whole digits
     shift = 1.01 * 10.0**place
     for row in (0, 20):
-        off = rounded(tmp_path, form, grid, np.where(np.arange(21) == row, shift, 0.0))
+        off = rounded(tmp_path, form, GRID, np.where(np.arange(21) == row, shift, 0.0))
         assert off.outcome is Outcome.FAIL, off.message
         assert off.errors["y"].position.worst_step == row
-    assert rounded(tmp_path, form, grid, shift).outcome is Outcome.FAIL
+    assert rounded(tmp_path, form, GRID, shift).outcome is Outcome.FAIL
 
 
 @pytest.mark.parametrize("count", [4, 7, 30, 400])
-def test_rounding_of_rows_moves_a_spline_by_no_more(count):
+def test_spline_rounding_bound(count):
     """Against the splines of rows of nothing and one, and the whole matrix of weights."""
     rng = np.random.default_rng(count)
     x = np.arange(count) + rng.uniform(-0.3, 0.3, count)
@@ -489,7 +460,7 @@ def test_rounding_of_rows_moves_a_spline_by_no_more(count):
     within = at > 1.0
     weights = np.abs(CubicSpline(x, np.eye(count))(at))
     expected = np.where(within, weights @ half, 0.0)
-    assert bounded(x, half, at, within) == pytest.approx(expected, rel=1e-9)
+    assert bound_rounding(x, half, at, within) == pytest.approx(expected, rel=1e-9)
 
 
 VELOCITIES = """
@@ -501,24 +472,28 @@ citation = "made up"
 
 
 @pytest.mark.parametrize("name", ["velocity", "acceleration"])
-def test_rates_are_judged_by_their_own_digits(name, tmp_path):
-    text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+def test_reference_rates_have_own_digits(name, tmp_path):
+    text = crank_text().partition("[reference]")[0]
     rows = [
         [t, round(100 * math.cos(t), 3), round(-100 * math.sin(t), 1), round(-100 * math.cos(t))]
-        for t in np.linspace(-1.0, 1.0, 21).tolist()
+        for t in GRID.tolist()
     ]
-    case = load_case(write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows))))
-    assert judged(case).outcome is Outcome.PASS
+
+    def verdict():
+        file = write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows)))
+        return judged(load_case(file))
+
+    assert verdict().outcome is Outcome.PASS
     rows[3][2 + (name == "acceleration")] += 0.1 if name == "velocity" else 1
-    off = judged(load_case(write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows)))))
+    off = verdict()
     assert off.outcome is Outcome.FAIL
     assert f"x: {name} is off" in off.message
 
 
 @pytest.mark.parametrize(("truth", "half"), [("closed_form", 0.0), ("third_party_data", 0.05)])
-def test_rows_of_a_formula_are_exact(truth, half, tmp_path):
+def test_closed_form_rows_are_exact(truth, half, tmp_path):
     """A wrong result would pass as the rounding of 1.0 and 0.0; data may be printed so."""
-    text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    text = crank_text().partition("[reference]")[0]
     rows = '[reference]\nrows = [[0.0, 99.9]]\ncolumns = ["turn", "x"]\ncitation = "made up"\n'
     case = load_case(write(tmp_path, text.replace("third_party_data", truth) + rows))
     known = case.reference["x"].uncertainty.get("position", np.zeros(1))
@@ -526,56 +501,56 @@ def test_rows_of_a_formula_are_exact(truth, half, tmp_path):
     assert judged(case).outcome is Outcome.FAIL
 
 
-def test_a_column_of_all_digits_is_exact_beside_short_numbers(tmp_path):
+def test_column_of_all_digits_is_exact(tmp_path):
     """Zeros, constants and even numbers of a file of all digits are no rounded ones."""
-    t = np.linspace(-1.0, 1.0, 21)
-    lines = ["turn,x,y", *(f"{a:.17g},{100 * math.cos(a):.17g},{0.5 + k}" for k, a in enumerate(t))]
-    write(tmp_path, "\n".join(lines) + "\n", "rig.csv")
-    case = load_case(write(tmp_path, CRANK.replace("SWEEP", EVEN).replace("ATOL", "1e-6")))
+    rows = [(t, x, 0.5 + k) for k, (t, x, _) in enumerate(curve(GRID))]
+    case = crank_case(tmp_path, rows, form="{:.17g}")
     assert case.reference["x"].uncertainty == case.reference["y"].uncertainty == {}
 
 
-def test_a_reference_of_too_few_digits_is_told(tmp_path):
-    rows = curve(np.linspace(-1.0, 1.0, 21))
-    told = [note for note in notes(case_of(tmp_path, rows, form="{:.0e}")) if "too few" in note]
+def test_reference_of_few_digits_is_noted(tmp_path):
+    rows = curve(GRID)
+    told = [note for note in notes(crank_case(tmp_path, rows, form="{:.0e}")) if "too few" in note]
     assert [note.partition(": ")[0] for note in told] == ["x"]  # 100 mm, known to 50 mm
-    assert not any("too few" in note for note in notes(case_of(tmp_path, rows, form="{:.2e}")))
+    assert not any("too few" in note for note in notes(crank_case(tmp_path, rows, form="{:.2e}")))
 
 
-def test_rows_are_matched_by_driver_value():
+def test_rows_match_driver_values():
     at = np.array([0.0, 0.1, 0.2, 0.3])
-    assert matched(at, at, 1e-12).tolist() == [0, 1, 2, 3]
-    assert matched(np.array([0.3, 0.1]), at, 1e-12).tolist() == [-1, 1, -1, 0]
-    assert matched(np.array([0.3, 0.11]), at, 1e-12) is None
-    assert matched(np.array([0.3, 0.3]), at, 1e-12) is None
+    assert match_rows(at, at, 1e-12).tolist() == [0, 1, 2, 3]
+    assert match_rows(np.array([0.3, 0.1]), at, 1e-12).tolist() == [-1, 1, -1, 0]
+    assert match_rows(np.array([0.3, 0.11]), at, 1e-12) is None
+    assert match_rows(np.array([0.3, 0.3]), at, 1e-12) is None
 
 
 @pytest.mark.parametrize("count", [4, 5, 9, 30])
-def test_the_estimate_bounds_the_error_of_interpolation(count):
+def test_interpolation_error_bound(count):
     jitter = np.random.default_rng(count).uniform(-0.3, 0.3, count)
     x = 2.0 * (np.arange(count) + jitter) / count
     at = np.linspace(x[0], x[-1], 101)
-    found, error = interpolated(x, np.sin(3.0 * x), at)
+    found, error = interpolate(x, np.sin(3.0 * x), at)
     assert (np.abs(found - np.sin(3.0 * at)) <= error + 1e-12).all()
     if count == 30:
         assert error.max() < 1e-2
 
 
-def test_slopes_are_not_those_of_noise():
+def test_slopes_ignore_noise():
     x = np.repeat(np.linspace(0.0, 1.0, 101), 2) + np.tile([0.0, 1e-9], 101)
     noise = np.tile([0.0, 1e-3], 101)
     assert slopes(x, 2.0 * x + noise, np.array([0.0, 0.503, 1.0])).max() < 2.2
 
 
-def test_a_deviation_counts_in_tolerances_where_accuracy_differs():
+def test_deviation_counts_in_tolerances():
     known = Curve(np.zeros(2), half=np.array([0.0, 2.0]))
-    off = deviation(Curve(np.array([1.0, 2.0]), 0.5), known)
-    assert (off.worst_step, off.max_abs, off.tolerance, off.within) == (0, 1.0, 0.5, False)
-    off = deviation(Curve(np.array([0.0, 2.0])), known)
-    assert (off.worst_step, off.max_abs, off.tolerance, off.within) == (1, 2.0, 2.0, True)
+    for values, atol, worst in (
+        ([1.0, 2.0], 0.5, (0, 1.0, 0.5, False)),
+        ([0.0, 2.0], 0.0, (1, 2.0, 2.0, True)),
+    ):
+        off = deviation(Curve(np.array(values), atol), known)
+        assert (off.worst_step, off.max_abs, off.tolerance, off.within) == worst
 
 
-def test_a_slip_scales_the_accuracy_with_the_reference():
+def test_slip_scales_accuracy():
     values = np.linspace(1.0, 2.0, 9)
     held = Curve(values, 1e-9)
     reference = Curve(values / 1000.0 + 4e-7, half=np.full(9, 5e-7))

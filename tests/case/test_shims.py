@@ -96,7 +96,7 @@ def write_table(folder, name, toe, camber, moved):
 
 @pytest.mark.parametrize("name", [*RODS])
 @pytest.mark.parametrize("angles", [(0.0, 0.0), (0.3, -2.0)])
-def test_shims_of_every_template(tmp_path, name, angles):
+def test_template_shims_equal_differences(tmp_path, name, angles):
     toe, camber = map(math.radians, angles)
     spin = write_table(tmp_path, name, toe, camber, {})
     found = {each.roles[0]: each.shim for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
@@ -111,7 +111,7 @@ def test_shims_of_every_template(tmp_path, name, angles):
 
 
 @pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) > 2])
-def test_tie_rod_moves_leave_no_bump_steer(tmp_path, name):
+def test_tie_rod_moves_cancel_bump_steer(tmp_path, name):
     def bump_steer(moved):
         write_table(tmp_path, name, 0.01, -0.03, moved)
         return solved(load(tmp_path / "car.csv", Supplied(travel="0.01:3")))["toe.per_travel"][1]

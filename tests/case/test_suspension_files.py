@@ -14,76 +14,83 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_tab
 from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.case.suspension.base import Attitude
 from kincheck.core.cli import main
-from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import write_report
 from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
-from ..studies.test_vary import HEAD
 from ..support.case_texts import refused
 from ..support.rods_of_templates import solved
-from ..support.suspension_changes import TOE, changed
-from ..support.suspension_files import STRUT, TABLE, loaded, unreferenced
+from ..support.suspension_files import STRUT, TABLE, TOE, changed, loaded, unreferenced
+from ..support.variations import HEAD
 from ..support.written_again import written_again
 
 POINTS = STRUT["points"] | {"top": {"body": "chassis", "position": [1.0, 0.55, 0.6]}}
-ON_CHASSIS = changed("suspension", wheel_center="top") | {"points": POINTS}
+RODS = [["strut_top", "strut_foot"]]
+ON_CHASSIS = changed(wheel_center="top") | {"points": POINTS}
 WRONG = {
     "mirrored hardpoints": (
-        changed("suspension", side="left"),
+        changed(side="left"),
         "suspension.side ... 'left' ... 0.715 m on the other side ... correct side",
     ),
     "another convention": (
-        changed("suspension", convention="din"),
+        changed(convention="din"),
         "suspension.convention ... 'din' ... iso8855, sae_j670",
     ),
-    "no convention": (changed("suspension", convention=None), "suspension.convention ... missing"),
-    "no forward": (changed("suspension", forward=None), "suspension.forward ... missing"),
+    "no convention": (changed(convention=None), "suspension.convention ... missing"),
+    "no forward": (changed(forward=None), "suspension.forward ... missing"),
     "zero forward": (
-        changed("suspension", forward=[0, 0, 0]),
+        changed(forward=[0, 0, 0]),
         "suspension.forward ... found zero",
     ),
     "leaning up": (
-        changed("suspension", up=[0.1, 0, 1]),
+        changed(up=[0.1, 0, 1]),
         "suspension.up ... right angles to forward ... correct one",
     ),
     "no such wheel": (
-        changed("suspension", wheel_center="wheel"),
+        changed(wheel_center="wheel"),
         "suspension.wheel_center ... 'wheel', expected a point; known: lower_ball",
     ),
     "no such kingpin": (
-        changed("suspension", kingpin=["lower_ball", "strut"]),
+        changed(kingpin=["lower_ball", "strut"]),
         "suspension.kingpin ... did you mean 'strut_top'",
     ),
     "kingpin upside down": (
-        changed("suspension", kingpin=["strut_top", "lower_ball"]),
+        changed(kingpin=["strut_top", "lower_ball"]),
         "suspension.kingpin ... the lower point, then",
     ),
     "wheel of the chassis": (ON_CHASSIS, "suspension.wheel_center ... a body that moves"),
     "negative radius": (
-        changed("suspension", wheel_radius=-0.3),
+        changed(wheel_radius=-0.3),
         "suspension.wheel_radius ... -0.3 ... a positive length",
     ),
     "share in percent": (
-        changed("suspension", brake_share=70),
+        changed(brake_share=70),
         "suspension.brake_share ... 70 ... 0 to 1",
     ),
     "no radius": (
-        changed("suspension", wheel_radius=None),
+        changed(wheel_radius=None),
         'outputs.half_track_change ... wheel_radius ... at = "wheel_center"',
     ),
     "no kingpin": (
-        changed("suspension", kingpin=None),
+        changed(kingpin=None),
         "suspension.kingpin ... missing ... outputs.caster of type 'caster'",
     ),
+    "kingpin beside links": (
+        changed(kingpin_links=RODS * 4),
+        "kingpin_links: found beside kingpin, ... remove",
+    ),
+    "no such link": (
+        changed(kingpin=None, kingpin_links=[*RODS * 3, ["strut_tip", "strut_foot"]]),
+        "kingpin_links: found 'strut_tip', ... 'strut_top'",
+    ),
     "no axle": (
-        changed("suspension", axle=None),
+        changed(axle=None),
         "suspension.axle ... missing ... outputs.wheelbase_change",
     ),
     "dive of the rear": (
-        changed("suspension", axle="rear"),
+        changed(axle="rear"),
         "outputs.anti_dive ... rear axle, expected a front one",
     ),
     "no table": (
@@ -118,150 +125,72 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_refusals(name):
+def test_wrong_suspension_is_refused(name):
     data, said = WRONG[name]
     refused(lambda: loaded(unreferenced(data)), f"case.json ... {said}")
 
 
-def test_quotients_of_velocities_want_a_driver_of_travel():
-    rack = {**STRUT["bodies"]["rack"], "fixed": False}
-    steered = STRUT | {
-        "bodies": STRUT["bodies"] | {"rack": rack},
-        "joints": (
-            STRUT["joints"]
-            | {
-                "guide": {
-                    "type": "translational",
-                    "bodies": ["chassis", "rack"],
-                    "point": [1.14, 0, 0.1455],
-                    "axis": [0, 1, 0],
-                }
-            }
-        ),
-        "drivers": (
-            STRUT["drivers"]
-            | {
-                "steering": {
-                    "type": "joint_displacement",
-                    "joint": "guide",
-                    "motion": {"type": "ramp", "rate": 0.5},
-                }
-            }
-        ),
-    }
+def test_motion_ratio_needs_travel_driver():
+    guide = {"type": "translational", "bodies": ["chassis", "rack"], "axis": [0, 1, 0]}
+    steering = {"type": "joint_displacement", "joint": "guide"}
+    stroke = STRUT["drivers"]["stroke"]
+    data = changed("bodies", unreferenced(STRUT), rack=STRUT["bodies"]["rack"] | {"fixed": False})
+    data = changed("joints", data, guide=guide | {"point": [1.14, 0, 0.1455]})
+    steering |= {"motion": {"type": "ramp", "rate": 0.5}}
+    data = changed("drivers", data, steering=steering)
     # other drivers are held; values only, because rates along the sweep are others
-    orders = {output.name: output.orders for output in loaded(unreferenced(steered)).outputs}
+    orders = {output.name: output.orders for output in loaded(data).outputs}
     assert (orders["toe"], orders["toe.per_travel"], orders["motion_ratio"]) == (3, 1, 1)
-    of_knuckle = steered["drivers"]["stroke"] | {"point": "strut_foot"}
-    steered["drivers"]["stroke"] = of_knuckle
-    with pytest.raises(
-        CaseError,
-        match=r"outputs\.motion_ratio\.type: found 'motion_ratio' while stroke, steering move,"
-        r" .* by suspension\.travel",
-    ):
-        loaded(unreferenced(steered))
-    # along the path of both drivers a slope has a meaning
-    case = loaded(unreferenced(steered | TOE))
-    assert [output.orders for output in case.outputs] == [3, 2]
-    named = steered | {"suspension": STRUT["suspension"] | {"travel": "stroke"}}
-    assert loaded(unreferenced(named)).outputs[0].vehicle.travel == ("stroke",)
-    named["suspension"]["travel"] = "strike"
-    with pytest.raises(CaseError, match=r"suspension\.travel: found 'strike', .*'stroke'"):
-        loaded(unreferenced(named))
-
-
-def test_one_steering_axis():
-    rods = [["strut_top", "strut_foot"]] * 4
-    with pytest.raises(CaseError, match=r"kingpin_links: found beside kingpin, .* remove"):
-        loaded(changed("suspension", kingpin_links=rods))
-    rods = [["strut_top", "strut_foot"]] * 3 + [["strut_tip", "strut_foot"]]
-    with pytest.raises(CaseError, match=r"kingpin_links: found 'strut_tip', .*'strut_top'"):
-        loaded(changed("suspension", kingpin_links=rods, kingpin=None))
-
-
-def test_signs_of_a_reference_table_must_be_those_of_the_case():
-    with pytest.raises(CaseError, match=r"signs: found 'iso8855' of signs, expected 'sae_j670'"):
-        loaded(changed("suspension", convention="sae_j670"))
-    with pytest.raises(
-        CaseError, match=r'found no convention of signs, expected .* write "# signs: iso8855"'
-    ):
-        loaded(STRUT, TABLE.replace("# signs: iso8855\n", ""))
-
-
-def test_millimetres_and_degrees():
-    """All numbers of the file in mm and degrees: tolerances, references and outputs in SI are the
-    same.
-    """
-
-    def scaled(value):
-        return [scaled(each) for each in value] if isinstance(value, list) else 1000.0 * value
-
-    lengths = {
-        "origin",
-        "point",
-        "points",
-        "position",
-        "start",
-        "stop",
-        "rate",
-        "wheel_radius",
-        "wheelbase",
-        "cg_height",
-    }
-
-    def table(data):
-        return {
-            key: (
-                table(each)
-                if isinstance(each, dict)
-                else scaled(each)
-                if key in lengths and not isinstance(each, str)
-                else each
-            )
-            for key, each in data.items()
-        }
-
-    angle = {"static_camber": -0.02, "center_plane": [0.0, 0.01, 0.0]}
-    metres = changed("suspension", **angle) | {
-        "outputs": changed("outputs", toe={"type": "toe", "atol": 0.5, "why": "test"})["outputs"]
-    }
-    reference = {"reference": {"columns": ["stroke", "toe", "camber.per_travel"]}}
-    rows = [[k / 1000, 0.25, 3.0] for k in range(-80, 81, 5)]
-    other = {
-        key: table(value) if isinstance(value, dict) and key != "drivers" else value
-        for key, value in metres.items()
-    }
-    other["points"] = table(STRUT["points"])
-    other["joints"] = {name: table(joint) for name, joint in STRUT["joints"].items()}
-    other["drivers"] = {"stroke": STRUT["drivers"]["stroke"]}
-    other["suspension"] |= {"static_camber": np.degrees(-0.02), "center_plane": [0.0, 10.0, 0.0]}
-    other["outputs"] |= {"toe": {"type": "toe", "atol": np.degrees(0.5), "why": "test"}}
-    other["units"] = {"length": "mm", "angle": "deg"}
-    other["reference"] = reference["reference"] | {
-        "rows": [[1000 * s, np.degrees(t), np.degrees(c) / 1000] for s, t, c in rows]
-    }
-    a, b = loaded(metres | {"reference": reference["reference"] | {"rows": rows}}), loaded(other)
-    for one, two in zip(a.outputs, b.outputs, strict=True):
-        assert (one.name, one.atol) == (two.name, pytest.approx(two.atol))
-    for name in ("toe", "camber.per_travel"):
-        assert b.reference[name].position == pytest.approx(a.reference[name].position, rel=1e-14)
-    assert b.outputs[0].vehicle.static_camber == pytest.approx(-0.02, rel=1e-14)
-    for one, two in zip(a.mechanism.points, b.mechanism.points, strict=True):
-        assert (one.name, one.body) == (two.name, two.body)
-        assert two.position == pytest.approx(one.position, abs=1e-15)
-
-
-def test_slopes_can_be_left_out():
-    case = loaded(
-        changed("suspension", per_travel=False)
-        | TOE
-        | {"reference": {"rows": [[k / 1000, 0.0] for k in range(-80, 81, 5)]}}
+    data = changed("drivers", data, stroke=stroke | {"point": "strut_foot"})
+    refused(
+        lambda: loaded(data),
+        "outputs.motion_ratio.type: found 'motion_ratio' while stroke, steering move, ..."
+        " by suspension.travel",
     )
+    # along the path of both drivers a slope has a meaning
+    case = loaded(data | TOE)
+    assert [output.orders for output in case.outputs] == [3, 2]
+    case = loaded(changed("suspension", data, travel="stroke"))
+    assert case.outputs[0].vehicle.travel == ("stroke",)
+    data = changed("suspension", data, travel="strike")
+    refused(lambda: loaded(data), "suspension.travel: found 'strike', ... 'stroke'")
+
+
+def test_reference_signs_must_match():
+    data = changed(convention="sae_j670")
+    refused(lambda: loaded(data), "signs: found 'iso8855' of signs, expected 'sae_j670'")
+    table = TABLE.replace("# signs: iso8855\n", "")
+    told = 'found no convention of signs, expected ... write "# signs: iso8855"'
+    refused(lambda: loaded(STRUT, table), told)
+
+
+def test_suspension_in_millimetres_and_degrees():
+    """The same numbers in these units are a thousandth of the metres, and degrees."""
+    rows = [[k / 1000, 0.25, 3.0] for k in range(-80, 81, 5)]
+    data = changed(static_camber=-0.02, center_plane=[0.0, 0.01, 0.0]) | {
+        "outputs": STRUT["outputs"] | {"toe": {"type": "toe", "atol": 0.5, "why": "test"}},
+        "reference": {"columns": ["stroke", "toe", "camber.per_travel"], "rows": rows},
+    }
+    large, small = loaded(data), loaded(data | {"units": {"length": "mm", "angle": "deg"}})
+    degree = np.radians(1.0)
+    (toe,) = [output for output in small.outputs if output.name == "toe"]
+    assert toe.atol == pytest.approx(0.5 * degree)
+    for name, unit in (("toe", degree), ("camber.per_travel", 1e3 * degree)):
+        expected = unit * large.reference[name].position
+        assert small.reference[name].position == pytest.approx(expected, rel=1e-14)
+    lengths = ("wheel_radius", "wheelbase", "cg_height", "middle")
+    for name, unit in {"static_camber": degree, **dict.fromkeys(lengths, 1e-3)}.items():
+        one, two = (getattr(case.outputs[0].vehicle, name) for case in (large, small))
+        assert two == pytest.approx(unit * np.array(one), rel=1e-14)
+
+
+def test_per_travel_false_omits_slopes():
+    case = loaded(unreferenced(changed(per_travel=False)) | TOE)
     assert [output.name for output in case.outputs] == ["toe"]
     assert case.points == ("wheel_center", "~wheel_center.spin")  # and nothing else is computed
 
 
-def test_a_new_type_is_a_short_class(capsys):
+def test_own_suspension_output_type(capsys):
     @dataclass(frozen=True)
     class Lead(Attitude):
         type = "lead_of_test_suspension"
@@ -320,7 +249,7 @@ def results():
     return run([loaded(STRUT)], [Native(), Bent()], tol=1e-12)
 
 
-def test_a_twisted_wheel_fails_in_radians(results):
+def test_twisted_wheel_fails_in_radians(results):
     native, bent = results.records
     assert (native.outcome, bent.outcome) == (Outcome.PASS, Outcome.FAIL)
     error = bent.errors["toe"].position
@@ -329,7 +258,7 @@ def test_a_twisted_wheel_fails_in_radians(results):
     assert 'message="toe: position is off by 4e-06 rad at sample' in to_junit(results).decode()
 
 
-def test_signs_head_everything(results, tmp_path):
+def test_signs_in_reports(results, tmp_path):
     again = from_json(to_json(results))
     assert again.run["cases"]["mcpherson_suspension"]["signs"] == SIGNS
     assert again.records[0].outputs["steer_angle"].sense == "positive: to the left"
@@ -349,7 +278,8 @@ def test_signs_head_everything(results, tmp_path):
     assert "# signs: iso8855" in TABLE
 
 
-def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
+def test_signs_in_command_tables(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     parquet = pytest.importorskip("pyarrow.parquet")
     file = tmp_path / "strut.json"
     file.write_text(json.dumps(unreferenced(changed("sweep", steps=3)) | TOE))
@@ -357,22 +287,13 @@ def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
     (tmp_path / "vary.json").write_text(
         json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied})
     )
-    sweep = [
-        "sweep",
-        "--samples",
-        "2",
-        "--out",
-        str(tmp_path),
-        "--store",
-        str(tmp_path / "all.parquet"),
-        "--vary",
-    ]
+    sweep = "sweep --samples 2 --out . --store all.parquet --vary vary.json"
     for command, first in (
-        (["explain"], "output "),
-        (["reference"], "native error"),
-        ([*sweep, str(tmp_path / "vary.json")], "output"),
+        ("explain", "output "),
+        ("reference", "native error"),
+        (sweep, "output"),
     ):
-        assert main.main([*command, str(file)]) == 0
+        assert main.main([*command.split(), str(file)]) == 0
         lines = capsys.readouterr().out.splitlines()
         tables = [k for k, line in enumerate(lines) if line.strip().startswith(first)]
         assert tables
@@ -384,7 +305,7 @@ def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
     )
 
 
-def test_tables_keep_lengths_and_angles_apart(results):
+def test_markdown_separates_lengths_and_angles(results):
     """Lengths are shown where there are any; errors in other units have theirs beside them."""
     assert "[" not in cells(results)[1]
     native, bent = cells(run([loaded(unreferenced(STRUT | TOE))], [Native(), Bent()], tol=1e-12))
@@ -425,7 +346,7 @@ def pointed(**changes):
     return data
 
 
-def test_points_give_what_the_numbers_give():
+def test_wheel_points_equal_wheel_numbers():
     data = deepcopy(unreferenced(STRUT))
     data["suspension"] |= {"static_toe": STATIC_TOE, "static_camber": STATIC_CAMBER}
     expected = solved(loaded(data))
@@ -443,13 +364,13 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "key", "words"), FAULTS)
-def test_wrong_point_is_told(changes, key, words):
+@pytest.mark.parametrize(("changes", "key", "words"), FAULTS, ids=str)
+def test_wrong_wheel_point_is_refused(changes, key, words):
     refused(lambda: loaded(pointed(**changes)), f"{key} ... {words}")
 
 
 @pytest.mark.parametrize("axle", [None, "roll"])
-def test_case_file_of_a_table_keeps_the_points(tmp_path, axle):
+def test_import_keeps_wheel_points(tmp_path, axle):
     table = tmp_path / "car.csv"
     table.write_text(sample_table(TEMPLATES["mcpherson"]) + "wheel_axis,1,790,309,\n")
     case = load(table, Supplied(travel="0.04:3", axle=axle))

@@ -1,18 +1,14 @@
 """Andrews' squeezer mechanism against its published start, accelerations and states."""
 
-from dataclasses import replace
-
 import mpmath as mp
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.cases import (
-    andrews_squeezer,
-)
+from kincheck.cases import andrews_squeezer, load
 from kincheck.cases.jet import Jet
 from kincheck.cases.vectors import Circle
 
-from ..support.case_library import CASES
+from ..support.fakes import swept
 
 # Andrews' squeezer: the equations and both states are those of the Bari test set for initial value
 # problems, problem andrews
@@ -64,15 +60,15 @@ def test_andrews_published_start_closes():
     with mp.workdps(40):
         assert max(map(abs, closure(START, "-.03635"))) < 1e-30
         assert max(map(abs, closure(START, ".03635"))) == pytest.approx(0.0727, abs=1e-12)
-    case = CASES["andrews_squeezer"]
-    engine, still = Native(), replace(case, sweep=replace(case.sweep, values=np.zeros(1)))
+    case = load("andrews_squeezer")
+    engine, still = Native(), swept(case, np.zeros(1))
     found = engine.solve(engine.build(still), still, 1e-12)
     assert max(found.residual, found.details["redundant_residual"]) <= 1e-17
     for point in case.mechanism.points:
         assert np.abs(found.points[point.name].position[0] - point.position).max() <= 1e-17
 
 
-def test_andrews_published_acceleration_at_the_start():
+def test_andrews_published_start_acceleration():
     """The crank starts from rest with 14222.44 rad/s^2, the rod on it with -10666.83, and all else
     stays: E and D do not move.
     """
@@ -87,7 +83,7 @@ def test_andrews_published_acceleration_at_the_start():
         assert max(np.abs(jet.a).max() for jet in points[name]) < 1e-8
 
 
-def test_andrews_published_state_after_two_and_a_half_turns():
+def test_andrews_published_state_after_turns():
     """t = 0.03 s, computed by others to 1e-14: the constraints hold, and the crank alone leads to
     the rest, rates included.
     """

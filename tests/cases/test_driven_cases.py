@@ -20,6 +20,7 @@ from kincheck.core.report.report import write_report
 
 from ..report.page import Page
 from ..support.case_texts import edited, write
+from ..support.fakes import swept
 
 STRUT = (cases.FOLDER / "mcpherson_strut.toml").read_text()
 RACK = """[joints.rack_guide]
@@ -87,7 +88,7 @@ def solved(case, engine="native"):
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
-def test_engines_agree(case, engine):
+def test_driven_case_engines_agree(case, engine):
     if adapters.engine(engine).version() is None:
         pytest.skip(f"{engine} is not installed")
     native, found = (solved(case, name).points["wheel_center"] for name in ("native", engine))
@@ -97,7 +98,7 @@ def test_engines_agree(case, engine):
         assert np.abs(getattr(found, quantity) - getattr(native, quantity)).max() <= 1e-11
 
 
-def test_rates_are_those_of_the_path(case):
+def test_driven_case_rates_follow_path(case):
     """Differences of positions over time, sixth order, on the same motions sampled more finely
     about every tenth sample.
     """
@@ -107,11 +108,7 @@ def test_rates_are_those_of_the_path(case):
     for k in range(0, len(path.times), 10):
         near = path.times[k] + h * np.arange(-3, 4)
         at = near * case.sweep.rate + case.sweep.design if case.sweep.driver != "time" else near
-        x = (
-            solved(replace(case, sweep=replace(case.sweep, values=at)))
-            .points["wheel_center"]
-            .position
-        )
+        x = solved(swept(case, at)).points["wheel_center"].position
         velocity = sum(w * (x[3 + m] - x[3 - m]) for m, w in enumerate(weights[1], 1)) / h
         acceleration = (
             sum(w * (x[3 + m] + x[3 - m]) for m, w in enumerate(weights[2], 1)) - 49 / 18 * x[3]
@@ -140,7 +137,7 @@ def both(tmp_path):
     return load_case(write(tmp_path, edited((where, where + height), base=text)))
 
 
-def test_absolute_values_are_absolute(both):
+def test_absolute_driver_values(both):
     assert both.sweep.driver == "time"
     assert both.sweep.motions["stroke"] == Absolute(
         Table((0.0, 0.2, 0.5), (0.091, 0.131, 0.101)), 0.101
@@ -149,7 +146,7 @@ def test_absolute_values_are_absolute(both):
     assert z[[0, 20, 50]] == pytest.approx([0.091, 0.131, 0.101], abs=1e-15)
 
 
-def test_the_record_lists_every_driver_the_swept_one_first(both):
+def test_record_lists_swept_driver_first(both):
     (record,) = run([both], [adapters.engine("native")], tol=1e-12).records
     assert list(record.driver) == ["time", "stroke", "steer"]
     assert record.driver["time"] == np.linspace(0.0, 0.5, 51).tolist()
@@ -160,7 +157,7 @@ def test_the_record_lists_every_driver_the_swept_one_first(both):
 
 
 @pytest.mark.parametrize(("name", "swept"), [("sine", "stroke"), ("time", "time")])
-def test_engines_pass_and_all_is_told(tmp_path, name, swept):
+def test_driven_case_run_and_report(tmp_path, name, swept):
     case = load_case(write(tmp_path, CASES[name]))
     engines = [adapters.engine(each) for each in adapters.ENGINES]
     results = run([case], engines, tol=1e-12)
@@ -191,7 +188,7 @@ def test_engines_pass_and_all_is_told(tmp_path, name, swept):
     assert ('"title":{"text":"time [s]"}' in plots) == (swept == "time")
 
 
-def test_a_deviation_is_located_in_time(both):
+def test_deviation_is_located_in_time(both):
     native = adapters.engine("native")
 
     class Wrong:
@@ -212,14 +209,14 @@ def test_a_deviation_is_located_in_time(both):
     assert b"at sample 15 (time = 0.15)" in to_junit(results)
 
 
-def test_an_end_of_travel_names_the_drivers(tmp_path):
+def test_end_of_travel_names_drivers(tmp_path):
     case = load_case(write(tmp_path, steered(BOUNCE.replace("0.03", "0.9"), CLOCK)))
     (record,) = run([case], [adapters.engine("native")], tol=1e-12).records
     assert record.outcome is Outcome.FAIL
     assert "cannot be followed beyond stroke = " in record.message
 
 
-def test_a_name_is_no_path(tmp_path):
+def test_case_name_with_slashes_stays_local(tmp_path):
     here = tmp_path / "deep" / "down"
     here.mkdir(parents=True)
     file = write(here, CASES["time"].replace("strut/steered", "../../up/strut"))
@@ -238,7 +235,7 @@ def at_pace(case, **sweep):
     return pace(replace(case, sweep=replace(case.sweep, **sweep)))
 
 
-def test_the_pace_is_that_of_the_fastest_driver(tmp_path):
+def test_pace_of_fastest_driver(tmp_path):
     case = load_case(
         write(tmp_path, steered('[drivers.steer.motion]\ntype = "ramp"\nrate = -0.2\n'))
     )

@@ -64,17 +64,15 @@ TERM = signal.SIGTERM, 143, "terminated"
     ("count", "number", "status", "said"),
     [(1, *INTERRUPT), (10, *TERM), (100, *INTERRUPT), (300, *TERM)],
 )
-def test_during_imports(count, number, status, said):
+def test_interrupt_during_imports_is_one_line(count, number, status, said):
     assert stopped_at("import", count, number, "list") == (status, "", f"kincheck: {said}\n")
 
 
-@pytest.mark.parametrize(
-    "command", [["list"], "run rssr --engine native".split(), ["trace", "four_bar"], ["doctor"]]
-)
-def test_an_interrupt_of_any_command_is_one_line(command):
+@pytest.mark.parametrize("line", ["list", "run rssr --engine native", "trace four_bar", "doctor"])
+def test_interrupt_of_command_is_one_line(line):
     """Texts that imports compile, which make Python end by the signal if it is left to itself."""
     for count in (5, 40):
-        status, _, err = stopped_at("exec", count, signal.SIGINT, *command)
+        status, _, err = stopped_at("exec", count, signal.SIGINT, *line.split())
         assert (status, lines(err)) == (130, ["kincheck: interrupted"])
 
 
@@ -117,7 +115,7 @@ def test_interrupt_while_writing_completes_files(tmp_path, number):
 
 
 @pytest.mark.parametrize("seconds", [0.3, 0.7, 1.4])
-def test_at_any_moment(tmp_path, seconds):
+def test_interrupt_of_run_at_any_time(tmp_path, seconds):
     """From when Python has begun to the end of the run, workers and history included."""
     command = "run rssr --engine native --jobs 1".split()
     command += ["--history", tmp_path / "h.sqlite", "--out", tmp_path]
@@ -142,7 +140,7 @@ def test_at_any_moment(tmp_path, seconds):
     assert len(lines(err)) == (status == 130), err
 
 
-def test_a_second_interrupt_is_noted_and_a_third_stops():
+def test_second_interrupt_waits_third_stops():
     heard = interrupts.Interrupts()
     with pytest.raises(KeyboardInterrupt):
         heard(signal.SIGINT, None)
@@ -165,7 +163,7 @@ def test_deferred_interrupt_waits_for_work():
     assert done == ["whole"]
 
 
-def test_a_signal_that_is_ignored_stays_ignored():
+def test_ignored_signal_stays_ignored():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with interrupts.listening():

@@ -7,7 +7,6 @@ import json
 import random
 import re
 import tomllib
-from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
 
@@ -72,8 +71,6 @@ TEXTS = (
     "a" * 250,
 )
 
-Step = Callable[[bytes, random.Random], bytes]
-
 
 def keys_and_values(value: Any, words: tuple[str, ...], rng: random.Random) -> Any:
     """A tree with one of its places changed."""
@@ -126,24 +123,10 @@ def changed_json(data: bytes, rng: random.Random, words: tuple[str, ...]) -> byt
 def changed_toml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
     """TOML with one place changed. Raises ValueError where it is none."""
     tables = keys_and_values(tomllib.loads(data.decode()), words, rng)
-    return _toml(tables).encode(errors="surrogatepass") if isinstance(tables, dict) else data
-
-
-def _toml(tables: dict[str, Any]) -> str:
-    """Tables two deep under headers, everything further inside in lines."""
-    lines = _lines(tables)
-    for key, table in tables.items():
-        if isinstance(table, dict):
-            lines += [f"[{_name(key)}]", *_lines(table)]
-            for name, below in table.items():
-                if isinstance(below, dict):
-                    inside = (f"{_name(k)} = {_inline(v)}" for k, v in below.items())
-                    lines += [f"[{_name(key)}.{_name(name)}]", *inside]
-    return "\n".join(lines) + "\n"
-
-
-def _lines(table: dict[str, Any]) -> list[str]:
-    return [f"{_name(k)} = {_inline(v)}" for k, v in table.items() if not isinstance(v, dict)]
+    if not isinstance(tables, dict):
+        return data
+    lines = (f"{_name(key)} = {_inline(value)}\n" for key, value in tables.items())
+    return "".join(lines).encode(errors="surrogatepass")
 
 
 def _name(key: str) -> str:

@@ -20,7 +20,7 @@ from kincheck.core.harness.workers.distributed import ClusterError, on_cluster
 from kincheck.core.harness.workers.serve import pack
 
 from ..support.bad_engine import Bad
-from ..support.fake_command_line import Slow
+from ..support.fake_command import Slow
 from ..support.fakes import Fake, crank, raising, run_case
 from .test_workers import timeless
 

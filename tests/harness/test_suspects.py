@@ -29,7 +29,7 @@ from ..support.case_texts import BASE, CSV, INLINE, complains, write
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
 from ..support.fakes import Fake, crank, exact, off, record_of, run_case
-from ..support.loaded import loaded
+from ..support.loaded_slider_crank import loaded
 
 ENGINES = [Fake("native"), Fake("other"), Fake("third")]
 S = np.linspace(-1.0, 1.3, 24)

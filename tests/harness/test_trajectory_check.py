@@ -15,7 +15,7 @@ from kincheck.core.trajectory import Trajectory
 from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
 from ..support.fakes import SAMPLES, Fake, at, crank, record_of, run_case, solution
-from ..support.loaded import loaded
+from ..support.loaded_slider_crank import loaded
 
 NATIVE = NativeEngine(every_body=True)
 

@@ -18,7 +18,7 @@ from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.pool import in_workers
 
 from ..support.bad_engine import Bad, Elsewhere, Leaking, Unimportable
-from ..support.fake_command_line import Slow
+from ..support.fake_command import Slow
 from ..support.fakes import Fake, crank, raising, record_of, run_case
 
 ROOT = Path(__file__).parents[2]

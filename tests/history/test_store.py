@@ -364,7 +364,7 @@ def kincheck(*arguments, limit=None, **environment):
         sys.executable,
         "-B",  # a limit would cut files of bytecode
         "-c",
-        f"{restrict}import sys; from tests.support.fake_command_line import main; sys.exit(main())",
+        f"{restrict}import sys; from tests.support.fake_command import main; sys.exit(main())",
         *map(str, arguments),
     ]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

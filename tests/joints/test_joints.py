@@ -167,7 +167,7 @@ def threaded(example):
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TYPES)
-def test_joint_forbids_what_the_paper_forbids(name, seed):
+def test_joint_rows_span_paper_rows(name, seed):
     """On the manifold: native residuals vanish, the branch is the intended one, and the rows span
     the exact ones.
     """
@@ -188,7 +188,7 @@ def test_joint_forbids_what_the_paper_forbids(name, seed):
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TYPES)
-def test_joint_accelerates_as_the_paper_says(name, seed):
+def test_joint_gamma_equals_paper_acceleration(name, seed):
     """Any admissible velocity, any acceleration with rows . acceleration = gamma: the exact second
     derivative vanishes.
     """
@@ -210,7 +210,7 @@ def test_joint_accelerates_as_the_paper_says(name, seed):
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_freedoms_are_those_that_are_left(name):
+def test_joint_freedoms_complement_rows(name):
     joint = example(name)
     left = 6 - joint.rows
     # those of a screw are two names for one freedom; a distance joint names none, as nothing drives
@@ -221,7 +221,7 @@ def test_freedoms_are_those_that_are_left(name):
 
 
 @pytest.mark.parametrize("name", [name for name in TYPES if Joint.registry[name].symmetric])
-def test_exchanged_bodies(name):
+def test_joint_rows_with_reversed_bodies(name):
     """A joint forbids the same with its bodies exchanged, unless its geometry belongs to one of
     them.
     """
@@ -241,7 +241,7 @@ def test_exchanged_bodies(name):
 @pytest.mark.parametrize(
     "annotation", ["tuple[float, float, float]", "Vector", tuple[float, float, float]]
 )
-def test_a_field_of_several_numbers_says_what_they_are(annotation):
+def test_joint_field_without_kind_is_refused(annotation):
     """Else it were taken for a number, and no specimen but its default tried."""
     body = {
         "__annotations__": {"axis": annotation},
@@ -260,7 +260,7 @@ def test_a_field_of_several_numbers_says_what_they_are(annotation):
     assert issubclass(type("Mine", (Joint,), kept), Joint)
 
 
-def test_a_joint_that_measures_no_coordinate_cannot_be_driven(monkeypatch):
+def test_joint_without_measure_is_undrivable(monkeypatch):
     monkeypatch.setattr(Joint, "registry", {**Joint.registry})  # other tests try all that are known
 
     @dataclass(frozen=True)

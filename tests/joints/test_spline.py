@@ -1,4 +1,4 @@
-"""Splines against the same conditions in truncated powers, and their refusals."""
+"""Splines against the same conditions for their slopes, in fractions, and their refusals."""
 
 import re
 
@@ -17,7 +17,7 @@ def spline(points, **options):
 
 
 @pytest.mark.parametrize("count", range(2, 7))
-def test_spline_has_the_ends_of_opensim(count):
+def test_spline_equals_opensim_spline(count):
     """Two points have a line, three a parabola; beyond the ends it goes on straight."""
     points = (*zip(X[:count], Y[:count], strict=True),)
     found, expected = spline(points).function, through(points)
@@ -25,7 +25,7 @@ def test_spline_has_the_ends_of_opensim(count):
         assert found.at(x) == pytest.approx(expected(x), rel=1e-12, abs=1e-12)
 
 
-def test_spline_of_a_cubic_is_the_cubic():
+def test_spline_of_cubic_is_cubic():
     """As by the third derivatives of its ends; a natural spline is not."""
     cubic = np.polynomial.Polynomial([0.3, -1.0, 0.5, 2.0])
     found = spline((*((x, float(cubic(x))) for x in X),)).function
@@ -37,7 +37,7 @@ def test_spline_of_a_cubic_is_the_cubic():
         )
 
 
-def test_spline_changes_units_and_origin():
+def test_spline_in_units_and_origin():
     points = (*zip(X, Y, strict=True),)
     first = spline(points, freedoms=("translation", "rotation"))
     value, slope, bend = first.function.at(0.2)
@@ -64,7 +64,8 @@ def test_spline_changes_units_and_origin():
         (((0.0, 0.0), (5e-324, 1.0), (1.0, 0.0)), "too close or too large for a spline"),
         (((0.0, -1e308), (1.0, 1e308)), "too close or too large for a spline"),
     ],
+    ids=str,
 )
-def test_points_without_a_spline_are_refused(points, message):
+def test_spline_of_bad_points_is_refused(points, message):
     with pytest.raises(MechanismError, match=re.escape(message)):
         spline(points)

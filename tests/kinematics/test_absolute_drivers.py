@@ -36,7 +36,7 @@ HEIGHTS = np.array([0.7, 0.6, 0.2, 0.3])
 ROUND_OFF = 4e-16
 
 
-def test_values_are_the_coordinate_itself():
+def test_absolute_driver_values_are_coordinates():
     found = solve(ARM, "y", HEIGHTS, rate=2.0)
     tip = found.points["tip"]
     assert found.solved.all()
@@ -47,7 +47,7 @@ def test_values_are_the_coordinate_itself():
     assert "beyond y = 1 (wanted y = 1.2)" in solve(ARM, "y", [1.2]).message
 
 
-def test_a_relative_one_is_measured_from_the_design():
+def test_relative_driver_is_measured_from_design():
     relative = replace(ARM, drivers=[replace(ARM.drivers[0], relative=True)])
     one, other = (
         solve(ARM, "y", HEIGHTS).points["tip"],
@@ -57,7 +57,7 @@ def test_a_relative_one_is_measured_from_the_design():
     assert [each.design_value("y") for each in (ARM, relative)] == [pytest.approx(0.6), 0.0]
 
 
-def test_motions_of_further_drivers_are_absolute_too():
+def test_absolute_motion_of_second_driver():
     """A sleeve that turns and slides: the driven height is 0.5 at design."""
     sleeve = Mechanism(
         "sleeve",
@@ -81,7 +81,7 @@ def test_motions_of_further_drivers_are_absolute_too():
     assert found.points["tip"].position[:, 2] == pytest.approx(0.5 + times, abs=ROUND_OFF)
 
 
-def test_designs_that_move_the_driven_point_are_refused():
+def test_designs_moving_driven_point_are_refused():
     at = {"points.tip.position": np.array([[0.8, 0.6, 0.0], [0.8, 0.5, 0.0]])}
     with pytest.raises(
         SolveError,
@@ -95,7 +95,7 @@ def test_designs_that_move_the_driven_point_are_refused():
     assert found[:, :, 1] == pytest.approx(np.broadcast_to(HEIGHTS, (2, 4)), abs=ROUND_OFF)
 
 
-def test_sensitivities_hold_the_coordinate_where_the_point_moves():
+def test_sensitivity_of_absolute_and_relative_drivers():
     """x = sqrt(X^2 + Y^2 - y^2): by Y it is Y / x, at a height that is given; relative, it moves
     along: (Y - y) / x.
     """
@@ -122,7 +122,7 @@ def test_sensitivities_hold_the_coordinate_where_the_point_moves():
         assert known.get("y", 0.0) == pytest.approx(expected["y"], abs=1e-14)
 
 
-def test_where_nothing_is_solved_nothing_is_found():
+def test_residual_without_solved_sample_is_nan():
     """Of residuals zero would be the best there is."""
     found = solve(ARM, "y", [1.2])
     assert not found.solved.any()

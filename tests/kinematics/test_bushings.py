@@ -46,14 +46,14 @@ def at_pose(element, u, q):
 
 
 @pytest.mark.parametrize("law", TORQUES)
-def test_bushing_turned_has_its_laws_torque(law):
+def test_bushing_torque_by_rotation_law(law):
     element = Bushing("b", GROUND, "block", ORIGIN, turning_stiffness=(100, 200, 50), law=law)
     found = at_pose(element, ORIGIN, rotated(ROTATION))
     assert [*found.wrenches[GROUND].torque] == pytest.approx(TORQUES[law], abs=6e-9)
     assert [*found.wrenches["block"].torque] == pytest.approx([-x for x in TORQUES[law]], abs=6e-9)
 
 
-def test_bushing_displaced_has_force_along_first_bodys_axes():
+def test_bushing_force_and_moment_when_displaced():
     element = Bushing("b", GROUND, "block", ORIGIN, stiffness=(1e5, 2e5, 3e5), preload=(1, 2, 3))
     found = at_pose(element, (0.003, -0.002, 0.004), rotated(ROTATION))
     assert [*found.wrenches[GROUND].force] == pytest.approx([301.0, -398.0, 1203.0], rel=1e-14)
@@ -65,7 +65,7 @@ def test_bushing_displaced_has_force_along_first_bodys_axes():
 
 @pytest.mark.parametrize("law", TORQUES)
 @pytest.mark.parametrize("angle", [0.3, 1.4, 2.9])
-def test_torque_of_large_turns_equals_matrix_form(law, angle):
+def test_bushing_torque_equals_adapters_matrix_form(law, angle):
     """The adapters' torque, from a rotation matrix, against the one from Euler parameters."""
     axes = ((1.0, 2.0, 0.5), (2.0, -1.0, 0.0))
     element = Bushing("b", GROUND, "block", ORIGIN, axes, turning_stiffness=(30, 70, 110), law=law)
@@ -79,7 +79,7 @@ def test_torque_of_large_turns_equals_matrix_form(law, angle):
     assert [*found] == pytest.approx((triad.T @ own).tolist(), abs=1e-12 * 330)
 
 
-def test_curve_passes_rows_smoothly_and_straight_beyond():
+def test_force_curve_is_smooth_through_rows():
     for x, y in TABLE:
         assert force_of(TABLE, x) == pytest.approx(y, abs=1e-12)
     x = np.linspace(-0.05, 0.06, 2001)
@@ -102,7 +102,7 @@ def bushed(tmp_path, law):
 
 
 @pytest.mark.parametrize("law", TORQUES)
-def test_power_of_bushings_is_balanced(tmp_path, law):
+def test_bushing_power_is_balanced(tmp_path, law):
     case = bushed(tmp_path, law)
     for way in (solved, traced):
         forces = way(case.mechanism, case).forces
@@ -111,7 +111,7 @@ def test_power_of_bushings_is_balanced(tmp_path, law):
 
 @pytest.mark.parametrize("law", TORQUES)
 @pytest.mark.parametrize("engine", ["pinocchio", "mujoco", "exudyn", "drake", "dart", "simbody"])
-def test_every_engine_agrees_on_bushings(tmp_path, law, engine):
+def test_bushing_forces_agree_in_all_engines(tmp_path, law, engine):
     engine, native = adapters.engine(engine), adapters.engine("native")
     if engine.version() is None:
         pytest.skip(f"{engine.name} is not installed here")
@@ -129,7 +129,7 @@ def test_every_engine_agrees_on_bushings(tmp_path, law, engine):
         assert found.elements[name] == pytest.approx(expected.elements[name], abs=1e-11 * scale)
 
 
-def test_case_with_bushings_reads_as_written(tmp_path):
+def test_bushing_case_file_round_trip(tmp_path):
     case = bushed(tmp_path, "cardan")
     again = tmp_path / "again.toml"
     again.write_text(case_text(case))
@@ -143,7 +143,7 @@ def test_case_with_bushings_reads_as_written(tmp_path):
     assert case.mechanism.force("b").curve[1] == TABLE
 
 
-def test_released_joint_leaves_its_bushings(tmp_path):
+def test_released_joint_keeps_its_bushings(tmp_path):
     soft = bushed(tmp_path, "cardan").mechanism.released()
     assert [joint.name for joint in soft.joints] == ["g"]
     assert [each.name for each in soft.forces] == ["b", "s", "h.front"]
@@ -163,7 +163,7 @@ def test_released_joint_leaves_its_bushings(tmp_path):
         ("damping = 0", "has no stiffness"),
     ],
 )
-def test_bushing_of_bad_values_is_refused(tmp_path, given, expected):
+def test_bushing_with_bad_values_is_refused(tmp_path, given, expected):
     file = tmp_path / "bad.toml"
     text = BUSHED.replace("LAW", "cardan").replace("stiffness = [1000, 2000, 3000]\n", given + "\n")
     file.write_text(text.replace("turning_stiffness = 1000\n", "").replace(AXES, ""))
@@ -171,7 +171,7 @@ def test_bushing_of_bad_values_is_refused(tmp_path, given, expected):
         load_case(file)
 
 
-def test_spring_without_stiffness_or_curve_is_refused(tmp_path):
+def test_spring_without_stiffness_is_refused(tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text(re.sub(r"curve = \[\[-50.*\n", "", BUSHED.replace("LAW", "cardan")))
     with pytest.raises(KincheckError, match="stiffness: missing"):
@@ -184,7 +184,7 @@ def test_bushing_on_unknown_body_is_refused():
 
 
 @pytest.mark.parametrize("target", adapters.WRITERS)
-def test_writers_name_bushings_and_curves_left_out(tmp_path, target):
+def test_writers_name_omitted_bushings_and_curves(tmp_path, target):
     case = bushed(tmp_path, "cardan")
     text = "".join(map(str, written(case, adapters.writer(target)).values()))
     assert re.search(r"Left out:[^\n]*force 'b' \(bushing\)[^\n]*force 's'", text)

@@ -1,14 +1,237 @@
-"""Caches of functions and threads: the last results are kept, and all are cleared."""
+"""One mechanism solved again and again is made ready once."""
 
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from threading import Thread
 from weakref import WeakSet
 
+import numpy as np
 import pytest
+from kincheck.core import Spherical, solve, solve_designs
 from kincheck.core.caches import KEYS, ThreadCache, cache_last, clear_caches
+from kincheck.core.kinematics.blocks import component_lanes, sparse_lanes
+from kincheck.core.kinematics.blocks import sweep as block_sweep
+from kincheck.core.kinematics.compiled import compiled_model
+from kincheck.core.kinematics.compiled import routes as samples
+from kincheck.core.kinematics.compiled.compiled_model import source_files
+from kincheck.core.kinematics.continuation import walk
+from kincheck.core.kinematics.one_design import prepare
+from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
+from kincheck.core.studies.bench.size import circle
+
+from ..support.mechanisms import chain, mcpherson, solve_all
+
+STROKES = np.linspace(-0.05, 0.05, 21)
 
 
-def test_what_was_made_for_a_thread_goes_with_it():
+def calls(monkeypatch, owner, name):
+    """The arguments of all calls from now on."""
+    every, call = [], getattr(owner, name)
+    monkeypatch.setattr(
+        owner, name, lambda *given, **named: (every.append(given), call(*given, **named))[1]
+    )
+    return every
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Models."""
+    return calls(monkeypatch, compiled_model, "compile_model")
+
+
+def test_model_cache_of_equal_requests(made):
+    first = solve(mcpherson(), "stroke", STROKES).points["wheel"]
+    was = first.position.copy()
+    other = solve(mcpherson(), "stroke", STROKES[::-1] / 2.0).points["wheel"]
+    again = solve(mcpherson(), "stroke", STROKES).points["wheel"]
+    assert len(made) == 1
+    np.testing.assert_array_equal(first.position, was)
+    np.testing.assert_array_equal(again.position, was)
+    assert np.abs(other.position - was[::-1]).max() > 1e-3
+    solve(mcpherson(), "stroke", STROKES, order=0)
+    wheel = mcpherson().point("wheel").position
+    higher = replace(mcpherson().point("wheel"), position=(*wheel[:2], wheel[2] + 0.01))
+    moved = solve(replace(mcpherson(), points=[higher]), "stroke", STROKES).points["wheel"]
+    assert len(made) == 3
+    assert np.abs(moved.position - was).max() > 1e-3
+
+
+def test_model_cache_of_designs(made):
+    place = "points.wheel.position"
+    values = {place: np.array([mcpherson().point("wheel").position, (0.1, 0.7, 0.3)])}
+    first, again = (
+        solve_designs(mcpherson(), "stroke", STROKES, values).points["wheel"].position
+        for _ in range(2)
+    )
+    assert len(made) == 1
+    np.testing.assert_array_equal(first, again)
+
+
+def test_model_cache_is_shared_by_threads():
+    alone = solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy()
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(lambda _: solve(mcpherson(), "stroke", STROKES), range(24)):
+            np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
+
+
+@pytest.fixture
+def swept(monkeypatch):
+    """Paths through components."""
+    return calls(monkeypatch, block_sweep.BlockSweep, "__init__")
+
+
+def test_cache_keeps_last_path_of_chain(swept):
+    turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
+    found = []
+    for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
+        found.append(solve(chain(21), "turn", values).points["end"].acceleration)
+        assert len(swept) == number
+    for each in (found[1], found[3]):
+        np.testing.assert_array_equal(each, found[0])
+
+
+def test_path_cache_is_per_thread(swept):
+    turn = np.linspace(-0.1, 0.2, 9)
+    with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
+        found = [
+            pool.submit(solve, chain(21), "turn", turn).result().points["end"].acceleration
+            for pool in (one, other, one, other)
+        ]
+    assert len(swept) == 2
+    for each in found[1:]:
+        np.testing.assert_array_equal(each, found[0])
+
+
+@pytest.mark.usefixtures("own_joint_types")
+@pytest.mark.parametrize(
+    ("mechanism", "owner", "name"),
+    [
+        (mcpherson(), compiled_model, "compile_model"),
+        (chain(21), component_lanes.ComponentLanes, "__init__"),
+    ],
+    ids=["one program", "components"],
+)
+def test_user_joints_are_not_cached(mechanism, owner, name, monkeypatch):
+    """They may be equal, and yet not mean the same."""
+
+    @dataclass(frozen=True)
+    class Ball(Spherical):
+        type = "ball_of_mine"
+
+    built = calls(monkeypatch, owner, name)
+    joints = [
+        Ball(j.name, *j.bodies, j.point) if type(j) is Spherical else j for j in mechanism.joints
+    ]
+    own, (driver,) = replace(mechanism, joints=joints), mechanism.drivers
+    for number in (1, 2):
+        solve_all(own, driver.name, STROKES)
+        assert len(built) == number
+
+
+@pytest.fixture
+def bound(monkeypatch):
+    """Routes bound to lanes."""
+    return calls(monkeypatch, walk.Marcher, "__init__")
+
+
+def test_route_cache_of_equal_samples(bound):
+    first, again = (
+        solve(mcpherson(), "stroke", STROKES).points["wheel"].acceleration.copy() for _ in range(2)
+    )
+    assert len(bound) == 1
+    np.testing.assert_array_equal(first, again)
+    others = {"values": STROKES[:-1]}, {"rate": 2.0}, {"values": STROKES + 1e-15}, {"order": 1}
+    for k, other in enumerate(others, start=2):
+        solve(mcpherson(), "stroke", **({"values": STROKES} | other))
+        assert len(bound) == k
+
+
+def test_changed_sample_array_is_harmless():
+    strokes = STROKES.copy()
+    far = solve(mcpherson(), "stroke", strokes).points["wheel"].position[0].copy()
+    strokes *= 0.5
+    near = solve(mcpherson(), "stroke", strokes).points["wheel"].position
+    assert np.abs(near[0] - far).max() > 1e-3
+    np.testing.assert_array_equal(
+        solve(mcpherson(), "stroke", STROKES).points["wheel"].position[0], far
+    )
+
+
+def test_user_motions_are_not_cached(bound, swept):
+    """They may be equal, and yet not mean the same."""
+
+    @dataclass(frozen=True)
+    class Mine(Motion):
+        def at(self, t):
+            return 0.0 * t, 0.0 * t, 0.0 * t
+
+    assert Path({}, np.ones(2)) == Path({}, np.ones(2)) != Path({}, np.ones(3))
+    # their messages differ
+    assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})
+    table, wave = Table(np.arange(2.0), [0.0, 1.0]), Absolute(Sine(1.0, 1.0, 0.0), 0.2)
+    # whoever has an array may change it
+    for motion, builtin in (
+        *((own, False) for own in (Mine(), Absolute(Mine(), 0.0), Ramp(np.array(1.0)))),
+        *((ours, True) for ours in (Ramp(1.0), wave, table)),
+    ):
+        assert Path({"steer": motion}, np.ones(1)).is_builtin == builtin
+    for made, mechanism, driver, point in (
+        (bound, mcpherson(), "stroke", "wheel"),
+        (swept, chain(21), "turn", "end"),
+    ):
+        for number in (1, 2):
+            request = samples.Request((driver,), (point,))
+            found = prepare(mechanism, request, Path({driver: Mine()}, STROKES))(1e-12)
+            assert found.solved.all()
+            assert len(made) == number
+
+
+def test_very_long_route_is_not_cached(bound):
+    strokes = np.linspace(-0.05, 0.05, samples.LONGEST_KEPT + 1)
+    for number in (1, 2):
+        solve(mcpherson(), "stroke", strokes)
+        assert len(bound) == number
+
+
+@pytest.mark.parametrize(
+    ("large", "kind"),
+    [
+        (chain(21), component_lanes.ComponentLanes),
+        (circle(22).mechanism, sparse_lanes.SparseLanes),
+    ],
+    ids=["components", "sparse"],
+)
+def test_cache_keeps_last_large_mechanism(large, kind, monkeypatch):
+    made = calls(monkeypatch, kind, "__init__")
+    values, driver = np.linspace(-0.1, 0.2, 9), large.drivers[0].name
+    first = solve(large, driver, values).points
+    other = solve(large, driver, values[::2]).points
+    again = solve(large, driver, values).points
+    assert len(made) == 1
+    for name, motion in first.items():
+        np.testing.assert_array_equal(again[name].acceleration, motion.acceleration)
+        # predicted from other samples: round-off, by the condition and once more for each
+        # derivative
+        assert np.abs(other[name].acceleration - motion.acceleration[::2]).max() <= 1e-10
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(solve, large, driver, values).result()
+    assert len(made) == 2
+
+
+def test_clear_caches_drops_models(made):
+    for number in (1, 2):
+        solve(mcpherson(), "stroke", STROKES)
+        solve(mcpherson(), "stroke", STROKES)
+        assert len(made) == number
+        clear_caches()
+
+
+# Caches of functions and threads: the last results are kept, and all are cleared
+
+
+def test_thread_cache_ends_with_thread():
     bound = ThreadCache()
     made = WeakSet()
 
@@ -27,7 +250,7 @@ def test_what_was_made_for_a_thread_goes_with_it():
     assert len(made) == 1
 
 
-def test_a_thread_keeps_what_it_used_last():
+def test_thread_cache_replaces_oldest_key():
     bound, made = ThreadCache(), list[int]()
 
     def ask(key):
@@ -43,7 +266,7 @@ def test_a_thread_keeps_what_it_used_last():
 
 
 @pytest.mark.parametrize("per_thread", [False, True])
-def test_a_function_keeps_its_last_results(per_thread):
+def test_cache_last_keeps_recent_results(per_thread):
     made = list[int]()
 
     @cache_last(2, per_thread=per_thread)
@@ -61,7 +284,7 @@ def test_a_function_keeps_its_last_results(per_thread):
 
 
 @pytest.mark.parametrize("per_thread", [False, True])
-def test_clearing_reaches_every_thread(per_thread):
+def test_clear_caches_reaches_every_thread(per_thread):
     class Large:
         pass
 
@@ -79,3 +302,34 @@ def test_clearing_reaches_every_thread(per_thread):
         assert len(made) == 2
         clear_caches()
         assert len(made) == 0
+
+
+# The key of the program cache: a change of any source that tracing runs through must change it
+
+
+TRACE = """
+import sys
+from kincheck import cases
+from kincheck.core.kinematics.compiled import compiled_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.formulation.constraints import Style
+
+case = cases.load("mcpherson_strut")
+for style in Style:
+    request = Request(tuple(case.sweep.path.motions), tuple(case.points), style=style)
+    compiled_model._trace(case.mechanism, request, None, 4)
+for name, module in sys.modules.items():
+    if name.startswith("kincheck.core.") and getattr(module, "__file__", None):
+        print(name, module.__file__)
+"""
+
+
+def test_program_cache_key_covers_modules():
+    done = subprocess.run(
+        [sys.executable, "-c", TRACE], capture_output=True, text=True, check=True
+    ).stdout
+    loaded = dict(line.split(" ", 1) for line in done.splitlines())
+    layers = ("kincheck.core.case", "kincheck.core.harness")
+    traced = {file for name, file in loaded.items() if not name.startswith(layers)}
+    assert len(traced) > 50
+    assert traced <= {str(file) for file in source_files()}

@@ -17,8 +17,11 @@ from kincheck.core import (
     Revolute,
     solve,
 )
+from kincheck.core.kinematics.formulation.constraints import Style
 
-Z, ORIGIN, ROD = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.8
+from ..support.mechanisms import ORIGIN, Z, circles_meet, planar_four_bar, solve_all
+
+ROD = 0.8
 
 
 def pin(angle):
@@ -27,12 +30,7 @@ def pin(angle):
 
 def corner(angle, beside, rod=ROD, rocker=ROD):
     """Where rod and rocker meet, on the left from the rocker's pivot to the crank's pin."""
-    pivot = np.array([1.0 - beside, 0.0, 0.0])
-    d = pin(angle) - pivot
-    square = (d * d).sum(axis=-1, keepdims=True)
-    along = 0.5 * (square + rocker**2 - rod**2) / square
-    left = np.stack([-d[..., 1], d[..., 0], d[..., 2]], axis=-1)
-    return pivot + along * d + np.sqrt(rocker**2 / square - along**2) * left
+    return circles_meet((1.0 - beside, 0.0, 0.0), rocker, pin(angle), rod)
 
 
 def loop(start, beside, rod=ROD, rocker=ROD, loops=1):
@@ -71,11 +69,10 @@ def latin(rows, columns, others):
     ("beside", "count", "loops"),
     latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2]),
 )
-def test_a_corner_is_turned_round(beside, count, loops):
+def test_corner_is_turned(beside, count, loops):
     """The rocker makes half a turn while the crank's pin passes its pivot."""
     turn = np.linspace(0.0, 2.0, count)
-    found = solve(loop(-1.0, beside, loops=loops), "turn", turn, order=loops - 1)
-    assert found.solved.all(), found.message
+    found = solve_all(loop(-1.0, beside, loops=loops), "turn", turn, order=loops - 1)
     # one over the distance of the two is the condition there, and all that follows goes through it
     assert np.abs(found.points["meet"].position - corner(turn - 1.0, beside)).max() <= 1e-13 / abs(
         beside
@@ -84,7 +81,7 @@ def test_a_corner_is_turned_round(beside, count, loops):
 
 
 @pytest.mark.parametrize(("beside", "loops"), [(1e-6, 1), (1e-9, 2), (-1e-12, 1), (1e-6, 2)])
-def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
+def test_narrow_corner_ends_motion(beside, loops):
     turn = np.linspace(0.0, 2.0, 9)
     found = solve(loop(-1.0, beside, loops=loops), "turn", turn)
     assert found.solved[:4].all()
@@ -99,7 +96,7 @@ def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
 @pytest.mark.parametrize(
     ("short", "count", "loops"), latin([1e-2, 1e-5, 1e-8, 1e-10], [2, 5, 9, 300], [1, 2])
 )
-def test_a_gap_is_the_end(short, count, loops):
+def test_gap_ends_motion(short, count, loops):
     turn = np.linspace(0.0, 2.0, count)
     mechanism = loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops)
     found = solve(mechanism, "turn", turn, order=0)
@@ -124,7 +121,7 @@ COUNTS = [2, 3, 5, 9, 300]
     ("ground", "short", "start", "count"),
     [(*kite, count) for k, kite in enumerate(KITES) for count in COUNTS[k % 2 :: 2]],
 )
-def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, start, count):
+def test_kite_gap_ends_motion(ground, short, start, count):
     """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond,
     what crosses there is as near.
     """
@@ -135,7 +132,7 @@ def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, 
     assert (found.solved == (turn < -start - end)).all()
 
 
-def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
+def test_singular_pose_verdict_ignores_order():
     """The rates interpolated at the pose are worse than the pose; they are not wanted, and what is
     beyond is solved as anywhere.
     """
@@ -150,8 +147,7 @@ def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
     mechanism = Mechanism(
         "groove", [Body("crank"), Body("shaft")], joints, [point], [JointAngle("turn", "hinge")]
     )
-    found = [solve(mechanism, "turn", [0.0, 1.0], order=order) for order in range(3)]
-    assert [each.solved.all() for each in found] == [True] * 3
+    found = [solve_all(mechanism, "turn", [0.0, 1.0], order=order) for order in range(3)]
     assert all("crosses a singular pose" in each.details["notes"][0] for each in found)
     for each in found[1:]:
         np.testing.assert_allclose(
@@ -159,13 +155,148 @@ def test_a_motion_goes_on_beyond_a_singular_pose_whatever_is_asked_of_it():
         )
 
 
-def test_verdict_beside_a_gap_ignores_wanted_points():
+def test_gap_verdict_ignores_wanted_points():
     """The crank's own motion is smooth, whatever the rocker does."""
-    mechanism, turn = (
-        loop(np.pi - 1.0, 1e-7, rod=1.2 - 1e-10, rocker=0.8),
-        np.linspace(0.0, 2.0, 300),
-    )
+    mechanism = loop(np.pi - 1.0, 1e-7, rod=1.2 - 1e-10, rocker=0.8)
+    turn = np.linspace(0.0, 2.0, 300)
     pinned = replace(mechanism, points=[Point("pin", "crank", (1.0, 0.0, 0.0))])
     whole, crank = (solve(each, "turn", turn) for each in (mechanism, pinned))
     assert not whole.solved.all()
     np.testing.assert_array_equal(crank.solved, whole.solved)
+
+
+# Four-bars that nearly fold, with more rows than they need: no choice of rows hides a corner
+
+
+# and nearly parallelograms: pin, end of the rod, rest of the rocker, last turn, samples
+NEARLY_KITES = {
+    "kite": (
+        (0.4260866094025061, 0.09610141632702796),
+        (0.05330114251731225, 0.32373794595045846),
+        1.0098026454771485,
+        -5.6167,
+        73,
+    ),
+    "kite that folds": (
+        (-0.9963803731629649, -0.5891443362735412),
+        (0.061853652076719, 0.016510422670654),
+        1.2192612306465147,
+        4.1357,
+        25,
+    ),
+    "never locks": (
+        (0.9697033471070498, -0.3443453141456345),
+        (0.6073751573486417, -1.3075254632217728),
+        1.7110737849494355,
+        -6.2769,
+        19,
+    ),
+    "locks": (
+        (0.407187255644269, -0.06317054565251659),
+        (1.4280674729874876, -0.0631734360870428),
+        1.0208806657722926,
+        3.2062,
+        13,
+    ),
+    "turns unseen": (
+        (-0.8114361531517722, 0.4497902962488659),
+        (0.11192415924912638, 0.5400567995235857),
+        1.3589039496745472,
+        3.4404473351597655,
+        7,
+    ),
+    "twisted": (
+        (0.6286049409194256, -0.008145844979201),
+        (2.1516027678897336, -0.008643655436957),
+        1.5230044750512732,
+        -4.8815,
+        7,
+    ),
+}
+
+
+def side_of_the_line(pin, rest, turn, found):
+    """By its sign on which side of the line from the pin to the rocker's pivot the rod's end is:
+    there it stays.
+    """
+    (x, y), cos, sin = pin, np.cos(turn), np.sin(turn)
+    across = np.stack([rest - (x * cos - y * sin), -(x * sin + y * cos)], axis=-1)
+    d = found.points["meet"].position[:, :2] - (np.array([rest, 0.0]) - across)
+    return across[:, 0] * d[:, 1] - across[:, 1] * d[:, 0]
+
+
+STYLES = [style.value for style in Style]
+# Each kite with both linkages, and with three of the styles, two of which are always the native and
+# the relative one.
+CHOSEN = [
+    (name, ("universals", "hinges")[(row + column) % 2], style)
+    for row, name in enumerate(NEARLY_KITES)
+    for column, style in enumerate(("native", STYLES[1 + row % 3], "relative"))
+]
+
+
+@pytest.mark.parametrize(("name", "ends", "style"), CHOSEN)
+def test_chosen_rows_do_not_hide_corner(name, ends, style):
+    """A determinant of rows chosen from more changes its sign by a singular pose, and by one of the
+    choice; not by both.
+    """
+    (x, y), meet, rest, last, count = NEARLY_KITES[name]
+    turn = np.linspace(0.0, last, count)
+    kite = planar_four_bar((x, y, 0.0), (*meet, 0.0), (rest, 0.0, 0.0), ends)
+    found = solve(kite, "turn", turn, order=0, style=style)
+    side = side_of_the_line((x, y), rest, turn, found)
+    assert (side[found.solved] * side[0] > 0.0).all()
+    assert found.solved.all() or "there is a singular pose ahead" in found.message
+    assert found.solved.sum() >= 3
+
+
+@pytest.mark.parametrize(
+    ("ends", "beside", "style"),
+    latin(["universals", "hinges"], [1e-2, -3e-3, 1e-3], ["native", "relative"]),
+)
+def test_nearly_singular_kite_exchanges_rows(ends, beside, style):
+    """Those that were chosen at design depend on each other where it lies flat, or so nearly that
+    it cannot be told from that.
+    """
+    start, turn = np.float64(-1.5), np.linspace(0.0, 3.3, 31)
+    meet = corner(start, beside, 1.2, 1.2)
+    mechanism = planar_four_bar(pin(start), meet, (1.0 - beside, 0.0, 0.0), ends)
+    found = solve_all(mechanism, "turn", turn, style=style, order=0)
+    expected = corner(start + turn, beside, 1.2, 1.2)
+    assert np.abs(found.points["meet"].position - expected).max() <= 1e-13 / abs(beside)
+
+
+# every count with the native style and another one
+@pytest.mark.parametrize(
+    ("count", "style"),
+    [
+        (count, style)
+        for k, count in enumerate([4, 7, 8, 10, 12, 15])
+        for style in ("native", STYLES[1 + k % 4])
+    ],
+)
+def test_small_loop_does_not_hide_corner(count, style):
+    """Its singular values are the smaller ones all the way round, but where the large one folds."""
+    x, y, rest, end = (
+        -0.35245745516404536,
+        -0.7148047631848835,
+        2.802282190370843,
+        (2.175441305403854, 0.49218148289661845),
+    )
+    across = np.cos(1.345), np.sin(1.345), 0.0
+    large = planar_four_bar((x, y, 0.0), (*end, 0.0), (rest, 0.0, 0.0), "universals", across)
+    pin, meet = (
+        (-0.023472379164771337, -0.0056469601124647896, 0.0),
+        (0.0017654205974588259, 0.11112362657419883, 0.0),
+    )
+    joints = [
+        Revolute(
+            "small rest", "ground", "small", (0.12433883023528294, 0.04634680743282863, 0.0), Z
+        ),
+        Distance("small rod", "crank", "small", (pin, meet)),
+    ]
+    both = replace(large, bodies=[*large.bodies, Body("small")], joints=[*large.joints, *joints])
+    turn = np.linspace(0.0, 5.0379839, count)
+    found = solve_all(both, "turn", turn, order=0, style=style)
+    side = side_of_the_line((x, y), rest, turn, found)
+    assert (side * side[0] > 0.0).all()

@@ -8,6 +8,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import (
     Body,
+    Fixed,
     Gear,
     JointAngle,
     Mechanism,
@@ -18,93 +19,82 @@ from kincheck.core import (
 )
 from kincheck.core.cli import main
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.structure import degrees_of_freedom
-from kincheck.core.kinematics.structure.degrees_of_freedom import account
+from kincheck.core.kinematics.structure.degrees_of_freedom import (
+    DENSE,
+    account,
+    degrees_of_freedom,
+    require_driven,
+)
 
 from ..support.case_texts import write
-from ..support.mechanisms import slider_crank
-from .test_chain import chain
+from ..support.mechanisms import Z, chain, slider_crank
 
 LOOPS = 14  # 29 bodies
+WELDED = DENSE + 1
 
 
-@pytest.fixture
-def sparse(monkeypatch):
-    """Every mechanism counts as a large one."""
-    monkeypatch.setattr(degrees_of_freedom, "DENSE", 0)
+def large(mechanism):
+    """The mechanism with so many welded blocks beside it that freedoms are counted sparsely."""
+    blocks = [f"block {k}" for k in range(WELDED)]
+    return replace(
+        mechanism,
+        bodies=[*mechanism.bodies, *map(Body, blocks)],
+        joints=[*mechanism.joints, *(Fixed(f"weld {k}", "ground", k) for k in blocks)],
+    )
 
 
 @pytest.mark.parametrize("name", cases.names())
-def test_the_sparse_count_is_the_dense_one(name, sparse):
+def test_sparse_freedom_count_equals_dense(name):
     mechanism = cases.load(name).mechanism
     dof = account(mechanism, frames(mechanism)).dof
-    undriven, twice = (
-        replace(mechanism, drivers=each) for each in ((), (*mechanism.drivers, *again(mechanism)))
-    )
-    assert [
-        degrees_of_freedom.degrees_of_freedom(each) for each in (mechanism, undriven, twice)
-    ] == [dof] * 3
-    degrees_of_freedom.require_driven(mechanism)
-
-
-def again(mechanism):
-    """Its drivers under other names."""
-    return [replace(driver, name=f"{driver.name} again") for driver in mechanism.drivers]
+    again = [replace(driver, name=f"{driver.name} again") for driver in mechanism.drivers]
+    whole = large(mechanism)
+    assert len(whole.moving) > DENSE
+    for drivers in (whole.drivers, (), (*whole.drivers, *again)):
+        assert degrees_of_freedom(replace(whole, drivers=drivers)) == dof
+    require_driven(whole)
 
 
 @pytest.mark.parametrize("count", [1, 4, 11])
-def test_many_freedoms_are_counted_one_by_one(count, sparse):
+def test_freedom_count_of_free_balls(count):
     bodies = [Body(f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
     balls = [Spherical(f"s{k}", "ground", f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
-    free = Mechanism("loose", bodies, balls, [], [])
-    assert degrees_of_freedom.degrees_of_freedom(free) == 3 * count
+    free = large(Mechanism("loose", bodies, balls))
+    assert degrees_of_freedom(free) == 3 * count
+    columns, dof = 6 * (count + WELDED), 3 * count
     with pytest.raises(
         SolveError,
-        match=(
-            rf"{3 * count} degrees of freedom \({6 * count} coordinates - rank {3 * count}\) but 0 "
-        ),
+        match=rf"{dof} degrees of freedom \({columns} coordinates - rank {columns - dof}\) but 0 ",
     ):
-        degrees_of_freedom.require_driven(free)
+        require_driven(free)
 
 
-def test_what_only_couplers_tie_is_counted(sparse):
-    axles = [
-        Revolute(name, "ground", name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
-        for name, x in (("first", 0.0), ("second", 1.0))
-    ]
-    wheels = Mechanism(
-        "gears",
-        [Body("first"), Body("second")],
-        axles,
-        [],
-        [],
-        [Gear("mesh", ("first", "second"), -2.0)],
-    )
-    assert degrees_of_freedom.degrees_of_freedom(wheels) == 1
-    assert degrees_of_freedom.degrees_of_freedom(replace(wheels, couplers=())) == 2
+def test_freedom_count_with_gear():
+    axles = [Revolute(name, "ground", name, (0.0, 0.0, 0.0), Z) for name in ("first", "second")]
+    bodies, mesh = [Body("first"), Body("second")], Gear("mesh", ("first", "second"), -2.0)
+    assert degrees_of_freedom(large(Mechanism("gears", bodies, axles, couplers=[mesh]))) == 1
+    assert degrees_of_freedom(large(Mechanism("gears", bodies, axles))) == 2
 
 
-def test_a_driver_that_is_locked_at_the_design_is_left_to_the_solver(sparse):
-    stretched = slider_crank()
-    degrees_of_freedom.require_driven(
-        replace(stretched, drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
-    )
+def test_driver_locked_at_design_is_accepted():
+    push = PointCoordinate("push", "end", (1.0, 0.0, 0.0))
+    require_driven(large(replace(slider_crank(), drivers=[push])))
 
 
-def test_a_large_mechanism_is_refused_with_names():
+def test_large_mechanism_driver_mismatch_names_parts():
     whole = chain(LOOPS)
-    degrees_of_freedom.require_driven(whole)
+    require_driven(whole)
     with pytest.raises(
         SolveError,
         match=r"1 degree of freedom \(174 coordinates - rank 173\) but 0 drivers; what can still",
     ):
-        degrees_of_freedom.require_driven(replace(whole, drivers=()))
+        require_driven(replace(whole, drivers=()))
     twice = replace(whole, drivers=(*whole.drivers, JointAngle("second", "pivot7")))
     with pytest.raises(
         SolveError,
         match=r"but 2 drivers; not independent are '(turn|second)', '(turn|second)'; remove 1 or",
     ):
-        degrees_of_freedom.require_driven(twice)
+        require_driven(twice)
     spinning = replace(
         whole,
         bodies=[*whole.bodies, Body("stray")],
@@ -116,7 +106,7 @@ def test_a_large_mechanism_is_refused_with_names():
             r"4 degrees of freedom .* but 1 driver; what can still move is most of all 'stray'; add"
         ),
     ):
-        degrees_of_freedom.require_driven(spinning)
+        require_driven(spinning)
 
 
 def written(mechanism, drivers):
@@ -157,8 +147,9 @@ def written(mechanism, drivers):
         (2, {"turn": "pivot0"}, "cross1", 2,
          "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
     ],
+    ids=["large", "large, overdriven", "large, loose", "small, overdriven", "small, loose"],
 )  # fmt: skip
-def test_exit_status_is_the_same_for_small_and_large(
+def test_driver_mismatch_exit_status_and_message(
     loops, drivers, left_out, status, said, tmp_path, capsys
 ):
     whole = chain(loops)

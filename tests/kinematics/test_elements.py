@@ -4,37 +4,17 @@ import numpy as np
 import pytest
 
 pytest.importorskip("llvmlite")
-from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, RackPinion, Revolute, Screw
 from kincheck.core.case.joint_probe import probes
-from kincheck.core.joints import Translational
 from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.programs import Tracer
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.mechanism.motions import PointCoordinate
 from kincheck.core.studies.bench.size import ring
 
 from ..support.block_structures import chain_of_hinges, torus
+from ..support.mechanisms import gears
 
-X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 LANES = 11
 """More than a vector has."""
-
-
-def gears():
-    """Return coordinates of joints, coupled, and a held driver of a point."""
-    return Mechanism(
-        "gears",
-        [Body("wheel"), Body("pinion", (1.0, 0.0, 0.0)), Body("rack"), Body("nut")],
-        [
-            Revolute("first", "ground", "wheel", (0.0, 0.0, 0.0), Z),
-            Revolute("second", "pinion", "ground", (1.0, 0.0, 0.0), Z),
-            Translational("guide", "ground", "rack", (1.0, 0.3, 0.0), X),
-            Screw("thread", "pinion", "nut", (1.0, 0.0, 0.5), Z, 0.02),
-        ],
-        [Point("tooth", "rack", (1.0, 0.3, 0.0)), Point("top", "nut", (1.2, 0.1, 0.5))],
-        [JointAngle("turn", "first"), PointCoordinate("height", "top", Z)],
-        [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
-    )
 
 
 def equations(system, drivers, random):
@@ -56,7 +36,7 @@ EVERY = [*OWN, *(case.mechanism for case in probes())]
 
 
 @pytest.mark.parametrize("mechanism", EVERY, ids=lambda each: each.name)
-def test_elements_give_the_equations_of_the_whole(mechanism):
+def test_elements_match_whole_equations(mechanism):
     drivers = tuple(each.name for each in mechanism.drivers)
     points = tuple(each.name for each in mechanism.points)
     bodies = tuple(each.name for each in mechanism.moving)

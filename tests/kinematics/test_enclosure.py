@@ -1,10 +1,10 @@
 """Proofs in ball arithmetic: what is proved is true, and what is not true, or singular, is not
-proved.
+proved. Also exact numbers and derivatives of tapes, of which enclosures are made.
 """
 
 import csv
 import math
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from kincheck.core import (
     PointCoordinate,
     Revolute,
 )
+from kincheck.core.algebra import root
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.errors import SolveError
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
@@ -29,6 +30,7 @@ from kincheck.core.kinematics.one_design import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.verified import krawczyk
 from kincheck.core.kinematics.verified.exact import (
+    Exact,
     as_decimal,
     as_double,
     equations,
@@ -38,7 +40,9 @@ from kincheck.core.kinematics.verified.krawczyk import Enclosure, UnprovedError
 from kincheck.core.kinematics.verified.proofs import _states, prove
 from kincheck.core.mechanism.motions import Path as Way
 from kincheck.core.mechanism.motions import Ramp
-from kincheck.core.program.ball_executor import precision
+from kincheck.core.program import Tape, absolute, cos, program, sin, where_larger
+from kincheck.core.program.ball_executor import UndecidedError, evaluate, precision
+from kincheck.core.program.tape import jacobian
 
 from ..support.mechanisms import CRANK, ORIGIN, ROD, Z, four_bar, slider_crank
 
@@ -59,7 +63,7 @@ def proved(mechanism, driver, values, reading=as_double, exact=None, tol=1e-12):
 # What is proved is true
 
 
-def test_slider_crank_is_its_closed_form():
+def test_enclosure_holds_slider_crank_closed_form():
     angles = np.linspace(-2.5, 2.5, 7)
     found = proved(slider_crank(), "turn", angles)
     with precision(BITS):
@@ -78,7 +82,7 @@ def test_slider_crank_is_its_closed_form():
             assert all(x.contains(0) for x in moved[1:])
 
 
-def test_strut_agrees_with_its_printed_reference():
+def test_enclosure_agrees_with_printed_strut_reference():
     """Two independent 40-digit solutions, printed to 17 digits, of the geometry as its decimals
     say.
     """
@@ -112,14 +116,14 @@ def test_strut_agrees_with_its_printed_reference():
 PROVED = [case for case in probes() if case.name != "spline"]
 
 
-def test_splines_have_no_proofs_and_are_refused():
+def test_proof_of_spline_coupler_is_refused():
     (case,) = (case for case in probes() if case.name == "spline")
-    with pytest.raises(SolveError, match="has pieces, and proofs know none"):
+    with pytest.raises(SolveError, match="is a spline, and proofs know none"):
         proved(case.mechanism, case.sweep.driver, case.sweep.change[:1])
 
 
 @pytest.mark.parametrize("case", PROVED, ids=lambda case: case.name)
-def test_every_joint_type_is_proved(case):
+def test_enclosure_of_every_joint_type(case):
     """Velocities and accelerations here come from the residuals alone; the native ones from rows,
     nu and gamma.
     """
@@ -137,7 +141,7 @@ def test_every_joint_type_is_proved(case):
             assert np.abs(native.acceleration[k] - acceleration).max() < 1e-11
 
 
-def test_turns_of_coupled_joints_are_counted():
+def test_enclosure_of_worm_gear_turns():
     """A worm: twelve turns of the shaft are one of the wheel, and the samples are most of half a
     turn apart.
     """
@@ -160,7 +164,7 @@ def test_turns_of_coupled_joints_are_counted():
         assert abs(float(each.points["rim"][0][1]) - 0.1 * (math.cos(angle / 12.0) - 1.0)) < 1e-13
 
 
-def test_redundant_rows_are_zero_at_the_solution():
+def test_enclosure_has_zero_redundant_rows():
     found = proved(four_bar(), "turn", [0.5, 1.0])
     assert len(found.redundant) == 3
     for each in found.samples:
@@ -168,7 +172,7 @@ def test_redundant_rows_are_zero_at_the_solution():
         assert all(x.contains(0) and x.rad() < 1e-40 for x in each.left_out)
 
 
-def test_a_wrong_native_solution_is_measured_not_believed():
+def test_enclosure_measures_wrong_native_pose():
     """The pose of one mechanism, given as that of another whose rod is 1e-9 m longer."""
     right = proved(slider_crank(), "turn", [1.0]).samples[0].points["end"][0][0]
     longer, pose, drives = _setup(slider_crank(ROD + 1e-9), slider_crank(), 1.0)
@@ -199,13 +203,13 @@ def _setup(mechanism, native, angle):
 # What is not true, or singular, is not proved
 
 
-def test_a_solution_too_far_away_is_not_taken():
+def test_enclosure_refuses_distant_start():
     traced, pose, drives = _setup(slider_crank(), slider_crank(), 1.0)
     with precision(BITS), pytest.raises(UnprovedError, match=r"another one|no solution near"):
         krawczyk.enclose(traced, pose + 0.05, drives, BITS)
 
 
-def test_a_spurious_branch_is_not_proved():
+def test_enclosure_refuses_overturned_branch():
     """A crank turned over about an axis in its plane solves the residuals of its revolute, and its
     driver's at half a turn.
     """
@@ -225,7 +229,7 @@ def test_a_spurious_branch_is_not_proved():
             krawczyk.enclose(traced, turned_over, drives, BITS)
 
 
-def test_a_change_point_is_not_proved_and_says_so():
+def test_enclosure_refuses_change_point():
     """A parallelogram with all pivots on a line can go on as a parallelogram or as its crossed
     twin.
     """
@@ -251,7 +255,7 @@ def test_a_change_point_is_not_proved_and_says_so():
     )
 
 
-def test_a_dead_centre_is_not_proved_and_its_neighbours_are():
+def test_enclosure_near_and_at_dead_centre():
     bent = replace(slider_crank(), drivers=[JointDisplacement("push", "guide")])
     start, end = 2.0, CRANK + ROD
     turned = proved(slider_crank(), "turn", [start]).native
@@ -269,3 +273,105 @@ def test_a_dead_centre_is_not_proved_and_its_neighbours_are():
     )
     # the singular value is a hundredth, the proof reaches less far
     assert found.samples[2].alone < 0.2 * found.samples[0].alone
+
+
+# Derivatives and balls
+
+
+def test_tape_jacobian_equals_series_slopes():
+    tape = Tape()
+    inputs = [tape.input(slot) for slot in range(3)]
+    x, y, z = inputs
+    values = [x * y - z / (x + 2.0), root(x * x + y * y), sin(x * z) * cos(-y), 3.0 * z, 1.0]
+    gradients = jacobian(tape, values, inputs)
+    assert gradients[3].keys() == {2}
+    assert gradients[4] == {}
+    code = program("values", tape, dict(enumerate(values)))
+    slopes = program(
+        "slopes",
+        tape,
+        {3 * row + k: value for row, each in enumerate(gradients) for k, value in each.items()},
+    )
+    with precision(BITS):
+        at = [flint.arb(x) for x in ("0.7", "-0.3", "1.9")]
+        found = evaluate(slopes, at)
+        for k in range(3):
+            moving = [flint.arb_series([x, int(k == j)], prec=3) for j, x in enumerate(at)]
+            for row, value in evaluate(code, moving).items():
+                expected = value[1] if isinstance(value, flint.arb_series) else flint.arb(0)
+                assert abs(found.get(3 * row + k, flint.arb(0)) - expected) < 1e-50
+
+
+def test_tape_jacobian_of_kink_is_refused():
+    tape = Tape()
+    x = tape.input(0)
+    with pytest.raises(TypeError, match="'abs' has a kink"):
+        jacobian(tape, [absolute(x)], [x])
+
+
+def test_comparison_of_overlapping_balls_is_undecided():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    larger = program("larger", tape, {0: where_larger(x, y, 1.0, 2.0)})
+    assert evaluate(larger, [flint.arb(-3), flint.arb(2)])[0] == 1
+    assert evaluate(larger, [flint.arb(2), flint.arb(-3)])[0] == 2
+    with pytest.raises(UndecidedError, match="cannot be told apart"):
+        evaluate(larger, [flint.arb(2, 0.1), flint.arb(-2)])
+
+
+def test_precision_context_is_restored():
+    before = flint.ctx.prec
+    with precision(BITS):
+        assert before != flint.ctx.prec == BITS
+    assert flint.ctx.prec == before
+
+
+# Exact numbers
+
+
+def test_exact_number_arithmetic():
+    third = Exact.of(Fraction(1, 3))
+    assert (third + 0.5 - Exact.of(Fraction(5, 6))).trivial == 0.0
+    assert (Exact.of(Fraction(9, 16)).sqrt() - 0.75).trivial == 0.0
+    with precision(BITS):
+        root = Exact.of(Fraction(2)).sqrt()
+        assert root.trivial is None
+        assert abs(root.ball**2 - 2) < 1e-58
+        assert abs((root * root - 2.0).ball) < 1e-58
+    assert as_double(0.1) != Fraction(1, 10) == as_decimal(0.1)
+
+
+@pytest.mark.parametrize("case", PROVED, ids=lambda case: case.name)
+def test_exact_joints_call_no_doubles(case, monkeypatch):
+    """Nothing that reaches the primitives went through a function of doubles; checks and the choice
+    of a length unit may.
+    """
+
+    def exactly(do):
+        def call(*arguments):
+            assert not any(isinstance(each, Exact) for each in arguments), (
+                f"{do} rounds {arguments} to a double"
+            )
+            return do(*arguments)
+
+        return call
+
+    with precision(BITS):
+        exact = exact_mechanism(case.mechanism, as_double)
+        frame = frames(exact)
+        for name in {name for name in dir(math) if callable(getattr(math, name))} - {
+            "isfinite",
+            "dist",
+        }:
+            monkeypatch.setattr(math, name, exactly(getattr(math, name)))
+        for constraint in constraints(exact, frame, {}):
+            assert {*_floats(constraint)} <= {0.0, 1.0, -1.0}, constraint
+
+
+def _floats(value):
+    if isinstance(value, float):
+        yield value
+    elif isinstance(value, dict):
+        yield from (x for each in value.values() for x in _floats(each))
+    elif is_dataclass(value):
+        yield from (x for each in fields(value) for x in _floats(getattr(value, each.name)))

@@ -215,14 +215,14 @@ def assert_same(found, expected, limits=NATIVE):
 
 
 @pytest.mark.parametrize("engine", adapters.ENGINES)
-@pytest.mark.parametrize("variant", [*STRUTS, ALL])
-def test_the_strut_moves_alike_however_it_is_composed(variant, engine):
+@pytest.mark.parametrize("variant", [*STRUTS, ALL], ids=str)
+def test_strut_motion_of_equivalent_joints(variant, engine):
     mechanism = composed(*(variant if variant is ALL else [variant]))
     assert_same(motion(mechanism, STROKES, engine), motion(mcpherson(), STROKES), LIMITS[engine])
 
 
 @pytest.mark.parametrize("engine", adapters.ENGINES)
 @pytest.mark.parametrize("variant", FOUR_BARS)
-def test_the_four_bar_moves_alike_however_it_is_composed(variant, engine):
+def test_four_bar_motion_of_equivalent_joints(variant, engine):
     mechanism = changed(four_bar(), **FOUR_BARS[variant])
     assert_same(motion(mechanism, TURNS, engine), motion(four_bar(), TURNS), LIMITS[engine])

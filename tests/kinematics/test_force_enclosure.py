@@ -21,7 +21,7 @@ from kincheck.core.program.ball_executor import precision
 from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.driven_chains import COUPLINGS, Link, chain
-from ..support.loaded import loaded, pushed
+from ..support.loaded_slider_crank import loaded, pushed
 
 flint = pytest.importorskip("flint")
 BITS = 200
@@ -69,7 +69,7 @@ def slider_crank():
     return proved(loaded())
 
 
-def test_balls_hold_the_closed_form_of_every_load(slider_crank):
+def test_force_enclosure_holds_closed_form(slider_crank):
     """Springs, dampers, constant loads, gravity: the truth is energy and one body's balance."""
     with precision(BITS):
         for angle, each in zip(ANGLES, slider_crank.samples, strict=True):
@@ -87,16 +87,7 @@ def test_balls_hold_the_closed_form_of_every_load(slider_crank):
             assert found.power.contains(0)
 
 
-def test_the_native_forces_are_in_the_balls_but_for_round_off(slider_crank):
-    native = slider_crank.native.forces
-    largest = max(np.abs(each.force).max() for each in native.joints.values())
-    for k, each in enumerate(slider_crank.samples):
-        for name, balls in each.forces.joints.items():
-            wrench = np.concatenate([native.joints[name].force[k], native.joints[name].moment[k]])
-            assert np.abs(wrench - [float(x) for x in balls]).max() < 1e-14 * largest
-
-
-def test_a_driven_point_has_its_effort():
+def test_force_enclosure_of_driven_point_effort():
     """The same slider-crank, pushed at its tip: at one pose and rate the powers are equal."""
     found = proved(pushed(), [0.25], 0.5)
     (each,) = found.samples
@@ -104,7 +95,7 @@ def test_a_driven_point_has_its_effort():
     assert abs(float(each.forces.drivers["push_tip"]) - effort) < 1e-12 * abs(effort)
 
 
-def test_masses_are_read_as_decimals_or_doubles():
+def test_force_enclosure_reads_decimals_or_doubles():
     def tension(reading):
         mechanism = loaded()
         heavy = [replace(each, mass=0.1 * each.mass) for each in mechanism.bodies]
@@ -132,7 +123,7 @@ CASES = [
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_forces_of_every_case_with_masses_are_enclosed(name):
+def test_force_enclosure_of_library_cases(name):
     case = cases.load(name)
     values = case.sweep.values[[1, len(case.sweep.values) // 3]]
     outputs = tuple(each for each in case.outputs if each.forces)
@@ -148,7 +139,7 @@ def test_forces_of_every_case_with_masses_are_enclosed(name):
     assert max(error.largest[0] for error in errors) < 1e-13 * largest
 
 
-def test_an_undetermined_component_is_refused_with_the_reason():
+def test_undetermined_force_enclosure_has_reason():
     case = cases.load("four_bar")
     (pin, *_) = [each for each in case.outputs if each.name == "coupler_pin_force_e1"]
     loose = replace(pin, name="loose", direction=(0.3, 0.5, 0.7))
@@ -207,7 +198,7 @@ def at_origins(self, freedom, i, j):
 @pytest.mark.parametrize(
     "coupled", [None, "rack", "rack that is a screw", "polynomial, translation by rotation"]
 )
-def test_proved_forces_are_those_by_hand(coupled):
+def test_force_enclosure_equals_free_body_diagrams(coupled):
     if coupled is None:
         made = chain([Link(Revolute), Link(Translational, flipped=True), Link(Revolute)])
     else:
@@ -217,7 +208,7 @@ def test_proved_forces_are_those_by_hand(coupled):
 
 
 @pytest.mark.parametrize("coupled", [False, True])
-def test_a_proof_does_not_share_the_row(coupled, monkeypatch):
+def test_force_enclosure_ignores_shifted_driver_row(coupled, monkeypatch):
     """A slide driven beside its axis has the same motion: the proof keeps the line of action."""
     monkeypatch.setattr(AxialJoint, "measured", at_origins)
     slide = Link(Translational, flipped=True)
@@ -226,7 +217,7 @@ def test_a_proof_does_not_share_the_row(coupled, monkeypatch):
     assert off_by_hand(made) < 1e-13
 
 
-def test_another_coordinate_is_no_proof(monkeypatch):
+def test_force_enclosure_refuses_doubled_coordinate(monkeypatch):
     """One of twice the displacement."""
 
     def doubled(self, freedom, i, j):
@@ -242,14 +233,14 @@ def test_another_coordinate_is_no_proof(monkeypatch):
 # Planted mistakes
 
 
-def test_a_wrong_sign_of_gravity_is_no_proof(monkeypatch):
+def test_force_enclosure_refuses_wrong_gravity_sign(monkeypatch):
     right = equations.inertial
     monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
     with pytest.raises(AssertionError, match="the powers of drivers, masses and force elements"):
         proved(loaded(), [0.5])
 
 
-def test_a_wrong_torque_of_euler_parameters_is_no_proof(monkeypatch):
+def test_force_enclosure_refuses_halved_torque(monkeypatch):
     right = exact_forces.ExactForces._by_state
     monkeypatch.setattr(
         exact_forces.ExactForces,

@@ -121,14 +121,14 @@ def with_spring():
 
 
 @pytest.mark.parametrize("solve", [solved, traced])
-def test_without_a_mistake_nothing_is_missing(solve):
+def test_force_balance_without_mistake(solve):
     case, mechanism = with_spring()
     assert max(worst(mechanism, case, solve)) <= 1e-11
 
 
 @pytest.mark.parametrize("solve", [solved, traced])
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_planted_mistake_is_found(mistake, solve, monkeypatch):
+def test_force_balance_finds_planted_mistake(mistake, solve, monkeypatch):
     place, change = MISTAKES[mistake]
     module, *path = place.split(".")
     if module == "elimination" and solve is solved:

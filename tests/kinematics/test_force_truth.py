@@ -1,7 +1,6 @@
 """Reactions and efforts against ADAMS, a published benchmark and closed forms."""
 
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +26,7 @@ from kincheck.core.trajectory import BodyMotion, Trajectory
 from ..oracles import naive, newton_euler
 from ..support.adams_single_joints import CASES, right
 from ..support.loads import GRAVITY, six
-from ..support.mechanisms import X
+from ..support.mechanisms import ORIGIN, X, Z
 
 DATA = Path(__file__).parents[1] / "data"
 REACTIONS = json.loads((DATA / "adams_joint_reactions.json").read_text(encoding="utf-8"))["cases"]
@@ -38,7 +37,7 @@ ANDREWS = json.loads((DATA / "andrews_squeezer.json").read_text(encoding="utf-8"
 
 
 @pytest.mark.parametrize("name", sorted(REACTIONS))
-def test_reactions_of_adams(name):
+def test_reactions_agree_with_adams_records(name):
     """A body falls from one joint; the recorded motion gives the recorded reaction on the ground.
 
     The motion is printed with six digits, so reactions agree to a few parts in a million.
@@ -76,130 +75,112 @@ def test_reactions_of_adams(name):
 
 def pendulum(**options):
     body = Body("arm", mass=2.0, center_of_mass=(0.5, 0.0, 0.0), inertia=(0.1, 0.3, 0.3, 0, 0, 0))
-    hinge = Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    hinge = Revolute("hinge", "ground", "arm", ORIGIN, Z)
     tip = Point("tip", "arm", X)
     return Mechanism("pendulum", [body], [hinge], [tip], [JointAngle("turn", "hinge")], **options)
 
 
 ANGLES = np.linspace(-7.0, 7.0, 29)  # more than a turn to both sides
+C, S = np.cos(ANGLES), np.sin(ANGLES)
+HEAVY = pendulum(gravity=(0.0, -9.81, 0.0))
 
 
-def test_pendulum_by_hand():
-    mechanism = pendulum(gravity=(0.0, -9.81, 0.0))
-    found = solve(mechanism, "turn", ANGLES, rate=3.0, forces=True).forces
-    c, s = np.cos(ANGLES), np.sin(ANGLES)
-    expected = np.stack([-2.0 * 0.5 * 9.0 * c, -2.0 * 0.5 * 9.0 * s + 2.0 * 9.81, 0 * c], axis=1)
+def turned(mechanism, sign=1.0, rate=3.0):
+    return solve(mechanism, "turn", sign * ANGLES, rate=sign * rate, forces=True).forces
+
+
+def test_pendulum_reactions_closed_form():
+    found = turned(HEAVY)
+    expected = np.stack([-9.0 * C, -9.0 * S + 2.0 * 9.81, 0 * C], axis=1)
     reaction = found.joints["hinge"]
-    np.testing.assert_allclose(reaction.force, expected, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(reaction.moment, 0.0, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(found.drivers["turn"], 9.81 * c, rtol=0, atol=1e-13)
+    assert reaction.force == pytest.approx(expected, abs=1e-13)
+    assert reaction.moment == pytest.approx(0.0, abs=1e-13)
+    assert found.drivers["turn"] == pytest.approx(9.81 * C, abs=1e-13)
 
 
-def test_the_second_body_may_be_the_ground():
+def test_reactions_of_reversed_joint_change_sign():
     """Then the reaction is what the arm exerts on the ground."""
-    mechanism = pendulum(gravity=(0.0, -9.81, 0.0))
-    reversed_ = replace(mechanism, joints=[mechanism.joints[0].reversed()])
-    one = solve(mechanism, "turn", ANGLES, forces=True).forces
-    other = solve(reversed_, "turn", -ANGLES, rate=-1.0, forces=True).forces
-    for a, b in (
-        (one.joints["hinge"].force, -other.joints["hinge"].force),
-        (one.joints["hinge"].moment, -other.joints["hinge"].moment),
-        (one.drivers["turn"], -other.drivers["turn"]),
-    ):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
+    one = turned(HEAVY)
+    other = turned(replace(HEAVY, joints=[HEAVY.joints[0].reversed()]), sign=-1.0)
+    assert one.drivers["turn"] == pytest.approx(-other.drivers["turn"], abs=1e-13)
+    one, other = one.joints["hinge"], other.joints["hinge"]
+    assert one.force == pytest.approx(-other.force, abs=1e-13)
+    assert one.moment == pytest.approx(-other.moment, abs=1e-13)
 
 
-def test_springs_and_loads_by_hand():
+def test_pendulum_forces_of_each_element():
     """Each element alone on the pendulum; its torque is what the driver works against."""
-    c, s = np.cos(ANGLES), np.sin(ANGLES)
-    anchor = np.array([0.0, 2.0, 0.0])
-    tip = np.stack([c, s, 0 * c], axis=1)
-    d = tip - anchor
+    tip = np.stack([C, S, 0 * C], axis=1)
+    d = tip - [0.0, 2.0, 0.0]
     length = np.linalg.norm(d, axis=1)
-    rate = 3.0 * (d[:, 0] * -s + d[:, 1] * c) / length
+    rate = 3.0 * (d[:, 0] * -S + d[:, 1] * C) / length
     tension = 100.0 * (length - 0.7) + 5.0 * rate
     pull = -tension[:, None] * d / length[:, None]
-    cases_of = [
+    winding = -(10.0 * (ANGLES - 0.5) + 2.0 * 3.0)
+    push, still = (0.0, 7.0, 0.0), turned(pendulum()).joints["hinge"].force
+    for element, amount, torque, force in (
         (
             SpringDamper("x", "ground", "arm", ((0, 2, 0), X), 100.0, 5.0, 0.7),
             tension,
             tip[:, 0] * pull[:, 1] - tip[:, 1] * pull[:, 0],
             pull,
         ),
-        (
-            TorsionSpringDamper("x", "hinge", 10.0, 2.0, 0.5),
-            -(10.0 * (ANGLES - 0.5) + 2.0 * 3.0),
-            -(10.0 * (ANGLES - 0.5) + 2.0 * 3.0),
-            np.zeros((len(c), 3)),
-        ),
-        (
-            Force("x", "arm", X, (0.0, 7.0, 0.0)),
-            np.full(len(c), 7.0),
-            7.0 * c,
-            np.stack([0 * c, 7.0 + 0 * c, 0 * c], axis=1),
-        ),
-        (
-            Force("x", "arm", X, (0.0, 7.0, 0.0), "body"),
-            np.full(len(c), 7.0),
-            7.0 + 0 * c,
-            np.stack([-7.0 * s, 7.0 * c, 0 * c], axis=1),
-        ),
-        (Torque("x", "arm", (0.0, 3.0, 4.0)), np.full(len(c), 5.0), 4.0 + 0 * c, np.zeros((1, 3))),
-    ]
-    still = solve(pendulum(), "turn", ANGLES, rate=3.0, forces=True).forces
-    for element, amount, torque, force in cases_of:
-        found = solve(pendulum(forces=[element]), "turn", ANGLES, rate=3.0, forces=True).forces
-        np.testing.assert_allclose(found.elements["x"], amount, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(found.drivers["turn"], -torque, rtol=0, atol=1e-11)
-        reaction = found.joints["hinge"].force - still.joints["hinge"].force
-        np.testing.assert_allclose(reaction, np.broadcast_to(-force, reaction.shape), atol=1e-11)
+        (TorsionSpringDamper("x", "hinge", 10.0, 2.0, 0.5), winding, winding, 0.0),
+        (Force("x", "arm", X, push), 7.0, 7.0 * C, push),
+        (Force("x", "arm", X, push, "body"), 7.0, 7.0, np.stack([-7 * S, 7 * C, 0 * C], axis=1)),
+        (Torque("x", "arm", (0.0, 3.0, 4.0)), 5.0, 4.0, 0.0),
+    ):
+        found = turned(pendulum(forces=[element]))
+        for one, expected in (
+            (found.elements["x"], amount),
+            (-found.drivers["turn"], torque),
+            (still - found.joints["hinge"].force, force),
+        ):
+            assert np.abs(one - expected).max() <= 1e-11
         assert np.abs(found.power).max() <= 1e-12 * max(found.largest_power.max(), 1.0)
 
 
-def sine_driven(mechanism, sine):
-    """Motion of all bodies, and forces, of a driver that follows a sine."""
-    path = motions.Path({"turn": sine}, np.linspace(0.1, 1.0, 5))
+def driven(mechanism, motion, times):
+    """Motion of all bodies, and forces, by a motion of the driver."""
+    (driver,) = mechanism.drivers
+    path = motions.Path({driver.name: motion}, times)
     names = tuple(body.name for body in mechanism.moving)
-    motion = prepare(mechanism, Request(("turn",), (), names, 2), path)(1e-12)
-    return motion, forces_of(mechanism, path, motion), path.times
+    found = prepare(mechanism, Request((driver.name,), (), names, 2), path)(1e-12)
+    return found, forces_of(mechanism, path, found)
 
 
-def test_a_gear_loads_the_driven_shaft_and_not_the_hinges():
+SWUNG = np.linspace(0.1, 1.0, 5)
+
+
+def test_gear_effort_carries_geared_inertia():
     """Two shafts: the effort carries the second one's inertia by the ratio squared."""
-    z = (0.0, 0.0, 1.0)
     bodies = [
         Body("one", mass=1.0, inertia=(1.0, 1.0, 0.3, 0, 0, 0)),
         Body("two", X, mass=1.0, inertia=(1.0, 1.0, 0.5, 0, 0, 0)),
     ]
     joints = [
-        Revolute("first", "ground", "one", (0.0, 0.0, 0.0), z),
-        Revolute("second", "ground", "two", X, z),
+        Revolute("first", "ground", "one", ORIGIN, Z),
+        Revolute("second", "ground", "two", X, Z),
     ]
-    mechanism = Mechanism(
-        "m",
-        bodies,
-        joints,
-        [],
-        [JointAngle("turn", "first")],
-        [Gear("gear", ("first", "second"), 2.0)],
-    )
+    gear = Gear("gear", ("first", "second"), 2.0)
+    mechanism = Mechanism("m", bodies, joints, [], [JointAngle("turn", "first")], [gear])
     sine = motions.Sine(0.5, 0.3)
-    motion, found, times = sine_driven(mechanism, sine)
-    acceleration = sine.at(times)[2]
+    motion, found = driven(mechanism, sine, SWUNG)
+    acceleration = sine.at(SWUNG)[2]
     ratio = motion.bodies["two"].a[:, 5] / acceleration
     expected = (0.3 + ratio**2 * 0.5) * acceleration
-    np.testing.assert_allclose(found.drivers["turn"], expected, rtol=0, atol=1e-12)
+    assert found.drivers["turn"] == pytest.approx(expected, abs=1e-12)
     for reaction in found.joints.values():
-        np.testing.assert_allclose(reaction.moment, 0.0, rtol=0, atol=1e-12)
+        assert reaction.moment == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_screw_does_no_work():
+def test_screw_reaction_does_no_work():
     """Its thrust and its torque, times their rates, cancel."""
     axis = np.array([0.6, 0.0, 0.8])
     nut = Body("nut", mass=2.0, inertia=(1.0, 1.0, 1.0, 0, 0, 0))
     joint = Screw("screw", "ground", "nut", (0.1, 0.2, 0.3), tuple(axis), 0.05)
     mechanism = Mechanism("m", [nut], [joint], [], [JointAngle("turn", "screw")], gravity=GRAVITY)
-    motion, found, _ = sine_driven(mechanism, motions.Sine(2.0, 0.3))
+    motion, found = driven(mechanism, motions.Sine(2.0, 0.3), SWUNG)
     reaction, moved = found.joints["screw"], motion.bodies["nut"]
     thrust, torque = reaction.force @ axis, reaction.moment @ axis
     slide = np.einsum("ni,i->n", moved.v[:, :3], axis)
@@ -222,44 +203,15 @@ class Lifted(motions.Motion):
         return 0.5 * self.acceleration * t**2, self.acceleration * t, self.acceleration + 0.0 * t
 
 
-def test_andrews_published_start():
+def test_andrews_squeezer_published_start_forces():
     """The published accelerations as a driven motion give back the published drive torque.
 
     And the published multipliers, which are the components of the force at E of the triangle.
     """
-    p = {k: float(v) for k, v in ANDREWS["parameters"].items()}
-    start = ANDREWS["published"]["t0"]
-    be, th, ga, ph, de, om, ep = map(float, start["q"])
-    xa, ya, xb, yb = p["xa"], p["ya"], p["xb"], p["yb"]
-    c, s = math.cos, math.sin
-    e, f = p["e"] - p["ea"], p["zf"] - p["fa"]
-    centers = [
-        (p["ra"] * c(be), p["ra"] * s(be)),
-        (p["rr"] * c(be) - p["da"] * c(be + th), p["rr"] * s(be) - p["da"] * s(be + th)),
-        (xb + p["sa"] * s(ga) + p["sb"] * c(ga), yb - p["sa"] * c(ga) + p["sb"] * s(ga)),
-        (xa + p["zt"] * c(de) + e * s(ph + de), ya + p["zt"] * s(de) - e * c(ph + de)),
-        (xa + p["ta"] * c(de) - p["tb"] * s(de), ya + p["ta"] * s(de) + p["tb"] * c(de)),
-        (xa + p["u"] * s(ep) + f * c(om + ep), ya - p["u"] * c(ep) + f * s(om + ep)),
-        (xa + p["ua"] * s(ep) - p["ub"] * c(ep), ya - p["ua"] * c(ep) - p["ub"] * s(ep)),
-    ]
-    case = cases.load("andrews_squeezer")
-    bodies = [
-        # the plane motion needs Izz only
-        Body(
-            f"K{k}", mass=p[f"m{k}"], center_of_mass=(*at, 0.0), inertia=[p[f"i{k}"]] * 3 + [0] * 3
-        )
-        for k, at in enumerate(centers, start=1)
-    ]
-    D = case.mechanism.point("D").position
-    ends = ((p["xc"], p["yc"], 0.0), D)
-    spring = SpringDamper("spring", "ground", "K3", ends, p["c0"], free_length=p["l0"])
-    mechanism = replace(case.mechanism, bodies=bodies, forces=[spring])
-    driver = mechanism.drivers[0].name
-    path = motions.Path({driver: Lifted(float(start["qdd"][0]))}, np.zeros(1))
-    names = tuple(body.name for body in mechanism.moving)
-    motion = prepare(mechanism, Request((driver,), (), names, 2), path)(1e-12)
-    found = forces_of(mechanism, path, motion)
-    assert abs(found.drivers[driver][0] - p["mom"]) <= 1e-12
+    torque, start = ANDREWS["parameters"]["mom"], ANDREWS["published"]["t0"]
+    mechanism = cases.load("andrews_squeezer").mechanism
+    _, found = driven(mechanism, Lifted(float(start["qdd"][0])), np.zeros(1))
+    assert abs(found.drivers["crank"][0] - float(torque)) <= 1e-12
     multipliers = np.array([98.5668703962410896, -6.12268834425566265])
     force = found.joints["E3"]
     assert all(np.isfinite(force.along(axis)).all() for axis in np.eye(3)[:2])

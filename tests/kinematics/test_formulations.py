@@ -5,6 +5,8 @@ are exact where the equations hold; away from there they are not, and that is wh
 the spurious zeros (formulation section 3).
 """
 
+from dataclasses import replace
+
 import kincheck.cases
 import numpy as np
 import pytest
@@ -14,7 +16,17 @@ from kincheck.core.case.joint_probe import probes
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
-from kincheck.core.kinematics.formulation.constraints import Style, constraints, frames
+from kincheck.core.kinematics.formulation.acceptance_criteria import (
+    Block,
+    Candidate,
+    Limits,
+    margins,
+)
+from kincheck.core.kinematics.formulation.cartesian import Cartesian
+from kincheck.core.kinematics.formulation.constraints import Constraint, Style, constraints, frames
+from kincheck.core.kinematics.structure.redundancy import independent_rows
+from kincheck.core.mechanism.mechanism import GROUND
+from kincheck.core.primitives import Drive, Ground, Twist
 from kincheck.core.primitives.base import Pose
 from kincheck.core.primitives.dot11 import Dot11, PaperDot11
 from kincheck.core.primitives.dot12 import Dot12, PaperDot12
@@ -24,6 +36,7 @@ from kincheck.core.primitives.named import NamedTurn
 
 from ..support.mechanisms import mcpherson
 from ..support.specimens import LANES, direction, frame, lanes, orientation, rotation, vector
+from .test_freedom import jacobian
 
 OTHERS = [style for style in Style if style is not Style.NATIVE]
 ORDERS = ("position", "velocity", "acceleration")
@@ -50,7 +63,7 @@ STROKES = np.linspace(-0.08, 0.08, 161)
 
 
 @pytest.mark.parametrize("style", OTHERS)
-def test_the_strut_moves_alike_in_all_styles(style):
+def test_strut_motion_in_row_styles(style):
     """Round-off of metre-sized coordinates is 1e-16; each derivative passes the equations, of
     pivots about 0.3, once more.
     """
@@ -82,7 +95,7 @@ STYLES = {name: OTHERS if name in PROBES else [Style.RELATIVE] for name in CASES
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_all_cases_move_alike_in_all_styles(name):
+def test_case_motion_in_row_styles(name):
     reference = run(CASES[name], Style.NATIVE)
     # a hundred roundings, divided by the smallest singular value once for positions, and once more
     # for each derivative
@@ -99,7 +112,7 @@ def test_all_cases_move_alike_in_all_styles(name):
             )
 
 
-def test_a_primitive_without_other_forms_is_named():
+def test_primitive_without_paper_form_is_named():
     with pytest.raises(SolveError, match="NamedTurn has no rows in the styles paper"):
         NamedTurn(X).paper_form()
     with pytest.raises(SolveError, match="NamedTurn has no rows"):
@@ -140,33 +153,28 @@ def off_by(rng, angle, turn=None):
 SMALL = np.geomspace(1e-6, 1e-2, LANES)
 
 
-def test_parallel_axes_have_exact_rows_on_the_right_branch_only(rng):
-    f, g, h = frame(rng)
-    i = Pose.of(vector(rng), orientation(rng))
-    spin = rotation(h, rng.uniform(-3.0, 3.0, LANES))
+@pytest.mark.parametrize("primitive", [Dot11, Dot12])
+def test_simplified_rows_by_misalignment(primitive, rng):
+    """Of parallel axes and of a lock: exact on the manifold alone."""
+    (f, g, h), i = frame(rng), Pose.of(vector(rng), orientation(rng))
+    native = Dot11(f, g, h) if primitive is Dot11 else Dot12()
+    spin = rotation(h, rng.uniform(-3.0, 3.0, LANES) if primitive is Dot11 else 0.0)
 
     def rows(misalignment):
-        return both(Dot11(f, g, h), i, Pose.of(vector(rng), i.q * rotation(f, misalignment) * spin))
+        return both(native, i, Pose.of(vector(rng), i.q * rotation(f, misalignment) * spin))
 
     simplified, exact = rows(0.0)
     assert np.abs(simplified - exact).max() < 1e-14
-    simplified, exact = rows(np.pi)
-    assert np.abs(simplified + exact).max() < 1e-14
     simplified, exact = rows(SMALL)
     error = np.abs(simplified - exact).max(axis=(1, 2)) / SMALL
     # first order in the misalignment: largest component of a unit vector
     assert 0.1 < error.min() < error.max() < 2.0
+    if primitive is Dot11:  # opposite on the other branch
+        simplified, exact = rows(np.pi)
+        assert np.abs(simplified + exact).max() < 1e-14
 
 
-def test_a_lock_has_exact_rows_where_it_is_closed_only(rng):
-    simplified, exact = both(Dot12(), *off_by(rng, 0.0))
-    assert np.abs(simplified - exact).max() < 1e-14
-    simplified, exact = both(Dot12(), *off_by(rng, SMALL))
-    error = np.abs(simplified - exact).max(axis=(1, 2)) / SMALL
-    assert 0.1 < error.min() < error.max() < 2.0
-
-
-def test_simplified_lock_rows_are_never_singular(rng):
+def test_simplified_lock_rows_are_regular(rng):
     """Those by full products are, for one, at a right angle about a joint axis."""
     simplified, exact = both(Dot12(), *off_by(rng, 0.5 * np.pi, X))
     assert np.linalg.svd(exact, compute_uv=False).min() < 1e-15
@@ -180,7 +188,7 @@ def beyond(rows, others):
     return np.abs(rows - rows @ np.linalg.pinv(others) @ others).max(axis=(1, 2))
 
 
-def test_a_simplified_line_needs_the_lock_beside_it(rng):
+def test_simplified_line_rows_need_lock(rng):
     """dot21 leaves out what three rows of dot12 say; with them it spans the exact rows at any pose,
     without them it is wrong.
     """
@@ -241,7 +249,7 @@ def newton(primitives, i, j):
 
 
 @pytest.mark.parametrize("style", Style)
-def test_from_anywhere_to_the_right_branch(style, rng):
+def test_newton_branch_from_random_starts(style, rng):
     """Exact rows lead to the nearest zero; seven of the eight rotations that solve the conventional
     residual are spurious.
     """
@@ -255,3 +263,91 @@ def test_from_anywhere_to_the_right_branch(style, rng):
         assert (np.minimum(np.abs(turns - 120.0), np.abs(turns - 180.0)) < 1e-3).all()
     else:
         assert right == STARTS
+
+
+# Ground rows: the paper counts fixed bodies too; eliminating them changes nothing
+
+
+def with_ground_rows(mechanism, drives):
+    held = [
+        Constraint(body.name, Ground(), GROUND, body.name)
+        for body in mechanism.bodies
+        if body.fixed
+    ]
+    return Cartesian(
+        [*held, *constraints(mechanism, frames(mechanism), drives)],
+        [body.name for body in mechanism.bodies],
+    )
+
+
+def test_ground_rows_keep_rank():
+    """Formulation section 10: 30 columns, 29 rows and the driver, rank 29 without it."""
+    formulation = with_ground_rows(mcpherson(), {})
+    J = jacobian(formulation, formulation.configuration(formulation.design))
+    assert J.shape == (30, 30)
+    singular = np.linalg.svd(J[:29], compute_uv=False)
+    assert singular[-1] > 1e-3
+    assert len(independent_rows(J[:29], 0)) == 29
+
+
+def test_ground_rows_keep_solution():
+    """Newton's iteration on all 30 unknowns, dense and by numpy, against the sweep of 18."""
+    stroke, mechanism = 0.05, mcpherson()
+    unit = frames(mechanism).unit
+    formulation = with_ground_rows(mechanism, {"stroke": Drive(stroke / unit, 1.0 / unit)})
+    at = formulation.configuration(formulation.design)
+    for _ in range(8):
+        step = np.linalg.solve(jacobian(formulation, at), -np.array(formulation.phi(at)))
+        at = formulation.configuration(formulation.retract(at, list(step)))
+    assert np.abs(formulation.phi(at)).max() < 1e-15
+    v = np.linalg.solve(jacobian(formulation, at), formulation.nu(at))
+    a = np.linalg.solve(jacobian(formulation, at), formulation.gamma(at, list(v)))
+    arm = frames(mechanism).arm("knuckle", mechanism.point("wheel").position)
+    pose, motion = at.poses["knuckle"], formulation.twists(at, list(v))["knuckle"]
+    rest = formulation.accelerations(at, list(v), list(a))["knuckle"]
+    S = pose.turn(arm)
+    expected = (
+        np.add([*(unit * (pose.u + pose.swing(arm)))], mechanism.point("wheel").position),
+        [*(unit * motion.of(S))],
+        [*(unit * (Twist(rest.v_t, rest.w_t).of(S) + motion.centripetal(S)))],
+    )
+    wheel = solve(mechanism, "stroke", [stroke]).points["wheel"]
+    for found, wanted in zip(
+        (wheel.position[0], wheel.velocity[0], wheel.acceleration[0]), expected, strict=True
+    ):
+        assert found == pytest.approx(wanted, rel=1e-14, abs=1e-14)
+    for fixed in ("chassis", "rack"):
+        assert np.abs([*at.poses[fixed].u]).max() < 1e-15
+
+
+# Acceptance: each criterion fails alone
+
+BLOCKS = [Block(0.5, 0.5, 0.1)]
+POSE = Candidate(1.0, 1e-15, 1e-15, 1.0, 0.0, 0.1, 0.1, [0.1], 0.5, 0.5, 1.0, 0.0, BLOCKS)
+SPOILT = [
+    ("converged", {"done": 0.0}),
+    ("closed", {"closure": 2e-12}),
+    ("consistent", {"leftover": 2e-12}),
+    ("on the branch", {"branch": -0.1}),
+    ("continued", {"gap": 0.011}),
+    ("near", {"reach": 0.6}),
+    ("not turned round", {"turns": [0.1, -2.1]}),
+    ("as regular", {"blocks": [Block(0.5, 0.03, 0.1)]}),
+    ("as regular", {"blocks": [*BLOCKS, Block(0.03, 0.5, 0.1)]}),
+    ("on this side", {"reversal": -1.0}),
+    ("regular between", {"moved": 0.3, "blocks": [Block(0.5, 0.5, 1.0)]}),
+    ("certain", {"sigma": 1e-7}),
+    ("not turned by rounding", {"sigma": 2e-6, "before": 1e-6}),
+]
+
+
+@pytest.mark.parametrize(("criterion", "changes"), SPOILT, ids=str)
+def test_margins_of_spoilt_pose(criterion, changes):
+    def failed(pose, crossing):
+        found = margins(pose, Limits(1e-12, 1e-12, crossing))
+        return {name for name, margin in found.items() if margin <= 0.0}
+
+    assert failed(POSE, 0.0) == set()
+    assert failed(replace(POSE, **changes), 0.0) == {criterion}
+    passed = criterion in ("as regular", "on this side", "regular between")
+    assert failed(replace(POSE, **changes), 100.0) == (set() if passed else {criterion})

@@ -28,71 +28,74 @@ TURNS = 2.0 * np.pi * np.linspace(-1.0, 1.0, 31)
 STROKES = np.linspace(-0.08, 0.08, 33)
 
 
-def wheel(mechanism=None, values=STROKES, **options):
-    found = solve(mechanism or mcpherson(), "stroke", values, **options)
+STRUT = mcpherson()
+
+
+def wheel(mechanism=STRUT, values=STROKES, **options):
+    """Position, velocity and acceleration, shape (3, n, 3)."""
+    found = solve(mechanism, "stroke", values, **options)
     assert found.solved.all(), found.message
-    return found.points["wheel"]
+    motion = found.points["wheel"]
+    return np.array([motion.position, motion.velocity, motion.acceleration])
 
 
-def assert_same(found, expected, position=2e-16, velocity=2e-15, acceleration=2e-14):
-    """Two motions of a point that differ by round-off: numbers near one, amplified by the condition
-    (36).
-    """
-    assert np.abs(found.position - expected.position).max() <= position
-    assert np.abs(found.velocity - expected.velocity).max() <= velocity
-    assert np.abs(found.acceleration - expected.acceleration).max() <= acceleration
+def assert_same(found, expected, limits=(2e-16, 2e-15, 5e-14)):
+    """Two motions that differ by round-off: numbers near one, amplified by the condition (36)."""
+    assert (np.abs(found - expected).max(axis=(1, 2)) <= limits).all()
 
 
 @pytest.mark.parametrize("rate", [0.25, -2.0, 1e3])
-def test_rate_scales_velocities_and_accelerations(rate):
-    expected, found = wheel(), wheel(rate=rate)
-    once, scaled = (
-        solve(mcpherson(), "stroke", STROKES, rate=each).iterations for each in (1.0, rate)
-    )
+def test_rate_scales_derivatives(rate):
+    assert_same(wheel(rate=rate) / rate ** np.arange(3.0)[:, None, None], wheel())
+    once, scaled = (solve(STRUT, "stroke", STROKES, rate=x).iterations for x in (1.0, rate))
     # predicted as well; a negative rate starts at the other side
     assert sorted(once) == sorted(scaled)
-    assert np.abs(found.position - expected.position).max() <= 2e-16
-    assert found.velocity == pytest.approx(
-        rate * expected.velocity, rel=1e-13, abs=1e-15 * abs(rate)
-    )
-    assert found.acceleration == pytest.approx(
-        rate**2 * expected.acceleration, rel=1e-13, abs=1e-14 * rate**2
-    )
 
 
-@pytest.mark.parametrize("number", range(6))
-def test_order_of_the_bodies_of_a_joint_does_not_matter(number):
-    """Each joint exchanged by itself, and all of them."""
-    m = mcpherson()
-    exchanged = [
-        joint.reversed() if number in (k, 5) else joint for k, joint in enumerate(m.joints)
-    ]
-    assert_same(wheel(replace(m, joints=exchanged)), wheel())
+def exchanged(*numbers):
+    joints = [x.reversed() if k in numbers else x for k, x in enumerate(STRUT.joints)]
+    return replace(STRUT, joints=joints)
 
 
-def test_order_of_the_bodies_of_a_driven_joint_turns_its_sign():
-    forward, back = (
-        solve(m, "turn", a) for m, a in ((slider_crank(), TURNS), (swapped(slider_crank()), -TURNS))
-    )
-    assert np.abs(back.points["pin"].position - forward.points["pin"].position).max() <= 1e-15
-    assert np.abs(back.points["pin"].velocity + forward.points["pin"].velocity).max() <= 1e-15
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_order_of_bodies_and_joints_does_not_matter(seed):
-    rng, m = np.random.default_rng(seed), mcpherson()
+def shuffled(seed):
+    rng = np.random.default_rng(seed)
     bodies, joints = (
-        [m.bodies[k] for k in rng.permutation(5)],
-        [m.joints[k] for k in rng.permutation(5)],
+        [each[k] for k in rng.permutation(5)] for each in (STRUT.bodies, STRUT.joints)
     )
-    assert_same(wheel(replace(m, bodies=bodies, joints=joints)), wheel(), acceleration=5e-14)
+    return replace(STRUT, bodies=bodies, joints=joints)
+
+
+DRAWN = PointCoordinate("stroke", "wheel", (0.0, 0.0, 4.0))
+WRITTEN = {
+    **{f"joint {k} reversed": exchanged(k) for k in range(5)},
+    "all joints reversed": exchanged(*range(5)),
+    **{f"order {seed}": shuffled(seed) for seed in range(3)},
+    "long axes": placed(STRUT, tuple, lambda axis: tuple(137.0 * np.array(axis))),
+    "ground for fixed bodies": without_fixed_bodies(STRUT),
+    "long direction": replace(STRUT, drivers=[DRAWN]),
+}
+
+
+@pytest.mark.parametrize("way", WRITTEN)
+def test_motion_invariant_to_description(way):
+    exact = way in ("ground for fixed bodies", "long direction")
+    assert_same(wheel(WRITTEN[way]), wheel(), *[[0.0] * 3] * exact)
+
+
+def test_reversed_driven_joint_changes_sign():
+    forward, back = (
+        solve(m, "turn", a).points["pin"]
+        for m, a in ((slider_crank(), TURNS), (swapped(slider_crank()), -TURNS))
+    )
+    assert np.abs(back.position - forward.position).max() <= 1e-15
+    assert np.abs(back.velocity + forward.velocity).max() <= 1e-15
 
 
 @pytest.mark.parametrize(
     "name",
     ["andrews_squeezer", "bricard", "four_bar", "mcpherson_strut", "planar_slider_crank", "rssr"],
 )
-def test_joints_twice_are_the_same_joints(name):
+def test_motion_invariant_to_duplicate_joints(name):
     """Some again, hinges and slides elsewhere on their axes, all in another order: which rows are
     left out does not matter.
     """
@@ -111,53 +114,40 @@ def test_joints_twice_are_the_same_joints(name):
     )
     assert twice.solved.all()
     for point in case.points:
+        a, b = once.points[point], twice.points[point]
         # some round-offs of numbers near one, amplified by conditions of up to 40
-        assert np.abs(twice.points[point].position - once.points[point].position).max() <= 5e-15
-        scale = 1.0 + np.abs(once.points[point].acceleration).max()
-        assert (
-            np.abs(twice.points[point].acceleration - once.points[point].acceleration).max()
-            <= 5e-14 * scale
-        )
+        assert np.abs(b.position - a.position).max() <= 5e-15
+        scale = 1.0 + np.abs(a.acceleration).max()
+        assert np.abs(b.acceleration - a.acceleration).max() <= 5e-14 * scale
 
 
-def test_fixed_bodies_or_ground():
-    assert_same(wheel(without_fixed_bodies(mcpherson())), wheel(), 0.0, 0.0, 0.0)
+# Scaling and turning round every hardpoint once, which moves the result by the condition times
+# 1e-16.
+ROUNDED = 3e-15, 5e-15, 5e-14
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 7.0, 1e3])
-def test_size_does_not_matter(factor):
+def test_motion_scales_with_size(factor):
     """All lengths, the stroke and the rate scaled: everything scales, to the same relative
     accuracy.
     """
-    small = placed(mcpherson(), lambda point: tuple(factor * np.array(point)), factor=factor)
-    found, expected = wheel(small, factor * STROKES, rate=factor), wheel()
-    # scaling rounds every hardpoint once, which moves the result by the condition times 1e-16
-    assert found.position / factor == pytest.approx(expected.position, abs=3e-15)
-    assert found.velocity / factor == pytest.approx(expected.velocity, abs=3e-15)
-    assert found.acceleration / factor == pytest.approx(expected.acceleration, abs=5e-14)
+    small = placed(STRUT, lambda point: tuple(factor * np.array(point)), factor=factor)
+    assert_same(wheel(small, factor * STROKES, rate=factor) / factor, wheel(), ROUNDED)
 
 
-def snapped(point):
-    """Rounded to 2^-30 m, so that whole numbers of metres up to 2^22 can be added without
-    rounding.
-    """
-    return tuple(np.round(np.array(point) * 2.0**30) / 2.0**30)
-
-
-@pytest.mark.parametrize("offset", [(1e6, 0.0, 0.0), (-1e6, 1e6, 2e6)])
-def test_place_does_not_matter(offset):
+@pytest.mark.parametrize("offset", [(1e6, 0.0, 0.0), (-1e6, 1e6, 2e6)], ids=str)
+def test_motion_invariant_to_distant_place(offset):
     """A thousand kilometres away: only the sum with the position rounds, at 1e-10 m; the motion
-    keeps all its digits.
+    keeps all its digits. Hardpoints are rounded to 2^-30 m, so that their sums are exact.
     """
-    here = placed(mcpherson(), snapped)
+    here = placed(STRUT, lambda point: tuple(np.round(np.array(point) * 2.0**30) / 2.0**30))
     away = placed(here, lambda point: tuple(np.add(point, offset)))
-    found, expected = wheel(away), wheel(here)
-    assert np.abs(found.position - (expected.position + offset)).max() <= 2.4e-10
-    assert (found.velocity == expected.velocity).all()
-    assert (found.acceleration == expected.acceleration).all()
+    found = wheel(away)
+    found[0] -= offset
+    assert_same(found, wheel(here), (2.4e-10, 0.0, 0.0))
 
 
-def test_orientation_does_not_matter():
+def test_motion_invariant_to_orientation():
     """The strut turned in space, and the direction of its driver with it."""
     turn = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
@@ -165,21 +155,9 @@ def test_orientation_does_not_matter():
     def turned(point):
         return tuple(turn @ point)
 
-    m = placed(mcpherson(), turned, turned)
+    m = placed(STRUT, turned, turned)
     m = replace(m, drivers=[PointCoordinate("stroke", "wheel", turned(Z))])
-    found, expected = wheel(m), wheel()
-    # turning rounds every hardpoint, as scaling does
-    assert found.position @ turn == pytest.approx(expected.position, abs=3e-15)
-    assert found.velocity @ turn == pytest.approx(expected.velocity, abs=5e-15)
-    assert found.acceleration @ turn == pytest.approx(expected.acceleration, abs=5e-14)
-
-
-def test_units_of_axes_do_not_matter():
-    m = mcpherson()
-    long = placed(m, tuple, lambda axis: tuple(137.0 * np.array(axis)))
-    assert_same(wheel(long), wheel())
-    drawn = replace(m, drivers=[PointCoordinate("stroke", "wheel", (0.0, 0.0, 4.0))])
-    assert_same(wheel(drawn), wheel(), 0.0, 0.0, 0.0)
+    assert_same(wheel(m) @ turn, wheel(), ROUNDED)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3])
@@ -189,39 +167,34 @@ def test_units_of_axes_do_not_matter():
         Revolute("r", "ground", "a", ORIGIN, Z),
         ParallelAxes("r", "ground", "a", Z),
     ],
+    ids=["revolute", "parallel axes"],
 )
-def test_what_has_no_extent_between_its_joints_is_as_large_as_its_points(size, joint):
+def test_length_unit_of_single_joint(size, joint):
     """A single pivot, or axes that are nowhere: measured in metres, a point a micrometre away would
     be no way away.
     """
-    across, along = (size, 0.0, 0.0), (0.0, 1.0, 0.0)
-    free = (
-        []
-        if isinstance(joint, Revolute)
-        else [(f"at {k}", tuple(map(float, np.eye(3)[k]))) for k in range(3)]
-    )
+    free = () if isinstance(joint, Revolute) else np.eye(3).tolist()
     mechanism = Mechanism(
         "pivot",
         [Body("a")],
         [joint],
-        [Point("P", "a", across), Point("O", "a", ORIGIN)],
+        [Point("P", "a", (size, 0.0, 0.0)), Point("O", "a", ORIGIN)],
         [
-            PointCoordinate("y", "P", along),
-            *(PointCoordinate(name, "O", direction) for name, direction in free),
+            PointCoordinate("y", "P", (0.0, 1.0, 0.0)),
+            *(PointCoordinate(f"at {k}", "O", tuple(axis)) for k, axis in enumerate(free)),
         ],
     )
     sine = np.linspace(-0.9, 0.9, 7)
     found = solve(mechanism, "y", sine * size, rate=size)
     assert found.solved.all(), found.message
     cosine, motion = np.sqrt(1.0 - sine**2), found.points["P"]
-    np.testing.assert_allclose(motion.position[:, 0], size * cosine, rtol=2e-15)
-    np.testing.assert_allclose(
-        motion.velocity[:, 0], -size * sine / cosine, rtol=0, atol=2e-14 * size
-    )
-    np.testing.assert_allclose(motion.acceleration[:, 0], -size / cosine**3, rtol=1e-13)
+    x = motion.position[:, 0], motion.velocity[:, 0], motion.acceleration[:, 0]
+    closed = cosine, -sine / cosine, -1.0 / cosine**3
+    for one, expected, off in zip(x, closed, (2e-15, 2e-14, 1e-12), strict=True):
+        assert one / size == pytest.approx(expected, abs=off)
 
 
-def test_the_points_of_a_joint_are_known_by_their_kind():
+def test_length_unit_reads_position_fields():
     """Whatever a joint calls them, they are what the mechanism is measured by: a metre would be a
     million times its size.
     """
@@ -235,12 +208,7 @@ def test_the_points_of_a_joint_are_known_by_their_kind():
             return Revolute(self.name, self.i, self.j, self.pin, self.axis).primitives(i, j)
 
     size = 2.0**-20
-    corners = [
-        ORIGIN,
-        (0.0, size, 0.0),
-        (3.0 * size, 2.0 * size, 0.0),
-        (2.0 * size, 0.0, 0.0),
-    ]
+    corners = [(x * size, y * size, 0.0) for x, y in ((0, 0), (0, 1), (3, 2), (2, 0))]
     links = ["ground", "crank", "coupler", "rocker", "ground"]
     pins = [
         Pinned(f"pin {k}", *links[k : k + 2], axis=Z, pin=corner)
@@ -252,7 +220,7 @@ def test_the_points_of_a_joint_are_known_by_their_kind():
     assert places(mechanism)["joints.pin 2.pin"] == corners[2]
 
 
-def test_a_step_of_too_many_turns_is_not_called_singular():
+def test_step_of_many_turns_message():
     """A fine thread: its smallest singular value is small all along, and nothing is wrong with any
     pose.
     """

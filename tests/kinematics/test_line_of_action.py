@@ -36,34 +36,31 @@ def native(made, style="native"):
     return with_forces(mechanism, made.path, motion).forces
 
 
-@pytest.mark.parametrize("slow", [1.0, SLOW], ids=["moving", "at rest"])
+@pytest.mark.parametrize(
+    "motion",
+    [{}, {"slow": SLOW}, {"size": 6.0}],
+    ids=["moving", "at rest", "metres and more than a turn"],
+)
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_driven_joint_on_the_ground(kind, flipped, slow):
-    made = chain([replace(KINDS[kind], flipped=flipped), HINGE], slow=slow)
+def test_forces_of_driven_joint_on_ground(kind, flipped, motion):
+    made = chain([replace(KINDS[kind], flipped=flipped), HINGE], **motion)
     assert deviation(made, native(made)) < ROUND_OFF
 
 
 @pytest.mark.parametrize("slow", [1.0, SLOW], ids=["moving", "at rest"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "planar"])
-def test_a_driven_joint_on_a_moving_body(kind, flipped, slow):
+def test_forces_of_driven_joint_between_bodies(kind, flipped, slow):
     link = replace(KINDS[kind], flipped=flipped)
     made = chain([replace(HINGE, flipped=not flipped), link, HINGE], slow=slow)
-    assert deviation(made, native(made)) < ROUND_OFF
-
-
-@pytest.mark.parametrize("kind", ["translational", "cylindrical", "screw, by its turn"])
-def test_a_joint_driven_far_from_its_design(kind):
-    """By metres and more than a turn."""
-    made = chain([replace(KINDS[kind], flipped=True), HINGE], size=6.0)
     assert deviation(made, native(made)) < ROUND_OFF
 
 
 @pytest.mark.parametrize("other_end", [False, True], ids=["", "driven from its other end"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
 @pytest.mark.parametrize("name", COUPLINGS)
-def test_a_coupled_joint(name, flipped, other_end):
+def test_forces_of_coupled_joints(name, flipped, other_end):
     one, other, coupling = COUPLINGS[name]
     links = [HINGE, replace(one, flipped=flipped), replace(other, flipped=not flipped)]
     made = chain(links, replace(coupling, drive_driven=other_end), size=0.8)
@@ -72,7 +69,7 @@ def test_a_coupled_joint(name, flipped, other_end):
 
 @pytest.mark.parametrize("kind", ["translational", "cylindrical"])
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-def test_a_pushed_point(kind, flipped):
+def test_forces_of_pushed_point(kind, flipped):
     """Its force acts at the point, so that the slide carries a couple."""
     made = pushed_slide(replace(KINDS[kind], flipped=flipped))
     assert deviation(made, native(made)) < ROUND_OFF
@@ -80,12 +77,12 @@ def test_a_pushed_point(kind, flipped):
 
 @pytest.mark.parametrize("style", Style)
 @pytest.mark.parametrize("kind", ["translational", "screw, by its slide"])
-def test_no_row_style_moves_the_line(kind, style):
+def test_line_of_action_in_row_styles(kind, style):
     made = chain([HINGE, replace(KINDS[kind], flipped=True), HINGE])
     assert deviation(made, native(made, style)) < ROUND_OFF
 
 
-def test_a_place_far_away_moves_no_line():
+def test_line_of_action_far_from_origin():
     """Ten kilometres from the global origin: coordinates have lost four digits."""
     made = chain([HINGE, Link(Translational, flipped=True), HINGE], origin=(6e3, -8e3, 1e3))
     assert deviation(made, native(made)) < 1e4 * ROUND_OFF
@@ -93,7 +90,7 @@ def test_a_place_far_away_moves_no_line():
 
 @pytest.mark.usefixtures("own_joint_types")
 @pytest.mark.parametrize("flipped", [False, True], ids=["", "flipped"])
-def test_a_slide_of_a_user(flipped):
+def test_forces_of_user_slide(flipped):
     @dataclass(frozen=True)
     class Rail(AxialJoint):
         type = "rail"
@@ -107,7 +104,7 @@ def test_a_slide_of_a_user(flipped):
     assert deviation(made, native(made)) < ROUND_OFF
 
 
-def test_a_weight_beside_a_vertical_slide():
+def test_slide_moment_of_offset_weight():
     """(com - P) x W at every sample, as by hand on paper."""
     made = chain([Link(Translational, flipped=True)], slow=SLOW)
     (body,), (joint,) = made.mechanism.bodies, made.mechanism.joints
@@ -121,4 +118,4 @@ def test_a_weight_beside_a_vertical_slide():
     for moment, shift in zip(found.moment, shifts, strict=True):
         weight = np.array([0.0, 0.0, -10.0])
         about = np.cross(shift * h - np.array(guide.point), weight)
-        np.testing.assert_allclose(moment, about, rtol=0, atol=1e-12)
+        assert moment == pytest.approx(about, abs=1e-12)

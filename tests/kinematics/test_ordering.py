@@ -8,8 +8,8 @@ from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.program import Tape, program
 from kincheck.core.program.llvm import programs
-from kincheck.core.program.llvm.programs import AT_ONCE, CYCLES, OTHERS, _Straight, ordered
-from kincheck.core.program.straight_line import lowered
+from kincheck.core.program.llvm.programs import AT_ONCE, CYCLES, OTHERS, _Straight, reschedule
+from kincheck.core.program.straight_line import lower
 from kincheck.core.program.tape import LEAVES, operands
 
 from ..support.mechanisms import mcpherson
@@ -43,26 +43,26 @@ def waiting(steps, beside):
     return program("p", tape, {100 + k: value for k, value in enumerate([*products, x])})
 
 
-def test_what_the_rest_waits_for_comes_first_and_the_rest_between():
-    found = ordered(waiting(5, 30))
+def test_ordering_starts_with_longest_chain():
+    found = reschedule(waiting(5, 30))
     kinds = [node[0] for node in found.nodes if node[0] not in LEAVES]
     assert kinds[0] == "/"
     assert "*" in kinds[1 : len(kinds) - 1 - kinds[::-1].index("/")]
     assert cycles(found) == 5 * CYCLES["/"] < cycles(waiting(5, 30))
 
 
-def test_what_has_no_need_to_wait_is_left_as_it_was_traced():
+def test_ordering_leaves_wide_program():
     wide = waiting(1, 90)
-    assert ordered(wide) is wide
+    assert reschedule(wide) is wide
 
 
 @pytest.mark.parametrize("width", [2, 4, 8])
-def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkeypatch):
+def test_ordering_depends_on_registers(width, monkeypatch):
     each = compile_model(mcpherson(), Request(("stroke",), ("wheel",), compiled=False)).programs[
         "newton"
     ]
     traced, waiting = (
-        _Straight(found, width).text for found in (lowered(each), ordered(lowered(each)))
+        _Straight(found, width).text for found in (lower(each), reschedule(lower(each)))
     )
     assert traced != waiting
     assert (waiting if width == 8 else traced) in programs.function(each, width)
@@ -71,7 +71,7 @@ def test_machine_code_waits_least_where_there_are_registers_for_it(width, monkey
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_programs_of_a_mechanism_take_fewer_cycles_and_say_the_same(order):
+def test_ordering_keeps_results(order):
     model = compile_model(
         mcpherson(), Request(("stroke",), ("wheel",), ("strut", "knuckle"), order=order)
     )
@@ -79,8 +79,8 @@ def test_programs_of_a_mechanism_take_fewer_cycles_and_say_the_same(order):
     for name, each in model.programs.items():
         if each.times > 1 or any(node[0] == "node" for node in each.nodes):
             continue
-        before = lowered(each)
-        after = ordered(before)
+        before = lower(each)
+        after = reschedule(before)
         assert all(k < number for number, node in enumerate(after.nodes) for k in operands(node))
         assert Counter(node[0] for node in after.nodes) == Counter(node[0] for node in before.nodes)
         assert after.outputs.keys() == before.outputs.keys()
@@ -91,7 +91,7 @@ def test_programs_of_a_mechanism_take_fewer_cycles_and_say_the_same(order):
         block = rng.uniform(0.5, 1.5, size=(len(model.slots), 3))
         blocks = block.copy(), block.copy()
         # what is fused, only machine code knows
-        for found, here in zip((each, ordered(each)), blocks, strict=True):
+        for found, here in zip((each, reschedule(each)), blocks, strict=True):
             run_on([found], here, each.name)
         assert np.array_equal(*blocks, equal_nan=True)
     assert moved >= 3

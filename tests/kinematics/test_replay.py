@@ -70,14 +70,14 @@ def worst(name, joint):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_replay_of_adams_satisfies_its_joint(name):
+def test_replay_of_adams_joint(name):
     assert worst(name, right(CASES[name])) == pytest.approx([0.0, 0.0, 0.0], abs=1.0)
 
 
 @pytest.mark.parametrize(
     "name", [name for name, case in CASES.items() if case["joint"] != "revolute_spherical"]
 )
-def test_replay_of_adams_satisfies_the_reversed_joint(name):
+def test_replay_of_reversed_adams_joint(name):
     """With the body as the first one; a revolute-spherical joint would be another, with its hinge
     on the body.
     """
@@ -136,7 +136,7 @@ WRONG = [(name, what) for name, case in CASES.items() for what, _ in wrong_joint
 
 
 @pytest.mark.parametrize(("name", "what"), WRONG)
-def test_replay_of_adams_finds_a_wrong_joint(name, what):
+def test_replay_finds_wrong_adams_joint(name, what):
     found = worst(name, dict(wrong_joints(CASES[name]))[what])
     if what in BLIND.get(name, ()):
         assert max(found) <= 1.0
@@ -144,7 +144,7 @@ def test_replay_of_adams_finds_a_wrong_joint(name, what):
         assert found[0] > BEYOND_DOUBT
 
 
-def test_blind_sides_are_of_joints_that_are_tried():
+def test_replay_blind_sides_are_tried():
     assert {(name, what) for name, found in BLIND.items() for what in found} <= set(WRONG)
 
 
@@ -165,7 +165,7 @@ def loop():
     return mechanism, *moving(mechanism, np.linspace(-0.6, 0.8, 41))
 
 
-def test_replay_of_a_solved_loop_leaves_rounding(loop):
+def test_replay_of_solved_loop(loop):
     found = residuals(*loop)
     for quantity in ("position", "velocity", "acceleration"):
         assert found.worst(quantity).value < 1e-13
@@ -173,7 +173,7 @@ def test_replay_of_a_solved_loop_leaves_rounding(loop):
     assert set(found.joints) == {joint.name for joint in loop[0].joints}
 
 
-def test_replay_names_joint_body_and_sample_of_a_plant(loop):
+def test_replay_names_planted_error(loop):
     mechanism, poses, *rates = loop
     body = mechanism.moving[1].name
     planted = {**poses, body: poses[body].copy()}
@@ -185,14 +185,14 @@ def test_replay_names_joint_body_and_sample_of_a_plant(loop):
     assert found.joint in {j.name for j in mechanism.joints if body in j.bodies}
 
 
-def test_replay_of_rates_of_another_pace_fails(loop):
+def test_replay_finds_wrong_rates(loop):
     mechanism, poses, v, a = loop
     slow = {name: 0.5 * each for name, each in v.items()}
     assert residuals(mechanism, poses, slow).worst("velocity").value < 1e-13
     assert residuals(mechanism, poses, slow, a).worst("acceleration").value > 0.1
 
 
-def test_replay_of_some_bodies_names_joints_not_judged(loop):
+def test_replay_of_some_bodies(loop):
     mechanism, poses, *_ = loop
     absent = mechanism.moving[2].name
     found = residuals(mechanism, {k: x for k, x in poses.items() if k != absent})
@@ -202,7 +202,7 @@ def test_replay_of_some_bodies_names_joints_not_judged(loop):
     assert found.worst("position").value < 1e-13
 
 
-def test_replay_of_a_gap_judges_the_other_samples(loop):
+def test_replay_with_missing_sample(loop):
     mechanism, poses, v, a = loop
     body = mechanism.moving[0].name
     gap = {**poses, body: poses[body].copy()}
@@ -229,8 +229,9 @@ def geared(coupler):
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [(GEAR, replace(GEAR, ratio=-0.41)), (CURVE, replace(CURVE, coefficients=(0.0, 0.5, 0.031)))],
+    ids=["gear", "polynomial"],
 )
-def test_replay_of_a_coupler_judges_its_ratio(right, wrong):
+def test_replay_judges_coupler_ratio(right, wrong):
     mechanism = geared(right)
     motions = moving(mechanism, np.linspace(-8.0, 8.0, 65))
     for quantity in ("position", "velocity", "acceleration"):
@@ -242,7 +243,7 @@ def test_replay_of_a_coupler_judges_its_ratio(right, wrong):
         assert set(found.bodies) == {"one", "two"}
 
 
-def test_replay_digits_are_the_changes_of_each_number(loop):
+def test_replay_digits_match_changed_numbers(loop):
     """Compared with the same rows after each number is moved in truth."""
     mechanism, *motions = loop
     names = [body.name for body in mechanism.moving]
@@ -263,15 +264,21 @@ def test_replay_digits_are_the_changes_of_each_number(loop):
         assert found.allowed[quantity] == pytest.approx(total, rel=1e-4, abs=1e-12)
 
 
-def test_replay_of_wrong_arguments_says_what_to_give(loop):
-    mechanism, poses, v, a = loop
-    with pytest.raises(SolveError, match="no pose"):
-        residuals(mechanism, {})
-    with pytest.raises(UnknownNameError, match="moving body"):
-        residuals(mechanism, {"nobody": np.zeros((2, 7))})
-    with pytest.raises(SolveError, match=r"poses of body .* have shape \(41, 6\), expected"):
-        residuals(mechanism, v)
-    with pytest.raises(SolveError, match="accelerations need velocities"):
-        residuals(mechanism, poses, None, a)
-    with pytest.raises(SolveError, match="digits of body"):
-        residuals(mechanism, poses, digits={mechanism.moving[0].name: np.zeros((41, 6))})
+SHORT = np.zeros((41, 6))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"poses": {}}, "no pose"),
+        ({"poses": {"nobody": np.zeros((2, 7))}}, "moving body"),
+        ({"poses": {"crank": SHORT}}, r"poses of body .* have shape \(41, 6\), expected"),
+        ({"accelerations": {"crank": SHORT}}, "accelerations need velocities"),
+        ({"digits": {"crank": SHORT}}, "digits of body"),
+    ],
+    ids=["no pose", "unknown body", "shape", "no velocities", "digits"],
+)
+def test_replay_refuses_bad_arguments(loop, arguments, message):
+    mechanism, poses, *_ = loop
+    with pytest.raises((SolveError, UnknownNameError), match=message):
+        residuals(mechanism, **({"poses": poses} | arguments))

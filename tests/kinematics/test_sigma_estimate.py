@@ -10,8 +10,8 @@ from ..support.program_blocks import run_on
 # The signs of determinants
 
 
-@pytest.mark.parametrize("sizes", [[1], [2], [5], [11], [1, 3], [2, 2, 4]])
-def test_orientation_tells_the_sign_of_every_block(sizes):
+@pytest.mark.parametrize("sizes", [[1], [2], [5], [11], [1, 3], [2, 2, 4]], ids=str)
+def test_orientation_of_every_block(sizes):
     """Of blocks solved one after the other, rows and columns mixed: of each that of its
     determinant, or always the other.
     """
@@ -59,7 +59,7 @@ def estimated(matrices):
 
 
 @pytest.mark.parametrize("n", [2, 4, 6, 10, 20, 26])
-def test_sigma_is_about_the_smallest_singular_value(n):
+def test_sigma_estimates_smallest_singular_value(n):
     """Whichever rows depend on each other. Of 10,000 such matrices of each n it was 0.021 to 2.04
     times as much. The smallest pivot, up to 35,000 times as much, is no measure."""
     rng, sigma = np.random.default_rng(n), np.repeat([1.0, 1e-3, 1e-9], 200)
@@ -72,14 +72,3 @@ def test_sigma_is_about_the_smallest_singular_value(n):
     assert found.min() > (0.01 if n <= COMPARED else 0.1)
     assert found.max() < 4.0
     assert min(pivot[sigma == each].max() for each in (1e-3, 1e-9)) > 20.0
-
-
-def test_of_a_large_core_sigma_is_no_less_than_by_its_comparison_matrix(monkeypatch):
-    """And not by a little: of 24 random rows it would be a hundredth."""
-    matrices = np.random.default_rng(5).normal(size=(50, 24, 24))
-    exact, _ = estimated(matrices)
-    monkeypatch.setattr("kincheck.core.program.elimination.COMPARED", 24)
-    compared, _ = estimated(matrices)
-    assert (compared <= exact * (1.0 + 1e-12)).all()
-    assert np.median(exact / compared) > 10.0
-    assert (exact <= 4.0 * np.linalg.svd(matrices, compute_uv=False)[:, -1]).all()

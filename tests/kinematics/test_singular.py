@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
-from kincheck.core import Distance, JointDisplacement, Point, Translational
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Joint
@@ -23,25 +22,23 @@ from kincheck.core.kinematics.formulation.acceptance_criteria import is_uncertai
 from kincheck.core.kinematics.one_design import solve
 from mpmath import mp, mpf
 
-from ..support.mechanisms import CRANK, mcpherson, slider_crank, slider_crank_motion
-from .test_chain import LEAN, chain
-from .test_continuation import LIMITS
-
-BRANCH = LEAN + np.pi / 2.0
-"""Where all links of the chain are in line."""
-
-
-def chain_end(loops, turn):
-    """Closed form of the last crank's pin, its velocity and acceleration at rate one."""
-    s, c, zero = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
-    return [np.column_stack(each) for each in ([loops + s, c, zero], [-c, s, zero], [-s, -c, zero])]
-
+from ..support.mechanisms import (
+    BRANCH,
+    CRANK,
+    chain,
+    chain_end,
+    errors,
+    mcpherson,
+    pushed,
+    solve_all,
+)
+from .test_trace import LIMITS
 
 # In doubt
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, monkeypatch):
+def test_doubtful_estimate_is_judged_by_sigma(compiled, monkeypatch):
     """The estimate says a fifth of sigma; equations for that are traced for the first sweep
     only.
     """
@@ -71,21 +68,13 @@ def test_a_sample_in_doubt_by_the_estimate_alone_is_judged_by_sigma(compiled, mo
 
 @pytest.mark.parametrize("loops", [1, 2])
 @pytest.mark.parametrize("near", [0.0, 1e-13, -1e-9])
-def test_a_sample_where_the_motion_branches(loops, near):
+def test_sample_at_bifurcation(loops, near):
     """Its equations say nothing of it; it is interpolated, said to be, and the samples beyond are
     reached.
     """
     turn = np.array([0.0, 0.7, 1.4, BRANCH + near, 2.3, 3.0])
-    found = solve(chain(loops), "turn", turn)
-    assert found.solved.all(), found.message
-    end = found.points["end"]
-    for values, expected, error in zip(
-        (end.position, end.velocity, end.acceleration),
-        chain_end(loops, turn),
-        (1e-12, 1e-11, 1e-9),
-        strict=True,
-    ):
-        assert np.abs(values - expected).max() <= error
+    found = solve_all(chain(loops), "turn", turn)
+    assert (errors(found.points["end"], chain_end(loops, turn)) <= [1e-12, 1e-11, 1e-9]).all()
     (note,) = found.details["notes"]
     assert note.startswith(f"passes a singular pose at turn = {BRANCH:.9g}")
     assert "the branch followed is the continuation of the motion" in note
@@ -99,33 +88,29 @@ def test_a_sample_where_the_motion_branches(loops, near):
     assert "turn" not in pose["rows_of"]
 
 
-def test_many_samples_around_it():
+def test_samples_around_bifurcation():
     """Fine steps up to it: some are interpolated, none is wrong."""
     turn = BRANCH + np.linspace(-1e-3, 1e-3, 21)
-    found = solve(chain(1), "turn", turn)
-    assert found.solved.all(), found.message
-    assert np.abs(found.points["end"].position - chain_end(1, turn)[0]).max() <= 1e-9
+    found = solve_all(chain(1), "turn", turn)
+    assert errors(found.points["end"], chain_end(1, turn))[0] <= 1e-9
     assert found.details["retried_samples"] >= 1
 
 
-def test_a_singular_pose_between_samples():
-    turn = np.linspace(0.0, 2.4, 7)
-    found = solve(chain(1), "turn", turn)
-    assert found.solved.all()
+def test_bifurcation_between_samples():
+    found = solve_all(chain(1), "turn", np.linspace(0.0, 2.4, 7))
     (pose,) = found.details["singular_poses"]
     assert pose["outcome"] == "crossed"
     assert pose["driver"]["turn"] == pytest.approx(BRANCH, abs=0.4 / 17)
     assert "crosses a singular pose between turn = 1.6 and turn = 2" in found.details["notes"][0]
 
 
-def test_both_ways_and_twice():
-    found = solve(chain(1), "turn", np.linspace(-3.0, 6.0, 40))
-    assert found.solved.all()
+def test_bifurcations_on_both_sides():
+    found = solve_all(chain(1), "turn", np.linspace(-3.0, 6.0, 40))
     places = sorted(pose["driver"]["turn"] for pose in found.details["singular_poses"])
     assert places == pytest.approx([BRANCH - np.pi, BRANCH, BRANCH + np.pi], abs=0.02)
 
 
-def test_a_run_says_what_a_passing_record_passed():
+def test_run_reports_singular_pose():
     case = cases.load("iftomm_n_four_bar")
     sweep = replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0])))
     (record,) = run([replace(case, sweep=sweep, reference={})], [Native()], tol=1e-12).records
@@ -134,7 +119,7 @@ def test_a_run_says_what_a_passing_record_passed():
     assert "passes a singular pose at crank = 1.57079633" in record.message
 
 
-def test_ordinary_sweeps_say_nothing():
+def test_ordinary_sweeps_report_nothing():
     for mechanism, driver in ((mcpherson(), "stroke"), (chain(1), "turn")):
         details = solve(mechanism, driver, np.linspace(-0.08, 0.08, 9)).details
         assert not {"notes", "singular_poses", "retried_samples"} & set(details)
@@ -143,27 +128,11 @@ def test_ordinary_sweeps_say_nothing():
 # Lock-up
 
 
-def pushed():
-    """A slider that drives its crank, from an open angle; its dead centre is at the second
-    value.
-    """
-    design = float(slider_crank_motion([1.0]).x[0])
-    pin = (CRANK * np.cos(1.0), 0.0, -CRANK * np.sin(1.0))
-    m = slider_crank()
-    rod = Distance("rod", "crank", "slider", (pin, (design, 0.0, 0.0)))
-    guide = Translational("guide", "ground", "slider", (design, 0.0, 0.0), (1.0, 0.0, 0.0))
-    driven = replace(m, joints=[m.joint("pivot"), rod, guide], points=[Point("pin", "crank", pin)])
-    return replace(driven, drivers=[JointDisplacement("push", "guide")]), design, pin
-
-
 def pin_height(design, pin, push):
     """Of the pin below the guide [m], in 40 digits from the doubles that the mechanism has."""
     with mp.workdps(40):
-        x, crank, rod = (
-            mpf(design) + mpf(push),
-            mp.norm([mpf(v) for v in pin]),
-            mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])]),
-        )
+        x, crank = mpf(design) + mpf(push), mp.norm([mpf(v) for v in pin])
+        rod = mp.norm([mpf(design) - mpf(pin[0]), mpf(pin[2])])
         along = (x * x + crank * crank - rod * rod) / (2 * x)
         return -mp.sqrt(crank * crank - along * along)
 
@@ -171,20 +140,19 @@ def pin_height(design, pin, push):
 GAPS = np.array([1e-3, 1e-6, 1e-9, 1e-12])
 
 
-def test_near_a_dead_centre_positions_are_right():
+def test_positions_beside_dead_centre():
     """1e-12 m before it a residual of 1e-12 would be 1e-6 m of the pin; samples are solved again
     until rounding ends it.
     """
     mechanism, design, pin = pushed()
     values = CRANK + 1.0 - design - GAPS
-    found = solve(mechanism, "push", values, order=0)
-    assert found.solved.all(), found.message
+    found = solve_all(mechanism, "push", values, order=0)
     for position, value in zip(found.points["pin"].position, values.tolist(), strict=True):
         assert abs(mpf(float(position[2])) - pin_height(design, pin, value)) <= 1e-9
     assert found.details["retried_samples"] >= 2
 
 
-def test_near_a_dead_centre_uncertain_rates_are_refused():
+def test_uncertain_rates_are_refused():
     mechanism, design, _ = pushed()
     found = solve(mechanism, "push", CRANK + 1.0 - design - GAPS)
     assert found.solved.tolist() == [True, True, False, False]
@@ -196,7 +164,7 @@ def test_near_a_dead_centre_uncertain_rates_are_refused():
     assert [pose["outcome"] for pose in found.details["singular_poses"]] == ["refused", "refused"]
 
 
-def test_a_tolerance_below_rounding_is_no_singular_pose():
+def test_tolerance_below_rounding_is_refused():
     found = solve(mcpherson(), "stroke", [0.0], tol=1e-30)
     assert not found.solved.any()
     assert "rounding alone leaves the pose uncertain by" in found.message
@@ -206,7 +174,7 @@ def test_a_tolerance_below_rounding_is_no_singular_pose():
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
+def test_strut_limit_is_reported(direction):
     found = solve(mcpherson(), "stroke", direction * np.linspace(0.0, 0.4, 21))
     assert f"the limit of travel is stroke = {LIMITS[direction]:.9g}" in found.message
     assert "kincheck trace" in found.message
@@ -218,12 +186,12 @@ def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
     assert {"lca", "knuckle"} <= set(pose["direction"])
 
 
-def test_beside_a_singular_pose_accelerations_keep_their_digits():
+def test_accelerations_beside_singular_pose():
     """There sigma is 6e-4: solved only as any other sample they are off by 1e-8."""
     turn = BRANCH + np.array([-0.2, -0.1, -0.05, -0.002])
     found = solve(chain(1), "turn", turn)
     assert found.details["retried_samples"] == 1
-    assert np.abs(found.points["end"].acceleration - chain_end(1, turn)[2]).max() <= 1e-9
+    assert errors(found.points["end"], chain_end(1, turn))[2] <= 1e-9
 
 
 @pytest.mark.parametrize(
@@ -235,6 +203,7 @@ def test_beside_a_singular_pose_accelerations_keep_their_digits():
         ([-1.0, -1.0], None),
         ([-1.0, 1.0], None),
     ],
+    ids=str,
 )
-def test_a_part_of_a_step_is_gone_only_where_its_half_could_be(margins, part):
+def test_part_of_step_needs_half(margins, part):
     assert longest(np.array(margins)) == part

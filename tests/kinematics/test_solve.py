@@ -2,28 +2,42 @@
 equations; what is asked is computed.
 """
 
+import pickle
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.core import (
     Body,
     Distance,
-    Fixed,
+    JointDisplacement,
     Mechanism,
     Point,
     Revolute,
+    SolveError,
     Translational,
-    Universal,
 )
 from kincheck.core.joints import Cylindrical, Screw
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import RATE, RATE_T, Request
 from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.kinematics.one_design import solve
+from kincheck.core.mechanism.motions import Ramp
+from kincheck.core.trajectory import Motions, PointMotion
 
 from ..oracles import naive
-from ..support.mechanisms import four_bar, mcpherson, slider_crank, swapped
+from ..support.mechanisms import (
+    errors,
+    four_bar,
+    mcpherson,
+    slider_crank,
+    solve_all,
+    swapped,
+    without_fixed_bodies,
+)
 
 STROKES = np.linspace(-0.08, 0.08, 161)
 MOVING = ("lca", "knuckle", "strut")
@@ -44,9 +58,7 @@ def reference():
 
 @cache
 def solution(style="native"):
-    found = solve(mcpherson(), "stroke", STROKES, bodies=MOVING, style=style)
-    assert found.solved.all()
-    return found
+    return solve_all(mcpherson(), "stroke", STROKES, bodies=MOVING, style=style)
 
 
 def deviation(found, *columns):
@@ -57,7 +69,7 @@ def deviation(found, *columns):
 
 
 @pytest.mark.parametrize("style", [style.value for style in Style])
-def test_wheel_against_the_reference(style):
+def test_wheel_against_reference(style):
     """Round-off of numbers near one, amplified by the condition (36) and the second derivatives (3
     1/m).
     """
@@ -70,7 +82,7 @@ def test_wheel_against_the_reference(style):
 
 
 @pytest.mark.parametrize("style", [style.value for style in Style])
-def test_knuckle_against_the_reference(style):
+def test_knuckle_against_reference(style):
     """The body's own frame, in the paper's variables: its origin is the wheel centre."""
     knuckle = solution(style).bodies["knuckle"]
     assert deviation(knuckle.r, "x_W", "y_W", "z_W") <= 5e-16
@@ -78,7 +90,7 @@ def test_knuckle_against_the_reference(style):
     assert np.abs(np.linalg.norm(knuckle.p, axis=1) - 1.0).max() <= 5e-16
 
 
-def test_iterations_and_residual():
+def test_strut_iterations_and_residual():
     found = solution()
     assert found.iterations.max() <= 4
     assert found.iterations.min() >= 1
@@ -87,28 +99,6 @@ def test_iterations_and_residual():
 
 
 # Against the unsimplified equations
-
-
-def universal_chain():
-    """A crank that drives, through a universal joint, a shaft askew, with a plate welded on."""
-    return Mechanism(
-        "cardan",
-        [
-            Body("crank", (0.1, 0.2, 0.3), (0.5, 0.5, -0.5, 0.5)),
-            Body("shaft", (0.0, 0.3, 1.5)),
-            Body("plate", (0.2, 0.0, 2.0)),
-        ],
-        [
-            Revolute("in", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-            Universal(
-                "cross", "crank", "shaft", (0.0, 0.0, 1.0), ((1.0, 0.0, 0.0), (0.0, 0.8, -0.6))
-            ),
-            Revolute("out", "shaft", "ground", (0.0, 0.6, 1.8), (0.0, 0.6, 0.8)),
-            Fixed("weld", "shaft", "plate"),
-        ],
-        [Point("tip", "plate", (0.3, 0.5, 2.0))],
-        [replace(four_bar().driver("turn"), joint="in")],
-    )
 
 
 def jack():
@@ -132,12 +122,13 @@ def jack():
     )
 
 
+cardan = cases.load("double_cardan")
 SWEEPS = {
     "jack": (jack, "turn", np.linspace(-8.0, 6.0, 3)),
     "mcpherson": (mcpherson, "stroke", np.linspace(-0.08, 0.06, 3)),
     "slider_crank": (slider_crank, "turn", np.linspace(-4.0, 9.0, 3)),
     "four_bar": (four_bar, "turn", np.linspace(-4.0, 9.0, 3)),
-    "universal_chain": (universal_chain, "turn", np.linspace(-4.0, 9.0, 3)),
+    "double_cardan": (lambda: cardan.mechanism, cardan.sweep.driver, np.linspace(-4.0, 9.0, 3)),
 }
 
 
@@ -155,7 +146,7 @@ WRITTEN = [
 
 
 @pytest.mark.parametrize(("name", "write", "style"), WRITTEN)
-def test_the_papers_equations_hold(name, write, style):
+def test_paper_equations_hold(name, write, style):
     """Residuals of all joints at the solved poses, and their first two derivatives by time along r,
     p, v and a.
 
@@ -164,15 +155,8 @@ def test_the_papers_equations_hold(name, write, style):
     """
     make, driver, values = SWEEPS[name]
     mechanism = write(make()) if write else make()
-    found = solve(
-        mechanism,
-        driver,
-        values,
-        rate=1.3,
-        bodies=[body.name for body in mechanism.moving],
-        style=style,
-    )
-    assert found.solved.all()
+    bodies = [body.name for body in mechanism.moving]
+    found = solve_all(mechanism, driver, values, rate=1.3, bodies=bodies, style=style)
     for k in range(len(values)):
         path = naive.along(naive.sample(found, k))
         phi, phi_t, phi_tt = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
@@ -184,29 +168,24 @@ def test_the_papers_equations_hold(name, write, style):
         assert np.abs(phi_tt).max() <= 1e-11
 
 
-def test_wrong_angular_velocities_would_show():
+def test_paper_equations_find_wrong_rates():
     """The check above has teeth: omega' in the wrong frame or with the wrong sign breaks it by
     orders of magnitude.
     """
     mechanism, found = mcpherson(), solution()
     r, p, v, a = naive.sample(found, 0)["knuckle"]
     A = naive.A(p)
-    for wrong in (A @ v[3:], -v[3:]):
-        bodies = naive.sample(found, 0) | {"knuckle": (r, p, np.r_[v[:3], wrong], a)}
-        assert (
-            np.abs(
-                naive.taylor(lambda t, b=bodies: naive.residuals(mechanism, naive.along(b)(t)))[1]
-            ).max()
-            > 1e-2
-        )
-    bodies = naive.sample(found, 0) | {"knuckle": (r, p, v, np.r_[a[:3], A @ a[3:]])}
-    assert (
-        np.abs(naive.taylor(lambda t: naive.residuals(mechanism, naive.along(bodies)(t)))[2]).max()
-        > 1e-2
-    )
+    for part, rates, seconds in (
+        (1, np.r_[v[:3], A @ v[3:]], a),
+        (1, np.r_[v[:3], -v[3:]], a),
+        (2, v, np.r_[a[:3], A @ a[3:]]),
+    ):
+        path = naive.along(naive.sample(found, 0) | {"knuckle": (r, p, rates, seconds)})
+        parts = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        assert np.abs(parts[part]).max() > 1e-2
 
 
-def test_points_are_carried_by_their_bodies():
+def test_points_follow_bodies():
     """Position, velocity and acceleration of a point by the bodies' r, p, omega' alone."""
     mechanism, found = mcpherson(), solution()
     arm = naive.arm(naive.design(mechanism)["knuckle"], mechanism.point("rod_end").position)
@@ -217,3 +196,191 @@ def test_points_are_carried_by_their_bodies():
         assert rod_end.position[k] == pytest.approx(r + A @ arm, abs=5e-16)
         assert rod_end.velocity[k] == pytest.approx(v[:3] + A @ w @ arm, abs=5e-15)
         assert rod_end.acceleration[k] == pytest.approx(a[:3] + A @ (w_t + w @ w) @ arm, abs=5e-14)
+
+
+# A solution has what is asked for and no more, and bad arguments are refused
+
+
+# What is asked for, and no more
+
+
+def flops(found):
+    return {name: size["flops"] for name, size in found.details["program"].items()}
+
+
+def test_lower_orders_cost_less():
+    by_order = [
+        solve(mcpherson(), "stroke", STROKES, bodies=MOVING, order=order) for order in (0, 1, 2)
+    ]
+    position, velocity, acceleration = by_order
+    # all are predicted by rates and accelerations, and end at the same pose but for its rounding
+    wheel, strut = acceleration.points["wheel"], acceleration.bodies["strut"]
+    for found in by_order:
+        assert (found.iterations == acceleration.iterations).all()
+        off = errors(found.points["wheel"], [wheel.position, wheel.velocity, wheel.acceleration])
+        assert (off <= [3e-16, 2e-15, 0.0][: len(off)]).all()
+        assert np.abs(found.bodies["strut"].p - strut.p).max() <= 3e-16
+    assert position.points["wheel"].velocity is None
+    assert position.bodies["strut"].v is None
+    assert velocity.points["wheel"].acceleration is None
+    assert velocity.bodies["strut"].a is None
+    assert np.abs(velocity.bodies["strut"].v - strut.v).max() <= 2e-15
+    cost = [sum(flops(found).get(name, 0) for name in ("newton", "outputs")) for found in by_order]
+    assert cost[0] < cost[1] < cost[2]
+    for order, wanted in enumerate([set(), {RATE}, {RATE, RATE_T}]):
+        model = compile_model(mcpherson(), Request(("stroke",), (), MOVING, order=order))
+        put_out = model.programs["outputs"].outputs.keys()
+        assert {name for name in (RATE, RATE_T) if put_out & {*model.vectors[name]}} == wanted
+
+
+@pytest.mark.parametrize("style", [style.value for style in Style])
+def test_fixed_bodies_cost_nothing(style):
+    """Chassis and rack as fixed bodies, or as the ground itself: the same programs, the same
+    bits.
+    """
+    free, fixed = (
+        solve(each, "stroke", STROKES, style=style)
+        for each in (without_fixed_bodies(mcpherson()), mcpherson())
+    )
+    assert flops(free) == flops(fixed)
+    assert (free.points["wheel"].position == fixed.points["wheel"].position).all()
+    assert free.details["rank"] == fixed.details["rank"]
+
+
+def test_ground_as_either_body():
+    """Which body of a joint is the fixed one costs nothing either."""
+    m = mcpherson()
+    turned = [
+        joint.reversed() if any(map(m.is_fixed, joint.bodies)) else joint for joint in m.joints
+    ]
+    assert sum(joint is not other for joint, other in zip(turned, m.joints, strict=True)) == 3
+    assert flops(solve(replace(m, joints=turned), "stroke", [0.0])) == flops(
+        solve(m, "stroke", [0.0])
+    )
+
+
+def test_solution_has_requested_names_only():
+    everything = solve(mcpherson(), "stroke", [0.0, 0.01], bodies=MOVING)
+    little = solve(mcpherson(), "stroke", [0.0, 0.01], points=["rod_end"])
+    nothing = solve(mcpherson(), "stroke", [0.0, 0.01], points=[])
+    assert [(set(each.points), set(each.bodies)) for each in (everything, little, nothing)] == [
+        ({"wheel", "rod_end"}, set(MOVING)),
+        ({"rod_end"}, set()),
+        (set(), set()),
+    ]
+    assert flops(nothing)["outputs"] < flops(little)["outputs"] < flops(everything)["outputs"]
+    assert flops(nothing)["newton"] == flops(everything)["newton"]
+
+
+def test_fixed_bodies_stay():
+    top = Point("top", "chassis", (1.0, 0.55, 0.6))
+    mechanism = replace(mcpherson(), points=[*mcpherson().points, top])
+    found = solve(mechanism, "stroke", [-0.05, 0.05], points=["top"], bodies=["rack"])
+    top, rack = found.points["top"], found.bodies["rack"]
+    assert (np.hstack([top.position, rack.r]) == (1.0, 0.55, 0.6, 1.14, 0.0, 0.1455)).all()
+    assert not np.hstack([top.velocity, top.acceleration, rack.v, rack.a]).any()
+
+
+def test_motions_are_lazy_views():
+    table = np.arange(12.0).reshape(2, 6)
+    motions = Motions(PointMotion, table, {"P": [slice(0, 3), slice(3, 6), None]})
+    assert (list(motions), len(motions), "Q" in motions) == (["P"], 1, False)
+    motion = pickle.loads(pickle.dumps(motions))["P"]
+    assert (motion.position == table[:, :3]).all()
+    assert (motion.velocity == table[:, 3:]).all()
+    assert motion.acceleration is None
+    assert np.shares_memory(motions["P"].velocity, table)
+    with pytest.raises(KeyError, match="Q"):
+        motions["Q"]
+
+
+@pytest.mark.parametrize("name", ["rssr", "four_bar", "iftomm_n_four_bar"])
+def test_solve_without_samples(name):
+    """Also where rows are left out, which may be chosen anew."""
+    case = cases.load(name)
+    found = solve(case.mechanism, case.sweep.driver, [])
+    assert found.solved.shape == (0,)
+    assert {motion.position.shape for motion in found.points.values()} == {(0, 3)}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"driver": "steer"}, "there is no driver 'steer'; known: stroke"),
+        ({"points": ["hub"]}, "there is no point 'hub'; known: rod_end, wheel"),
+        ({"bodies": ["hub"]}, "there is no body 'hub'; known: "),
+        ({"order": 3}, "order is 3, expected 0, 1 or 2"),
+        ({"rate": 0.0}, "rate is 0.0, expected driver units"),
+        ({"tol": np.nan}, "tol is nan, expected a positive number"),
+        ({"tol": np.inf}, "tol is inf"),
+        ({"values": 0.1}, r"values have shape \(\), expected \(n,\)"),
+        ({"values": [[0.0, 0.1]]}, r"values have shape \(1, 2\)"),
+        ({"values": [0.0, np.nan]}, "values are not all finite"),
+        ({"values": ["a"]}, r"values are \['a'\], expected numbers"),
+        ({"values": [1j]}, r"values are \[1j\], expected numbers"),
+        ({"rate": 1e-320}, "rate is 1e-320: no number is the time of the values then"),
+        ({"motions": {"stroke": Ramp(1.0)}}, "motions has 'stroke', which is swept; leave it out"),
+        ({"motions": {"steer": Ramp(1.0)}}, "there is no driver 'steer'"),
+        ({"motions": {"steer": 3.0}}, r"motions\['steer'\] is 3.0, expected a motion"),
+        (
+            {"style": "dads"},
+            "there is no style 'dads'; known: native, paper, conventional, mixed, relative",
+        ),
+    ],
+    ids=str,
+)
+def test_solve_refuses_bad_arguments(arguments, message):
+    with pytest.raises(SolveError, match=message):
+        solve(mcpherson(), **({"driver": "stroke", "values": [0.0, 0.1]} | arguments))
+
+
+# More than one driver: those that are not swept hold their design value
+
+
+def steered():
+    """The strut with a rack that can slide."""
+    base = mcpherson()
+    rack = Translational("rack_guide", "chassis", "rack", (1.14, 0.0, 0.1455), (0.0, 1.0, 0.0))
+    bodies = [replace(body, fixed=body.name == "chassis") for body in base.bodies]
+    return replace(
+        base,
+        bodies=bodies,
+        joints=[*base.joints, rack],
+        drivers=[*base.drivers, JointDisplacement("steer", "rack_guide")],
+    )
+
+
+def test_held_driver_keeps_value():
+    held = solve(steered(), "stroke", STROKES)
+    fixed = solve(mcpherson(), "stroke", STROKES)
+    wheel = fixed.points["wheel"]
+    expected = wheel.position, wheel.velocity, wheel.acceleration
+    assert (errors(held.points["wheel"], expected) <= [5e-16, 1e-14, 1e-13]).all()
+
+
+def test_driven_displacement():
+    """Steering with the stroke held: the rack moves as driven, all joints hold, the wheel keeps its
+    height.
+    """
+    mechanism, values = steered(), np.linspace(-0.03, 0.05, 9)
+    bodies = [body.name for body in mechanism.moving]
+    found = solve_all(mechanism, "steer", values, rate=0.2, bodies=bodies)
+    rack = found.bodies["rack"]
+    assert rack.r - (1.14, 0.0, 0.1455) == pytest.approx(
+        np.outer(values, (0.0, 1.0, 0.0)), abs=1e-16
+    )
+    assert rack.v == pytest.approx(np.tile((0.0, 0.2, 0.0, 0.0, 0.0, 0.0), (9, 1)), abs=1e-15)
+    assert np.abs(found.points["wheel"].position[:, 2] - 0.101).max() <= 2e-16
+    for k in range(len(values)):
+        path = naive.along(naive.sample(found, k))
+        parts = naive.taylor(lambda t, path=path: naive.residuals(mechanism, path(t)))
+        largest = [np.abs(part).max() for part in parts]
+        assert (np.array(largest) < [2e-15, 1e-13, 1e-11]).all()
+
+
+def test_drivers_in_either_order():
+    """Whichever is swept, the other follows, and both end at the same pose."""
+    one = solve_all(steered(), "stroke", [0.03], motions={"steer": Ramp(2.0 / 3.0)})
+    other = solve_all(steered(), "steer", [0.02], motions={"stroke": Ramp(1.5)})
+    ends = [each.points["rod_end"].position for each in (one, other)]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-14)

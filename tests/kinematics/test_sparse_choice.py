@@ -10,9 +10,7 @@ from kincheck.core import (
     Body,
     Distance,
     Inline,
-    Point,
     Revolute,
-    Universal,
 )
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
@@ -23,8 +21,8 @@ from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.size import LEAN, pivot, ring
 
 from ..support.block_structures import chain_of_hinges, solve_sparse
+from ..support.mechanisms import Z, circles_meet, crank_tip, planar_four_bar
 
-X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 CRANKS = 5
 """A small ring is solved as one sparse system on request; the front door does so from 40 bodies."""
 
@@ -36,91 +34,65 @@ def swept(mechanism, turn, order=2):
 
 
 def pin_meeting(crank, ground, rod, rocker, angle):
-    """Where a rod from a crank's pin meets a rocker, by two circles; shape (n, 2)."""
-    pin = crank * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    d = np.array([ground, 0.0]) - pin
-    square = (d * d).sum(axis=-1)
-    along = 0.5 * (square + rod**2 - rocker**2) / square
-    off = np.sqrt(np.maximum(rod**2 / square - along**2, 0.0))
-    return pin, pin + along[:, None] * d + off[:, None] * np.stack([-d[:, 1], d[:, 0]], axis=-1)
+    """A crank's pin, and where a rod from there meets a rocker; of shape (n, 3) each."""
+    pin = crank * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+    return pin, circles_meet(pin, rod, (ground, 0.0, 0.0), rocker)
 
 
 def four_bar(sizes, start, ends, cranks=CRANKS):
-    """A four-bar on the driven crank of a ring, its rod on hinges or on universals: three rows or
-    one more than are needed.
-    """
-    pin, meet = ((*each[0].tolist(), 0.0) for each in pin_meeting(*sizes, np.array([start])))
-    joints = [Revolute("rest", "ground", "rocker", (sizes[1], 0.0, 0.0), Z)]
-    if ends == "hinges":
-        joints += [
-            Revolute("pin", "crank0", "rod", pin, Z),
-            Revolute("end", "rod", "rocker", meet, Z),
-        ]
-    else:
-        joints += [
-            Universal("pin", "crank0", "rod", pin, (X, Z)),
-            Universal("end", "rod", "rocker", meet, (Z, X)),
-        ]
+    """A four-bar on the driven crank of a ring."""
+    pin, meet = pin_meeting(*sizes, start)
+    bar = planar_four_bar(pin, meet, (sizes[1], 0.0, 0.0), ends, crank="crank0")
     whole = ring(cranks)
-    bodies = [*whole.bodies, Body("rod"), Body("rocker")]
     return replace(
         whole,
-        bodies=bodies,
-        joints=[*whole.joints, *joints],
-        points=[Point("meet", "rocker", meet)],
+        bodies=[*whole.bodies, *bar.bodies[1:]],
+        joints=[*whole.joints, *bar.joints[1:]],
+        points=bar.points,
     )
 
 
-PLAIN, KITE, ASIDE = (0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.000001, 1.2)
+KITE = (1.25, 1.2, 0.7, 0.7)
+SHAPES = {"plain": (0.5, 1.5, 1.3, 1.2), "kite": KITE, "aside": (1.0, 1.2, 1.000001, 1.2)}
+"""Lengths of crank, ground, rod and rocker."""
 
 
 @pytest.mark.parametrize(
-    ("count", "sizes", "ends"),
+    ("count", "shape", "ends"),
     [
-        (9, PLAIN, "hinges"),
-        (9, PLAIN, "universals"),
-        (9, KITE, "hinges"),
-        (9, ASIDE, "universals"),
-        (65, KITE, "universals"),
-        (65, ASIDE, "hinges"),
+        (9, "plain", "hinges"),
+        (9, "plain", "universals"),
+        (9, "kite", "hinges"),
+        (9, "aside", "universals"),
+        (65, "kite", "universals"),
+        (65, "aside", "hinges"),
     ],
 )
-def test_rows_that_come_to_depend_on_each_other_end_nothing(sizes, ends, count):
+def test_sparse_rows_are_exchanged(shape, ends, count):
     """A plain four-bar, a kite off by a twentieth, and one on its side beside its corner."""
-    turn = np.linspace(0.0, 1.6, count)
+    turn, sizes = np.linspace(0.0, 1.6, count), SHAPES[shape]
     found = swept(four_bar(sizes, -1.1, ends), turn)
     assert found.solved.all(), found.message
     _, meet = pin_meeting(*sizes, turn - 1.1)
-    assert np.abs(found.points["meet"].position[:, :2] - meet).max() < 1e-12
+    assert np.abs(found.points["meet"].position - meet).max() < 1e-12
 
 
-def test_rows_chosen_anew_are_counted():
-    found = swept(four_bar(KITE, -1.1, "hinges"), np.linspace(0.0, 1.6, 65))
-    assert found.details["rows_chosen_anew"] >= 1
-    assert "rows_chosen_anew" not in swept(ring(CRANKS), np.linspace(0.0, 0.8, 9)).details
-
-
-def test_rates_with_rows_chosen_anew_keep_lengths():
+def test_sparse_rates_after_row_exchange():
     mechanism = four_bar(KITE, -1.1, "hinges")
     path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.6, 41))
     found = solve_sparse(mechanism, path, ["meet"])
     assert found.solved.all(), found.message
+    assert found.details["rows_chosen_anew"] >= 1
+    assert "rows_chosen_anew" not in swept(ring(CRANKS), np.linspace(0.0, 0.8, 9)).details
     pin, meet = pin_meeting(*KITE, path.times - 1.1)
     point = found.points["meet"]
-    assert np.abs(point.position[:, :2] - meet).max() < 1e-13
+    assert np.abs(point.position - meet).max() < 1e-13
     # the rod and the rocker keep their lengths, to the second derivative
     for end, rate, second in (
-        (pin, np.stack([-pin[:, 1], pin[:, 0]], axis=-1), -pin),
-        (np.array([1.2, 0.0]), np.zeros(2), np.zeros(2)),
+        (pin, np.cross((0.0, 0.0, 1.0), pin), -pin),
+        (np.array([1.2, 0.0, 0.0]), 0.0, 0.0),
     ):
-        d, v, a = (
-            x[:, :2] - y
-            for x, y in (
-                (point.position, end),
-                (point.velocity, rate),
-                (point.acceleration, second),
-            )
-        )
+        d, v, a = point.position - end, point.velocity - rate, point.acceleration - second
         assert np.abs((d * v).sum(axis=1)).max() < 1e-12
         assert np.abs((v * v).sum(axis=1) + (d * a).sum(axis=1)).max() < 1e-10
 
@@ -154,48 +126,51 @@ def inside(off, ends, crank=3, cranks=CRANKS, phase=0.7):
     return replace(whole, bodies=[*bodies, Body("rod")], joints=joints)
 
 
-COARSE, MIDDLE = np.linspace(0.0, -1.1, 3), np.linspace(0.0, -1.1, 9)
-FINE = np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.5014, -0.601, -5e-4)])
-"""Samples close to each other only where the motion ends."""
+GRIDS = {
+    "coarse": np.linspace(0.0, -1.1, 3),
+    "middle": np.linspace(0.0, -1.1, 9),
+    # samples close to each other only where the motion ends
+    "fine": np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.5014, -0.601, -5e-4)]),
+}
 
 
 @pytest.mark.parametrize(
-    ("turn", "ends"), [(COARSE, "distance"), (MIDDLE, "hinges"), (FINE, "distance")]
+    ("grid", "ends"), [("coarse", "distance"), ("middle", "hinges"), ("fine", "distance")]
 )
-def test_parallelogram_in_line_goes_on(ends, turn):
+def test_parallelogram_in_line_goes_on(ends, grid):
     """Where the rod's arms are in line with it the parallelogram may go on as another."""
+    turn = GRIDS[grid]
     found = swept(inside(0.0, ends), turn, order=0)
     assert found.solved.all(), found.message
     assert "crosses a singular pose near turn = -0.5707" in found.details["notes"][0]
-    at = pivot(2, CRANKS)
-    tip = np.column_stack([at + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    tip, *_ = crank_tip(pivot(2, CRANKS), LEAN - turn)
     assert np.abs(found.points["tip2"].position - tip).max() <= 1e-12
 
 
 # where the rod's arms are in line with it, what is nearly a parallelogram turns back
 @pytest.mark.parametrize(
-    ("turn", "ends", "off", "end"),
+    ("grid", "ends", "off", "end"),
     [
-        (COARSE, "hinges", 1e-6, 0.57053),
-        (MIDDLE, "distance", 1e-6, 0.57053),
-        (FINE, "hinges", 1e-6, 0.57053),
-        (COARSE, "distance", 1e-4, 0.56846),
-        (MIDDLE, "hinges", 1e-4, 0.56846),
+        ("coarse", "hinges", 1e-6, 0.57053),
+        ("middle", "distance", 1e-6, 0.57053),
+        ("fine", "hinges", 1e-6, 0.57053),
+        ("coarse", "distance", 1e-4, 0.56846),
+        ("middle", "hinges", 1e-4, 0.56846),
     ],
 )
-def test_a_gap_in_the_largest_block_is_not_stepped_over(off, end, ends, turn):
+def test_sparse_gap_ends_motion(off, end, ends, grid):
+    turn = GRIDS[grid]
     found = swept(inside(off, ends), turn, order=0)
     assert found.solved.tolist() == (turn > -end).tolist()
     assert "cannot be followed beyond" in found.message
 
 
 @pytest.mark.parametrize("ends", ["distance", "hinges"])
-def test_the_largest_block_is_followed_where_it_is_regular(ends):
+def test_largest_block_is_followed(ends):
     turn = np.linspace(0.0, 0.8, 9)
     found = swept(inside(0.0, ends), turn)
     assert found.solved.all(), found.message
-    at = pivot(2, CRANKS)
-    tip = np.column_stack([at + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    tip, *_ = crank_tip(pivot(2, CRANKS), LEAN - turn)
     assert np.abs(found.points["tip2"].position - tip).max() <= 1e-13
 
 
@@ -228,7 +203,7 @@ def test_sigmas_of_blocks():
         assert (ratio <= (4.0 if near == 1.0 else 1.0 + 1e-6)).all()
 
 
-def test_rows_that_are_kept_are_well_conditioned():
+def test_kept_rows_are_well_conditioned():
     """Of a chain of loops rows were left out at one end: the smallest singular value was nothing,
     that of all rows is not.
     """

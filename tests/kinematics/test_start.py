@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters.exudyn.exudyn import Exudyn
+from kincheck.adapters.exudyn.statics import static
 from kincheck.adapters.mujoco.mujoco import MuJoCo
 from kincheck.adapters.pinocchio.pinocchio import Pinocchio
 from kincheck.core import (
@@ -21,15 +22,20 @@ from kincheck.core import (
     Translational,
     solve,
 )
+from kincheck.core import solve_designs as designs
 from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.io.model_writer import way_to
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.routes import start_of
+from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
+from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.variation.variation_file import read_variation
+from kincheck.core.studies.verified_reference import prove_case
 
-from ..support.block_structures import solve_sparse
-from ..support.mechanisms import X, slider_crank
-from .test_chain import chain
+from ..support.block_structures import solve_components, solve_sparse
+from ..support.mechanisms import X, chain, errors, slider_crank
 
 RADIUS = 0.1
 TIMES = np.linspace(-0.75, 0.75, 13)
@@ -72,6 +78,11 @@ def arm(degrees, *, relative=False):
     )
 
 
+def turned_arm(degrees=30.0):
+    """The arm, driven at its two hinges."""
+    return replace(arm(degrees), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+
+
 def circling(mechanism, phases, kind="sine"):
     """Motions of the tip that go once round the unit circle in a second."""
 
@@ -95,14 +106,8 @@ def phases_of(degrees):
 def case_of(mechanism, motions, times=TIMES):
     points = [each.name for each in mechanism.points]
     outputs = tuple(Output(f"{name}_x", name, X, False, 1e-9, 0.0, "a test") for name in points)
-    return Case(
-        "case",
-        "made up",
-        Truth.CONSENSUS_ONLY,
-        mechanism,
-        Sweep("time", times, 1.0, 0.0, motions),
-        outputs,
-    )
+    sweep = Sweep("time", times, 1.0, 0.0, motions)
+    return Case("case", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
 def by_style(style):
@@ -123,10 +128,9 @@ def by_engine(engine):
     return lambda case: engine.solve(engine.build(case), case, 1e-12)
 
 
-STYLES = ("native", "paper", "conventional", "mixed", "relative")
 ENGINES = {"mujoco": MuJoCo, "pinocchio": Pinocchio, "exudyn": Exudyn}
 WAYS = [
-    *(pytest.param(by_style(style), id=style) for style in STYLES),
+    *(pytest.param(by_style(style.value), id=style.value) for style in Style),
     pytest.param(by_sparse, id="sparse"),
     *(
         pytest.param(
@@ -146,7 +150,7 @@ WAYS = [
         *(pytest.param(*way.values, ANGLES[:2], id=way.id, marks=way.marks) for way in WAYS),
     ],
 )
-def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved, angles):
+def test_pinion_rolls_from_any_angle(solved, angles):
     """At 60 degrees the sine of the phase is not the design value to the last bit, at 45 it is."""
     for degrees in angles:
         mechanism = arm(degrees)
@@ -161,7 +165,7 @@ def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved, angl
 
 @pytest.mark.parametrize("solved", WAYS)
 @pytest.mark.parametrize("kind", ["sine", "typed table"])
-def test_six_typed_digits_are_as_good_as_all(solved, kind):
+def test_typed_digits_start_at_design(solved, kind):
     degrees = ANGLES[2 if kind == "sine" else 3]
     phases = phases_of(degrees)
     mechanism = arm(degrees)
@@ -180,17 +184,11 @@ def test_six_typed_digits_are_as_good_as_all(solved, kind):
     )
 
 
-@pytest.mark.parametrize(
-    ("solved", "turns"),
-    [
-        pytest.param(*way.values, (1.0, 3.0)[k % 2], id=way.id, marks=way.marks)
-        for k, way in enumerate(WAYS)
-    ],
-)
-def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
+@pytest.mark.parametrize("solved", WAYS)
+def test_relative_drivers_with_typed_phase(solved):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    for phase in (turns * math.pi, six(turns * math.pi)):
+    mechanism = turned_arm()
+    for phase in (math.pi, six(3.0 * math.pi)):
         motions = {"u": Sine(-9.0, 0.5, phase), "v": Ramp(0.3)}
         found = solved(case_of(mechanism, motions))
         assert found.solved.all(), found.message
@@ -200,20 +198,16 @@ def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
         assert found.details["start"]["time"] == 0.0
 
 
-def test_a_design_value_that_is_rounding_itself_is_zero_to_a_driver_held_there():
+def test_rounded_design_value_is_zero():
     mechanism = arm(180.0)
     assert 0.0 < mechanism.design_value("y") < 1e-15
-    motions = {
-        "x": Absolute(Sine(1.0, 1.0, -math.pi / 2.0), mechanism.design_value("x")),
-        "y": Absolute(Ramp(0.0), 0.0),
-    }
-    start = start_of(
-        mechanism, Path({**motions, "y": Absolute(Ramp(0.0), mechanism.design_value("y"))}, TIMES)
-    )
+    motions = {"x": Sine(1.0, 1.0, -math.pi / 2.0), "y": Ramp(0.0)}
+    held = {name: Absolute(each, mechanism.design_value(name)) for name, each in motions.items()}
+    start = start_of(mechanism, Path(held, TIMES))
     assert (start.time, start.lead, start.starts_at_design) == (0.0, None, True)
 
 
-def test_what_is_exact_is_where_it_was():
+def test_exact_start_is_design():
     mechanism = arm(30.0, relative=True)
     start = start_of(mechanism, Path({"x": Sine(0.1, 1.0), "y": Ramp(0.1)}, TIMES))
     assert (start.time, start.lead, start.other, start.facts) == (
@@ -224,9 +218,9 @@ def test_what_is_exact_is_where_it_was():
     )
 
 
-def test_a_table_that_does_not_know_time_zero_begins_at_its_first_sample():
+def test_table_starts_at_first_sample():
     """Beyond its ends a line goes on through the design, and is not asked there."""
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+    mechanism = turned_arm()
     table = Table((1.0, 2.0, 3.0), (1.0, 2.0, 3.0))
     path = Path({"u": table, "v": table}, np.array([1.0, 1.5]))
     start = start_of(mechanism, path)
@@ -235,7 +229,7 @@ def test_a_table_that_does_not_know_time_zero_begins_at_its_first_sample():
 
 
 @pytest.mark.parametrize("solved", WAYS)
-def test_a_sample_at_which_the_design_stands_is_a_start(solved):
+def test_start_at_sample_of_design(solved):
     """A table of one turn and a half that is at the design in its middle, at 0.75 s."""
     degrees, times = 60.0, np.linspace(0.0, 1.5, 13)
     mechanism = arm(degrees)
@@ -249,7 +243,7 @@ def test_a_sample_at_which_the_design_stands_is_a_start(solved):
 
 
 @pytest.mark.parametrize("phase", [3.0 * math.pi, six(3.0 * math.pi)])
-def test_a_singular_pose_between_the_start_and_the_first_sample_is_passed(phase):
+def test_start_passes_singular_pose(phase):
     """The cranks of a parallelogram pass their base line, 1.87 rad from design, before any
     sample.
     """
@@ -261,7 +255,7 @@ def test_a_singular_pose_between_the_start_and_the_first_sample_is_passed(phase)
     )
 
 
-def test_a_start_nearer_than_rounding_may_be_a_dead_centre():
+def test_start_near_dead_centre():
     """Design: stretched out. To depart from there for 1e-16 rad is to depart from there."""
     found = solve(slider_crank(), "turn", np.linspace(-0.4, 0.4, 5), motions={})
     path = Path({"turn": Sine(-0.4, 0.25, math.pi)}, np.array([-1.0, 0.0, 1.0]))
@@ -269,3 +263,143 @@ def test_a_start_nearer_than_rounding_may_be_a_dead_centre():
     assert other.points["end"].position == pytest.approx(
         found.points["end"].position[::2], abs=1e-15
     )
+
+
+# Two ways from the design to the path: which one is taken, and what is said of the other
+
+
+FAR = 1.0
+"""By what the arm at time zero is ahead of its design [rad]."""
+
+
+@pytest.mark.parametrize("solved", WAYS)
+def test_ambiguous_start_is_noted(solved):
+    mechanism = arm(60.0)
+    motions = circling(mechanism, [phase + FAR for phase in phases_of(60.0)])
+    found = solved(case_of(mechanism, motions))
+    assert found.solved.all(), found.message
+    said = "; ".join(found.details["notes"])
+    assert "AMBIGUOUS: by way of the first sample the results differ by up to 0.62" in said
+    assert "all drivers go straight from it to time zero" in said
+    # what is found at a time does not depend on where the sweep begins
+    shorter = solved(case_of(mechanism, motions, TIMES[4::4]))
+    assert shorter.points["r"].position == pytest.approx(
+        found.points["r"].position[4::4], abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_start_with_two_design_samples(sign):
+    """The nearer one to time zero is the start, before it or after."""
+    mechanism = turned_arm()
+    waves = {name: Sine(0.5, 0.5, -0.5 * math.pi * sign) for name in "uv"}
+    times = sign * np.array([0.5, 0.8, 1.5])
+    start = start_of(mechanism, Path(waves, np.sort(times)))
+    assert (start.time, start.ambiguous) == (times[0], True)
+    assert start.other.time == times[2]
+
+
+def test_equal_starts_are_not_ambiguous():
+    mechanism = turned_arm()
+    found = by_style("native")(case_of(mechanism, {"u": Sine(2.0, 1.0, 1.0), "v": Ramp(0.3)}))
+    (note,) = found.details["notes"]
+    assert "go straight from it to time zero (u = 1.68" in note
+
+
+@pytest.mark.parametrize("solved", WAYS)
+def test_start_with_one_reachable_way(solved):
+    """Straight to time zero, the tip would go through the hinge, where links of different lengths
+    cannot bring it.
+    """
+    mechanism = arm(0.0)
+    short = replace(mechanism.joints[1], point=(0.55, math.sqrt(0.6**2 - 0.55**2), 0.0))
+    mechanism = replace(mechanism, joints=[mechanism.joints[0], short, mechanism.joints[2]])
+    motions = circling(mechanism, [1.5 * math.pi, math.pi])
+    found = solved(case_of(mechanism, motions, np.linspace(-0.3, 0.1, 9)))
+    assert found.solved.all(), found.message
+    assert "no sample can be reached by way of time zero" in "; ".join(found.details["notes"])
+    assert found.details["start"]["time"] == -0.3
+
+
+# Components, many designs, simulators and proofs start as a sweep does
+
+
+def test_components_start_at_typed_phase():
+    for phase in (math.pi, six(math.pi)):
+        path = Path({"turn": Sine(-1.2, 0.2, phase)}, TIMES)
+        found = solve_components(chain(3), path, ("end",))
+        expected = 3.0 + np.sin(0.3 - path.motions["turn"].at(TIMES)[0])
+        assert found.solved.all(), found.message
+        assert found.points["end"].position[:, 0] == pytest.approx(expected, abs=1e-12)
+        assert found.details["start"]["time"] == 0.0
+
+
+def test_designs_start_at_typed_phase():
+    mechanism = turned_arm()
+    values, tips = np.linspace(-1.0, 1.0, 5), np.array([(1.0, 0.1, 0.0), (0.9, 0.2, 0.0)])
+    for phase in (math.pi, six(math.pi), 1.0):
+        motions = {"v": Sine(0.5, 0.3, phase)}
+        found = designs(mechanism, "u", values, {"points.tip.position": tips}, motions=motions)
+        for k, tip in enumerate(tips.tolist()):
+            one = replace(mechanism, points=[Point("tip", "b", tuple(tip))])
+            alone = solve(one, "u", values, motions=motions).points["tip"]
+            assert errors(alone, [found.points["tip"].position[k]])[0] <= 1e-12
+
+
+def test_designs_note_assumed_start():
+    tips = {"points.tip.position": np.array([(1.0, 0.1, 0.0)])}
+    near, far = (
+        designs(turned_arm(), "u", TIMES, tips, motions={"v": Sine(0.5, 0.3, phase)}).notes
+        for phase in (six(math.pi), 1.0)
+    )
+    assert [*near] == []
+    assert "the design position is not on the path: all drivers go straight" in "; ".join(far)
+
+
+@pytest.mark.parametrize(("phase", "said"), [(six(math.pi), False), (1.0, True)])
+def test_study_notes_assumed_start(phase, said, tmp_path):
+    mechanism = turned_arm()
+    file = tmp_path / "vary.toml"
+    what = '[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
+    file.write_text(f'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n{what}')
+    case = case_of(mechanism, {"u": Sine(0.5, 0.3, phase), "v": Ramp(0.1)})
+    found = sweep_designs(case, read_variation(file, case), samples=8)
+    assert any("go straight" in note for note in found.run["cases"]["case"]["notes"]) == said
+
+
+def test_simulator_starts_at_typed_phase():
+    """Turns of a coupled joint are counted from the design, where a typed phase begins as well as
+    an exact one.
+    """
+    if static().version() is None:
+        pytest.skip("not installed")
+    mechanism = turned_arm(60.0)
+    near, far = (
+        case_of(mechanism, {"u": Sine(1.0, 0.3, phase), "v": Ramp(0.1)})
+        for phase in (six(math.pi), 1.0)
+    )
+    assert static().unsupported(near) is None
+    assert "count from the design" in str(static().unsupported(far))
+    found = static().solve(static().build(near), near, 1e-12)
+    assert found.points["r"].position[:, 0] == pytest.approx(
+        RADIUS * near.sweep.motions["u"].at(TIMES)[0], abs=1e-9
+    )
+
+
+def test_written_start_is_reached():
+    """The way begins at the design, also where the motion does not, so that turns are counted."""
+    mechanism = turned_arm(60.0)
+    case = case_of(mechanism, {"u": Sine(9.0, 0.1, 1.5), "v": Ramp(0.1)})
+    way = way_to(case, 0.5)
+    assert way["rack"].r[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
+    assert way["a"].p[0] == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-15)
+    assert way["rack"].r[-1, 0] == pytest.approx(
+        RADIUS * case.sweep.motions["u"].at(np.array([0.5]))[0][0], abs=1e-12
+    )
+
+
+def test_typed_digits_are_proved():
+    mechanism = arm(60.0)
+    case = case_of(mechanism, circling(mechanism, map(six, phases_of(60.0))))
+    made, _ = prove_case(case, digits=20, numbers="double", tol=1e-12)
+    assert all(each.proved for each in made.samples)

@@ -3,6 +3,7 @@ name, by every function.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -24,32 +25,32 @@ from kincheck.core import (
 )
 from kincheck.core.mechanism.motions import Motion, Table
 
-from ..kinematics.test_chain import chain
-from ..support.mechanisms import mcpherson
+from ..support.mechanisms import chain, mcpherson
 
 VALUES = np.linspace(-0.01, 0.01, 3)
 NO_NUMBERS = (None, "x", 1j, np.complex128(1.0), np.array([1.0 + 0.0j]), [1.0, 2.0])
 BALL = {"joints.ball.point": np.array([[1.0, 0.5, 0.1]])}
 
 
+CALLS = {
+    "solve": partial(solve, mcpherson(), "stroke", VALUES),
+    "solve_designs": partial(solve_designs, mcpherson(), "stroke", VALUES, BALL),
+    "assemble": partial(assemble, mcpherson(), {}),
+    "find_assemblies": partial(find_assemblies, mcpherson(), {}),
+    "trace": partial(trace, mcpherson(), "stroke"),
+}
+
+
 @pytest.mark.parametrize("number", NO_NUMBERS, ids=repr)
-def test_one_number(number):
-    for who, argument, call in (
-        ("solve", "rate", lambda: solve(mcpherson(), "stroke", VALUES, rate=number)),
-        ("solve", "tol", lambda: solve(mcpherson(), "stroke", VALUES, tol=number)),
-        ("solve", "order", lambda: solve(mcpherson(), "stroke", VALUES, order=number)),
-        (
-            "solve_designs",
-            "rate",
-            lambda: solve_designs(mcpherson(), "stroke", VALUES, BALL, rate=number),
-        ),
-        ("assemble", "tol", lambda: assemble(mcpherson(), {}, tol=number)),
-        ("find_assemblies", "tol", lambda: find_assemblies(mcpherson(), {}, tol=number)),
-        ("trace", "tol", lambda: trace(mcpherson(), "stroke", tol=number)),
-        ("trace", "length", lambda: trace(mcpherson(), "stroke", length=number)),
-    ):
-        with pytest.raises(SolveError, match=f"^{who}: {argument} is "):
-            call()
+@pytest.mark.parametrize(
+    "name",
+    ["solve rate", "solve tol", "solve order", "solve_designs rate", "assemble tol"]
+    + ["find_assemblies tol", "trace tol", "trace length"],
+)
+def test_scalar_argument_of_wrong_kind(name, number):
+    who, argument = name.split()
+    with pytest.raises(SolveError, match=f"^{who}: {argument} is "):
+        CALLS[who](**{argument: number})
 
 
 @pytest.mark.parametrize(
@@ -57,51 +58,38 @@ def test_one_number(number):
     [VALUES + 0j, "x", ["a"], [[1.0], [2.0, 3.0]]],
     ids=["complex", "text", "texts", "ragged"],
 )
-def test_several_numbers(numbers):
+def test_array_argument_of_wrong_kind(numbers):
     ball = {"joints.ball.point": numbers}
     poses = {mcpherson().moving[0].name: (numbers, np.array([1.0, 0.0, 0.0, 0.0]))}
-    for message, call in (
-        ("solve: values are .*, expected numbers", lambda: solve(mcpherson(), "stroke", numbers)),
-        (
-            "solve_designs: values are .*, expected numbers",
-            lambda: solve_designs(mcpherson(), "stroke", numbers, BALL),
-        ),
-        (
-            "solve_designs: joints.ball.point are ",
-            lambda: solve_designs(mcpherson(), "stroke", VALUES, ball),
-        ),
-        ("assemble: origin r of body .* are ", lambda: assemble(mcpherson(), poses)),
-        ("find_assemblies: origin r of body .* are ", lambda: find_assemblies(mcpherson(), poses)),
+    for message, call, *rest in (
+        ("solve: values are .*, expected numbers", solve, "stroke", numbers),
+        ("solve_designs: values are .*, expected numbers", solve_designs, "stroke", numbers, BALL),
+        ("solve_designs: joints.ball.point are ", solve_designs, "stroke", VALUES, ball),
+        ("assemble: origin r of body .* are ", assemble, poses),
+        ("find_assemblies: origin r of body .* are ", find_assemblies, poses),
     ):
         with pytest.raises(SolveError, match=f"(?s)^{message}"):
-            call()
+            call(mcpherson(), *rest)
 
 
-def test_an_order_is_a_whole_number_of_any_kind():
-    assert (
-        solve(mcpherson(), "stroke", VALUES, order=np.float64(1.0)).points["wheel"].acceleration
-        is None
-    )
-    assert (
-        solve_designs(mcpherson(), "stroke", VALUES, BALL, order=np.float64(1.0))
-        .points["wheel"]
-        .acceleration
-        is None
-    )
+@pytest.mark.parametrize("who", ["solve", "solve_designs"])
+def test_order_may_be_numpy_float(who):
+    assert CALLS[who](order=np.float64(1.0)).points["wheel"].acceleration is None
 
 
-def test_descriptions_of_complex_numbers():
+def test_complex_coordinates_are_refused():
+    at, off = (0.0, 0.0, 0.0), (0.0, np.complex128(1.0), 1j)
     for call in (
-        lambda: Body("a", origin=(0.0, 0.0, 1j)),
-        lambda: Point("p", "a", (0.0, np.complex128(1.0), 0.0)),
-        lambda: Revolute("r", "ground", "a", point=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1j)),
-        lambda: Distance("d", "ground", "a", points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), length=1j),
+        partial(Body, "a", origin=off),
+        partial(Point, "p", "a", off),
+        partial(Revolute, "r", "ground", "a", point=at, axis=off),
+        partial(Distance, "d", "ground", "a", points=(at, (1.0, 0.0, 0.0)), length=1j),
     ):
         with pytest.raises(MechanismError, match="is not finite; give a "):
             call()
 
 
-def test_no_values_beside_a_motion_that_does_not_begin_at_the_design():
+def test_values_and_offset_motion_are_exclusive():
     table = {"rack": Table((0.0, 1.0), (0.001, 0.002))}
     found = solve(cases.load("mcpherson_steered").mechanism, "stroke", [], motions=table)
     assert found.solved.shape == (0,)
@@ -134,7 +122,7 @@ def with_an_arm(loops):
 
 
 @pytest.mark.parametrize("loops", [1, 21], ids=["one program", "components"])
-def test_numbers_that_may_change_are_read_at_each_call(loops):
+def test_mutable_arguments_are_read_each_call(loops):
     mechanism, turn, rate, numbers = (
         with_an_arm(loops),
         np.linspace(0.0, 0.4, 5),
@@ -147,29 +135,25 @@ def test_numbers_that_may_change_are_read_at_each_call(loops):
         swing = numbers[0] * turn / rate
         expected = np.column_stack([np.cos(swing), np.sin(swing), np.ones(5)])
         # round-off of numbers of size one
-        np.testing.assert_allclose(found.points["hand"].position, expected, rtol=0.0, atol=1e-15)
+        assert found.points["hand"].position == pytest.approx(expected, abs=1e-15)
         rate *= 4.0
         numbers[0] = 3.0
 
 
-def test_one_name_is_no_list_of_names():
-    for who, what, call in (
-        ("solve", "points", lambda: solve(mcpherson(), "stroke", VALUES, points="ball")),
-        ("solve", "bodies", lambda: solve(mcpherson(), "stroke", VALUES, bodies="lca")),
-        (
-            "solve_designs",
-            "points",
-            lambda: solve_designs(mcpherson(), "stroke", VALUES, BALL, points="ball"),
-        ),
-        ("trace", "points", lambda: trace(mcpherson(), "stroke", points="ball")),
-        ("solve", "driver", lambda: solve(mcpherson(), None, VALUES)),
-        ("trace", "driver", lambda: trace(mcpherson(), None)),
+def test_name_argument_of_wrong_kind():
+    for what, call in (
+        ("solve: points", partial(CALLS["solve"], points="ball")),
+        ("solve: bodies", partial(CALLS["solve"], bodies="lca")),
+        ("solve_designs: points", partial(CALLS["solve_designs"], points="ball")),
+        ("trace: points", partial(CALLS["trace"], points="ball")),
+        ("solve: driver", partial(solve, mcpherson(), None, VALUES)),
+        ("trace: driver", partial(trace, mcpherson(), None)),
     ):
-        with pytest.raises(SolveError, match=f"^{who}: {what} is .*, expected a "):
+        with pytest.raises(SolveError, match=f"^{what} is .*, expected a "):
             call()
 
 
-def test_members_of_a_mechanism_are_of_their_kind():
+def test_mechanism_member_of_wrong_kind():
     body, hinge = Body("arm"), Revolute("hinge", "ground", "arm", (0, 0, 0), (0, 0, 1))
     for bodies, joints, found in (
         ([hinge], [body], "bodies has Revolute"),

@@ -21,12 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from kincheck.core.mechanism.motions import PointCoordinate
 
-
-def turned(axis, angle):
-    """The rotation about an axis by the right hand (Rodrigues)."""
-    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * across @ across
+from .rods import rotation
 
 
 @dataclass(frozen=True)
@@ -68,7 +63,7 @@ def carried(parent, P, h, turn, shift):
     """
     n = parent.R @ h
     (angle, rate, rate_t), (d, d_t, d_tt) = turn, (parent.R @ each for each in shift)
-    R = parent.R @ turned(h, angle)
+    R = parent.R @ rotation(angle * h)
     w = parent.w + rate * n
     w_t = parent.w_t + rate_t * n + np.cross(parent.w, rate * n)
     reach = P + shift[0]  # of the parent, where the child's point is now

@@ -8,6 +8,11 @@ import numpy as np
 from . import naive
 
 
+def turn_of(body, motion, k):
+    """The rotation of a body since design."""
+    return naive.A(motion.p[k]) @ naive.A(np.array(body.euler_parameters)).T
+
+
 def demand(body, motion, k, gravity):
     """The force [N] and the torque about the centre of mass [N m] that a body's motion demands.
 
@@ -35,9 +40,8 @@ def carried(body, motion, k, position):
     """Where a point of a body is at a sample; its position at design is given."""
     if motion is None:
         return np.array(position)
-    A_design = naive.A(np.array(body.euler_parameters))
     arm = np.array(position) - np.array(body.origin)
-    return motion.r[k] + naive.A(motion.p[k]) @ A_design.T @ arm
+    return motion.r[k] + turn_of(body, motion, k) @ arm
 
 
 def left_over(mechanism, trajectory, k, pushes):

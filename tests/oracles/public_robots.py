@@ -100,22 +100,20 @@ def compared(file: Path, drive: str = "") -> Sequence[str]:
         KincheckError: the model is refused.
     """
     dof, joint = _freedoms(file, drive)
-    *_, driving, assembled = posed(file, Supplied(drive=(f"{joint}:0:1",), hold_rest=True))
+    *_, assembled = posed(file, Supplied(drive=(f"{joint}:0:1",), hold_rest=True))
     at = assembled.tree.joints[joint].value
     sweep = f"{joint}:{at - SPAN!r}:{at + SPAN!r}:{SAMPLES}"
-    case, driving, assembled = posed(file, Supplied(drive=(sweep,), hold_rest=True))
+    case, _, assembled = posed(file, supplied := Supplied(drive=(sweep,), hold_rest=True))
     mechanism = case.mechanism
-    names = tuple(body.name for body in mechanism.moving)
-    found = NativeSolver(order=0).prepare(mechanism, case.sweep.path, bodies=names)(1e-12)
-    reached, differences = _differences(file, found, case, driving, assembled)
+    solved, reached, worst = differences(file, supplied)
     left_out = re.sub(r"[a-z]+: [a-z]+ \(\d+\),? ?", "", case.source.split(LEFT_OUT)[1])
     return (
         str(dof),
         f"{len(mechanism.moving)}, {len(mechanism.joints)}",
         str(len(assembled.tree.ties)),
         left_out.strip(", ") or "nothing",
-        f"{int(found.solved.sum())}, {reached} of {SAMPLES}",
-        *(f"{each:.0e}" for each in differences),
+        f"{solved}, {reached} of {SAMPLES}",
+        *(f"{each:.0e}" for each in worst),
     )
 
 
@@ -138,10 +136,13 @@ def posed(file: Path, supplied: Supplied) -> tuple[Case, Driving, Assembled]:
     return load(file, supplied), driving, assembled
 
 
-def _differences(file, found, case, driving, assembled):
-    """Return the number of samples that both reach, the largest differences there [m, rad], and the
-    oracle's residual.
+def differences(file: Path, supplied: Supplied) -> tuple[int, int, np.ndarray]:
+    """Return the number of samples that are solved, of those that the oracle reaches too, and the
+    largest differences there [m, rad] with the oracle's residual.
     """
+    case, driving, assembled = posed(file, supplied)
+    names = tuple(body.name for body in case.mechanism.moving)
+    found = NativeSolver(order=0).prepare(case.mechanism, case.sweep.path, bodies=names)(1e-12)
     oracle = _oracle(file, assembled, driving)
     ((swept, values),) = driving.driven.items()
     held = {name: assembled.tree.joints[name].value for name in driving.held}
@@ -164,7 +165,7 @@ def _differences(file, found, case, driving, assembled):
                 continue
             reached += 1
             worst = np.maximum(worst, [*_apart(found, k, oracle, assembled), oracle.residual])
-    return reached, worst
+    return int(found.solved.sum()), reached, worst
 
 
 def _apart(found, k, oracle, assembled):

@@ -81,7 +81,7 @@ SAME_PHI = [kind for kind in discovered() if entry(TWINS, kind)]
 
 
 @pytest.mark.parametrize("kind", SAME_PHI)
-def test_phi_is_the_papers(kind, rng):
+def test_primitive_phi_equals_paper(kind, rng):
     """At any pose. The bodies' axes are the global ones at design, which is all the paper's frames
     may be asked to be.
     """
@@ -100,7 +100,7 @@ def test_phi_is_the_papers(kind, rng):
         )
 
 
-def test_dot12_is_the_papers_to_first_order(rng):
+def test_dot12_equals_paper_to_first_order(rng):
     """(17) and the Euler parameters agree up to the square of the misalignment, in global axes."""
     i, off = body(rng), direction(rng)
     for tilt in (1e-2, 1e-3):
@@ -113,7 +113,7 @@ def test_dot12_is_the_papers_to_first_order(rng):
             assert np.linalg.norm(found[:, k]) == pytest.approx(tilt, rel=1e-3)
 
 
-def test_dot21_is_the_papers_where_the_bodies_turn_alike(rng):
+def test_dot21_equals_paper_without_relative_turn(rng):
     """(23) with the bodies turned alike; otherwise (23) sees body j's arm turn, the const-C form
     does not.
     """
@@ -157,7 +157,7 @@ def gammas(equations, i, j):
 
 @pytest.mark.parametrize("formed", [True, False])
 @pytest.mark.parametrize("number", range(5))
-def test_dot_products_as_printed_are_the_conventional_rows(rng, number, formed):
+def test_printed_dot_products_equal_conventional_rows(rng, number, formed):
     """At any pose; the printed ones take positions, and are zero where a . b and a . d are."""
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
@@ -176,7 +176,7 @@ def test_dot_products_as_printed_are_the_conventional_rows(rng, number, formed):
 
 
 @pytest.mark.parametrize("formed", [True, False])
-def test_simplified_rows_as_printed_are_the_papers(rng, formed):
+def test_printed_simplified_rows_equal_paper_style(rng, formed):
     """The rows at any pose; d11's gamma where the condition holds, for it is simplified too."""
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
@@ -215,7 +215,7 @@ def test_simplified_rows_as_printed_are_the_papers(rng, formed):
     assert off(gammas([printed["d11"]], *alike(i, pinned)), 0.0) <= OF_ROWS
 
 
-def test_chain_and_skew():
+def test_printed_chain_and_skew():
     a, b = Vec3(1.0, 2.0, 3.0), Vec3(-2.0, 5.0, 7.0)
     assert skew(a) @ b == cross(a, b)
     assert chain(b, skew(a)) == cross(b, a)

@@ -25,3 +25,10 @@ def no_programs_kept(tmp_path, monkeypatch, loops):
     """The cache is without programs, so that none is compiled at first."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     copytree(loops, tmp_path / "kincheck")
+
+
+@pytest.fixture
+def cache_folder(monkeypatch, tmp_path):
+    """The folder of a cache of the test's own, which is not there yet."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "kincheck"

@@ -14,7 +14,7 @@ from kincheck.core.program import Plan, Tape, absolute, before, program
 from kincheck.core.program.llvm import compiler
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import LlvmCode
-from kincheck.core.program.straight_line import bytecode, lowered
+from kincheck.core.program.straight_line import bytecode, lower
 
 from ..support.mechanisms import four_bar, mcpherson
 from .test_llvm import OPERATIONS
@@ -35,11 +35,13 @@ def both(run: Callable[[LlvmCode], np.ndarray], plan: Plan) -> None:
     assert run(made).tobytes() == interpreted.tobytes()  # the sign of zeros too
 
 
-def every_slot(made: LlvmCode, name: str, lanes: int = 19) -> np.ndarray:
-    """All slots after a program was run on numbers."""
+def every_slot(made: LlvmCode, name: str = "f", values: np.ndarray | None = None) -> np.ndarray:
+    """All slots after a program was run on numbers, in the first slots."""
     slots = range(len(made.plan.slots))
-    executor = LlvmExecutor(made, lanes)
-    executor.put(slots, np.random.default_rng(1).normal(size=(len(slots), lanes)))
+    if values is None:
+        values = np.random.default_rng(1).normal(size=(len(slots), 19))
+    executor = LlvmExecutor(made, values.shape[1])
+    executor.put(slots[: len(values)], values)
     made._left = 10**9
     executor.run(name)
     return executor.get(slots)
@@ -53,7 +55,7 @@ DELTA = cases.load("delta_robot").mechanism
     [*((mcpherson(), width) for width in (2, 4, 8)), (four_bar(), 4), (DELTA, 2)],
     ids=lambda each: getattr(each, "name", each),
 )
-def test_programs_of_models(mechanism, width, monkeypatch):
+def test_bytecode_of_models_equals_machine_code(mechanism, width, monkeypatch):
     if width > compiler.vector_width():
         pytest.skip("no such vectors here")
     monkeypatch.setattr(compiler, "vector_width", lambda: width)
@@ -65,33 +67,25 @@ def test_programs_of_models(mechanism, width, monkeypatch):
 
 
 @pytest.mark.parametrize("name", [*OPERATIONS, "before"])
-def test_operations(name):
+def test_bytecode_of_operations_equals_machine_code(name):
     tape = Tape()
     a, b = tape.input(0), tape.input(1)
     value = before(a, b) if name == "before" else OPERATIONS[name](a, b)
     plan = Plan({"f": program("f", tape, {2: value})}, {str(k): k for k in range(3)})
-    both(lambda made: every_slot(made, "f"), plan)
+    both(every_slot, plan)
 
 
-def test_signs_of_zeros_are_the_same():
+def test_bytecode_signs_of_zeros():
     """LLVM may turn them in compiled programs only, if the flag nsz allows it."""
     tape = Tape()
     a, b, c, d = (tape.input(k) for k in range(4))
     nodes = program("f", tape, {4: -(a * b - c), 5: -(c * d + a), 6: d - (b * c - a)})
     plan = Plan({"f": nodes}, {str(k): k for k in range(7)})
     values = np.array(list(product([0.0, -0.0, 1.0, -1.0], repeat=4))).T
-
-    def run(made: LlvmCode) -> np.ndarray:
-        made._left = 10**9
-        executor = LlvmExecutor(made, values.shape[1])
-        executor.put(range(4), values)
-        executor.run("f")
-        return executor.get(range(4, 7))
-
-    both(run, plan)
+    both(lambda made: every_slot(made, values=values)[4:], plan)
 
 
-def test_outputs_that_take_the_place_of_inputs():
+def test_bytecode_outputs_replace_inputs():
     tape = Tape()
     x = [tape.input(k) for k in range(6)]
     outputs = {
@@ -105,26 +99,23 @@ def test_outputs_that_take_the_place_of_inputs():
         7: x[4],
     }
     plan = Plan({"f": program("f", tape, outputs)}, {str(k): k for k in range(8)})
-    values = np.arange(1.0, 7.0)
-    executor = LlvmExecutor(LlvmCode(plan), 1)
-    executor.put(range(6), values[:, None])
-    executor.run("f")
-    assert executor.get(range(8))[:, 0].tolist() == [2.0, 1.0, 5.0, 4.0, 3.0, 2.0, 3.0, 5.0]
-    both(lambda made: every_slot(made, "f"), plan)
+    found = every_slot(LlvmCode(plan), values=np.arange(1.0, 7.0)[:, None])
+    assert found[:, 0].tolist() == [2.0, 1.0, 5.0, 4.0, 3.0, 2.0, 3.0, 5.0]
+    both(every_slot, plan)
 
 
-def test_a_program_that_is_run_several_times():
+def test_bytecode_of_repeated_program():
     tape = Tape()
     out = {9: absolute(tape.input(0) - tape.input(4)), 10: absolute(tape.input(0))}
     plan = Plan({"f": program("f", tape, out, times=3)}, {str(k): k for k in range(11)})
-    both(lambda made: every_slot(made, "f"), plan)
+    both(every_slot, plan)
 
 
-def test_a_product_is_part_of_the_only_sum_it_goes_into():
+def test_single_use_product_is_fused():
     tape = Tape()
     a, b, c, d = (tape.input(k) for k in range(4))
     once, twice = a * b, c * d
-    found = lowered(
+    found = lower(
         program(
             "f",
             tape,
@@ -136,7 +127,7 @@ def test_a_product_is_part_of_the_only_sum_it_goes_into():
     assert kinds == ["*", "*", "+", "fma", "fma", "fms", "fnma"]
 
 
-def test_cells_are_used_again():
+def test_bytecode_cells_are_reused():
     tape = Tape()
     x = tape.input(0)
     for k in range(200):

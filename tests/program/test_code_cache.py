@@ -21,25 +21,7 @@ from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.program.llvm import jit
 from kincheck.core.program.llvm.jit import LlvmCode
 
-from ..support.mechanisms import four_bar
-
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
-
-
-def test_code_in_use_stays_after_clearing_the_caches(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # no machine code of another test's
-    mechanism, path = four_bar(), np.linspace(0.0, 1.0, 5)
-    driver, point = mechanism.drivers[0].name, mechanism.points[0].name
-    model = compile_model(mechanism, Request((driver,), (point,)))
-    assert model._code.interpreted
-
-    def positions():
-        return sweep(model, motions.Path({driver: Ramp(1.0)}, path), 1e-12).points[point].position
-
-    expected = positions()
-    clear_caches()
-    collect()
-    np.testing.assert_array_equal(positions(), expected)
 
 
 CRANK = Mechanism(
@@ -51,32 +33,40 @@ CRANK = Mechanism(
 )
 
 
-def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    wanted = np.linspace(0.0, 1.0, 5)
+def made():
+    """The model of the crank, in another process."""
+    clear_caches()
+    return compile_model(CRANK, Request(("turn",), ("tip",)))
 
-    def positions(*, often: bool = False):
-        clear_caches()  # as another process
-        mechanism = CRANK
-        driver, point = mechanism.drivers[0].name, mechanism.points[0].name
-        model = compile_model(mechanism, Request((driver,), (point,)))
-        if often and model._code.interpreted:
-            model._code.count(10**9)
-        return sweep(model, motions.Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
 
-    fresh = positions()
-    interpreted = {*(tmp_path / "kincheck").iterdir()}
+def positions(model, *, often=False):
+    if often and model._code.interpreted:
+        model._code.count(10**9)
+    path = motions.Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.0, 5))
+    return sweep(model, path, 1e-12).points["tip"].position
+
+
+def test_code_in_use_survives_cleared_caches(cache_folder):
+    model = made()
+    assert model._code.interpreted
+    expected = positions(model)
+    clear_caches()
+    collect()
+    np.testing.assert_array_equal(positions(model), expected)
+
+
+def test_damaged_cache_entry_is_rebuilt(cache_folder):
+    fresh = positions(made())
+    interpreted = {*cache_folder.iterdir()}
     # what was traced, its tables, what goes through them and the loops
     assert len(interpreted) == 4
-    np.testing.assert_array_equal(positions(often=True), fresh)
-    entries = [*(tmp_path / "kincheck").iterdir()]
+    np.testing.assert_array_equal(positions(made(), often=True), fresh)
+    entries = [*cache_folder.iterdir()]
     assert len(entries) == 5  # and its machine code
-    for name in ("_trace", "bytecode", "_text"):
-        owner = {"_trace": compiled_model, "bytecode": jit, "_text": LlvmCode}[name]
-        monkeypatch.setattr(owner, name, None)
-    np.testing.assert_array_equal(positions(), fresh)
-    monkeypatch.undo()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.MonkeyPatch.context() as patch:
+        for owner, name in ((compiled_model, "_trace"), (jit, "bytecode"), (LlvmCode, "_text")):
+            patch.setattr(owner, name, None)
+        np.testing.assert_array_equal(positions(made()), fresh)
     (code,) = {*entries} - interpreted
     for entry, other in zip(entries, [*entries[1:], entries[0]], strict=True):
         kept = entry.read_bytes()
@@ -88,7 +78,7 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
             if entry != code:
                 # where there is code, neither tables nor what goes through them is looked for
                 code.unlink()
-            np.testing.assert_array_equal(positions(often=True), fresh)
+            np.testing.assert_array_equal(positions(made(), often=True), fresh)
             assert entry.read_bytes() == kept
 
 
@@ -102,68 +92,42 @@ class Planted:
         return Path.touch, (self.mark,)
 
 
-def test_planted_entries_are_not_run(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-
-    def positions():
-        clear_caches()  # as another process
-        model = compile_model(CRANK, Request(("turn",), ("tip",)))
-        model._code.count(10**9)
-        path = motions.Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.0, 5))
-        return sweep(model, path, 1e-12).points["tip"].position
-
-    fresh, mark = positions(), tmp_path / "planted"
-    for entry in (tmp_path / "kincheck").iterdir():
+def test_planted_pickle_is_not_run(cache_folder, tmp_path):
+    fresh, mark = positions(made(), often=True), tmp_path / "planted"
+    for entry in cache_folder.iterdir():
         for planted in (dumps(Planted(mark)), b"", b"\x80", entry.read_bytes()[32:-1]):
             entry.write_bytes(sha256(entry.name.encode() + planted).digest() + planted)
-            np.testing.assert_array_equal(positions(), fresh)
+            np.testing.assert_array_equal(positions(made(), often=True), fresh)
     assert not mark.exists()
 
 
-def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+def test_trace_cache_key_distinguishes_requests(cache_folder, monkeypatch):
     times: list[str] = []
     trace = compiled_model._trace
     monkeypatch.setattr(
         compiled_model, "_trace", lambda *given: times.append("traced") or trace(*given)
     )
-    mechanism = four_bar()
-    request = Request((mechanism.drivers[0].name,), ())
-    moved = replace(mechanism.bodies[0], origin=(1e-16, 0.0, 0.0))
-    for different in (
-        lambda: (mechanism, request),
-        lambda: (mechanism, replace(request, order=1)),
-        lambda: (replace(mechanism, bodies=[moved, *mechanism.bodies[1:]]), request),
-        lambda: (
+    request = Request(("turn",), ())
+    moved = replace(CRANK, bodies=[Body("crank", (1e-16, 0.0, 0.0))])
+    for given in ((CRANK, request), (CRANK, replace(request, order=1)), (moved, request), None):
+        if given is None:
             monkeypatch.setattr(compiled_model, "_source", lambda: b"changed")
-            or (mechanism, request)
-        ),
-    ):
         times.clear()
         for _ in range(2):
-            compiled_model.traced(*different())
+            compiled_model.traced(*given or (CRANK, request))
         assert times == ["traced"]
 
 
-def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    known = four_bar()
-    hinge = next(joint for joint in known.joints if isinstance(joint, Revolute))
-
+def test_user_joint_traces_are_not_cached(cache_folder, own_joint_types):
     class Mine(Revolute):
         type = "mine_traced"
 
-    monkeypatch.setattr(
-        Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine_traced"}
-    )
+    (hinge,) = CRANK.joints
     mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
-    mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
-    compiled_model.traced(mechanism, Request((known.drivers[0].name,), ()))
-    assert not (tmp_path / "kincheck").exists()
+    compiled_model.traced(replace(CRANK, joints=[mine]), Request(("turn",), ()))
+    assert not cache_folder.exists()
 
 
-def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
-    (tmp_path / "kincheck").write_text("a file where the folder should be")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    mechanism = four_bar()
-    assert solve(mechanism, mechanism.drivers[0].name, [0.0, 0.5]).solved.all()
+def test_unwritable_cache_is_ignored(cache_folder):
+    cache_folder.write_text("a file where the folder should be")
+    assert solve(CRANK, "turn", [0.0, 0.5]).solved.all()

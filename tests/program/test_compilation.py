@@ -24,44 +24,32 @@ from kincheck.core.program import Plan, Program, Tape, program
 from kincheck.core.program.llvm import jit as llvm
 from kincheck.core.program.llvm.jit import LlvmCode
 
-from ..kinematics.test_chain import chain
-from ..support.mechanisms import four_bar, mcpherson
+from ..support.mechanisms import chain, four_bar, mcpherson
 from .test_bytecode import every_slot
 
 pytestmark = pytest.mark.usefixtures("no_programs_kept")
 
 
-def test_sweeps_are_the_same_before_and_after():
-    mechanism = mcpherson()
-    request = Request(("stroke",), tuple(each.name for each in mechanism.points))
-    model, values = compile_model(mechanism, request), np.linspace(-0.08, 0.08, 161)
-    route, found = Route(model, Path({"stroke": Ramp(1.0)}, values)), list[np.ndarray]()
-    for _ in range(10):
-        motions = follow(route, 1e-12).points.values()
-        found.append(np.array([each.position for each in motions]))
+def test_sweep_is_equal_after_compilation():
+    model = compile_model(mcpherson(), Request(("stroke",), ("wheel",)))
+    route = Route(model, Path({"stroke": Ramp(1.0)}, np.linspace(-0.08, 0.08, 161)))
+    first, *others = (follow(route, 1e-12).points["wheel"].position for _ in range(10))
     assert not model._code.interpreted
-    for each in found[1:]:
-        np.testing.assert_array_equal(each, found[0])
+    for each in others:
+        np.testing.assert_array_equal(each, first)
 
 
-def test_one_sweep_compiles_nothing():
+def test_single_sweep_is_interpreted():
     mechanism = mcpherson()
     solve(mechanism, "stroke", np.linspace(-0.08, 0.08, 161))
-    model = models.recent_model(mechanism, request_of(mechanism))
-    assert model._code is not None
+    points, bodies = (
+        tuple(each.name for each in members) for members in (mechanism.points, mechanism.moving)
+    )
+    model = models.recent_model(mechanism, Request(("stroke",), points, bodies))
     assert model._code.interpreted
 
 
-def request_of(mechanism) -> Request:
-    """That of `solve` with all it gives by itself."""
-    return Request(
-        ("stroke",),
-        tuple(each.name for each in mechanism.points),
-        tuple(each.name for each in mechanism.moving),
-    )
-
-
-def test_many_designs_compile_their_programs():
+def test_many_designs_are_compiled():
     mechanism, place = mcpherson(), "joints.tie_rod.points.0"
     request = Request(("stroke",), ("wheel",), varied=(place,))
     route = Route(
@@ -74,7 +62,7 @@ def test_many_designs_compile_their_programs():
     assert not route.model._code.interpreted
 
 
-def test_many_components_compile_their_programs():
+def test_many_components_are_compiled():
     mechanism = chain(15)
     parts = components(mechanism, frames(mechanism))
     cascade = ComponentLanes(mechanism, Request(("turn",), ()), parts)
@@ -85,7 +73,7 @@ def test_many_components_compile_their_programs():
     assert not any(kind.model._code.interpreted for kind in cascade.kinds if len(kind.members) > 1)
 
 
-def test_long_programs_are_walked_for_longer():
+def test_long_program_is_compiled_later():
     tape = Tape()
     x, y = tape.input(0), tape.input(1)
     for _ in range(llvm.OPERATIONS):
@@ -98,7 +86,7 @@ def test_long_programs_are_walked_for_longer():
     assert not made.interpreted
 
 
-def test_programs_that_another_process_walked_are_compiled_in_the_first_sweep():
+def test_known_program_is_compiled_sooner():
     # its tables are in the cache now
     plan = compile_model(mcpherson(), Request(("stroke",), ())).plan
     made = LlvmCode(plan)
@@ -108,15 +96,15 @@ def test_programs_that_another_process_walked_are_compiled_in_the_first_sweep():
     assert not made.interpreted
 
 
-def test_who_measures_has_programs_compiled_at_once_and_nobody_else():
+def test_compiled_at_once_context():
     with llvm.compiled_at_once():
         made = compile_model(mcpherson(), Request(("stroke",), ()))._code
     assert not made.interpreted  # they have run: the design is solved
     assert compile_model(four_bar(), Request(("turn",), ()))._code.interpreted
 
 
-def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
-    made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
+def test_interrupted_compilation_is_repeated(monkeypatch):
+    made = LlvmCode(compile_model(four_bar(), Request(("turn",), ())).plan)
     wanted = every_slot(made, "newton")
 
     def interrupted(*_: object) -> None:
@@ -133,9 +121,9 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
     np.testing.assert_array_equal(every_slot(made, "newton"), wanted)
 
 
-def test_threads_that_come_at_once_compile_once(monkeypatch):
+def test_threads_compile_program_once(monkeypatch):
     """The code of the first would be gone while it runs."""
-    made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
+    made = LlvmCode(compile_model(four_bar(), Request(("turn",), ())).plan)
     load, loaded, meet = llvm.load, list[str](), Barrier(4)
 
     def slowly(*given):

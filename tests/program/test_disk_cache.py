@@ -12,12 +12,6 @@ from kincheck.core.program import disk_cache
 DAY = 86400.0
 
 
-@pytest.fixture
-def here(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "kincheck"
-
-
 def fail():
     raise AssertionError("made again")
 
@@ -30,7 +24,7 @@ def found():
     return disk_cache.find(b"asked", bytes)
 
 
-def test_what_was_made_is_found(here):
+def test_cache_entry_is_found(cache_folder):
     assert disk_cache.size() == 0
     assert kept() == b"made"
     assert kept(fail) == b"made"
@@ -42,68 +36,64 @@ def test_what_was_made_is_found(here):
     [lambda was: was[:-1], lambda was: was[::-1], lambda was: b""],
     ids=["short", "turned", "empty"],
 )
-def test_what_is_not_whole_is_made_again(here, spoil):
+def test_damaged_entry_is_remade(cache_folder, spoil):
     kept()
-    (entry,) = here.iterdir()
+    (entry,) = cache_folder.iterdir()
     entry.write_bytes(spoil(entry.read_bytes()))
     assert found() is None
     assert kept() == b"made"
     assert found() == b"made"
 
 
-def test_what_was_not_used_for_longest_goes(here, monkeypatch):
-    monkeypatch.setattr(disk_cache, "MOST", 1000)
-    here.mkdir(mode=0o700)
-    (here / "a folder").mkdir()
-    for days, name in enumerate(["yesterday", "before", "long ago", "read since"], 1):
-        (here / name).write_bytes(bytes(300))
-        entry = (here / name).stat()
-        os.utime(here / name, (entry.st_atime - days * DAY, entry.st_mtime - days * DAY))
-    read = (here / "read since").stat()
-    os.utime(here / "read since", (read.st_atime + 4 * DAY, read.st_mtime))
+def test_least_recently_used_entries_are_removed(cache_folder):
+    cache_folder.mkdir(mode=0o700)
+    (cache_folder / "a folder").mkdir()
+    for name, days in {"yesterday": 1, "before": 2, "long ago": 3, "read since": 4}.items():
+        (cache_folder / name).touch()
+        os.truncate(cache_folder / name, disk_cache.MOST * 2 // 5)  # sparse: it takes no room
+        entry = (cache_folder / name).stat()
+        read = 0 if name == "read since" else days
+        os.utime(cache_folder / name, (entry.st_atime - read * DAY, entry.st_mtime - days * DAY))
     kept(lambda: bytes(200))
     assert found() == bytes(200)
-    assert {each.name for each in here.iterdir() if len(each.name) < 20} == {
-        "a folder",
-        "yesterday",
-        "read since",
-    }
-    assert disk_cache.size() <= 1000
+    left = {each.name for each in cache_folder.iterdir() if len(each.name) < 20}
+    assert left == {"a folder", "yesterday", "read since"}
+    assert disk_cache.size() <= disk_cache.MOST
 
 
 posix = pytest.mark.skipif(os.name == "nt", reason="Windows has no owners and modes of this kind")
 
 
 @posix
-def test_folder_and_entries_are_closed_to_others(here):
-    here.mkdir(mode=0o755)  # as older versions made it
+def test_cache_permissions_are_private(cache_folder):
+    cache_folder.mkdir(mode=0o755)  # as older versions made it
     kept()
-    (entry,) = here.iterdir()
-    assert [path.stat().st_mode & 0o777 for path in (here, entry)] == [0o700, 0o600]
+    (entry,) = cache_folder.iterdir()
+    assert [path.stat().st_mode & 0o777 for path in (cache_folder, entry)] == [0o700, 0o600]
 
 
-def opened(here):
-    here.chmod(0o777)
+def opened(cache_folder):
+    cache_folder.chmod(0o777)
 
 
-def opened_as_tmp(here):
-    here.chmod(0o1777)
+def opened_as_tmp(cache_folder):
+    cache_folder.chmod(0o1777)
 
 
-def opened_above(here):
-    here.parent.chmod(0o777)
+def opened_above(cache_folder):
+    cache_folder.parent.chmod(0o777)
 
 
-def linked(here):
-    here.rename(here.with_name("elsewhere"))
-    here.symlink_to("elsewhere")
+def linked(cache_folder):
+    cache_folder.rename(cache_folder.with_name("elsewhere"))
+    cache_folder.symlink_to("elsewhere")
 
 
-def linked_through_an_open_folder(here):
-    (here.parent / "open").mkdir()
-    (here.parent / "open").chmod(0o777)
-    (here.parent / "open" / "on").symlink_to(here.parent)
-    os.environ["XDG_CACHE_HOME"] = str(here.parent / "open" / "on")
+def linked_through_an_open_folder(cache_folder):
+    (cache_folder.parent / "open").mkdir()
+    (cache_folder.parent / "open").chmod(0o777)
+    (cache_folder.parent / "open" / "on").symlink_to(cache_folder.parent)
+    os.environ["XDG_CACHE_HOME"] = str(cache_folder.parent / "open" / "on")
 
 
 SPOILT = opened, opened_as_tmp, opened_above, linked, linked_through_an_open_folder
@@ -111,10 +101,10 @@ SPOILT = opened, opened_as_tmp, opened_above, linked, linked_through_an_open_fol
 
 @posix
 @pytest.mark.parametrize("spoil", SPOILT)
-def test_a_folder_others_can_replace_is_not_used(here, spoil, capsys):
+def test_replaceable_cache_folder_is_unused(cache_folder, spoil, capsys):
     kept()
     disk_cache._usable.cache_clear()  # as another process
-    spoil(here)
+    spoil(cache_folder)
     assert kept(lambda: b"made again") == b"made again"
     assert found() is None
     (note,) = capsys.readouterr().err.splitlines()
@@ -123,7 +113,7 @@ def test_a_folder_others_can_replace_is_not_used(here, spoil, capsys):
 
 
 @posix
-def test_a_folder_of_another_user_is_not_used(here, monkeypatch, capsys):
+def test_foreign_cache_folder_is_unused(cache_folder, monkeypatch, capsys):
     kept()
     disk_cache._usable.cache_clear()
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)  # as with sudo and the user's HOME
@@ -132,16 +122,16 @@ def test_a_folder_of_another_user_is_not_used(here, monkeypatch, capsys):
 
 
 @posix
-def test_a_cache_below_a_sticky_folder_is_used(here):
-    here.parent.chmod(0o1777)
+def test_cache_below_sticky_folder_is_used(cache_folder):
+    cache_folder.parent.chmod(0o1777)
     kept()
     assert kept(fail) == b"made"
 
 
 @posix
-def test_entries_others_may_have_written_are_made_again(here):
+def test_writable_or_foreign_entry_is_remade(cache_folder):
     kept()
-    (entry,) = here.iterdir()
+    (entry,) = cache_folder.iterdir()
     entry.chmod(0o666)
     assert found() is None
     assert kept(lambda: b"made again") == b"made again"
@@ -151,21 +141,21 @@ def test_entries_others_may_have_written_are_made_again(here):
         assert found() is None
         os.chown(entry, 0, -1)
     assert found() == b"made again"
-    entry.rename(here / "elsewhere")
-    entry.symlink_to(here / "elsewhere")
+    entry.rename(cache_folder / "elsewhere")
+    entry.symlink_to(cache_folder / "elsewhere")
     assert found() is None
 
 
-def test_an_entry_that_cannot_be_read_is_made_again(here):
+def test_unreadable_entry_is_remade(cache_folder):
     kept()
-    (entry,) = here.iterdir()
+    (entry,) = cache_folder.iterdir()
     entry.write_bytes(sha256(entry.name.encode() + b"forged").digest() + b"forged")
     assert disk_cache.load_or_make(b"asked", lambda: b"7", int) == 7
     assert found() == b"7"
 
 
 @pytest.mark.parametrize("home", ["", "relative"])
-def test_no_cache_is_kept_in_the_working_folder(home, tmp_path, monkeypatch):
+def test_relative_cache_folder_is_unused(home, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")
     monkeypatch.setenv("HOME", home)

@@ -46,38 +46,30 @@ def eliminate(values, literals, right, solve=Elimination.solve):
     return block[n * (n + 1) : -1].T, block[-1], elimination
 
 
+@pytest.mark.parametrize("transposed", [False, True])
 @pytest.mark.parametrize("density", [0.15, 0.4, 1.0])
 @pytest.mark.parametrize("literal", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("n", [1, 2, 5, 9])
-def test_elimination_solves(n, density, literal):
+def test_elimination_equals_numpy_solve(n, density, literal, transposed):
+    """In each lane by its own pivots, with several blocks where entries are few; the same factors
+    solve the transposed system.
+    """
+    solve = Elimination.solve_transposed if transposed else Elimination.solve
     rng = np.random.default_rng([n, int(10 * density), int(10 * literal)])
     for _ in range(3):
         values, literals = random_matrix(rng, n, 20, density, literal)
         right = rng.normal(size=(20, n)) * (rng.random(n) < 0.6)
         if np.linalg.cond(values).max() > 1e6 and literals.all():
             continue
-        found, _, _ = eliminate(values, literals, right)
-        expected = np.linalg.solve(values, right[:, :, None])[:, :, 0]
+        found, _, _ = eliminate(values, literals, right, solve)
+        matrices = values.swapaxes(1, 2) if transposed else values
+        expected = np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
         # the growth of the free pivots, beside the condition, limits what may be asked
         error = np.abs(found - expected).max(axis=1) / (np.abs(expected).max(axis=1) + 1e-300)
         assert (error <= 1e-13 * np.linalg.cond(values)).all()
 
 
-@pytest.mark.parametrize("literal", [0.0, 0.5])
-@pytest.mark.parametrize("density", [0.3, 1.0])
-def test_the_same_factors_solve_the_transposed_system(literal, density):
-    """In each lane by its own pivots, with several blocks where entries are few."""
-    rng = np.random.default_rng([7, int(10 * density), int(10 * literal)])
-    for n in (1, 4, 9):
-        values, literals = random_matrix(rng, n, 20, density, literal)
-        right = rng.normal(size=(20, n)) * (rng.random(n) < 0.6)
-        found, _, _ = eliminate(values, literals, right, Elimination.solve_transposed)
-        expected = np.linalg.solve(values.swapaxes(1, 2), right[:, :, None])[:, :, 0]
-        error = np.abs(found - expected).max(axis=1) / (np.abs(expected).max(axis=1) + 1e-300)
-        assert (error <= 1e-13 * np.linalg.cond(values)).all()
-
-
-def test_every_lane_pivots_for_itself():
+def test_elimination_pivots_by_lane():
     """Each lane is another permutation matrix: a pivot order that serves one lane is zero in
     another.
     """
@@ -91,7 +83,7 @@ def test_every_lane_pivots_for_itself():
 
 
 @pytest.mark.parametrize("known", [False, True])
-def test_small_pivots_are_not_taken(known):
+def test_elimination_avoids_small_pivots(known):
     """The classic: without exchange the answer is lost to round-off; a literal is no safer."""
     values = np.array([[[1e-20, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1e-20, 1.0]]])[: 2 - known]
     literals = np.array([[known, False], [False, False]])
@@ -99,7 +91,7 @@ def test_small_pivots_are_not_taken(known):
     assert found == pytest.approx(np.ones((2 - known, 2)), rel=1e-15)
 
 
-def test_constant_blocks_are_used_up_first():
+def test_elimination_uses_constant_blocks_first():
     """The +-I blocks of the simplified rows leave a core of the rest only, whatever stands beside
     them.
     """
@@ -116,7 +108,7 @@ def test_constant_blocks_are_used_up_first():
     assert identity.solve([1.0, 0.0, 2.0, 0.0, 0.0, 3.0]) == [-1.0, 0.0, -2.0, 0.0, 0.0, -3.0]
 
 
-def test_singular_lanes_show_and_spoil_no_other():
+def test_elimination_with_singular_lanes():
     rng = np.random.default_rng(6)
     values = rng.normal(size=(6, 4, 4))
     values[2, 3] = values[2, 0] + values[2, 1]  # dependent to round-off
@@ -143,6 +135,6 @@ SINGULAR = {
 
 
 @pytest.mark.parametrize("name", SINGULAR)
-def test_structurally_singular_matrices_raise(name):
+def test_structurally_singular_matrix_is_refused(name):
     with pytest.raises(ZeroDivisionError, match="singular whatever the pose"):
         Elimination(SINGULAR[name])

@@ -1,31 +1,166 @@
-"""Memory of executors: windows, tables, and slots that are read, written and carried."""
-
-from __future__ import annotations
+"""Executors: their memory, and motions that they follow again and again by blocks of slots, tables,
+and the worst sample.
+"""
 
 import math
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
+from kincheck.core.kinematics.compiled.routes import Route
+from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.kinematics.continuation.walk import follow_samples, marcher
+from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
 from kincheck.core.program.llvm.compiler import available
 from kincheck.core.program.llvm.executor import LlvmExecutor
-from kincheck.core.program.llvm.jit import LlvmCode
+from kincheck.core.program.llvm.jit import OFTEN, LlvmCode
 from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory, in_order
 
-from ..support.mechanisms import mcpherson
-from .test_tracks import COMPILED
+from ..support.mechanisms import four_bar, mcpherson, slider_crank
+
+COMPILED = [
+    False,
+    pytest.param(
+        True, marks=pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+    ),
+]
+TOL = 1e-12
 
 
-def bound(traced, slots, lanes, compiled):
+def route_of(mechanism, driver, values, *, compiled=True, order=2):
+    request = Request(
+        (driver,), tuple(point.name for point in mechanism.points), order=order, compiled=compiled
+    )
+    return Route(
+        compile_model(mechanism, request),
+        Path({driver: Ramp(1.0)}, np.asarray(values, dtype=float)),
+    )
+
+
+SWEEPS = {
+    "every sample": (mcpherson, "stroke", np.linspace(-0.05, 0.05, 33)),
+    "an end on one side": (mcpherson, "stroke", np.linspace(-0.05, 0.4, 46)),
+    "steps that are divided": (four_bar, "turn", np.linspace(0.0, 6.0, 5)),
+}
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+@pytest.mark.parametrize(
+    ("sweep", "order"), [(name, (0, 2)[k % 2]) for k, name in enumerate(SWEEPS)]
+)
+def test_worst_values_of_kept_samples(compiled, sweep, order):
+    make, driver, values = SWEEPS[sweep]
+    route = route_of(make(), driver, values, compiled=compiled, order=order)
+    for _ in range(2):
+        found = follow_samples(route, TOL)
+        assert found.solved.all() == (sweep != "an end on one side")
+        closure, leftover, sigma = (
+            found.kept[route.model.rows[name].start, found.solved]
+            for name in ("closure", "leftover", SIGMA)
+        )
+        assert found.worst == [closure.max(), leftover.max(), sigma.min()]
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_worst_values_of_shorter_march(compiled):
+    route = route_of(mcpherson(), "stroke", np.linspace(0.0, 0.2, 41), compiled=compiled)
+    whole, half = follow_samples(route, TOL), follow_samples(route, TOL, visit={20})
+    sigma = half.kept[route.model.rows[SIGMA].start, :21]
+    assert half.worst[-1] == sigma.min() > whole.worst[-1]
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_sweeps_of_one_model_are_independent(compiled):
+    """Whatever was swept in between, by whatever tolerance: the same bits, and what was given away
+    stays as it was.
+    """
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33), compiled=compiled)
+    other = Route(route.model, Path({"stroke": Ramp(1.0)}, np.linspace(0.02, 0.3, 33)))
+    first = follow(route, TOL).points["wheel"]
+    was = first.position.copy(), first.acceleration.copy()
+    follow(other, TOL)
+    assert not follow_samples(route, 1e-19).solved.all()
+    again = follow(route, TOL).points["wheel"]
+    assert not np.shares_memory(first.position, again.position)
+    for now in (first, again):
+        np.testing.assert_array_equal(now.position, was[0])
+        np.testing.assert_array_equal(now.acceleration, was[1])
+
+
+@pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+def test_route_keeps_no_results():
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33))
+    found = follow(route, TOL)
+    table = weakref.ref(found.points["wheel"].position.base)
+    del found
+    assert table() is None
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_route_swept_by_threads(compiled):
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled)
+    alone = follow(route, TOL).points["wheel"].acceleration.copy()
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(lambda _: follow(route, TOL), range(24)):
+            np.testing.assert_array_equal(found.points["wheel"].acceleration, alone)
+
+
+def test_interrupted_march_is_repeated(monkeypatch):
+    route = route_of(mcpherson(), "stroke", np.linspace(-0.05, 0.05, 33), compiled=False)
+    first = follow_samples(route, TOL)
+    monkeypatch.setattr(NumpyExecutor, "run", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        follow_samples(route, TOL)
+    monkeypatch.undo()
+    np.testing.assert_array_equal(follow_samples(route, TOL).kept, first.kept)
+
+
+@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_visited_samples_have_their_times(compiled, order):
+    """A sweep leaves no anchors there; who follows a side by hand goes on from one."""
+    route = route_of(
+        mcpherson(), "stroke", np.linspace(-0.08, 0.08, 161), compiled=compiled, order=order
+    )
+    whole = follow_samples(route, TOL)
+    visited = follow_samples(route, TOL, visit={0, 81, 103, 160}).visited
+    time = route.model.slots[FROM + TIME]
+    assert {k: float(lane[time]) for k, lane in visited.items()} == {
+        k: float(route.path.times[k]) for k in (0, 81, 103, 160)
+    }
+    again = follow_samples(route, TOL)
+    np.testing.assert_array_equal(again.kept, whole.kept)
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_partly_accepted_group_is_continued(compiled):
+    """Without a word from whoever divides steps."""
+    route = route_of(
+        slider_crank(),
+        "turn",
+        np.concatenate([[0.5, 1.0, 1.5], 1.5 + 0.002 * np.arange(1.0, 62.0)]),
+        compiled=compiled,
+    )
+    bound = marcher(route, TOL, crossing=False)
+    bound.run()
+    kept = bound.track.begin()
+    assert [*bound.track.run()] == [64]
+    assert np.isfinite(kept).all()
+
+
+def bound(traced, slots, lanes, compiled, often=OFTEN):
     plan = Plan({"f": traced}, {str(k): k for k in range(slots)})
-    return LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    return LlvmExecutor(LlvmCode(plan, often), lanes) if compiled else NumpyExecutor(plan, lanes)
 
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
+def test_repeated_program_keeps_largest_value(compiled, lanes):
     """Blocks of five slots: x from 0 on, y from 5 on."""
     times, tape = 5, Tape()
     x, y = tape.input(0), tape.input(times)
@@ -46,7 +181,7 @@ def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
     np.testing.assert_array_equal(executor.get([10, 11]), wanted)
 
 
-def test_flops_of_a_program_are_those_of_all_its_runs():
+def test_flops_of_repeated_program():
     tape = Tape()
     x, y = tape.input(0), tape.input(5)
     once, five = (program("f", tape, {10: absolute(x - y)}, times=times) for times in (1, 5))
@@ -60,7 +195,7 @@ def after(moves):
     return slots
 
 
-def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written():
+def test_carried_slots_are_ordered():
     """Whatever the order: the same as taking all over one after the other."""
     pairs = [
         (5, 6),
@@ -76,7 +211,7 @@ def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written()
 
 
 @pytest.mark.parametrize("count", range(1, 10))
-def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
+def test_padding_of_carried_pairs_is_neutral(count):
     pairs, width = [(k, k + 1) for k in reversed(range(count))], 8
     table = PlanInMemory(Plan({}, {}, carried=pairs), width, 20)._tables["carried"]
     assert len(table) % TOGETHER == 0
@@ -84,7 +219,7 @@ def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
 
 
 @pytest.mark.skipif(not available(), reason="llvmlite is not installed")
-def test_tables_begin_with_a_cache_line():
+def test_tables_are_cache_aligned():
     mechanism = mcpherson()
     model = compile_model(
         mechanism, Request(("stroke",), ("wheel",), varied=("points.wheel.position",))
@@ -100,7 +235,7 @@ def test_tables_begin_with_a_cache_line():
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 19])
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_window_of_slots_is_their_memory(compiled, lanes):
+def test_slot_window_shares_memory(compiled, lanes):
     tape = Tape()
     traced = program("f", tape, {3: tape.input(1) - tape.input(2)})
     executor = bound(traced, 4, lanes, compiled)
@@ -120,11 +255,10 @@ def test_window_of_slots_is_their_memory(compiled, lanes):
 
 
 @pytest.mark.parametrize("compiled", COMPILED)
-def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, monkeypatch):
+def test_outputs_read_slots_before_overwriting(compiled):
     """Lanes of a group: to slots that are read, that are put out elsewhere, and that nobody reads;
     and values used on the way.
     """
-    monkeypatch.setattr("kincheck.core.program.llvm.jit.OFTEN", 0)
     tape = Tape()
     x, last, first, other = (
         tape.input(0),
@@ -148,7 +282,7 @@ def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, mon
         7: head,
         8: late,
     }
-    executor = bound(program("f", tape, out), 9, 8, compiled)
+    executor = bound(program("f", tape, out), 9, 8, compiled, often=0)
     group = executor.margin if compiled else 8
     values = np.random.default_rng(5).uniform(0.2, 0.4, size=(9, 8))
     heads = np.arange(8) // group * group

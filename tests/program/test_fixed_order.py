@@ -23,7 +23,7 @@ def matrices(n, seed, share=0.2):
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 40])
-def test_factors_of_eight_solve_as_dense_ones(n):
+def test_fixed_order_factors_solve_as_dense(n):
     rows, columns, entries, dense = matrices(n, seed=n)
     order = FixedOrder(rows, columns, n, np.arange(len(rows)))
     order.factor(entries)
@@ -39,7 +39,7 @@ def test_factors_of_eight_solve_as_dense_ones(n):
     assert (order.odd == (np.linalg.det(dense) < 0.0)).all()
 
 
-def test_growth_and_zero_pivots_are_told_for_each_matrix():
+def test_fixed_order_reports_growth_and_zeros():
     rows, columns = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     entries = np.tile([[2.0], [1.0], [1.0], [-3.0]], LANES)
     entries[0, 1], entries[0, 2], entries[3, 3], entries[1, 4] = 1e-3, 0.0, 0.5, np.nan
@@ -52,7 +52,7 @@ def test_growth_and_zero_pivots_are_told_for_each_matrix():
     assert order.odd[[0, 1]].all()
 
 
-def test_later_matrices_replace_the_factors():
+def test_fixed_order_factors_are_replaced():
     rows, columns, entries, dense = matrices(13, seed=3)
     order = FixedOrder(rows, columns, 13, np.arange(len(rows)))
     for scale in (1.0, -4.0):

@@ -53,7 +53,7 @@ define double @scaled(double %x) {
 
 
 @images
-def test_an_image_does_what_its_text_says():
+def test_image_runs_its_text():
     code = jit.load(TEXT, lambda: TEXT, {"chosen": 1, "of_next": 1})
     assert [code.calls["chosen"](k) for k in range(6)] == [7, 21, -7, 3 << 33, ~4, -1]
     assert [code.calls["of_next"](k) for k in range(5)] == [21, -7, 3 << 33, ~4, -1]
@@ -61,13 +61,13 @@ def test_an_image_does_what_its_text_says():
 
 
 @images
-def test_code_that_calls_something_outside_makes_no_image():
+def test_image_with_external_call_is_refused():
     text = (
         "declare double @outside(double)\ndefine double @f(double %x) { %y = call double"
         " @outside(double %x) ret double %y }"
     )
     with pytest.raises(ValueError, match="'outside'"):
-        compiler.joined(compiler.emitted(text))
+        compiler.image_of(compiler.emit(text))
 
 
 def positions() -> np.ndarray:
@@ -75,19 +75,16 @@ def positions() -> np.ndarray:
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 
 
-def test_where_images_do_not_run_llvm_loads_what_it_compiled(tmp_path, monkeypatch):
+def test_object_files_where_images_cannot_run(cache_folder):
     expected = positions()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    loaded, load = list[str](), compiler.loaded
-    monkeypatch.setattr(compiler, "possible", lambda: False)
-    monkeypatch.setattr(compiler, "loaded", lambda file: loaded.append("once") or load(file))
-    monkeypatch.setattr(jit, "OFTEN", 0)
-    for _ in range(2):  # compiled, then kept
-        np.testing.assert_array_equal(positions(), expected)
-        assert loaded
-        loaded.clear()
-    monkeypatch.undo()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    loaded, load = list[str](), compiler.load_object
+    with pytest.MonkeyPatch.context() as patch, jit.compiled_at_once():
+        patch.setattr(compiler, "possible", lambda: False)
+        patch.setattr(compiler, "load_object", lambda file: loaded.append("once") or load(file))
+        for _ in range(2):  # compiled, then kept
+            np.testing.assert_array_equal(positions(), expected)
+            assert loaded
+            loaded.clear()
     np.testing.assert_array_equal(positions(), expected)  # an object file is not taken for an image
 
 
@@ -103,7 +100,7 @@ print("llvmlite" in sys.modules)
 
 
 @images
-def test_who_comes_back_does_not_import_llvm(tmp_path):
+def test_second_process_imports_no_llvm(tmp_path):
     here = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
 
     def imported() -> str:
@@ -115,8 +112,7 @@ def test_who_comes_back_does_not_import_llvm(tmp_path):
 
 
 @images
-def test_what_llvm_says_of_the_processor_is_kept_for_this_one(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+def test_processor_description_is_cached(cache_folder, monkeypatch):
     expected, asked, ask = compiler.processor(), list[str](), compiler._ask_llvm
     monkeypatch.setattr(compiler, "_ask_llvm", lambda: asked.append("once") or ask())
 
@@ -126,22 +122,22 @@ def test_what_llvm_says_of_the_processor_is_kept_for_this_one(tmp_path, monkeypa
 
     assert [found() for _ in range(2)] == [expected] * 2
     assert len(asked) == 1
-    (entry,) = (tmp_path / "kincheck").iterdir()
+    (entry,) = cache_folder.iterdir()
     entry.write_bytes(entry.read_bytes()[:-1])
     assert found() == expected
     assert len(asked) == 2
-    described = compiler._described()
+    described = compiler._describe()
     assert described is not None
-    monkeypatch.setattr(compiler, "_described", lambda: described.replace(b" sse2", b" no_sse2"))
+    monkeypatch.setattr(compiler, "_describe", lambda: described.replace(b" sse2", b" no_sse2"))
     assert found() == expected
-    monkeypatch.setattr(compiler, "_described", lambda: None)
+    monkeypatch.setattr(compiler, "_describe", lambda: None)
     assert found() == expected
     assert len(asked) == 4
 
 
 @images
-def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
-    described = compiler._described()
+def test_processor_is_described_by_llvm_traits(monkeypatch):
+    described = compiler._describe()
     assert described is not None
     assert {line.split(b"\t")[0] for line in described.splitlines() if b"\t" in line} == {
         *compiler.TRAITS
@@ -152,7 +148,7 @@ def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
     assert __version__.encode() in described
 
 
-def test_code_is_known_by_how_it_is_made(monkeypatch):
+def test_cache_key_depends_on_compiler_sources(monkeypatch):
     before = jit.cache_key(TEXT)
     monkeypatch.setattr(jit, "_sources", lambda: "another way")
     assert jit.cache_key(TEXT) != before

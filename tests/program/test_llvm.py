@@ -34,8 +34,7 @@ from kincheck.core.program.llvm import compiler
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import LlvmCode
 
-from ..kinematics.test_chain import chain
-from ..support.mechanisms import four_bar, mcpherson
+from ..support.mechanisms import chain, four_bar, mcpherson
 
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
@@ -65,7 +64,7 @@ OPERATIONS = {
 
 @pytest.mark.parametrize("lanes", [1, 7, 8, 9, 33])
 @pytest.mark.parametrize("name", OPERATIONS)
-def test_operations_are_numpys(name, lanes):
+def test_machine_code_operations_equal_numpy(name, lanes):
     rng = np.random.default_rng(lanes)
     both = executors(OPERATIONS[name], 2, lanes)
     values = rng.normal(size=(2, lanes)) * 10.0 ** rng.integers(-3, 4, size=(2, lanes))
@@ -78,7 +77,7 @@ def test_operations_are_numpys(name, lanes):
     np.testing.assert_allclose(b, a, rtol=2e-16, atol=0.0)
 
 
-def test_all_lanes_may_read_a_few_of_their_group():
+def test_lanes_read_nodes_of_group():
     """The first of them, the last, and some between; of machine code a group is a vector."""
     lanes = compiler.vector_width()
     values = np.random.default_rng(0).normal(size=(1, lanes))
@@ -94,7 +93,7 @@ def test_all_lanes_may_read_a_few_of_their_group():
 
 
 @pytest.mark.parametrize(("traced", "true"), [(sin, np.sin), (cos, np.cos)])
-def test_sine_and_cosine_hold_over_thousands_of_turns(traced, true):
+def test_sine_and_cosine_of_large_angles(traced, true):
     rng = np.random.default_rng(0)
     _, executor = executors(lambda x: traced(x), 1, 256)
     for extent in (1e-9, 1.0, 10.0, 1e4):
@@ -106,7 +105,7 @@ def test_sine_and_cosine_hold_over_thousands_of_turns(traced, true):
 
 
 @pytest.mark.parametrize("style", Style)
-def test_models_give_numpys_results(style):
+def test_machine_code_models_equal_numpy(style):
     for mechanism, values in (
         (mcpherson(), np.linspace(-0.08, 0.08, 33)),
         (four_bar(), np.linspace(0.0, 2.0 * np.pi, 37)),
@@ -127,7 +126,7 @@ def test_models_give_numpys_results(style):
             assert np.abs(a.acceleration - b.acceleration).max() <= 2e-13
 
 
-def test_a_lane_that_cannot_be_reached_is_reported_alike():
+def test_unreached_sample_message_in_both_executors():
     mechanism = mcpherson()
     messages = []
     for compiled in (False, True):
@@ -139,7 +138,7 @@ def test_a_lane_that_cannot_be_reached_is_reported_alike():
     assert messages[0] == messages[1]
 
 
-def test_without_llvmlite_numpy_takes_over(monkeypatch):
+def test_numpy_executor_without_llvmlite(monkeypatch):
     monkeypatch.setattr("kincheck.core.kinematics.compiled.compiled_model.available", lambda: False)
     mechanism = four_bar()
     model = compile_model(mechanism, Request((mechanism.drivers[0].name,), ()))
@@ -167,7 +166,7 @@ TIE_ROD = np.array([1.115, 0.665, 0.118])
 
 @pytest.mark.parametrize("width", [2, 4])
 @pytest.mark.parametrize("way", WAYS)
-def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
+def test_vector_widths_give_equal_results(way, width, monkeypatch):
     expected, asked = WAYS[way](), list[int]()
     monkeypatch.setattr(compiler, "vector_width", lambda: asked.append(width) or width)
     clear_caches()

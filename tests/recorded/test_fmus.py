@@ -149,7 +149,7 @@ MODEL, STEPS = "ModelExchange", "CoSimulation"
 
 @pytest.mark.parametrize("kind", [MODEL, STEPS])
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_outputs_belong_to_their_own_sample(judged, fmi, kind):
+def test_fmu_outputs_belong_to_their_sample(judged, fmi, kind):
     status, record = judged(fmi, [kind], ["angle=turn", "x=tip_x"])
     errors = record["errors"]["tip_x"]["position"]
     assert (status, record["mode"], record["engine"]) == (0, "simulate", "crank")
@@ -158,19 +158,19 @@ def test_outputs_belong_to_their_own_sample(judged, fmi, kind):
     assert "inputs without a driver keep their start values: rate" in record["message"]
 
 
-def test_offset_of_an_input_has_its_unit(judged):
+def test_fmu_input_offset_has_a_unit(judged):
     maps = ["angle=turn+90 [deg]", "x=tip_x"]
     _, record = judged(2, [MODEL], maps)
     assert record["errors"]["tip_x"]["position"]["max_abs"] == pytest.approx(0.70453, abs=1e-5)
 
 
-def test_fmu_moves_by_time_alone(judged):
+def test_fmu_without_inputs_passes(judged):
     status, record = judged(2, [STEPS], ["free_x=tip_x"])
     assert status == 0
     assert "no driver is an input" in record["message"]
 
 
-def test_step_of_a_co_simulation_is_halved(judged):
+def test_co_simulation_step_is_halved(judged):
     maps = ["rate=turn.velocity", "sum=swing [rad]"]
     status, record = judged(2, [MODEL, STEPS], maps, states=True)
     errors = record["errors"]["swing"]["position"]
@@ -179,7 +179,7 @@ def test_step_of_a_co_simulation_is_halved(judged):
     assert "half the step changes swing by" in record["message"]
 
 
-def test_wrong_output_of_a_co_simulation_fails(judged):
+def test_wrong_co_simulation_output_fails(judged):
     maps = ["rate=turn.velocity", "sum=swing+0.5 [rad]"]
     assert judged(2, [STEPS], maps, states=True)[0] == 1
 
@@ -195,14 +195,15 @@ def test_wrong_output_of_a_co_simulation_fails(judged):
         ({"maps": ["sum=turn [rad]", "x=tip_x"]}, "found sum for turn, expected an input"),
         ({"jobs": "0"}, "--fmu runs foreign machine code in workers alone. Leave out --jobs 0"),
     ],
+    ids=str,
 )
-def test_fmus_that_cannot_run_are_refused(judged, capsys, options, text):
+def test_unusable_fmu_is_refused(judged, capsys, options, text):
     given = {"fmi": 2, "kinds": [STEPS], "maps": ["angle=turn", "x=tip_x"], **options}
     assert judged(**given)[0] == 2
     assert text in capsys.readouterr().err
 
 
-def test_archive_without_description_is_refused(last_record, tmp_path, capsys):
+def test_fmu_without_description_is_refused(last_record, tmp_path, capsys):
     case, file = tmp_path / "crank.toml", tmp_path / "a.fmu"
     case.write_text(CASE)
     file.write_bytes(b"PK")

@@ -58,7 +58,7 @@ def judged(last_record, tmp_path):
     return run
 
 
-def test_c_program_is_an_engine(judged, tmp_path):
+def test_c_program_as_engine_passes(judged, tmp_path):
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         pytest.skip("no C compiler")
@@ -74,18 +74,18 @@ def test_c_program_is_an_engine(judged, tmp_path):
 
 
 @pytest.mark.parametrize(("error", "lift", "outcome"), [(0, 0, "pass"), (1e-6, 0, "fail")])
-def test_program_answers_with_poses(judged, error, lift, outcome):
+def test_program_with_poses_is_judged(judged, error, lift, outcome):
     _, record = judged(POSES.format(error=error, lift=lift))
     assert record["outcome"] == outcome
 
 
-def test_poses_of_a_program_satisfy_the_joints(judged):
+def test_program_pose_violating_joint_fails(judged):
     status, record = judged(POSES.format(error=0, lift="0.0000001"))
     assert status == 1
     assert "gap of 1e-07 m in pivot at sample 0 (crank)" in record["message"]
 
 
-def test_program_is_given_case_and_samples(judged):
+def test_program_reads_case_and_samples(judged):
     program = """
 import csv, sys, tomllib
 case = tomllib.load(open(sys.argv[1], "rb"))
@@ -109,13 +109,13 @@ sys.exit(3)
         ("import sys\nopen(sys.argv[2], 'w').write('a\\n1\\n')", "out.csv: found the columns 'a'"),
     ],
 )
-def test_failing_program_costs_its_pair(judged, program, text):
+def test_failing_program_is_an_error(judged, program, text):
     _, record = judged(program)
     assert record["outcome"] == "error"
     assert text in record["message"]
 
 
-def test_samples_without_values_are_unsolved(judged):
+def test_program_samples_without_values_are_unsolved(judged):
     program = """
 import sys
 open(sys.argv[2], "w").write("tip.z,tip.x\\n" + "0,\\n" * 20 + "nan,nan\\n")
@@ -126,7 +126,7 @@ open(sys.argv[2], "w").write("tip.z,tip.x\\n" + "0,\\n" * 20 + "nan,nan\\n")
 
 
 @pytest.mark.parametrize("words", ["{samples}", "{samples} {out} {other}", "{out} {"])
-def test_commands_of_another_form_are_refused(judged, capsys, words):
+def test_malformed_engine_command_is_refused(judged, capsys, words):
     assert judged("prog", words)[0] == 2
     assert 'say --engine-command "prog {case} {samples} {out}"' in capsys.readouterr().err
 
@@ -136,7 +136,7 @@ def test_missing_program_is_refused(judged, capsys):
     assert "there is no program 'no-such-program' that can be run" in capsys.readouterr().err
 
 
-def test_slow_program_is_ended_in_time(judged):
+def test_slow_program_times_out(judged):
     program = "import time\ntime.sleep(100)"
     _, record = judged(program, "{out}", "--jobs", "1", "--timeout", "3")
     assert record["outcome"] == "timeout"

@@ -62,7 +62,7 @@ RES = ("--recorded", DATA / "fourbar.res")
         (MOTION.replace("360D * TIME", "IF(TIME: 0, 0, 360D)"), "driver MOTION_1 follows"),
     ],
 )
-def test_deck_with_its_results_passes(run, fourbar, new, words):
+def test_recorded_deck_passes(run, fourbar, new, words):
     status, (native, record), _ = run(fourbar(MOTION, new), *RES)
     assert (status, record["outcome"], record["mode"]) == (0, "pass", "recorded")
     assert native["mode"] == "projection"
@@ -71,12 +71,12 @@ def test_deck_with_its_results_passes(run, fourbar, new, words):
     assert words in record["message"]
 
 
-def test_deck_of_another_crank_fails(run, fourbar):
+def test_recorded_deck_with_wrong_motion_fails(run, fourbar):
     status, (_, record), _ = run(fourbar("JOINT = 1, FUNCTION = 360D", "JOINT=1, FUN = 361D"), *RES)
     assert (status, record["outcome"]) == (1, "fail")
 
 
-def test_deck_without_motion_is_refused_with_its_freedom(run, fourbar):
+def test_deck_without_motion_is_refused(run, fourbar):
     status, _, err = run(fourbar(MOTION, ""))
     assert status == 2
     assert "1 freedom left without a motion, of the joints JOINT_1" in err
@@ -102,7 +102,7 @@ FREE = ["Spherical_Case02", "Universal_Case03"]
 
 
 @pytest.mark.parametrize("name", HELD + FREE)
-def test_motion_and_reactions_of_adams_pass(run, tmp_path, name):
+def test_adams_motion_and_reactions_pass(run, tmp_path, name):
     status, records, told = run(DECKS[name], *table(tmp_path, name))
     record = records[-1]
     assert (status, record["outcome"]) == (0, "pass")
@@ -112,20 +112,20 @@ def test_motion_and_reactions_of_adams_pass(run, tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["RotSpring_Case01", "TranSpring_Case01"])
-def test_spring_of_other_results_fails_by_its_force(run, tmp_path, name):
+def test_missing_spring_fails_by_force(run, tmp_path, name):
     status, records, _ = run(DECKS[name], *table(tmp_path, name))
     assert status == 1
     assert "for no joint or driver to carry" in records[-1]["message"]
 
 
-def test_reaction_of_another_load_fails_by_name(run, tmp_path):
+def test_wrong_recorded_reaction_is_named(run, tmp_path):
     options = table(tmp_path, "Revolute_Case01", ("JOINT_1.FZ", 1.01))
     status, records, _ = run(DECKS["Revolute_Case01"], *options)
     assert status == 1
     assert "the recorded JOINT_1.FZ is off by 0.2" in records[-1]["message"]
 
 
-def test_deck_of_another_mass_fails_by_its_reaction(run, tmp_path):
+def test_wrong_mass_fails_by_reaction(run, tmp_path):
     text = DECKS["Prismatic_Case02"].read_text()
     deck = tmp_path / "heavy.adm"
     deck.write_text(text.replace("MASS = 1\n", "MASS = 1.001\n"))

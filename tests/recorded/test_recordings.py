@@ -1,6 +1,7 @@
 """Recordings as engines: a four-bar by closed form in 40 digits, as other programs write it."""
 
 import csv
+import io
 import re
 import struct
 import zlib
@@ -11,6 +12,8 @@ import openpyxl
 import pytest
 from kincheck.adapters import engine
 from scipy.io import savemat
+
+from ..support.case_texts import write
 
 DATA = Path(__file__).parent.parent / "data" / "recordings"
 NATIVE = engine("native")
@@ -51,6 +54,20 @@ def table(tmp_path):
     return write
 
 
+def changed_cell(row, column, change):
+    """Return the change of a table that changes the text of one cell."""
+
+    def changed(rows):
+        rows[row][column] = change(rows[row][column])
+        return rows
+
+    return changed
+
+
+def more(by):
+    return lambda cell: f"{float(cell) + by:.9g}"
+
+
 def largest(record, quantity="position"):
     """Return the largest deviation of outputs."""
     found = [each[quantity] for each in record["errors"].values()]
@@ -65,26 +82,26 @@ def largest(record, quantity="position"):
         ("fourbar_123.csv", maps(EULER), 3.3e-9),
         ("fourbar_xyzw.csv", [w + ", first" if "=" in w else w for w in maps(XYZW)], 1e-8),
     ],
+    ids=["Adams", "quaternions", "Euler angles", "from the first pose"],
 )
-def test_recorded_poses_of_truth_pass(judged, file, options, gap):
+def test_true_recorded_poses_pass(judged, file, options, gap):
     status, record = judged(DATA / file, *options)
     assert (status, record["outcome"], record["mode"]) == (0, "pass", "recorded")
     assert record["engine"] == Path(file).stem
     assert 0.0 < record["details"]["rows"]["position"] < gap
 
 
-def test_map_of_a_body_to_a_prefix_suffices(judged, capsys):
+def test_map_of_body_to_prefix(judged, capsys):
     prefixes = [word for part, prefix in PARTS.items() for word in ("--map", f"{part}={prefix}")]
     status, record = judged(DATA / "fourbar_xyzw.csv", *prefixes)
     assert (status, record["outcome"]) == (0, "pass")
     assert 0.0 < record["details"]["rows"]["position"] < 7.6e-10
     assert judged(DATA / "fourbar_123.csv", *prefixes)[0] == 2
-    assert "found no pose of PART_2 in columns of known names below 'crank'" in (
-        capsys.readouterr().err
-    )
+    told = "found no pose of PART_2 in columns of known names below 'crank'"
+    assert told in capsys.readouterr().err
 
 
-def test_adams_results_are_judged_in_all_rates(judged):
+def test_adams_results_are_judged_with_rates(judged):
     _, record = judged(DATA / "fourbar.res", "--analysis", "kinematic_001")
     assert largest(record) < 2e-15
     assert largest(record, "velocity") < 1e-14
@@ -99,8 +116,9 @@ def test_adams_results_are_judged_in_all_rates(judged):
         ("fourbar_modelica_single.mat", MODELICA, 1e-7),
         ("fourbar.mot", ANGLES, 1e-9),
     ],
+    ids=["Modelica", "single precision", "OpenSim"],
 )
-def test_results_of_truth_pass(judged, file, options, tolerance):
+def test_true_recorded_angles_pass(judged, file, options, tolerance):
     status, record = judged(DATA / file, *options)
     assert status == 0
     assert largest(record) < tolerance
@@ -139,7 +157,7 @@ def written_as(file, form, crank, rocker):
         ("struct", ".mat"),
     ],
 )
-def test_truth_in_other_formats_passes(judged, tmp_path, form, suffix):
+def test_recording_in_other_formats_is_judged(judged, tmp_path, form, suffix):
     _, truth = judged(DATA / "fourbar_modelica.mat", *MODELICA)
     crank = np.array(truth["driver"]["MOTION_1"])
     rocker = np.array(truth["outputs"]["JOINT_4.angle"]["position"])
@@ -153,67 +171,82 @@ def test_truth_in_other_formats_passes(judged, tmp_path, form, suffix):
     assert record["errors"]["JOINT_4.angle"]["position"]["worst_step"] == 30
 
 
-def test_matrix_without_rows_is_left_out(judged, tmp_path, capsys):
-    file = tmp_path / "run.mat"
-    file.write_bytes(struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0")
-    assert judged(file)[0] == 2
-    assert "found the columns none, expected one of MOTION_1" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("place", "number", "text"),
-    [
-        (176, 199, "numbers of type 199"),  # with which scipy 1.17 ends the process
-        (128, 13, "an element of type 13"),
-        (152, 1, "a matrix without its head"),
-        (132, 10**9, "an element is cut off"),
-    ],
-)
-def test_damaged_elements_of_matlab_are_refused(judged, tmp_path, capsys, place, number, text):
-    file = tmp_path / "run.mat"
-    savemat(file, {"a": np.arange(9.0)})
-    data = bytearray(file.read_bytes())
+def damaged(place, number):
+    """Return a MAT-file with another number at a place."""
+    savemat(stream := io.BytesIO(), {"a": np.arange(9.0)})
+    data = bytearray(stream.getvalue())
     struct.pack_into("<I", data, place, number)
-    file.write_bytes(data)
-    assert judged(file)[0] == 2
+    return bytes(data)
+
+
+RESULTS = (DATA / "fourbar.res").read_text()
+TWO = RESULTS.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term")
+REFUSED = {
+    "MotionSolve": ("a.abf", b"\0", "of MotionSolve; in HyperGraph, export the curves as CSV"),
+    "Simpack": ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
+    "requests": ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
+    "level 7.3": ("a.mat", b"MATLAB 7.3 MAT-file", "of version 7.3; in MATLAB: save"),
+    "no MAT-file": ("a.mat", b"junk" * 99, "found no readable MAT-file"),
+    "no driver": ("a.csv", "time,z\n0,1\n", "the columns 'time', 'z', expected one of MOTION_1"),
+    "two analyses": (
+        "a.res",
+        TWO,
+        "the analyses 'kinematic_001', 'dynamic_002', expected one; say --analysis NAME",
+    ),
+    "cut off": ("a.res", RESULTS[:5000], "not valid XML"),
+    "old text": ("a.res", "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),
+    "entities": ("a.res", "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "expected"),
+    # a matrix without rows is left out
+    "no rows": (
+        "a.mat",
+        struct.pack("<5i", 0, 0, 2_000_000_000, 0, 2) + b"a\0",
+        "found the columns none, expected one of MOTION_1",
+    ),
+    # with which scipy 1.17 ends the process
+    "type of numbers": ("a.mat", damaged(176, 199), "numbers of type 199"),
+    "type of element": ("a.mat", damaged(128, 13), "an element of type 13"),
+    "no head": ("a.mat", damaged(152, 1), "a matrix without its head"),
+    "length": ("a.mat", damaged(132, 10**9), "an element is cut off"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_unreadable_recording_is_refused(judged, tmp_path, capsys, kind):
+    name, content, text = REFUSED[kind]
+    assert judged(write(tmp_path, content, name))[0] == 2
     assert text in capsys.readouterr().err
 
 
-def test_unpacked_size_of_a_file_is_bounded(judged, tmp_path, capsys):
+def test_matlab_zip_bomb_is_refused(judged, tmp_path, capsys):
     head = b"MATLAB 5.0".ljust(124) + b"\0\1IM"
     packed = zlib.compress(bytes(300_000_000), 9)
-    file = tmp_path / "run.mat"
-    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
-    assert judged(file)[0] == 2
+    data = head + struct.pack("<II", 15, len(packed)) + packed
+    assert judged(write(tmp_path, data, "run.mat"))[0] == 2
     assert "bytes when unpacked; write fewer samples or channels" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("column", [2, 5, 7, 8, 13, 14, 16, 18, 21])
-@pytest.mark.parametrize("name", ["fourbar_xyzw.csv", "fourbar_123.csv"])
-def test_one_moved_number_fails_by_name(judged, table, name, column):
-    quaternions = "xyzw" in name
-    if not quaternions and column > 18:
-        return
+COLUMNS = [2, 5, 7, 8, 13, 14, 16, 18, 21]
+
+
+@pytest.mark.parametrize(
+    ("name", "attitude", "column"),
+    [
+        *(("fourbar_xyzw.csv", XYZW, column) for column in COLUMNS),
+        *(("fourbar_123.csv", EULER, column) for column in COLUMNS[:-1]),
+    ],
+)
+def test_wrong_number_in_poses_is_located(judged, table, name, attitude, column):
     sample = 7 * column % 73
-
-    def moved(rows):
-        head, cell = rows[0][column], rows[sample + 1][column]
-        length = head.endswith("m]")
-        by = (1e-5 if quaternions else 1e-2) if length else (1e-4 if quaternions else 6e-3)
-        rows[sample + 1][column] = f"{float(cell) + by:.9g}"
-        return rows
-
-    status, record = judged(table(name, moved), *maps(XYZW if quaternions else EULER))
-    part = next(p for p, body in PARTS.items() if rows_head(name, column).startswith(body))
+    heads = (DATA / name).read_text().split("\n", 1)[0].split(",")
+    length, angle = {XYZW: (1e-5, 1e-4), EULER: (1e-2, 6e-3)}[attitude]
+    by = length if heads[column].endswith("m]") else angle
+    file = table(name, changed_cell(sample + 1, column, more(by)))
+    status, record = judged(file, *maps(attitude))
+    part = next(p for p, body in PARTS.items() if heads[column].startswith(body))
     found = re.search(r"gap of \S+ m in (\w+) at sample (\d+) \(([^)]*)\)", record["message"])
     assert status == 1
-    assert found is not None
     assert (int(found[2]), part in found[3]) == (sample, True)
     assert "72 of 73 samples" in record["message"]
-
-
-def rows_head(name, column):
-    return (DATA / name).read_text().split("\n", 1)[0].split(",")[column]
 
 
 @pytest.mark.parametrize(
@@ -224,15 +257,14 @@ def rows_head(name, column):
         (51, "recorded accelerations leave 1e-05 m/s² in JOINT_4 at sample 40 (PART_4)"),
     ],
 )
-def test_moved_number_of_adams_results_is_named(judged, tmp_path, number, text):
-    steps = (DATA / "fourbar.res").read_text().split('<Step type="kinematic">')
+def test_wrong_number_in_adams_is_located(judged, tmp_path, number, text):
+    steps = RESULTS.split('<Step type="kinematic">')
     head, tail = steps[41].split("</Step>")
     numbers = head.split()
     numbers[number - 1] = repr(float(numbers[number - 1]) + 0.01)
     steps[41] = "\n" + " ".join(numbers) + "\n</Step>" + tail
-    file = tmp_path / "moved.res"
-    file.write_text('<Step type="kinematic">'.join(steps))
-    status, record = judged(file)
+    moved = '<Step type="kinematic">'.join(steps)
+    status, record = judged(write(tmp_path, moved, "moved.res"))
     assert status == 1
     assert text in record["message"]
 
@@ -246,14 +278,14 @@ def test_moved_number_of_adams_results_is_named(judged, tmp_path, number, text):
         ("fourbar_xyzw.csv", XYZW + ", position x y z [mm]", "positions in m, not mm, the gap"),
     ],
 )
-def test_wrong_convention_is_named(judged, file, wrong, right):
+def test_wrong_attitude_convention_is_named(judged, file, wrong, right):
     texts = [w.replace("x y z, ", "") if "[mm]" in wrong else w for w in maps(wrong)]
     status, record = judged(DATA / file, *texts)
     assert status == 1
     assert right in record["message"]
 
 
-def test_other_zeros_are_explained_and_then_pass(judged):
+def test_other_zero_angles_are_explained(judged):
     rate = ["--map", "JOINT_4.angle.velocity=rocker rate"]
     status, record = judged(DATA / "fourbar_angles.csv", *ANGLES, *rate)
     stated = re.findall(r'--map "([^"]*)"', record["message"])
@@ -302,13 +334,13 @@ def from_zero(rows):
     ],
     ids=["late", "driver sign", "output unit", "driver unit"],
 )
-def test_slip_is_named_and_not_applied(judged, table, options, change, text):
+def test_slip_in_recording_is_named(judged, table, options, change, text):
     status, record = judged(table("fourbar_angles.csv", change), *options)
     assert status == 1
     assert text in record["message"]
 
 
-def test_offset_has_a_unit_of_its_own(judged):
+def test_map_offset_has_a_unit(judged):
     options = ["--map", "MOTION_1=crank-0.8726646259971648 [rad]", *RIGHT[2:]]
     assert judged(DATA / "fourbar_angles.csv", *options)[0] == 0
 
@@ -316,33 +348,33 @@ def test_offset_has_a_unit_of_its_own(judged):
 def test_joints_without_poses_are_not_judged(judged):
     status, record = judged(DATA / "fourbar_xyzw.csv", *maps(XYZW, ["PART_2", "PART_4"]))
     assert status == 0
-    assert (
-        "joints not judged, without the pose of a body: JOINT_2 (PART_3), JOINT_3 (PART_3)"
-        in (record["message"])
-    )
+    told = "joints not judged, without the pose of a body: JOINT_2 (PART_3), JOINT_3 (PART_3)"
+    assert told in record["message"]
 
 
-def test_nothing_comparable_is_not_judged(judged, tmp_path):
-    file = tmp_path / "driver.csv"
-    file.write_text("MOTION_1 [deg]\n0\n5\n")
-    status, record = judged(file)
+def test_recording_of_driver_alone_is_unjudged(judged, tmp_path):
+    status, record = judged(write(tmp_path, "MOTION_1 [deg]\n0\n5\n", "driver.csv"))
     assert (status, record["outcome"]) == (2, "unjudged")
 
 
-@pytest.mark.parametrize("rows", [slice(20, 50), slice(1, None, 4), slice(1, 2)])
-def test_windows_and_coarser_samples_pass(judged, table, rows):
+@pytest.mark.parametrize(
+    "rows",
+    [slice(20, 50), slice(1, None, 4), slice(1, 2)],
+    ids=["window", "coarser", "one sample"],
+)
+def test_recording_of_fewer_samples_passes(judged, table, rows):
     file = table("fourbar_xyzw.csv", lambda every: [every[0], *every[rows]])
     assert judged(file, *maps(XYZW))[0] == 0
 
 
-def test_equal_rows_at_an_event_are_merged(judged, table):
+def test_equal_event_rows_are_merged(judged, table):
     file = table("fourbar_xyzw.csv", lambda rows: [*rows[:10], *rows[9:]])
     status, record = judged(file, *maps(XYZW))
     assert (status, len(record["driver"]["MOTION_1"])) == (0, 73)
     assert "merged 1 row" in record["message"]
 
 
-def test_unequal_rows_at_an_event_need_a_choice(judged, table, capsys):
+def test_unequal_event_rows_need_option(judged, table, capsys):
     def changed(rows):
         return [*rows[:10], [*rows[9][:2], "-0.04", *rows[9][3:]], *rows[10:]]
 
@@ -358,57 +390,15 @@ def test_unequal_rows_at_an_event_need_a_choice(judged, table, capsys):
     ("column", "text"),
     [(2, "left out 1 sample without the pose of a driver"), (9, "PART_3 at 1 sample")],
 )
-def test_gaps_are_left_out_and_named(judged, table, cell, column, text):
-    def holed(rows):
-        rows[9][column] = cell
-        return rows
-
-    status, record = judged(table("fourbar_xyzw.csv", holed), *maps(XYZW))
+def test_gaps_in_poses_are_named(judged, table, cell, column, text):
+    file = table("fourbar_xyzw.csv", changed_cell(9, column, lambda _: cell))
+    status, record = judged(file, *maps(XYZW))
     assert status == 0
     assert text in record["message"]
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        (lambda t: t.replace("</Data>\n<Term", "</Data><Data name='dynamic_002'></Data>\n<Term"),
-         "found the analyses 'kinematic_001', 'dynamic_002', expected one; say --analysis NAME"),
-        (lambda t: t[:5000], "not valid XML"),
-        (lambda t: "1 2 3\n", "say RESULTS/XRF in the deck, which writes XML"),
-        (lambda t: "<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "expected"),
-    ],
-    ids=["two analyses", "cut off", "old text", "entities"],
-)  # fmt: skip
-def test_unreadable_adams_results_are_refused(judged, tmp_path, capsys, change, text):
-    file = tmp_path / "changed.res"
-    file.write_text(change((DATA / "fourbar.res").read_text()))
-    assert judged(file)[0] == 2
-    assert text in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "text"),
-    [
-        ("a.abf", b"\0", "binary result of MotionSolve; in HyperGraph, export the curves as CSV"),
-        ("a.sbr", b"\0", "Simpack; in its PostProcessor, export the channels as CSV"),
-        ("a.req", b"\0", "a request file of Adams; say RESULTS/XRF in the deck"),
-        ("a.mat", b"MATLAB 7.3 MAT-file", "found a MAT-file of version 7.3; in MATLAB: save"),
-        ("a.mat", b"junk" * 99, "found no readable MAT-file"),
-        ("a.csv", b"time,z\n0,1\n", "found the columns 'time', 'z', expected one of MOTION_1"),
-    ],
-)
-def test_other_files_are_refused_with_the_export(judged, tmp_path, capsys, name, content, text):
-    file = tmp_path / name
-    file.write_bytes(content)
-    assert judged(file)[0] == 2
-    assert text in capsys.readouterr().err
-
-
-def test_accuracy_is_stated_apart_from_digits(judged, table):
-    def moved(rows):
-        rows[8][1] = f"{float(rows[8][1]) + 1e-5:.9g}"
-        return rows
-
+def test_accuracy_option_of_recording(judged, table):
+    moved = changed_cell(8, 1, more(1e-5))
     file = table("fourbar_xyzw.csv", moved)
     assert judged(file, *maps(XYZW))[0] == 1
     status, record = judged(file, *maps(XYZW), "--accuracy", "position=0.02 mm")
@@ -416,18 +406,14 @@ def test_accuracy_is_stated_apart_from_digits(judged, table):
     assert record["details"]["rows"]["position"] == pytest.approx(1e-5, rel=1e-3)
 
 
-def test_driver_on_an_even_grid_has_no_digits(judged, tmp_path):
+def test_even_driver_values_are_exact(judged, tmp_path):
     _, truth = judged(DATA / "fourbar.mot", *ANGLES)
     angles = truth["outputs"]["JOINT_4.angle"]["position"]
-    file = tmp_path / "a.csv"
-
-    def write(change):
+    for change, status in ((0.0, 0), (1e-6, 1)):
         rows = [f"{5 * k},{x + change * (k == 30)!r}" for k, x in enumerate(angles)]
-        file.write_text("\n".join(["MOTION_1 [deg],JOINT_4.angle [rad]", *rows]))
-        return judged(file, "--accuracy", "JOINT_4.angle=1e-8 rad")[0]
-
-    assert write(0.0) == 0
-    assert write(1e-6) == 1
+        text = "\n".join(["MOTION_1 [deg],JOINT_4.angle [rad]", *rows])
+        file = write(tmp_path, text, "a.csv")
+        assert judged(file, "--accuracy", "JOINT_4.angle=1e-8 rad")[0] == status
 
 
 GEARS = """schema = "kincheck-case/1"
@@ -472,57 +458,59 @@ RACK = RACK.replace('type = "gear"', 'type = "rack_pinion"\nradius = 0.05')
 RACK = RACK.replace('component = "x"', 'component = "z"')
 
 
+def turning(body, place, angle):
+    """Return the columns of a body that turns about z."""
+    nil, half = 0.0 * angle, 0.5 * angle
+    values = (*(nil + x for x in place), np.cos(half), nil, nil, np.sin(half))
+    names = ("x", "y", "z", "e0", "e1", "e2", "e3")
+    return {f"{body}.{name}": each for name, each in zip(names, values, strict=True)}
+
+
+@pytest.fixture
+def coupled(last_record, tmp_path):
+    """Returns the status and record of columns, recorded of a case of coupled joints."""
+
+    def run(text, columns):
+        case, file = tmp_path / "case.toml", tmp_path / "run.csv"
+        case.write_text(text)
+        rows = np.column_stack([*columns.values()])
+        np.savetxt(file, rows, "%.9f", ",", header=",".join(columns), comments="")
+        return last_record(case, "--recorded", file)
+
+    return run
+
+
 @pytest.mark.parametrize("driven", ["by column", "by poses"])
 @pytest.mark.parametrize("first", [0, 20, 45])
 @pytest.mark.parametrize("kind", ["gears", "rack"])
-def test_coupled_joints_pass_after_several_turns(last_record, tmp_path, kind, first, driven):
+def test_recorded_couplers_pass_after_turns(coupled, kind, first, driven):
     turn = np.linspace(0.0, 12.0, 61)[first:]
-    half, nil = 0.5 * turn, 0.0 * turn
-    other = {"gears": -1.25 * turn, "rack": nil}[kind]
-    lift = {"gears": nil, "rack": 0.05 * turn}[kind]
-    columns = {
-        **({"turn": turn} if driven == "by column" else {}),
-        **dict(zip("xyz", (nil, nil, nil), strict=True)),
-        **dict(zip(("e0", "e1", "e2", "e3"), (np.cos(half), nil, nil, np.sin(half)), strict=True)),
-    }
-    columns = {name if name == "turn" else f"a.{name}": x for name, x in columns.items()}
-    columns |= {"b.x": nil + 0.3, "b.y": nil, "b.z": lift, "b.e0": np.cos(other)}
-    columns |= {"b.e1": nil, "b.e2": nil, "b.e3": np.sin(other)}
-    rows = [
-        ",".join(columns),
-        *(",".join(f"{x:.9f}" for x in row) for row in zip(*columns.values(), strict=True)),
-    ]
-    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
-    case.write_text({"gears": GEARS, "rack": RACK}[kind])
-    file.write_text("\n".join(rows))
-    status, record = last_record(case, "--recorded", file)
+    other, lift = {"gears": (-1.25, 0.0), "rack": (0.0, 0.05)}[kind]
+    columns = {"turn": turn} if driven == "by column" else {}
+    columns |= turning("a", (0.0, 0.0, 0.0), turn)
+    columns |= turning("b", (0.3, 0.0, lift * turn), 2.0 * other * turn)
+    text = {"gears": GEARS, "rack": RACK}[kind]
+    status, record = coupled(text, columns)
     assert status == 0
     assert ("coupled joints begin after whole turns" in record["message"]) == (first > 0)
-    case.write_text(case.read_text().replace("-0.4", "-0.40001").replace("0.05", "0.05001"))
-    assert last_record(case, "--recorded", file)[0] == 1
+    wrong = text.replace("-0.4", "-0.40001").replace("0.05", "0.05001")
+    assert coupled(wrong, columns)[0] == 1
 
 
-def test_wheel_half_a_turn_off_fails_where_turns_are_known(last_record, tmp_path):
+def test_recorded_gear_half_turn_off_fails(coupled):
     """A turn more of the driver would explain it; the driver's column says that there is none."""
     turn = np.linspace(0.0, 2.0, 11)
-    rows = ["turn," + ",".join(f"b.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))]
-    rows[0] += "," + ",".join(f"a.{x}" for x in ("x", "y", "z", "e0", "e1", "e2", "e3"))
-    for a in turn.tolist():
-        b = -2.5 * a - np.pi
-        wheel = (0.3, 0, 0, np.cos(b / 2), 0, 0, np.sin(b / 2))
-        crank = (0, 0, 0, np.cos(a / 2), 0, 0, np.sin(a / 2))
-        rows.append(",".join(f"{x:.9f}" for x in (a, *wheel, *crank)))
-    case, file = tmp_path / "case.toml", tmp_path / "run.csv"
-    case.write_text(GEARS.replace('body = "b"\nposition = [0.4', 'body = "a"\nposition = [0.1'))
-    file.write_text("\n".join(rows))
-    assert last_record(case, "--recorded", file)[0] == 1
+    columns = {"turn": turn} | turning("b", (0.3, 0.0, 0.0), -2.5 * turn - np.pi)
+    columns |= turning("a", (0.0, 0.0, 0.0), turn)
+    text = GEARS.replace('body = "b"\nposition = [0.4', 'body = "a"\nposition = [0.1')
+    assert coupled(text, columns)[0] == 1
 
 
 @pytest.mark.parametrize(
     ("column", "outcome"),
     [(None, "pass"), ("position", "fail"), ("velocity", "fail"), ("acceleration", "fail")],
 )
-def test_long_curves_of_a_run_are_read(judged, kincheck_main, tmp_path, column, outcome):
+def test_long_csv_as_recording(judged, kincheck_main, tmp_path, column, outcome):
     """With its rates; a single number that is wrong by a thousandth shows."""
     file = tmp_path / "curves.csv"
     options = ["--csv", file, "--long", "--quiet"]
@@ -536,7 +524,7 @@ def test_long_curves_of_a_run_are_read(judged, kincheck_main, tmp_path, column, 
     assert (status, record["outcome"]) == (int(outcome == "fail"), outcome)
 
 
-def test_long_curves_of_two_cases_are_refused(judged, kincheck_main, tmp_path, capsys):
+def test_long_csv_of_two_cases(judged, kincheck_main, tmp_path, capsys):
     file = tmp_path / "curves.csv"
     options = ["--csv", file, "--long", "--quiet"]
     kincheck_main("run", CASE, "crank", *options, engines=[NATIVE])

@@ -18,7 +18,7 @@ from kincheck.core.report.sections import parted
 from kincheck.core.studies.bench.size import ring
 from msgspec.structs import replace
 
-from ..kinematics.test_chain import chain
+from ..support.mechanisms import chain
 from ..support.strut_results import GRID, record, results, series
 from .page import report
 

@@ -1,8 +1,7 @@
-"""check-engine: a sound engine passes, each planted fault fails its own row, and engines from
-outside enter by module and class, or by an entry point.
+"""check-engine: a sound engine passes, each planted fault is found, and engines from outside enter
+by module and class, or by an entry point.
 """
 
-from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -15,37 +14,48 @@ from kincheck.core.case.joint_probe import probe
 from kincheck.core.cli import class_loading, main
 from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.run import run
-from kincheck.core.joints import Gear, Planar, Screw
+from kincheck.core.joints import Gear, Planar, Screw, Universal
 from kincheck.core.studies.checks import check_engine as checking
 from kincheck.core.studies.checks import engine_cases as force_cases
 from kincheck.core.studies.checks.check_engine import rates
 from kincheck.core.studies.checks.findings import Verdict
 
-from ..support.fakes import Fake, crank
+from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
+from ..support.fakes import Fake, crank, swept
 from ..support.faulty_engine import Odd, Shy, Sound
 
 ROOT = Path(__file__).parents[2]
 HERE = "tests.support.faulty_engine"
 
 
-@pytest.fixture
-def few(monkeypatch):
-    """Three joint types and one topology; modules of the tests are found by workers."""
-    monkeypatch.syspath_prepend(str(ROOT))
-    monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Planar, Gear)])
-    monkeypatch.setattr(force_cases, "probes", lambda: [probe(Screw)])
+def reduce(monkeypatch, *joint_types, force_type):
+    """Check these joint types, forces by one, and one topology."""
+    monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in joint_types])
+    monkeypatch.setattr(force_cases, "probes", lambda: [probe(force_type)])
     monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {"one loop": "rssr"})
 
 
-def failures(report):
+@pytest.fixture
+def few(monkeypatch):
+    """Modules of the tests are found by workers."""
+    monkeypatch.syspath_prepend(str(ROOT))
+    reduce(monkeypatch, Screw, Planar, Gear, force_type=Screw)
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    """Without worker processes: the checks that a faulty engine passes have them."""
+    monkeypatch.setattr(checking, "in_workers", lambda *_: solve_in_process)
+
+
+def failures(engine):
+    report = kincheck.check_engine(engine)
     return {each.check for each in report.findings if each.verdict is Verdict.FAIL}
 
 
-def test_a_sound_engine_passes(few, monkeypatch):
-    """Without worker processes: the checks that a faulty engine passes have them."""
-    monkeypatch.setattr(checking, "in_workers", lambda *_: solve_in_process)
+def test_check_engine_of_sound_engine_passes(few, in_process):
     report = kincheck.check_engine(Sound())
-    assert failures(report) == set()
+    assert {each.verdict for each in report.findings} == {Verdict.PASS}
     assert [each.check for each in report.findings] == [
         "protocol",
         "isolation: pickle",
@@ -69,7 +79,7 @@ def test_a_sound_engine_passes(few, monkeypatch):
     assert str(report).endswith("sound: 18 pass\n")
 
 
-def test_each_fault_fails_its_row(few, capsys):
+def test_check_engine_faults_fail_their_rows(few, capsys):
     assert main.main(["check-engine", f"{HERE}:Faulty"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert {line.split("  ")[0] for line in lines if "  fail " in line} == {
@@ -89,19 +99,19 @@ def test_each_fault_fails_its_row(few, capsys):
 
 
 def test_check_engine_stops_on_protocol_error(few):
-    report = kincheck.check_engine(Odd())
-    assert failures(report) == {"protocol", "isolation: pickle"}
-    assert "mode is 'magic', expected projection or simulate" in report["protocol"].message
-    assert failures(kincheck.check_engine(Shy())) == {"version"}
+    assert failures(Odd()) == {"protocol", "isolation: pickle"}
+    message = kincheck.check_engine(Odd())["protocol"].message
+    assert "mode is 'magic', expected projection or simulate" in message
+    assert failures(Shy()) == {"version"}
 
 
 @pytest.mark.parametrize(
     ("where", "message"),
     [
         (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
-        (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
+        ("tests.support.engine_faults:Trajectory", "Trajectory cannot be created: TypeError"),
         (
-            f"{HERE}:np",
+            "tests.support.engine_faults:np",
             "np is no engine: name, mode, loop, settings, unsupported, build, solve missing",
         ),
         ("tests.nothing:Sound", "there is no module 'tests.nothing'"),
@@ -114,7 +124,7 @@ def test_check_engine_refuses_class_without_protocol(monkeypatch, capsys, where,
     assert message in capsys.readouterr().err
 
 
-def test_run_takes_engine_by_module_and_class(monkeypatch, capsys):
+def test_engine_by_module_and_class(monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(ROOT))
     assert main.main(["run", "--jobs", "0", "--engine", f"{HERE}:Sound", "rssr"]) == 0
     assert "rssr  sound   pass" in capsys.readouterr().out
@@ -142,7 +152,7 @@ def offered(monkeypatch):
     return offer
 
 
-def test_other_packages_offer_engines(offered, capsys):
+def test_entry_points_offer_engines(offered, capsys):
     offered(sound=f"{HERE}:Sound", broken="tests.nothing:Engine")
     assert "sound" in main.registry().engines
     assert main.main("run rssr --jobs 0 --engine sound".split()) == 0
@@ -150,13 +160,13 @@ def test_other_packages_offer_engines(offered, capsys):
     assert "No module named 'tests.nothing'" in capsys.readouterr().out
 
 
-def test_entry_point_with_builtin_name_is_refused(offered, capsys):
+def test_entry_point_with_builtin_name_refused(offered, capsys):
     offered(mujoco=f"{HERE}:Sound")
     assert main.main("run rssr --engine native".split()) == 2
     assert "offers an engine named 'mujoco', which is kincheck's own" in capsys.readouterr().err
 
 
-def test_the_entry_point_group_is_asked_for(monkeypatch):
+def test_entry_point_group_is_kincheck_engines(monkeypatch):
     asked = []
 
     def entry_points(*, group):
@@ -165,15 +175,43 @@ def test_the_entry_point_group_is_asked_for(monkeypatch):
 
     class_loading.entry_points.cache_clear()
     monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
-    assert class_loading.offered(["native"]) == ("own",)
+    assert class_loading.names_of_entry_points(["native"]) == ("own",)
     assert asked == ["kincheck.engines"]
     class_loading.entry_points.cache_clear()
 
 
 @pytest.mark.parametrize(("samples", "compared"), [(21, False), (22, True)])
-def test_rates_of_short_sweeps_are_not_compared(samples, compared):
+def test_rates_of_short_sweeps_are_skipped(samples, compared):
     """Three times as many steps as a difference has weights."""
     case = crank(reference=False)
-    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-1.0, 1.0, samples)))
+    case = swept(case, np.linspace(-1.0, 1.0, samples))
     solved = [(case, record) for record in run([case], [Fake()], tol=1e-12).records]
     assert {each.verdict for each in rates(solved)} == {Verdict.PASS if compared else Verdict.SKIP}
+
+
+# Engines with one fault each
+
+
+@pytest.fixture
+def two(in_process, monkeypatch):
+    reduce(monkeypatch, Screw, Universal, force_type=Universal)
+
+
+@pytest.mark.parametrize("fault", OF_MOTION)
+def test_check_engine_finds_fault_of_motion(fault, two, monkeypatch):
+    monkeypatch.setattr(checking, "force_cases", list)
+    assert failures(Wrapped(fault))
+
+
+@pytest.mark.parametrize("fault", OF_FORCES)
+def test_check_engine_finds_fault_of_forces(fault, two, monkeypatch):
+    monkeypatch.setattr(checking, "probes", list)
+    monkeypatch.setattr("kincheck.core.cli.checks.TOPOLOGIES", {})
+    found = failures(Wrapped(fault))
+    assert any(check.startswith("forces: ") for check in found)
+    assert not any(check.startswith(("rates: ", "refusal: ")) for check in found)
+
+
+@pytest.mark.parametrize("change", ["", "no fault, with bodies", *HARMLESS])
+def test_check_engine_passes_harmless_changes(change, two):
+    assert failures(Wrapped(change)) == set()

@@ -28,7 +28,7 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.checks.findings import Verdict
 
-from ..support.fakes import Fake
+from ..support.fakes import Fake, native_but
 from ..support.joint_mutants import mutants
 from .test_check_joint_mistakes import mistaken
 
@@ -50,14 +50,14 @@ pytestmark = pytest.mark.usefixtures("own_joint_types")
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_built_in_joints_pass(few, name):
+def test_check_joint_passes_builtin_joints(few, name):
     report = check_joint(Joint.registry[name], samples=8)
     assert report.passed, report
     assert len({each.check for each in report.findings}) == len(report.findings)
 
 
 @pytest.mark.parametrize("module", USERS)
-def test_joints_of_users_pass(few, in_folder, module):
+def test_check_joint_passes_user_joints(few, in_folder, module):
     engines = [adapters.engine(name) for name in adapters.ENGINES]
     report = check_joint(load_joint(f"{module}:{USERS[module]}"), samples=8, engines=engines)
     assert report.passed, report
@@ -77,13 +77,9 @@ def test_joints_of_users_pass(few, in_folder, module):
         )
 
 
-def test_loop_with_large_residual_fails(loops_only):
-    native = adapters.engine("native")
-
-    def answer(case):
-        return dataclasses.replace(native.solve(native.build(case), case, 1e-12), residual=1e-3)
-
-    found = check_joint(Revolute, engines=[Fake("loose", answer=answer)])["loop: loose"]
+def test_check_joint_loop_large_residual_fails(loops_only):
+    loose = native_but(lambda found, case: dataclasses.replace(found, residual=1e-3), "loose")
+    found = check_joint(Revolute, engines=[loose])["loop: loose"]
     assert found.verdict is Verdict.FAIL
     assert (
         "the residual of samples that the engine calls solved is 0.001, tolerance 1e-12"
@@ -91,18 +87,15 @@ def test_loop_with_large_residual_fails(loops_only):
     )
 
 
-def test_loop_without_derivatives_passes_with_note(loops_only):
-    native = adapters.engine("native")
-
-    def answer(case):
-        found = native.solve(native.build(case), case, 1e-12)
+def test_check_joint_loop_without_derivatives_noted(loops_only):
+    def without_rates(found, case):
         bare = {
             name: dataclasses.replace(each, velocity=None, acceleration=None)
             for name, each in found.points.items()
         }
         return dataclasses.replace(found, points=bare)
 
-    found = check_joint(Revolute, engines=[Fake("bare", answer=answer)])["loop: bare"]
+    found = check_joint(Revolute, engines=[native_but(without_rates, "bare")])["loop: bare"]
     assert found.verdict is Verdict.PASS
     assert "not judged: velocity: the engine gives none" in found.message
 
@@ -110,7 +103,7 @@ def test_loop_without_derivatives_passes_with_note(loops_only):
 # Specimens
 
 
-def test_specimens_given_or_offered(loops_only):
+def test_check_joint_specimens_given_or_offered(loops_only):
     one = Universal("u", "a", "ground", (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0)))
     given = check_joint(Universal, specimens=[one])
     assert given.passed, given
@@ -121,13 +114,13 @@ def test_specimens_given_or_offered(loops_only):
     assert len(offered.specimens) == 1
 
 
-def test_the_seed_reproduces(few):
+def test_check_joint_seed_repeats_findings(few):
     first, again, other = (check_joint(Spherical, seed=seed, samples=4) for seed in (3, 3, 4))
     assert first == again
     assert first.findings != other.findings
 
 
-def test_no_specimen():
+def test_check_joint_without_specimen_is_refused():
     @dataclass(frozen=True)
     class Odd(AxialJoint):
         type = "odd"
@@ -160,7 +153,7 @@ def test_failing_equivalent_is_reported_as_error(loops_only):
     )
 
 
-def test_joint_type_name_in_use_is_refused():
+def test_joint_type_name_in_use_refused():
     with pytest.raises(
         MechanismError,
         match=r"Mine: type = 'revolute' is taken by kincheck.core.joints.revolute.Revolute; give",
@@ -178,7 +171,7 @@ def test_joint_type_name_in_use_is_refused():
     assert Joint.registry["mine"] is second is not first
 
 
-def test_report_names_what_was_not_checked(few):
+def test_check_joint_report_names_unchecked(few):
     report = check_joint(InPlane)
     skipped = {each.check: each.message for each in report.findings if each.verdict is Verdict.SKIP}
     assert set(skipped) == {
@@ -298,14 +291,14 @@ def test_check_joint_refuses_unusable_type_name(monkeypatch, tmp_path, capsys, b
 # The command
 
 
-def test_command(few, in_folder, capsys):
+def test_check_joint_command_prints_and_saves(few, in_folder, capsys):
     assert main("check-joint pin_in_slot:PinInSlot --seed 1".split()) == 0
     said = capsys.readouterr().out
     assert "spurious branches" in said
     assert "(seed 1)" in said
 
 
-def test_command_tells_of_a_failure(loops_only, monkeypatch, capsys, tmp_path):
+def test_check_joint_command_reports_failure(loops_only, monkeypatch, capsys, tmp_path):
     text = (JOINTS / "pin_in_slot.py").read_text(encoding="utf-8")
     text = text.replace('("slide", "turn")', '("slide",)')
     (tmp_path / "faulty_joint.py").write_text(text, encoding="utf-8")
@@ -334,7 +327,7 @@ def test_command_tells_of_a_failure(loops_only, monkeypatch, capsys, tmp_path):
         (".rzeppa:Rzeppa", "module '.rzeppa' cannot be imported: TypeError: "),
     ],
 )
-def test_check_joint_refuses_unknown_module_or_class(in_folder, capsys, where, message):
+def test_unknown_joint_module_or_class_refused(in_folder, capsys, where, message):
     assert main(["check-joint", where]) == 2
     assert message in capsys.readouterr().err
 
@@ -472,7 +465,7 @@ def test_edited_engine_code_makes_new_run(tmp_path, run):
     assert "run 2 is new" in run(*command, "--resume", status=0)
 
 
-def test_installed_modules_and_kinchecks_own_are_not_among_the_sources():
+def test_sources_omit_installed_modules():
     assert sources([]) == {}
     found = sources([f"{__name__}:Nothing", "numpy", "kincheck.adapters.native"])
     assert __name__ in found
@@ -495,7 +488,7 @@ HARMFUL = sorted(name for name in EVERY if not name.startswith(HARMLESS))
 
 
 @pytest.mark.parametrize("mutant", random.Random(SEED).sample(HARMFUL, CHOSEN))
-def test_a_mutant_of_one_term_is_found(mutant, own_joint_types, monkeypatch):
+def test_check_joint_finds_one_term_mutant(mutant, own_joint_types, monkeypatch):
     module = types.ModuleType("mutant")
     monkeypatch.setitem(sys.modules, "mutant", module)
     with warnings.catch_warnings():
@@ -505,7 +498,7 @@ def test_a_mutant_of_one_term_is_found(mutant, own_joint_types, monkeypatch):
         assert any(not report.passed for report in reports)
 
 
-def test_the_joints_without_a_mutation_pass(own_joint_types, in_folder):
+def test_check_joint_passes_telescope_joints(own_joint_types, in_folder):
     from telescope import Telescope, Threaded
 
     assert check_joint(Telescope, samples=8).passed

@@ -3,7 +3,7 @@
 import dataclasses
 import importlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 from kincheck.core import (
@@ -11,6 +11,7 @@ from kincheck.core import (
     Cylindrical,
     InPlane,
     Revolute,
+    Screw,
     Spherical,
     Translational,
     Universal,
@@ -18,9 +19,15 @@ from kincheck.core import (
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, cross, vec
+from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
+from kincheck.core.studies.checks.findings import Verdict
+from kincheck.core.studies.checks.joint_loops import driven, loaded, loops, reactions, solved
+
+from ..support.engine_faults import changed
+from ..support.fakes import native_but
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 checking = importlib.import_module("kincheck.core.studies.checks.check_joint")
@@ -46,12 +53,7 @@ def mistaken(base, primitive=None, **changes):
 
 def _retyped(native, primitive, changes):
     fields = {each.name: getattr(native, each.name) for each in dataclasses.fields(native)}
-    methods = {name: change for name, change in changes.items() if name not in fields}
-    kind = type(f"Mistaken{primitive.__name__}", (primitive,), methods)
-    return kind(
-        **fields
-        | {name: change(fields[name]) for name, change in changes.items() if name in fields}
-    )
+    return type(f"Mistaken{primitive.__name__}", (primitive,), changes)(**fields)
 
 
 def negative_gamma(self, i, j, vi, vj):
@@ -94,63 +96,28 @@ def cancelling(self, i, j):
     return tuple((each + 1e7 * x) - 1e7 * x for each in super(type(self), self).phi(i, j))
 
 
-def left_handed(self, i, j):
-    f, g, h = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(g, f, h)
+class Root(p.Spherical):
+    """Its equations cannot be traced."""
+
+    def phi(self, i, j):
+        return tuple(math.sqrt(x) for x in super().phi(i, j))
 
 
-def long_axis(self, i, j):
-    f, g, _ = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot11(f, g, vec(self.axis))
+def composed(base, primitives):
+    """A joint type like the base of primitives made of its two arms, its axes f, g and h, and its
+    axis as it is given.
+    """
 
+    def own(self, i, j):
+        P = vec(self.point)
+        axis = getattr(self, "axis", (0.0, 0.0, 1.0))
+        return primitives((i.arm(P), j.arm(P)), *triad(axis), vec(axis))
 
-def long_row(self, i, j):
-    P = vec(self.point)
-    return (p.Dot20(vec(self.axis), i.arm(P), j.arm(P), ZERO),)
-
-
-def missing_row(self, i, j):
-    f, _, h = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot10(f, h)
-
-
-def repeated_row(self, i, j):
-    f, _, h = triad(self.axis)
-    P = vec(self.point)
-    return p.Spherical(i.arm(P), j.arm(P)), p.Dot10(f, h), p.Dot10(h, f)
-
-
-def wrong_body(self, i, j):
-    P = vec(self.point)
-    return (p.Spherical(j.arm(P), j.arm(P)),)
+    return mistaken(base, primitives=own)
 
 
 def global_arm(self, i, j):
     return (p.Spherical(vec(self.point), vec(self.point)),)
-
-
-def open_at_design(self, i, j):
-    P, (f, g, _) = vec(self.point), triad(self.axis)
-    arms = i.arm(P), j.arm(P)
-    return p.Spherical(*arms, d0=0.01 * f), p.Dot11(f, g, unit(self.axis))
-
-
-def untraceable(self, i, j):
-    class Root(p.Spherical):
-        def phi(self, i, j):
-            return tuple(math.sqrt(x) for x in super().phi(i, j))
-
-    P = vec(self.point)
-    return (Root(i.arm(P), j.arm(P)),)
-
-
-def unscaled(self, i, j):
-    P, (f, g, _) = vec(self.point), triad(self.axis)
-    arms = i.arm(P), j.arm(P)
-    return tuple(p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in (f, g))
 
 
 def measured_backwards(self, freedom, i, j):
@@ -225,11 +192,33 @@ MISTAKES = {
     "no rows": ("equations", lambda: mistaken(InPlane, primitives=no_rows)),
     "rows without an arm": ("rows", lambda: mistaken(InPlane, p.Dot20, rows=rows_without_arm)),
     "rows too long": ("newton", lambda: mistaken(Spherical, p.Spherical, rows=doubled_rows)),
-    "axes swapped": ("newton", lambda: mistaken(Revolute, primitives=left_handed)),
-    "axis not unit": ("axis lengths", lambda: mistaken(Revolute, primitives=long_axis)),
-    "a row as long as the axis": ("axis lengths", lambda: mistaken(InPlane, primitives=long_row)),
-    "a row missing": ("freedoms", lambda: mistaken(Revolute, primitives=missing_row)),
-    "a row twice": ("rank", lambda: mistaken(Revolute, primitives=repeated_row)),
+    "axes swapped": (
+        "newton",
+        lambda: composed(
+            Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot11(g, f, h))
+        ),
+    ),
+    "axis not unit": (
+        "axis lengths",
+        lambda: composed(
+            Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot11(f, g, axis))
+        ),
+    ),
+    "a row as long as the axis": (
+        "axis lengths",
+        lambda: composed(InPlane, lambda arms, f, g, h, axis: (p.Dot20(axis, *arms, ZERO),)),
+    ),
+    "a row missing": (
+        "freedoms",
+        lambda: composed(Revolute, lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot10(f, h))),
+    ),
+    "a row twice": (
+        "rank",
+        lambda: composed(
+            Revolute,
+            lambda arms, f, g, h, axis: (p.Spherical(*arms), p.Dot10(f, h), p.Dot10(h, f)),
+        ),
+    ),
     "a freedom too many": (
         "freedoms",
         lambda: mistaken(Universal, freedoms=("rotation i", "rotation j", "slide")),
@@ -244,14 +233,29 @@ MISTAKES = {
         "spurious branches",
         lambda: mistaken(ConstantVelocity, p.ConstantVelocity, branch=no_branch),
     ),
-    "arm of the wrong body": ("rigid motion", lambda: mistaken(Spherical, primitives=wrong_body)),
+    "arm of the wrong body": (
+        "rigid motion",
+        lambda: composed(Spherical, lambda arms, *axes: (p.Spherical(arms[1], arms[1]),)),
+    ),
     "global arms": ("place", lambda: mistaken(Spherical, primitives=global_arm)),
-    "not closed at design": ("design", lambda: mistaken(Revolute, primitives=open_at_design)),
-    "a length that is none": ("size", lambda: mistaken(InPlane, primitives=unscaled)),
+    "not closed at design": (
+        "design",
+        lambda: composed(
+            Revolute,
+            lambda arms, f, g, h, axis: (p.Spherical(*arms, d0=0.01 * f), p.Dot11(f, g, h)),
+        ),
+    ),
+    "a length that is none": (
+        "size",
+        lambda: composed(
+            InPlane,
+            lambda arms, *axes: [p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in axes[:2]],
+        ),
+    ),
     "called symmetric": ("exchange", lambda: mistaken(InPlane, symmetric=True)),
     "not smooth": ("newton", lambda: mistaken(InPlane, p.Dot20, phi=rough)),
     "cancellation": ("round-off", lambda: mistaken(Spherical, p.Spherical, phi=cancelling)),
-    "math.sqrt": ("equations", lambda: mistaken(Spherical, primitives=untraceable)),
+    "math.sqrt": ("equations", lambda: composed(Spherical, lambda arms, *axes: (Root(*arms),))),
     "other coordinates": (
         "mixed style",
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
@@ -281,7 +285,7 @@ MISTAKES |= {name: ("driver", make) for name, make in MISTAKES_OF_DRIVERS.items(
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_are_caught(mistake, few, monkeypatch):
+def test_check_joint_finds_joint_mistakes(mistake, few, monkeypatch):
     """Few poses find them; the two dear checks run where they must find one."""
     check, make = MISTAKES[mistake]
     monkeypatch.setattr(checking, "loops", lambda tested, engines, failing=(): [])
@@ -301,13 +305,13 @@ def test_joint_without_rows_is_reported():
     )
 
 
-def test_the_base_of_a_mistake_is_sound(few):
+def test_check_joint_passes_unmistaken_base(few):
     """The machinery of these tests makes no mistakes by itself."""
     assert check_joint(mistaken(Revolute, p.Dot11), samples=8).passed
     assert check_joint(mistaken(ConstantVelocity, p.ConstantVelocity), samples=8).passed
 
 
-def test_a_wrong_equivalent_is_caught(few, in_folder):
+def test_check_joint_finds_wrong_equivalent(few, in_folder):
     right = load_joint("pin_in_slot:PinInSlot")
 
     def equivalent(self):
@@ -318,7 +322,7 @@ def test_a_wrong_equivalent_is_caught(few, in_folder):
     assert "2 degrees of freedom" in report["loop: native, equivalent"].message
 
 
-def test_an_equivalent_with_fixed_names_is_caught(few):
+def test_equivalent_with_fixed_names_is_found(few):
     """The second joint of a mechanism would have parts of the same names."""
 
     def equivalent(self):
@@ -328,3 +332,113 @@ def test_an_equivalent_with_fixed_names_is_caught(few):
     assert report.failures == ("loop: native, equivalent",), report
     message = report["loop: native, equivalent"].message
     assert "names a part 'pin', whatever the joint's name is" in message
+
+
+# Reactions: each check finds its mistake
+
+equations = importlib.import_module("kincheck.core.kinematics.forces.equations")
+
+
+def failing(joint_type, case_of=loaded):
+    """The failing checks of reactions of a joint type, loaded or driven in its own coordinates."""
+    found = reactions(solved(case_of(probe(joint_type))))
+    return [each.check.removeprefix("reaction: ") for each in found if each.verdict is Verdict.FAIL]
+
+
+def at_origins(self, freedom, i, j):
+    """Slides between the internal origins of the bodies, not at the joint's point."""
+    P, h = vec(self.point), unit(self.axis)
+    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
+    return between if freedom == "translation" else p.DrivenAngle(h)
+
+
+@pytest.mark.parametrize("base", [Translational, Screw])
+def test_slide_reaction_mistake_is_found(base):
+    assert "acts and reacts" in failing(mistaken(base, measured=at_origins), driven)
+
+
+@pytest.fixture
+def traced_anew(monkeypatch):
+    """Programs are traced with the mistake of the test, not taken from the cache on disk."""
+    monkeypatch.setattr(
+        "kincheck.core.kinematics.compiled.compiled_model.load_or_make",
+        lambda content, make, read: read(make()),
+    )
+
+
+def plant(monkeypatch, change):
+    """Change force and moment of a joint by its place in the mechanism."""
+    right = equations.ForceEquations.reaction
+
+    def wrong(self, joint, multipliers):
+        found = right(self, joint, multipliers)
+        return change(joint.name, self.mechanism.joints.index(joint), *found)
+
+    monkeypatch.setattr(equations.ForceEquations, "reaction", wrong)
+
+
+def test_moment_about_free_axis_is_found(monkeypatch, traced_anew):
+    """That of a hinge: the reaction works as it turns."""
+    axis = unit(AXIS)
+    plant(
+        monkeypatch,
+        lambda name, k, force, moment: (force, moment + (name == "tested") * (force @ axis) * axis),
+    )
+    assert {"no work", "acts and reacts"} <= {*failing(Revolute)}
+
+
+def test_unbalanced_reaction_is_found(monkeypatch, traced_anew):
+    """It does no work on a ball's freedoms, but is too small."""
+    plant(
+        monkeypatch,
+        lambda name, k, force, moment: ((0.99 if name == "tested" else 1.0) * force, moment),
+    )
+    assert failing(Spherical) == ["acts and reacts"]
+
+
+def by_metres(self, factor):
+    """A point a centimetre off, whatever the unit."""
+    x, y, z = self.point
+    return replace(self, point=(factor * x + 0.01, factor * y, factor * z))
+
+
+def by_place(self, factor):
+    """A point that is off by more, the farther it is from the global origin."""
+    x, y, z = self.point
+    return replace(self, point=(factor * (x + 1e-3 * x * x), factor * y, factor * z))
+
+
+@pytest.mark.parametrize("scaled", [by_metres, by_place])
+def test_reaction_scaling_mistake_is_found(scaled):
+    assert "size" in check_joint(mistaken(Spherical, scaled=scaled), samples=8).failures
+
+
+def test_order_dependent_reactions_are_found(monkeypatch, traced_anew):
+    plant(monkeypatch, lambda name, k, *found: tuple((1.0 + 1e-6 * k) * each for each in found))
+    assert "acts and reacts" in failing(Spherical)
+
+
+def test_gravity_sign_mistake_is_found(monkeypatch, traced_anew):
+    right = equations.inertial
+    monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
+    assert "power" in failing(Spherical)
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, Verdict.PASS), (1.001, Verdict.FAIL)])
+def test_engine_with_other_reactions_is_found(factor, verdict):
+    def change(found, case):
+        joints = found.forces.joints
+        joints = {k: replace(each, force=factor * each.force) for k, each in joints.items()}
+        return changed(found, forces=replace(found.forces, joints=joints))
+
+    findings = loops(Spherical, [native_but(change, "wrong")])
+    (found,) = (each for each in findings if each.check.startswith("reaction: wrong"))
+    assert found.verdict is verdict
+    assert ("force_" in found.message) == (verdict is Verdict.FAIL)
+
+
+def test_forces_skipped_if_equations_fail():
+    report = check_joint(mistaken(Revolute, p.Dot11, gamma=negative_gamma), samples=4)
+    (waiting,) = (each for each in report.findings if each.check == "reaction")
+    assert waiting.verdict is Verdict.SKIP
+    assert "first repair" in waiting.message

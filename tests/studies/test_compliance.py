@@ -22,6 +22,7 @@ from ..support.engine_motion import SIMULATORS, installed
 DATA = Path(__file__).parents[1] / "data" / "elastokinematics"
 STRUT = json.loads((DATA / "5_strut_kc.json").read_text())
 AXLE = json.loads((DATA / "8_hmmwv_axle.json").read_text())
+AXLE_CASE = DATA / "8_hmmwv_axle.toml"
 JOINTS = {"lca_front": "lca_pivot", "lca_rear": "lca_pivot", "top": "strut_top"}
 
 
@@ -61,17 +62,30 @@ type = "camber"
 """
 
 
-def strut(tmp_path, more=""):
+OUTBOARD = WHEEL.replace("CONVENTION", "iso8855").replace(
+    "wheel_radius", 'drive = "outboard"\nwheel_radius'
+)
+
+
+def loads_of(row):
+    fx, fy, _, _, _, mz = row["load_at_contact_patch"]
+    return {"longitudinal": fx, "lateral": fy, "aligning": mz}
+
+
+def strut_file(tmp_path, more=""):
     file = tmp_path / "strut.toml"
     file.write_text(strut_text(more))
-    return load_case(file)
+    return str(file)
 
 
-def test_command_writes_what_six_simulators_have(tmp_path, capsys):
+def strut(tmp_path, more=""):
+    return load_case(strut_file(tmp_path, more))
+
+
+def test_kc_agrees_with_six_simulators(tmp_path, capsys):
     rows = STRUT["results"]
-    (tmp_path / "strut.toml").write_text(strut_text())
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
-    case = str(tmp_path / "strut.toml")
+    case = strut_file(tmp_path)
     assert main(["kc", case, "--travel=0:50mm:2", "--load", "lateral=0:1kN:2", *files]) == 0
     found = json.loads((tmp_path / "json").read_text())
     assert found["travel"] == [0.0, 0.05]
@@ -97,35 +111,26 @@ def test_command_writes_what_six_simulators_have(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("travel", ["-10:10mm:3", "-10mm:10:3", "-0.01:0.01:3"])
-def test_unit_of_one_end_holds_for_both(tmp_path, travel):
-    (tmp_path / "strut.toml").write_text(strut_text())
+def test_travel_unit_of_one_end_suffices(tmp_path, travel):
     out = tmp_path / "out.json"
     loads = ["--load", "lateral=-1:1kN:3", "--json", str(out)]
-    assert main(["kc", str(tmp_path / "strut.toml"), f"--travel={travel}", *loads]) == 0
+    assert main(["kc", strut_file(tmp_path), f"--travel={travel}", *loads]) == 0
     found = json.loads(out.read_text())
     assert found["travel"] == [-0.01, 0.0, 0.01]
     assert found["loads"]["lateral"]["lateral"] == [-1000.0, 0.0, 1000.0]
 
 
-def test_constant_load_acts_over_all_travel(tmp_path):
+def test_kc_constant_load_acts_over_travel(tmp_path):
     """Loads at the contact, as the data have them, with a drive on the wheel carrier."""
     row = STRUT["results"][2]
-    case = strut(
-        tmp_path,
-        WHEEL.replace("CONVENTION", "iso8855").replace(
-            "wheel_radius", 'drive = "outboard"\nwheel_radius'
-        ),
-    )
-    fx, fy, _, _, _, mz = row["load_at_contact_patch"]
-    loads = {"longitudinal": fx, "lateral": fy, "aligning": mz}
-    found = compliance(case, [row["travel"]], loads).travel
+    found = compliance(strut(tmp_path, OUTBOARD), [row["travel"]], loads_of(row)).travel
     assert found.wheel_center[0] == pytest.approx(row["wheel_center"], abs=1e-14)
     assert found.wheel_load[0] == pytest.approx(row["wheel_load"], abs=1e-9)
 
 
 @pytest.mark.parametrize("convention", ["iso8855", "sae_j670"])
 @pytest.mark.parametrize("load", ["lateral", "longitudinal", "braking", "aligning"])
-def test_slopes_by_load_are_differences(tmp_path, convention, load):
+def test_slopes_by_load_equal_differences(tmp_path, convention, load):
     case = strut(tmp_path, WHEEL.replace("CONVENTION", convention))
     results = compliance(case, [0.0], {load: [-1.0, 0.0, 1.0]})
     curve = results.loads[load]
@@ -140,7 +145,7 @@ def test_slopes_by_load_are_differences(tmp_path, convention, load):
         assert moved > 0.0 if convention == "iso8855" else moved < 0.0
 
 
-def test_slope_by_travel_is_that_of_the_soft_suspension(tmp_path):
+def test_slope_by_travel_of_soft_suspension(tmp_path):
     case = strut(tmp_path, WHEEL.replace("CONVENTION", "iso8855"))
     found = compliance(case, [-1e-4, 0.0, 1e-4]).travel
     low, _, high = found.outputs["toe"].values
@@ -150,93 +155,8 @@ def test_slope_by_travel_is_that_of_the_soft_suspension(tmp_path):
     assert slope != pytest.approx((high - low) / 2e-4, rel=1e-3)
 
 
-def axle_text(bar):
-    """Return the axle of the data, with an anti-roll bar or without, as a case file."""
-    left = {name: np.array(place) for name, place in AXLE["points"].items()}
-    text = """schema = "kincheck-case/1"
-name = "axle"
-source = "Project Chrono, HMMWV front axle"
-gravity = [0.0, 0.0, -9.80665]
-"""
-    for side, sign in (("l", 1.0), ("r", -1.0)):
-        p = {name: place * [1.0, sign, 1.0] for name, place in left.items()}
-        bodies = {
-            "uca": ("uca_u", 5.813, (-0.106, sign * 0.589, 0.218)),
-            "lca": ("lca_u", 23.965, (0.0, sign * 0.547, -0.059)),
-            "up": ("wc", 34.155, (-0.04, sign * 0.82, -0.026)),
-        }
-        for name, (origin, mass, center) in bodies.items():
-            text += f"[bodies.{name}_{side}]\norigin = {p[origin].tolist()}\nmass = {mass}\n"
-            text += f"center_of_mass = {list(center)}\n"
-        for arm in ("uca", "lca"):
-            front, back = p[f"{arm}_f"], p[f"{arm}_b"]
-            h = (front - back) / np.linalg.norm(front - back)
-            text += f'[joints.{arm}_hinge_{side}]\ntype = "revolute"\n'
-            text += f'bodies = ["ground", "{arm}_{side}"]\n'
-            text += f"point = {(0.5 * (front + back)).tolist()}\naxis = {h.tolist()}\n"
-            first = np.cross(np.eye(3)[np.abs(h).argmin()], h)
-            first /= np.linalg.norm(first)
-            axes = first, np.cross(h, first)
-            for end, place in (("front", front), ("back", back)):
-                bodies, k, turning = ["ground", f"{arm}_{side}"], [7e7] * 3, [1e5, 1e5, 0.0]
-                place = place.tolist()
-                text += bushing_table(f"{arm}_hinge_{side}", end, bodies, place, axes, k, turning)
-            text += f'[joints.{arm}_ball_{side}]\ntype = "spherical"\n'
-            text += f'bodies = ["{arm}_{side}", "up_{side}"]\npoint = {p[f"{arm}_u"].tolist()}\n'
-        text += f'[joints.tie_{side}]\ntype = "distance"\nbodies = ["up_{side}", "ground"]\n'
-        text += f"points = [{p['tie_u'].tolist()}, {p['tie_c'].tolist()}]\n"
-        text += f'[forces.spring_{side}]\ntype = "spring_damper"\n'
-        text += f'bodies = ["ground", "lca_{side}"]\nstiffness = 181496.15\nfree_length = 0.339\n'
-        text += f"points = [{p['spr_c'].tolist()}, {p['spr_a'].tolist()}]\n"
-        text += f'[points.wc_{side}]\nbody = "up_{side}"\nposition = {p["wc"].tolist()}\n'
-        text += f'[drivers.jounce_{side}]\ntype = "point_coordinate"\npoint = "wc_{side}"\n'
-        text += "direction = [0.0, 0.0, 1.0]\n"
-        if bar:
-            text += f"[bodies.bar_{side}]\norigin = [0.35, {sign * 0.35}, -0.05]\n"
-            text += f'[joints.link_{side}]\ntype = "distance"\n'
-            text += f'bodies = ["bar_{side}", "lca_{side}"]\n'
-            text += f"points = [[0.1, {sign * 0.45}, -0.05], [0.1, {sign * 0.6}, -0.3]]\n"
-    if bar:
-        hinges = {"mount": ("ground", "bar_l", 0.35), "twist": ("bar_l", "bar_r", 0.0)}
-        for name, (i, j, y) in hinges.items():
-            text += f'[joints.{name}]\ntype = "revolute"\nbodies = ["{i}", "{j}"]\n'
-            text += f"point = [0.35, {y}, -0.05]\naxis = [0.0, 1.0, 0.0]\n"
-        text += '[forces.bar]\ntype = "bushing"\nbodies = ["bar_l", "bar_r"]\n'
-        text += f"point = [0.35, 0.0, -0.05]\nturning_stiffness = [0.0, {bar}, 0.0]\n"
-    return (
-        text
-        + """[sweep]
-driver = "jounce_l"
-start = -0.05
-stop = 0.05
-steps = 11
-[drivers.jounce_r.motion]
-type = "ramp"
-rate = 1.0
-[suspension]
-convention = "iso8855"
-side = "left"
-forward = [1.0, 0.0, 0.0]
-up = [0.0, 0.0, 1.0]
-wheel_center = "wc_l"
-wheel_radius = 0.47
-travel = "jounce_l"
-[suspension.other]
-wheel_center = "wc_r"
-travel = "jounce_r"
-[outputs.toe]
-type = "toe"
-[outputs.roll_center_height]
-type = "roll_center_height"
-"""
-    )
-
-
-def test_axle_has_its_wheel_rates(tmp_path):
-    rows = AXLE["rows"]
-    file = tmp_path / "axle.toml"
-    file.write_text(axle_text(rows["anti_roll_bar_turning_stiffness"]))
-    case = load_case(file)
+def test_axle_wheel_rates_heave_and_roll():
+    rows, case = AXLE["rows"], load_case(AXLE_CASE)
     found = compliance(case, [0.0, 0.02])
     curves = found.travel.outputs
     assert found.travel.wheel_load[0] == pytest.approx(rows["static_wheel_load"], rel=1e-12)
@@ -255,12 +175,10 @@ def test_axle_has_its_wheel_rates(tmp_path):
     assert rolled.wheel_load[0] > found.travel.wheel_load[1]  # the bar is twisted
 
 
-def test_axle_free_under_its_load_has_the_datas_compliance(tmp_path):
+def test_free_axle_compliance_equals_data():
     """Both wheels are free in height; loads and displacements at their centres."""
     rows = AXLE["rows"]
-    file = tmp_path / "axle.toml"
-    file.write_text(axle_text(rows["anti_roll_bar_turning_stiffness"]))
-    soft = load_case(file).mechanism.released()
+    soft = load_case(AXLE_CASE).mechanism.released()
     object.__setattr__(soft, "drivers", ())
     x, y, z = AXLE["points"]["wc"]
     ends = {"l": ("up_l", (x, y, z)), "r": ("up_r", (x, -y, z))}
@@ -276,11 +194,10 @@ def test_axle_free_under_its_load_has_the_datas_compliance(tmp_path):
     assert C[5, 1] + C[5, 7] == pytest.approx(lateral, rel=1e-9)
 
 
-def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
+def test_travel_beyond_equilibrium_is_error(tmp_path, capsys):
     """A tie rod that is pulled straight leaves no equilibrium at half a metre."""
-    (tmp_path / "strut.toml").write_text(strut_text())
     out = tmp_path / "found.json"
-    case = str(tmp_path / "strut.toml")
+    case = strut_file(tmp_path)
     assert main(["kc", case, "--travel=0:0.9:2", "--json", str(out), "--out", str(tmp_path)]) == 2
     for said in (capsys.readouterr().err, (tmp_path / "kc.html").read_text()):
         assert "no equilibrium at travel 0.9 m: the last is at travel" in said
@@ -289,10 +206,10 @@ def test_travel_beyond_equilibrium_is_an_error(tmp_path, capsys):
     assert found["wheel_load"][1] is None
 
 
-def test_load_beyond_equilibrium_is_named_and_counted(tmp_path, capsys):
+def test_load_beyond_equilibrium_is_counted(tmp_path, capsys):
     found = repr(compliance(strut(tmp_path), [0.0, 9.0]))
     assert found.endswith(", 2 samples of travel, 1 without equilibrium>")
-    case = str(tmp_path / "strut.toml")
+    case = strut_file(tmp_path)
     page = ["--out", str(tmp_path)]
     assert main(["kc", case, "--travel=-0.06:0.06:7", "--load", "braking=3e9", *page]) == 2
     out, err = capsys.readouterr()
@@ -306,27 +223,26 @@ def test_load_beyond_equilibrium_is_named_and_counted(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "options", "expected"),
     [
-        ('[compliance]\nwheel = "hub"\n', [], "'hub'"),
-        ('[compliance]\ncontact = "nowhere"\n', [], "'nowhere'"),
-        ("[compliance]\nheld = []\n", [], "no held driver lifts the wheel"),
-        ("", ["--axle", "roll"], "needs both wheels"),
-        ("", ["--load", "vertical=0:1:2"], "'vertical' is none of"),
-        ("", ["--travel=0:1"], "START:STOP:SAMPLES"),
-        ("", ["--travel=0:1furlong:3"], "START:STOP:SAMPLES"),
-        ("", ["--travel=nan:1:3"], "START:STOP:SAMPLES"),
-        ("", ["--out", __file__], "cannot be made a folder"),
-        ("", ["--travel=0:3deg:3"], "numbers in m or mm or cm"),
-        ("", ["--load", "lateral=0:3Nm:3"], "numbers in N or kN"),
-        ("", ["--load", "aligning=0:3N:3"], "numbers in Nm or kNm"),
+        ('[compliance]\nwheel = "hub"\n', "", "'hub'"),
+        ('[compliance]\ncontact = "nowhere"\n', "", "'nowhere'"),
+        ("[compliance]\nheld = []\n", "", "no held driver lifts the wheel"),
+        ("", "--axle roll", "needs both wheels"),
+        ("", "--load vertical=0:1:2", "'vertical' is none of"),
+        ("", "--travel=0:1", "START:STOP:SAMPLES"),
+        ("", "--travel=0:1furlong:3", "START:STOP:SAMPLES"),
+        ("", "--travel=nan:1:3", "START:STOP:SAMPLES"),
+        ("", f"--out {__file__}", "cannot be made a folder"),
+        ("", "--travel=0:3deg:3", "numbers in m or mm or cm"),
+        ("", "--load lateral=0:3Nm:3", "numbers in N or kN"),
+        ("", "--load aligning=0:3N:3", "numbers in Nm or kNm"),
     ],
 )
-def test_study_that_lacks_facts_says_so(tmp_path, capsys, more, options, expected):
-    (tmp_path / "strut.toml").write_text(strut_text(more))
-    assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 2
+def test_kc_without_facts_is_refused(tmp_path, capsys, more, options, expected):
+    assert main(["kc", strut_file(tmp_path, more), *options.split()]) == 2
     assert expected in capsys.readouterr().err
 
 
-def test_table_without_rubber_is_said_to_be_rigid(tmp_path, capsys):
+def test_table_without_bushings_is_rigid(tmp_path, capsys):
     assert main(["templates", "double_wishbone"]) == 0
     table = tmp_path / "car.csv"
     table.write_text(capsys.readouterr().out)
@@ -337,7 +253,7 @@ def test_table_without_rubber_is_said_to_be_rigid(tmp_path, capsys):
         assert ("note: nothing is elastic" in capsys.readouterr().err) == rigid
 
 
-def test_rig_is_written_as_read(tmp_path):
+def test_rig_file_round_trip(tmp_path):
     table = '[compliance]\nwheel = "knuckle"\nloads = ["lateral"]\ntire_stiffness = 2e5\n'
     case = strut(tmp_path, table)
     again = tmp_path / "again.toml"
@@ -349,7 +265,7 @@ def test_rig_is_written_as_read(tmp_path):
     assert found["ride_rate"].values[0] == pytest.approx(rate * 2e5 / (rate + 2e5))
 
 
-def test_released_joint_of_held_driver_is_refused(tmp_path):
+def test_released_joint_with_held_driver_refused(tmp_path):
     text = strut_text('[compliance]\nheld = ["stroke", "turn"]\n').replace(
         "[sweep]", '[drivers.turn]\ntype = "joint_angle"\njoint = "lca_pivot"\n\n[sweep]'
     )
@@ -359,7 +275,7 @@ def test_released_joint_of_held_driver_is_refused(tmp_path):
         compliance(load_case(file))
 
 
-def test_bushings_in_a_file_serve_a_hardpoint_table(tmp_path, capsys):
+def test_bushing_file_for_hardpoint_table(tmp_path, capsys):
     table, rubber = tmp_path / "car.csv", tmp_path / "rubber.toml"
     assert main(["templates", "double_wishbone"]) == 0
     table.write_text(capsys.readouterr().out)
@@ -394,24 +310,17 @@ HINGES = {
 }
 
 
-OUTBOARD = WHEEL.replace("CONVENTION", "iso8855").replace(
-    "wheel_radius", 'drive = "outboard"\nwheel_radius'
-)
-
-
 @pytest.fixture(scope="module")
 def load_cases(tmp_path_factory):
     """The four load cases of the data as equilibria for engines, with their results."""
     case, found = strut(tmp_path_factory.mktemp("strut"), OUTBOARD), []
     for row in STRUT["results"]:
-        fx, fy, _, _, _, mz = row["load_at_contact_patch"]
-        loads = {"longitudinal": fx, "lateral": fy, "aligning": mz}
-        found.append((compliance(case, [row["travel"]], loads).cases[0], row))
+        found.append((compliance(case, [row["travel"]], loads_of(row)).cases[0], row))
     return found
 
 
 @pytest.mark.parametrize("name", [*SIMULATORS, "exudyn-static"])
-def test_engine_finds_equilibria_of_the_data(load_cases, name):
+def test_engine_equilibria_equal_data(load_cases, name):
     """Wheel centre and load by its own kinematics, gravity and rows, for four load cases."""
     engine = engine_of(name)
     for asked, row in load_cases:
@@ -421,15 +330,14 @@ def test_engine_finds_equilibria_of_the_data(load_cases, name):
         assert found.forces.drivers["stroke"][0] == pytest.approx(row["wheel_load"], abs=4e-6)
 
 
-def test_engines_have_verdicts_on_an_axle(tmp_path, capsys):
+def test_engine_verdicts_on_axle(tmp_path, capsys):
     """Both wheels against each other, with an anti-roll bar."""
     names = ["mujoco", "exudyn-static"]
     for name in names:
         engine_of(name)
-    (tmp_path / "axle.toml").write_text(axle_text(800.0))
     options = ["--travel=-60mm:50mm:2", "--axle=roll", "--jobs=0", "--engine", *names]
     out = tmp_path / "kc.json"
-    assert main(["kc", str(tmp_path / "axle.toml"), *options, f"--json={out}"]) == 0
+    assert main(["kc", str(AXLE_CASE), *options, f"--json={out}"]) == 0
     for row in json.loads(out.read_text())["agreement"][1:]:
         assert row["outcome"] == "pass"
         assert row["wheel_center"] <= 1e-12
@@ -445,12 +353,11 @@ def engine_of(name):
     return engine
 
 
-def test_engine_that_deviates_is_named(tmp_path, capsys):
+def test_deviating_engine_is_named(tmp_path, capsys):
     """Its bushings are twice as stiff; history and page have its verdict."""
-    (tmp_path / "strut.toml").write_text(strut_text())
     options = ["--travel=0:20mm:2", "--jobs=0", "--engine", f"{__name__}:Stiff"]
     files = [f"--{what}={tmp_path / what}" for what in ("out", "history")]
-    assert main(["kc", str(tmp_path / "strut.toml"), *options, *files]) == 1
+    assert main(["kc", strut_file(tmp_path), *options, *files]) == 1
     assert "wheel_center_x: position is off by" in capsys.readouterr().out
     assert "wheel_load" in (tmp_path / "out" / "results.json").read_text()
     assert ">fail<" in (tmp_path / "out" / "kc.html").read_text()
@@ -472,16 +379,14 @@ class Stiff(NativeEngine):
 
 def test_engine_without_statics_is_unsupported(tmp_path, capsys):
     engine_of("mujoco")
-    (tmp_path / "strut.toml").write_text(strut_text())
     options = ["--travel=0:20mm:2", "--jobs=0", "--engine", "mujoco-default"]
-    assert main(["kc", str(tmp_path / "strut.toml"), *options]) == 0
+    assert main(["kc", strut_file(tmp_path), *options]) == 0
     assert "finds no equilibria" in capsys.readouterr().out
 
 
-def test_bench_gives_times_of_samples_and_matrices(tmp_path, capsys):
-    (tmp_path / "strut.toml").write_text(strut_text())
+def test_bench_compliance_times_samples_and_matrices(tmp_path, capsys):
     out = tmp_path / "bench.json"
-    command = ["bench", "compliance", str(tmp_path / "strut.toml"), "--rounds=1", f"--json={out}"]
+    command = ["bench", "compliance", strut_file(tmp_path), "--rounds=1", f"--json={out}"]
     assert main(command) == 0
     found = json.loads(out.read_text())
     assert found["reached"] == found["samples"]
@@ -532,7 +437,7 @@ steps = 2
 
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "exudyn-static"])
-def test_body_between_two_bushings_is_a_series_of_springs(tmp_path, capsys, name):
+def test_bushings_in_series_closed_form(tmp_path, capsys, name):
     """In mm; the second bushing's axes turn with its first body, which carries a couple."""
     engine_of(name)
     (tmp_path / "series.toml").write_text(SERIES)
@@ -549,7 +454,7 @@ def test_body_between_two_bushings_is_a_series_of_springs(tmp_path, capsys, name
     assert {row["outcome"] for row in found["agreement"]} == {"pass", "not judged"}
 
 
-def test_python_has_verdicts_of_engines(tmp_path):
+def test_python_compliance_with_engine_verdicts(tmp_path):
     """A stiff engine by itself, and a simulator by its name."""
     engine_of("pinocchio")
     case = strut(tmp_path)
@@ -561,7 +466,7 @@ def test_python_has_verdicts_of_engines(tmp_path):
         kincheck.compliance(case, [0.0], engines="pinochio")
 
 
-def test_values_below_their_accuracy_are_printed_as_zero(tmp_path, monkeypatch, capsys):
+def test_values_below_accuracy_print_zero(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for options, file in (("", "car.csv"), (" --bushings", "rubber.toml")):
         assert main(f"templates mcpherson{options}".split()) == 0

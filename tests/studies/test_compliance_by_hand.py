@@ -82,7 +82,7 @@ def study(tmp_path, text, *args, **options):
 
 @pytest.mark.parametrize("convention", ["iso8855", "sae_j670"])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_slopes_have_signs_of_side_and_convention(tmp_path, side, convention):
+def test_slope_signs_by_side_and_convention(tmp_path, side, convention):
     """A force on the contact towards the middle leans the wheel out at its top; the tie rod behind
     the axis then steers it in.
     """
@@ -107,7 +107,7 @@ def test_slopes_have_signs_of_side_and_convention(tmp_path, side, convention):
     ("key", "load"), [("brakes", "braking"), ("drive", "longitudinal")], ids=["brakes", "drive"]
 )
 @pytest.mark.parametrize("place", ["inboard", "outboard"])
-def test_torque_of_brake_or_drive_winds_up_the_knuckle(tmp_path, key, load, place):
+def test_brake_or_drive_torque_on_knuckle(tmp_path, key, load, place):
     """Outboard the force acts at the contact: the lower ball has 1.5 of it; else both have half."""
     text = corner("", 1.0, 1.0) + wheel(more=f'{key} = "{place}"')
     text += '[points.low]\nbody = "knuckle"\nposition = [0.0, 0.7, 0.15]\n'
@@ -119,7 +119,7 @@ def test_torque_of_brake_or_drive_winds_up_the_knuckle(tmp_path, key, load, plac
 
 
 @pytest.mark.parametrize("factor", [1.0, 1000.0], ids=["m", "mm"])
-def test_wheel_and_tire_are_springs_in_series(tmp_path, factor, capsys):
+def test_ride_rate_with_tire_in_series(tmp_path, factor, capsys):
     """In units of the file; the JSON file is in SI, the table in N/mm."""
     text = "" if factor == 1.0 else '[units]\nlength = "mm"\n'
     text += corner("", 1.0, factor) + wheel(radius=factor * 0.3)
@@ -166,7 +166,7 @@ def axle():
     return text + wheel() + f"[compliance]\ntire_stiffness = {TIRE}\n"
 
 
-def test_bar_of_an_axle_stiffens_roll_alone(tmp_path):
+def test_anti_roll_bar_stiffens_roll_only(tmp_path):
     """Half bars of 0.4 m: by a rise d of each link they twist by 2 d / 0.4 against each other."""
     found = study(tmp_path, axle(), [0.0]).travel
     values = {name: curve.values[0] for name, curve in found.outputs.items()}
@@ -180,7 +180,7 @@ def test_bar_of_an_axle_stiffens_roll_alone(tmp_path):
 
 
 @pytest.mark.parametrize(("motion", "sign"), [("heave", 1.0), ("roll", -1.0)])
-def test_loads_of_an_axle_act_alike_or_against(tmp_path, motion, sign):
+def test_axle_loads_in_heave_and_roll(tmp_path, motion, sign):
     """Lateral forces on both contacts, along the axes; the bar couples lean by the held heights."""
     values = {"lateral": [0.0, 10.0]}
     curves = study(tmp_path, axle(), [0.0], values, axle=motion).loads["lateral"]
@@ -207,7 +207,7 @@ point = [0.0, 0.3, 0.3]
 
 
 @pytest.mark.parametrize("law", ["stiffness", "curve"])
-def test_rack_and_subframe_are_springs_in_series(tmp_path, law):
+def test_rack_and_subframe_springs_in_series(tmp_path, law):
     """A guided body on rubber between the car and the tie rod, or both arms. A progressive curve
     starts with the same rate.
     """

@@ -17,28 +17,39 @@ from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.trajectory import QUANTITIES
 
-from ..support.fakes import Fake, crank
+from ..support.fakes import Fake, crank, native_but, swept
+from ..support.variations import vary, vary_file
 from .test_sweep_command import POINTS
 from .test_sweep_study import PIVOT, STRUT, TIP
-from .test_vary import vary, vary_file
 
 
-def deviating(at):
-    """The native engine but for one variant, whose tip is a micrometre off, and for another, which
-    it refuses.
-    """
-    native = adapters.engine("native")
+def deviating(variant, point, sample, name):
+    """The native engine but for one variant, of which a point is a micrometre off at a sample."""
 
-    def answer(case):
-        found = native.solve(native.build(case), case, 1e-12)
-        if f"variant {at} " in case.name:
-            found.points["tip"].position[4, 1] += 1e-6
+    def change(found, case):
+        if f"variant {variant} " in case.name:
+            found.points[point].position[sample, 1] += 1e-6
         return found
 
-    return Fake("off", answer=answer)
+    return native_but(change, name)
 
 
-def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
+@pytest.fixture
+def instead(monkeypatch):
+    """Has an engine stand in for the one of its name."""
+    known = adapters.engine
+
+    def put(engine):
+        monkeypatch.setattr(
+            adapters,
+            "engine",
+            lambda name, *mode: engine if name == engine.name else known(name, *mode),
+        )
+
+    return put
+
+
+def test_sweep_check_finds_deviating_variant(tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     (some,) = chosen(600, 1 / 600, 4)
@@ -51,7 +62,7 @@ def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
         variation,
         samples=600,
         seed=4,
-        check=Check(deviating(at), 0.05, solve_in_process, 1e-12),
+        check=Check(deviating(at, "tip", 4, "off"), 0.05, solve_in_process, 1e-12),
     )
     assert [each.variant for each in found.checked] == sorted(picked)
     (bad,) = found.deviating
@@ -61,7 +72,7 @@ def test_a_cross_check_finds_the_variant_that_deviates(tmp_path):
     assert max(each.ratio for each in found.checked if each is not bad) < 1e-4
 
 
-def test_impossible_check_is_refused_first(tmp_path):
+def test_impossible_sweep_check_is_refused(tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip=TIP)
     for engine, message in (
@@ -74,7 +85,7 @@ def test_impossible_check_is_refused_first(tmp_path):
             )
 
 
-def test_a_check_with_a_simulator_agrees(tmp_path):
+def test_sweep_check_with_mujoco_agrees(tmp_path):
     mujoco = adapters.engine("mujoco")
     if mujoco.version() is None:
         pytest.skip("mujoco is not installed")
@@ -90,20 +101,9 @@ def test_a_check_with_a_simulator_agrees(tmp_path):
     assert found.deviating == []
 
 
-def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch):
+def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch, instead):
     file = vary_file(tmp_path, POINTS)
-    native = adapters.engine("native")
-
-    def answer(case):
-        found = native.solve(native.build(case), case, 1e-12)
-        if case.name.endswith(" variant 4 of seed 8"):
-            found.points["wheel_center"].position[7, 1] += 1e-6
-        return found
-
-    liar, known = Fake("native", answer=answer), adapters.engine
-    monkeypatch.setattr(
-        adapters, "engine", lambda name, *mode: liar if name == "native" else known(name, *mode)
-    )
+    instead(deviating(4, "wheel_center", 7, "native"))
     command = f"sweep mcpherson_strut --vary {file} --seed 8 --check native:1.0".split()
     assert main([*command, "--samples", "6"]) == 1
     told = capsys.readouterr().out
@@ -124,26 +124,21 @@ def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch):
     assert (out / "report.html").exists()
 
 
-def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
+def test_sweep_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch, instead):
     """An engine with values where the motion ends, and one that has not converged."""
     path = vary_file(tmp_path, {"rod": {"at": "joints.rod.length", "half_width": 3500.0}})
-    native, known = adapters.engine("native"), adapters.engine
     command = f"sweep rssr --vary {path} --samples 12 --check mujoco:1.0".split()
 
+    monkeypatch.setattr(
+        "kincheck.core.cli.sweep.checking_solver", lambda options, engine: solve_in_process
+    )
+
     def checked(change):
-        liar = Fake(
-            "mujoco", answer=lambda case: change(native.solve(native.build(case), case, 1e-12))
-        )
-        monkeypatch.setattr(
-            adapters, "engine", lambda name, *mode: liar if name == "mujoco" else known(name, *mode)
-        )
-        monkeypatch.setattr(
-            "kincheck.core.cli.sweep.checking_solver", lambda options, engine: solve_in_process
-        )
+        instead(native_but(change, "mujoco"))
         assert main(command) == 1
         return capsys.readouterr().out
 
-    def everywhere(found):
+    def everywhere(found, case):
         kept = {
             name: {each: np.nan_to_num(getattr(m, each)) for each in QUANTITIES}
             for name, m in found.points.items()
@@ -156,71 +151,52 @@ def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
             residual=np.nan_to_num(found.residual),
         )
 
-    assert "fail: variant" not in (told := checked(lambda found: found)), told
+    assert "fail: variant" not in (told := checked(lambda found, case: found)), told
     told = checked(everywhere)
     ends = (
         r"values at 132 of 181 samples that native cannot reach; native: cannot be followed beyond"
         r" crank = 1\.6998182"
     )
     assert re.search(r"fail: variant 11 \(.*\): " + ends, told), told
-    told = checked(lambda found: replace(found, residual=1e-3))
+    told = checked(lambda found, case: replace(found, residual=1e-3))
     assert "the residual of samples that the engine calls solved is 0.001" in told
 
 
-def test_variant_solved_alone_is_no_contradiction(tmp_path):
+def nominal(tmp_path, case):
+    """A study of a point's offset, the native record of its nominal design, and its rows."""
+    end = {"at": case.mechanism.points[0].name, "values": [1.0]}
+    study = Study(case, vary(tmp_path, case, "one_at_a_time", end=end), 2, 0, 2, 1e-12)
+    pair = Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)
+    (_, found), *_ = solve_in_process([pair])
+    values = [
+        getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
+        for row in study.rows
+    ]
+    return study, found, np.array(values)
+
+
+def test_sweep_check_of_variant_solved_alone(tmp_path):
     """Many variants at once do not pass a singular pose that one alone does: the engine has values
     there, and native too.
     """
     case = load("iftomm_n_four_bar")
-    case = replace(
-        case,
-        sweep=replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0]))),
-        reference={},
-    )
-    end = {"at": case.mechanism.points[0].name, "values": [1.0]}
-    # the first is the nominal design
-    study = Study(case, vary(tmp_path, case, "one_at_a_time", end=end), 2, 0, 2, 1e-12)
-    (_, found), *_ = solve_in_process(
-        [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
-    )
+    study, found, rows = nominal(tmp_path, swept(case, np.deg2rad([0.0, 60.0, 90.0, 110.0])))
     assert found.result.solved == 4
-    rows = np.array(
-        [
-            getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
-            for row in study.rows
-        ]
-    )
     rows[:, 2:] = np.nan  # as many at once leave them
     record = judged(study, 0, found, rows)
     assert (record.outcome, record.message) == ("pass", "")
 
 
-def test_check_names_rows_without_values(tmp_path):
+def test_sweep_check_names_rows_without_values(tmp_path):
     """An engine with positions only passes by them; the message names the rows not judged."""
-    case = load("rssr")
-    name = next(iter(case.mechanism.points)).name
-    study = Study(
-        case,
-        vary(tmp_path, case, "one_at_a_time", end={"at": name, "values": [1.0]}),
-        2,
-        0,
-        2,
-        1e-12,
-    )
-    (_, found), *_ = solve_in_process(
-        [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
-    )
-    values = [
-        getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
-        for row in study.rows
-    ]
+    study, found, values = nominal(tmp_path, load("rssr"))
     bare = {
         key: replace(each, velocity=None, acceleration=None)
         for key, each in found.result.outputs.items()
     }
     found = replace(found, result=replace(found.result, outputs=bare))
     derived = [row.name for row in study.rows if row.derivative]
-    record = judged(study, 0, found, np.array(values))
+    record = judged(study, 0, found, values)
     assert record.outcome == "pass"
     assert derived
     assert record.message.startswith(f"not judged: {', '.join(derived[:3])}")

@@ -17,7 +17,7 @@ from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import on_cluster, solve_there, sweep_designs
 
 from ..support.fakes import crank
-from .test_vary import vary
+from ..support.variations import vary
 
 # its own, of sockets and loops it leaves to the collector when a worker is killed
 pytestmark = [
@@ -104,7 +104,7 @@ def test_sweep_reports_lost_cluster(tmp_path, monkeypatch):
         )
 
 
-def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
+def test_sweep_without_scheduler_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(ours, "ANSWER", 0.25)
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})

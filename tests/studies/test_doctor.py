@@ -19,7 +19,7 @@ from kincheck.core.program import disk_cache
 @pytest.fixture
 def without_imports(monkeypatch):
     """Nothing is imported in processes of their own: that takes seconds."""
-    monkeypatch.setattr(installation, "_imported", lambda found, *others: found)
+    monkeypatch.setattr(installation, "_with_import_problems", lambda found, *others: found)
 
 
 def missing(monkeypatch, *names):
@@ -33,7 +33,7 @@ def missing(monkeypatch, *names):
     monkeypatch.setattr(importlib.metadata, "version", found)
 
 
-def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
+def test_doctor_of_sound_installation(without_imports, tmp_path, capsys):
     assert main(["doctor", "--json", str(tmp_path / "found.json")]) == 0
     out = capsys.readouterr().out
     assert re.search(r"pin +\S+ +engine +ok", out)
@@ -114,34 +114,37 @@ def test_doctor_fails_without_essential_library(without_imports, monkeypatch, ca
     assert "pip install 'scipy>=" in out
 
 
+def imported(name, code):
+    """What doctor finds of a library that is imported by code."""
+    part = installation.Part(name, "1.0", "kincheck", True, "", "")
+    (found,) = installation._with_import_problems([part], {name: code} if code else {}, {})
+    return found
+
+
 @pytest.mark.parametrize(
-    ("imported", "said"),
+    ("code", "said", "remedy"),
     [
-        ("os; os.abort()", "the process ended with status"),
-        ("no_such_module", "No module named 'no_such_module'"),
-        ("time; time.sleep(60)", "takes more than"),
+        ("os; os.abort()", "the process ended with status", "pip install --force-reinstall numpy"),
+        ("no_such_module", "No module named 'no_such", "pip install --force-reinstall numpy"),
+        ("time; time.sleep(60)", "takes more than", "pip install --force-reinstall numpy"),
+        (
+            "ctypes; ctypes.CDLL('libnothing.so.7')",
+            "libnothing.so.7",
+            "install the system's package with libnothing.so.7 (of Debian: ",
+        ),
     ],
 )
-def test_doctor_finds_broken_library(imported, said, monkeypatch):
-    monkeypatch.setattr(installation, "PATIENCE", 5.0 if "sleep" not in imported else 0.5)
-    part = installation.Part("numpy", "1.0", "kincheck", True, "", "")
-    (found,) = installation._imported([part], {"numpy": imported}, {})
+def test_doctor_finds_broken_library(code, said, remedy, monkeypatch):
+    monkeypatch.setattr(installation, "PATIENCE", 5.0 if "sleep" not in code else 0.5)
+    found = imported("numpy", code)
     assert said in found.problem
-    assert found.remedy == "pip install --force-reinstall numpy"
+    assert found.remedy.startswith(remedy)
 
 
-def test_doctor_runs_no_module_of_the_working_folder(monkeypatch, tmp_path):
+def test_doctor_ignores_modules_of_working_folder(monkeypatch, tmp_path):
     (tmp_path / "msgspec.py").write_text("raise SystemExit('planted')")
     monkeypatch.chdir(tmp_path)
-    part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
-    assert installation._imported([part], {}, {}) == [part]
-
-
-def test_a_missing_system_library_is_named():
-    part = installation.Part("pin", "4.1", "engine", False, "", "")
-    broken = {"pin": "ctypes; ctypes.CDLL('libnothing.so.7')"}
-    (found,) = installation._imported([part], broken, {})
-    assert found.remedy.startswith("install the system's package with libnothing.so.7 (of Debian: ")
+    assert not imported("msgspec", "").problem
 
 
 def test_doctor_names_unwritable_cache(without_imports, monkeypatch, tmp_path, capsys):
@@ -154,7 +157,7 @@ def test_doctor_names_unwritable_cache(without_imports, monkeypatch, tmp_path, c
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no modes of this kind")
-def test_doctor_names_a_cache_others_can_write(without_imports, monkeypatch, tmp_path, capsys):
+def test_doctor_names_cache_writable_by_others(without_imports, monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "kincheck").mkdir()
     (tmp_path / "kincheck").chmod(0o777)
@@ -162,7 +165,7 @@ def test_doctor_names_a_cache_others_can_write(without_imports, monkeypatch, tmp
     assert f"other users can write in {tmp_path / 'kincheck'}; every" in capsys.readouterr().out
 
 
-def test_user_without_home_has_no_cache(without_imports, monkeypatch, capsys):
+def test_doctor_of_user_without_home(without_imports, monkeypatch, capsys):
     """As in a container that is run as a user whom it does not know."""
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", nobody)
@@ -172,7 +175,7 @@ def test_user_without_home_has_no_cache(without_imports, monkeypatch, capsys):
     assert "the user has no home directory; every process compiles again" in out
     assert disk_cache.load_or_make(b"said", lambda: b"made", bytes) == b"made"
     assert disk_cache.find(b"said", bytes) is None
-    assert not disk_cache.known(b"said")
+    assert not disk_cache.contains(b"said")
 
 
 def nobody():

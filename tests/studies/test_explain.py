@@ -42,6 +42,7 @@ from kincheck.core.studies.diagnosis import diagnose
 from kincheck.core.studies.diagnosis.diagnose import determinacy
 from kincheck.core.studies.diagnosis.text import _directions, _forces
 
+from ..support.fakes import swept
 from ..support.mechanisms import four_bar, mcpherson, slider_crank
 
 
@@ -70,7 +71,7 @@ def test_program_account_names_uncomputed_parts():
     assert totals(explain(case)) == [positions, velocities, accelerations]
 
 
-def test_redundant_rows_and_held_drivers_are_named():
+def test_program_account_names_redundant_rows():
     (line,) = (line for line in explain(cases.load("four_bar")) if "redundant" in line)
     assert line.count(":") == 5  # three rows, each JOINT: PRIMITIVE
     assert "none" not in line
@@ -88,9 +89,7 @@ def test_run_explain_prints_program_account(capsys):
 def test_joints_between_fixed_bodies_are_skipped(tmp_path, capsys):
     """As a CAD export has them. What is written is read as the same case."""
     case = cases.load("mcpherson_strut")
-    case = replace(
-        case, sweep=replace(case.sweep, values=np.linspace(-0.05, 0.05, 3)), reference={}
-    )
+    case = swept(case, np.linspace(-0.05, 0.05, 3))
     bolts = [
         Revolute("bolt", "chassis", "rack", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
         Distance("stay", "ground", "chassis", ((0, 0, 0), (0, 0, 1))),
@@ -143,7 +142,7 @@ def with_joint(mechanism, name, **changes):
     )
 
 
-def test_redundant_rows_are_sums_of_others():
+def test_redundant_rows_are_weighted_sums():
     ranks = Ranks(four_bar())
     assert len(ranks.dependencies) == ranks.account.rows - ranks.account.rank == 3
     rows = list(map(str, ranks.rows))
@@ -178,7 +177,7 @@ def test_hinge_out_of_line_is_named():
     assert diagnose(case(four_bar(), [0.0, 0.1]), samples=3, tol=1e-12).findings == []
 
 
-def test_long_rods_contradict_by_excess_length():
+def test_contradiction_of_long_rods_by_length():
     """Two rods of 1.001 m push a slider from both sides, 1 m away: it stays where it is and each is
     off by 1 mm.
     """
@@ -220,7 +219,7 @@ def test_free_motion_is_described_by_body():
     )
 
 
-def test_a_link_turns_about_its_instantaneous_centre():
+def test_free_motion_about_instantaneous_centre():
     """Where crank and rocker, drawn longer, meet: (0.3, 0.4) s = (1.4, 0) + (0.2, 1.2) t at s =
     6.
     """
@@ -231,7 +230,7 @@ def test_a_link_turns_about_its_instantaneous_centre():
     assert np.abs(coupler.axis) == pytest.approx(Y)
 
 
-def test_a_nut_that_nothing_holds_screws_by_its_lead():
+def test_free_motion_of_nut_has_lead():
     nut = Mechanism(
         "nut", [Body("nut")], [Screw("thread", "ground", "nut", (0.5, 0.0, 0.0), Z, lead=0.3)]
     )
@@ -253,7 +252,7 @@ def test_dead_centre_at_design_is_diagnosed():
     assert any("driver 'push' cannot move" in finding for finding in found.findings)
 
 
-def test_two_mechanisms_in_one_are_two_components():
+def test_separate_mechanisms_are_two_components():
     one, other = mcpherson(), slider_crank()
     both = Mechanism(
         "both",
@@ -274,13 +273,13 @@ def test_two_mechanisms_in_one_are_two_components():
     assert (second.bodies, second.dof, second.drivers) == (("crank", "slider"), 1, ("turn",))
 
 
-def test_conditioning_finds_the_worst_sample_and_its_motion():
+def test_conditioning_names_worst_sample_and_motion():
     """Near the limit of its stroke the strut's driver loses its hold of the motion that its other
     rows allow.
     """
     loaded = cases.load("mcpherson_strut")
     found = diagnose(
-        replace(loaded, sweep=replace(loaded.sweep, values=np.linspace(0.0, 0.293, 30))),
+        swept(loaded, np.linspace(0.0, 0.293, 30)),
         samples=30,
         tol=1e-12,
     )
@@ -330,7 +329,7 @@ def test_direction_kind_ignores_joint_name():
     assert found["joints.rear.axis.point x"] == ("m/m", pytest.approx(-np.sin(0.5)))
 
 
-def test_spring_torque_of_unreached_motion_is_missing():
+def test_unreached_motion_lacks_spring_torque():
     """A rocker far beyond its dead centres: how far the spring's joint turned is not known."""
     spring = TorsionSpringDamper("spring", "B", 2.0, 0.1)
     rocker = [JointAngle("rock", "D")]
@@ -347,7 +346,7 @@ def test_spring_torque_of_unreached_motion_is_missing():
 
 
 @pytest.mark.usefixtures("in_folder", "own_joint_types")
-def test_joint_of_its_residual_alone_is_solved_and_explained():
+def test_joint_by_residual_is_explained():
     """A marble in a bowl: z = x^2 / (2 R), so z' = x / R, z'' = 1 / R, and dz / dR = -z / R."""
     bowl = load_joint("bowl:Bowl")("bowl", "ground", "marble", (0.0, 0.0, 0.0), Z, 0.4)
     marble = Mechanism(
@@ -395,6 +394,7 @@ def test_joint_of_its_residual_alone_is_solved_and_explained():
         ),
         (lambda text: text.replace("[1.0, 0.55, 0.6]", "[1.0, 0.55]"), 2, "bodies.strut.origin"),
     ],
+    ids=["sound", "end of stroke", "over-constrained", "free", "bad file"],
 )
 def test_explain_status_follows_findings(edit, status, said, tmp_path, capsys):
     text = (Path(cases.__file__).parent / "mcpherson_strut.toml").read_text(encoding="utf-8")
@@ -413,7 +413,7 @@ TWO = "points = [[1.115, 0.665, 0.118], [1.14, 0.355, 0.1455]]"
 ONE = "point = [1.115, 0.665, 0.118]"
 
 
-def test_every_case_of_the_library_is_found_sound(capsys):
+def test_explain_finds_library_cases_sound(capsys):
     for name in ("four_bar", "bricard", "delta_robot", "mcpherson_suspension"):
         assert main(["explain", name, "--samples", "3"]) == 0
         out = capsys.readouterr().out
@@ -458,7 +458,7 @@ def found(name, *, massless=False, asked=False):
 @pytest.mark.parametrize(
     ("name", "expected"), [("four_bar", (2, 1, 3)), ("bennett", (0, 1, 3)), ("bricard", (2, 2, 5))]
 )
-def test_directions_are_counted_by_joint(name, expected):
+def test_reaction_directions_are_counted_by_joint(name, expected):
     """The numbers are those of forces.md of the study."""
     made = found(name, massless=True)
     assert made.joints == len(made.partly) > 3
@@ -467,7 +467,7 @@ def test_directions_are_counted_by_joint(name, expected):
     assert "4 of 4" in str(made) or name == "bricard"
 
 
-def test_without_redundant_rows_all_is_determined():
+def test_reactions_without_redundant_rows_are_determined():
     made = found("rssr", massless=True)
     assert made.partly == []
     assert str(made) == "all reactions and efforts are determined"
@@ -480,7 +480,7 @@ def test_determinacy_covers_joints_of_outputs():
     assert pin in whole.partly
 
 
-def test_the_directions_are_those_of_the_plane():
+def test_undetermined_directions_of_planar_four_bar():
     (pin, *_) = found("four_bar").partly
     normal = np.array(cases.load("four_bar").mechanism.joint(pin.joint).axis)
     normal /= np.linalg.norm(normal)
@@ -488,7 +488,7 @@ def test_the_directions_are_those_of_the_plane():
     assert abs(abs(np.array(pin.moment_along[0]) @ normal) - 1.0) < 1e-12
 
 
-def test_the_table_names_directions(capsys):
+def test_determinacy_table_names_directions(capsys):
     import sys
 
     page = console(sys.stdout)

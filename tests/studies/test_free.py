@@ -133,7 +133,7 @@ def test_damped_block_follows_its_closed_form(k, c, method):
     assert np.abs(found.motion.points["p"].position[found.samples, 0] - expected.real).max() < 1e-13
 
 
-def test_torsional_spring_swings_beyond_whole_turns():
+def test_torsional_spring_swings_beyond_turns():
     spring = TorsionSpringDamper("s", "hinge", stiffness=3.0, free_angle=10.0)
     body = Body("rod", mass=1.0, center_of_mass=(0.0, 0.0, 0.0), inertia=(0.2, 0.3, 0.4, 0, 0, 0))
     wheel = pendulum(bodies=[body], forces=[spring])
@@ -144,7 +144,7 @@ def test_torsional_spring_swings_beyond_whole_turns():
     assert np.abs(p[:, 0] - np.cos(0.5 * angle)).max() < 1e-12
 
 
-def test_andrews_squeezer_reaches_its_known_angles():
+def test_andrews_squeezer_free_reaches_published_angles():
     # 80-bit floats, seven angles, order 16; the IVP test set prints them to about ten digits
     mechanism = kincheck.load("andrews_squeezer").mechanism
     torque = Torque("motor", "K1", vector=(0.0, 0.0, 0.033))
@@ -161,7 +161,7 @@ def test_andrews_squeezer_reaches_its_known_angles():
     assert found.redundant == 9
 
 
-def test_parallelogram_ends_at_its_change_point():
+def test_free_parallelogram_ends_at_change_point():
     joints = [
         Revolute(name, *bodies, point, (0.0, 0.0, 1.0))
         for name, bodies, point in (
@@ -201,8 +201,9 @@ def test_parallelogram_ends_at_its_change_point():
             "no inertia",
         ),
     ],
+    ids=["massless", "unknown joint", "contradiction", "no inertia"],
 )
-def test_free_motion_without_a_law_is_refused(changed, rates, message):
+def test_free_motion_without_law_is_refused(changed, rates, message):
     with pytest.raises(SolveError, match=message):
         free_motion(pendulum(**changed), np.linspace(0.0, 1.0, 3), rates)
 
@@ -254,14 +255,14 @@ def test_free_command_counts_turns_between_samples(case, tmp_path):
     assert found[:, 1] == pytest.approx(2.0 * amplitude, abs=1e-11)
 
 
-def test_python_free_gives_what_the_case_asks(case):
+def test_python_free_returns_case_outputs(case):
     found = kincheck.free(case)
     assert found.times.tolist() == [0.0, 2.0, 4.0]
     assert kincheck.free(case, duration=1.0, samples=2).times[-1] == 1.0
     assert found.facts["outputs"]["angle"] == found.outputs["angle"].tolist()
 
 
-def test_case_with_free_motion_is_written_and_read(case, tmp_path):
+def test_free_case_file_round_trip(case, tmp_path):
     from kincheck.core.case.io.case_file import case_text, load_case
 
     again = tmp_path / "again.toml"
@@ -284,7 +285,7 @@ def test_bad_free_table_names_its_key(case, old, new, message):
         kincheck.free(case)
 
 
-def test_free_without_duration_says_what_to_give(capsys):
+def test_free_without_duration_is_refused(capsys):
     assert main(["free", "hooke_joint"]) == 2
     assert "--duration" in capsys.readouterr().err
     with pytest.raises(KincheckError, match="duration"):

@@ -66,7 +66,7 @@ SAME = {
 
 
 @pytest.mark.parametrize(("text", "lost"), SAME.values(), ids=SAME)
-def test_same_motion_with_something_lost_says_what(text, lost, tmp_path):
+def test_same_motion_names_lost_facts(text, lost, tmp_path):
     found = against(tmp_path, text)
     assert found["verdict"] == "same", found["reason"]
     assert found["largest_m"] < 1e-15
@@ -89,14 +89,14 @@ DIFFERENT = {
 
 
 @pytest.mark.parametrize(("text", "reason"), DIFFERENT.values(), ids=DIFFERENT)
-def test_other_motion_names_joint_and_place(text, reason, tmp_path):
+def test_different_motion_names_joint_and_place(text, reason, tmp_path):
     found = against(tmp_path, text)
     assert found["verdict"] == "differs"
     assert reason in found["reason"]
     assert found["largest_m"] > 1e-9
 
 
-def test_moved_base_is_told_as_placement(tmp_path):
+def test_moved_base_is_placement(tmp_path):
     moved = GRIPPER.replace('<link name="base"/>', '<link name="root"/><link name="base"/>')
     moved = moved.replace(
         "</robot>",
@@ -138,7 +138,7 @@ def wedges():
     ["four_bar", "five_bar", "hooke_joint_cross", "mcpherson_arm", "strut_swapped", "wedges"],
 )
 @pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf", "osim"])
-def test_written_case_is_the_same_mechanism(name, form, tmp_path):
+def test_exported_case_is_same_mechanism(name, form, tmp_path):
     own = {"strut_swapped": lambda: CASES[name], "wedges": wedges}
     given = own.get(name, lambda: cases.load(name))()
     for suffix, text in written(given, adapters.writer(form), None).items():
@@ -151,7 +151,7 @@ def test_written_case_is_the_same_mechanism(name, form, tmp_path):
     assert found.lost == []
 
 
-def test_converted_file_is_within_its_digits(tmp_path, capsys):
+def test_same_converted_file_within_digits(tmp_path, capsys):
     pytest.importorskip("mujoco")
     (file := tmp_path / "gripper.urdf").write_text(GRIPPER)
     assert main(["same", str(file), "--converted-by", "mujoco"]) == 0
@@ -160,7 +160,7 @@ def test_converted_file_is_within_its_digits(tmp_path, capsys):
     assert "velocity limit of left, right" in text
 
 
-def test_other_mechanisms_differ_by_freedoms():
+def test_different_mechanisms_differ_by_freedoms():
     pair = (undriven_case(cases.load(name), name) for name in ("four_bar", "five_bar"))
     found = compare(*pair, {})
     assert found.verdict == "differs"
@@ -168,20 +168,20 @@ def test_other_mechanisms_differ_by_freedoms():
     assert found.largest is None
 
 
-def test_one_file_asks_for_another(tmp_path, capsys):
+def test_same_with_one_file_is_refused(tmp_path, capsys):
     (file := Path(tmp_path) / "gripper.urdf").write_text(GRIPPER)
     assert main(["same", str(file)]) == 2
     assert "expected two or more" in capsys.readouterr().err
 
 
-def test_a_converter_that_saves_no_model_says_so(tmp_path, capsys):
+def test_converter_without_output_is_refused(tmp_path, capsys):
     (file := tmp_path / "gripper.urdf").write_text(GRIPPER)
     for name in ("drake", "pinocchio"):
         assert main(["same", str(file), "--converted-by", name]) == 2
         assert f"--converted-by {name}: " in capsys.readouterr().err
 
 
-def test_table_of_converters_has_a_row_for_each_file(tmp_path):
+def test_converter_table_has_row_per_file(tmp_path):
     pytest.importorskip("mujoco")
     (tmp_path / "gripper.urdf").write_text(GRIPPER)
     (tmp_path / "none.urdf").write_text("<robot name='r'/>")
@@ -191,7 +191,7 @@ def test_table_of_converters_has_a_row_for_each_file(tmp_path):
     assert second.startswith("| `none.urdf` | mujoco | not judged: ")
 
 
-def test_without_leaves_elements_out_of_both_files(tmp_path, capsys):
+def test_same_without_omits_elements_of_both(tmp_path, capsys):
     tied = GRIPPER.replace("</robot>", '<tie a="left_link" b="right_link"/></robot>')
     for name, text in (("tied", tied), ("plain", GRIPPER)):
         (tmp_path / f"{name}.urdf").write_text(text)
@@ -216,7 +216,7 @@ def written_as_urdf(file: Path, *drive: str) -> Path:
     return out
 
 
-def test_written_coupling_with_an_offset_moves_a_zero(tmp_path, capsys):
+def test_exported_coupling_offset_moves_zero(tmp_path, capsys):
     """Links stand in the file where they stood in the model at that coordinate."""
     (file := tmp_path / "offset.xml").write_text(OFFSET)
     written = written_as_urdf(file, "--drive", "first:-0.2:0.2")
@@ -239,7 +239,7 @@ SLIDER = """<sdf version="1.9"><model name="ram">
 <axis><xyz>1 0 1</xyz></axis></joint></model></sdf>"""
 
 
-def test_loops_opened_elsewhere_are_the_same(tmp_path, capsys):
+def test_same_with_loops_opened_elsewhere(tmp_path, capsys):
     """A link without mass between two joints has no partner, and needs none."""
     (tmp_path / "ram.sdf").write_text(SLIDER)
     (file := tmp_path / "ram.toml").touch()
@@ -249,7 +249,7 @@ def test_loops_opened_elsewhere_are_the_same(tmp_path, capsys):
     assert "placed where they fit: ram.copy" in capsys.readouterr().out
 
 
-def test_unreadable_file_is_reported_as_json(tmp_path, capsys):
+def test_same_reports_unreadable_file_as_json(tmp_path, capsys):
     (file := tmp_path / "gripper.urdf").write_text(GRIPPER)
     assert main(["same", str(file), str(tmp_path / "none.urdf"), "--json", "-"]) == 2
     found = json.loads(capsys.readouterr().out)

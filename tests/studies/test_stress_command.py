@@ -8,7 +8,6 @@ import kincheck.adapters
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.adapters.native import Native
 from kincheck.core import solve
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.joint_probe import probes
@@ -22,33 +21,29 @@ from kincheck.core.studies.stress.run import Cell, Finding, Stress
 from kincheck.core.studies.stress.verdicts import Verdict
 from kincheck.core.trajectory import PointMotion
 
-from ..support.fakes import Fake
+from ..support.fakes import Fake, crank, native_but, swept
+from ..support.written_again import written_again
 
 
-class Shifted(Native):
-    """The native engine, off by a micrometre beyond 2 rad."""
-
-    def build(self, case):
-        found = solve(case.mechanism, case.sweep.driver, case.sweep.values, rate=case.sweep.rate)
-        far = (np.abs(case.sweep.change) > 2.0)[:, None]
-        points = {
-            name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()
-        }
-        return replace(found, points=points)
-
-    def solve(self, model, case, tol):
-        return model
+def shift(found, case):
+    """Be off by a micrometre beyond 2 rad."""
+    far = (np.abs(case.sweep.change) > 2.0)[:, None]
+    points = {
+        name: replace(m, position=m.position + 1e-6 * far) for name, m in found.points.items()
+    }
+    return replace(found, points=points)
 
 
 @pytest.fixture
 def shifted(monkeypatch):
-    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": Shifted())
+    engine = native_but(shift)
+    monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
     monkeypatch.setattr(
         "kincheck.core.studies.stress.run.suited", lambda engine, case, number: engine
     )
 
 
-def test_a_run_writes_tables_and_data(tmp_path, capsys):
+def test_stress_writes_tables_and_data(tmp_path, capsys):
     new = tmp_path / "new"
     options = f"--family units degenerate --samples 40 --out {new} --json -"
     assert main.main(["stress", *options.split()]) == 0
@@ -81,7 +76,7 @@ def test_silent_error_is_reduced_and_replayed(tmp_path, capsys, shifted):
     assert "silently wrong first at turn = " in capsys.readouterr().out
 
 
-def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
+def test_stress_replay_of_sound_case(tmp_path, capsys):
     file = tmp_path / "rssr.toml"
     file.write_text(case_text(cases.load("rssr")), encoding="utf-8")
     assert main.main(["stress", "--replay", str(file)]) == 0
@@ -99,7 +94,7 @@ def test_a_sound_case_is_replayed_as_right(tmp_path, capsys):
     ],
     ids=["unable", "missing"],
 )
-def test_stress_without_examined_samples_has_status_2(tmp_path, capsys, monkeypatch, engine, why):
+def test_stress_without_samples_has_status_2(tmp_path, capsys, monkeypatch, engine, why):
     monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
     assert main.main("stress --family units --samples 20 --no-proofs".split()) == 2
     out, err = capsys.readouterr()
@@ -126,7 +121,7 @@ def cell(name="one", **samples):
     return Cell(samples=counts, **of)
 
 
-def test_samples_without_a_verdict_are_counted_apart():
+def test_unjudged_samples_are_counted():
     refused, unjudged = {"refused, right reason": 2}, {"not judged": 3, "unsupported": 4}
     found = cell(right=5, **refused, **unjudged)
     assert headline([found]) == "None of 7 samples silently wrong, 3 not judged, 4 unsupported"
@@ -134,14 +129,14 @@ def test_samples_without_a_verdict_are_counted_apart():
     assert headline([found, wrong]) == "1 of 15 samples silently wrong, 3 not judged, 4 unsupported"
 
 
-def test_families_are_listed_with_their_sizes(capsys):
+def test_stress_list_prints_families(capsys):
     assert main.main(["stress", "--list"]) == 0
     out = capsys.readouterr().out
     assert "units" in out
     assert "1e7 m" in out
 
 
-def test_text_of_files_is_no_markup():
+def test_stress_page_escapes_file_text():
     """Names and messages come from files and simulators."""
     evil = "<script>|*x*`"
     others = ("refused, right reason", "refused, wrong reason", "silently wrong", "not judged")
@@ -169,33 +164,17 @@ def test_text_of_files_is_no_markup():
 
 @pytest.mark.parametrize("name", sorted(set(cases.names()) - {"mcpherson_suspension"}))
 def test_written_built_in_cases_read_back(name, tmp_path):
-    same_after_writing(cases.load(name), tmp_path)
+    written_again(cases.load(name), tmp_path)
 
 
 @pytest.mark.parametrize("case", probes(), ids=lambda case: case.name)
 def test_written_joint_types_read_back(case, tmp_path):
-    same_after_writing(case, tmp_path)
-
-
-def same_after_writing(case, folder):
-    file = folder / "case.toml"
-    file.write_text(case_text(case, ["what it is", "and why"]), encoding="utf-8")
-    read = load_case(file)
-    values = read.sweep.values
-    for part in ("name", "source", "mechanism", "outputs"):
-        assert getattr(read, part) == getattr(case, part)
-    for part in ("driver", "rate", "design", "motions"):
-        assert getattr(read.sweep, part) == getattr(case.sweep, part)
-    # a grid in degrees is even but for its last places
-    assert np.abs(values - case.sweep.values).max() <= 4 * np.spacing(
-        np.abs(case.sweep.values).max()
-    )
+    written_again(case, tmp_path)
 
 
 def test_unwritable_cases_are_refused():
     case = cases.load("rssr")
-    values = np.array([0.0, 1.0, 1.5])
-    uneven = replace(case, sweep=replace(case.sweep, values=values), reference={})
+    uneven = swept(case, [0.0, 1.0, 1.5])
     with pytest.raises(CaseError, match="no even grid"):
         case_text(uneven)
     strut = cases.load("mcpherson_suspension")
@@ -206,18 +185,11 @@ def test_unwritable_cases_are_refused():
 
 
 def test_written_names_are_quoted(tmp_path):
-    case = next(case for case in probes() if case.name == "revolute")
-    odd = 'ti "p"\\1'
-    points = [
-        replace(point, name=odd) if point.name == "tip_1" else point
-        for point in case.mechanism.points
-    ]
-    outputs = tuple(
-        replace(each, point=odd) if each.point == "tip_1" else each for each in case.outputs
-    )
-    same_after_writing(
-        replace(case, mechanism=replace(case.mechanism, points=points), outputs=outputs), tmp_path
-    )
+    case, odd = crank(), 'ti "p"\\1'
+    points = [replace(point, name=odd) for point in case.mechanism.points]
+    outputs = tuple(replace(each, point=odd) for each in case.outputs)
+    mechanism = replace(case.mechanism, points=points)
+    written_again(replace(case, mechanism=mechanism, outputs=outputs, reference={}), tmp_path)
 
 
 def test_stress_replay_refuses_output_files(tmp_path, capsys):
@@ -240,7 +212,7 @@ def case():
     return four_bar_case("rod", 5)
 
 
-def test_a_bad_case_is_made_small():
+def test_reduction_removes_unneeded_parts():
     """Bad is whatever has a crank longer than 0.1 m that is turned by more than 0.3 rad."""
     case = four_bar_case("revolutes", 41)
 

@@ -36,6 +36,8 @@ from kincheck.core.studies.truth.motion import (
 from kincheck.core.studies.truth.proofs import distance_from_proof
 from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 
+from ..support.fakes import swept
+
 PROBES = {case.name: case for case in probes()}
 CRANK, ROD = 0.3, 1.0
 
@@ -51,7 +53,7 @@ def worst(truth, positions):
 
 
 @pytest.mark.parametrize("name", PROBES)
-def test_jacobian_and_curvature_equal_differences(name):
+def test_truth_jacobian_and_curvature_equal_differences(name):
     case = PROBES[name]
     rows = Rows(case.mechanism)
     bodies, rng, h = len(rows.bodies), np.random.default_rng(5), 1e-5
@@ -69,7 +71,7 @@ def test_jacobian_and_curvature_equal_differences(name):
 
 
 @pytest.mark.parametrize("name", PROBES)
-def test_every_joint_type_moves_as_in_the_native_solver(name):
+def test_truth_of_joint_types_equals_native(name):
     """That one is held to the paper's equations elsewhere; here it is the other way round: the same
     motion from other equations.
     """
@@ -81,7 +83,7 @@ def test_every_joint_type_moves_as_in_the_native_solver(name):
 
 
 @pytest.mark.parametrize("name", ["polynomial", "spline"])
-def test_curves_have_their_rates_and_accelerations(name):
+def test_truth_curve_rates_and_accelerations(name):
     """Against the native solver, whose curves other tests hold to closed forms."""
     case = PROBES[name]
     found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
@@ -102,7 +104,7 @@ def test_curves_have_their_rates_and_accelerations(name):
         "bennett",
     ],
 )
-def test_the_motion_followed_is_the_closed_form(name):
+def test_followed_motion_equals_closed_form(name):
     """Position, velocity and acceleration, of mechanisms whose closed forms are in the case
     library.
     """
@@ -120,7 +122,7 @@ def test_the_motion_followed_is_the_closed_form(name):
             assert np.abs(along - getattr(case.reference[output.name], quantity)).max() < 1e-11
 
 
-def test_unknown_joint_type_is_named():
+def test_truth_names_unknown_joint_type():
     @dataclass(frozen=True)
     class Odd(Spherical):
         type = "odd"
@@ -154,7 +156,7 @@ def parallelogram(off, samples=9):
 
 
 @pytest.mark.parametrize(("ratio", "seed"), [(1.0, 0), (1.0, 1), (1e-3, 2)])
-def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
+def test_combined_loops_truth_equals_followed(ratio, seed):
     """The second with points of its own, of any size beside the first; its closed form is that of
     both.
     """
@@ -169,7 +171,7 @@ def test_two_loops_on_one_crank_move_as_followed(ratio, seed):
 
 
 @pytest.mark.parametrize("off", [1e-9, 1e-3])
-def test_a_gap_narrower_than_the_grid_is_not_jumped(off):
+def test_truth_stops_at_narrow_gap(off):
     """The sweep has nine samples; what is nearly a change point turns the motion round within the
     root of off.
     """
@@ -183,14 +185,14 @@ def test_a_gap_narrower_than_the_grid_is_not_jumped(off):
 
 
 @pytest.mark.parametrize("off", [-1e-9, -1e-3])
-def test_samples_past_a_gap_are_beyond(off):
+def test_samples_past_gap_are_beyond(off):
     case, motion = parallelogram(off)
     truth, known = followed(case), closed(case, motion)
     assert list(truth.reach) == list(known.reach)
     assert (truth.reach == Reach.BEYOND).sum() in (2, 3, 4, 5)
 
 
-def test_the_end_of_a_stroke_is_found_to_the_last_digits():
+def test_stroke_end_to_last_digits():
     """A slider-crank driven at its slider: it ends where the rod is stretched."""
     b = polar(CRANK, 0.4)
     c = float(b.real + np.sqrt(ROD**2 - b.imag**2))
@@ -217,16 +219,11 @@ def test_sample_behind_rounding_singularity_may_fail(off, told):
 
 def test_round_off_bound_grows_with_condition():
     near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
-    bounds = [
-        followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][
-            0, 0
-        ]
-        for case in (near, far)
-    ]
+    bounds = [followed(swept(case, [-1.2])).bounds["C"][0, 0] for case in (near, far)]
     assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
 
 
-def test_wrong_closed_form_is_a_defect():
+def test_wrong_closed_form_is_refused():
     case, motion = parallelogram(1e-3)
     wrong = replace(
         case.mechanism,
@@ -240,7 +237,7 @@ def test_wrong_closed_form_is_a_defect():
 
 
 @pytest.mark.parametrize("name", ["rssr", "spatial_slider_crank", "gear", "rack_pinion", "screw"])
-def test_the_truth_is_proved(name):
+def test_proof_confirms_truth(name):
     """Krawczyk's test, about the equations of the engine: the two sets of equations have the same
     solution, to 19 digits.
     """
@@ -251,21 +248,21 @@ def test_the_truth_is_proved(name):
     assert distance_from_proof(replace(truth, points=off), 3) > 1e-2
 
 
-def test_proof_chooses_rows_at_the_sample():
+def test_proof_chooses_rows_at_sample():
     """The Bennett loop after a quarter turn, where those chosen at the design depend on each
     other.
     """
     case = cases.load("bennett")
-    truth = followed(replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 45.0, 90.0]))))
+    truth = followed(swept(case, np.radians([0.0, 45.0, 90.0])))
     assert distance_from_proof(truth, 2) < 1e-2
 
 
-def test_a_point_of_the_ground_needs_no_proof():
+def test_ground_point_needs_no_proof():
     """At the global origin it has no round-off either."""
     case = cases.load("four_bar")
     points = [*case.mechanism.points, Point("here", "ground", (0.0, 0.0, 0.0))]
     case = replace(case, mechanism=replace(case.mechanism, points=points))
-    few = with_all_coordinates(replace(case, sweep=replace(case.sweep, values=np.array([0.25]))))
+    few = with_all_coordinates(swept(case, [0.25]))
     assert "here" in few.points
     assert distance_from_proof(followed(few), 0) < 1e-2
 
@@ -280,10 +277,10 @@ def failures(make):
 
 
 @pytest.mark.parametrize(("make", "reasons"), WRONG.values(), ids=WRONG)
-def test_degenerate_mechanisms_name_their_failure(make, reasons):
+def test_degenerate_mechanisms_name_failure(make, reasons):
     assert reasons.intersection(failures(make))
 
 
 @pytest.mark.parametrize("make", SOUND.values(), ids=SOUND)
-def test_unusual_but_sound_mechanisms_are_solved(make):
+def test_unusual_sound_mechanisms_are_solved(make):
     assert failures(make) == ()

@@ -17,8 +17,8 @@ from kincheck.core.studies.tolerance.study import Ready
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 
 from ..support.fakes import crank
+from ..support.variations import vary, vary_file
 from .test_sweep_study import TIP
-from .test_vary import vary, vary_file
 
 POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},
@@ -101,7 +101,7 @@ def test_sweep_writes_all_its_files(file, tmp_path, capsys):
     )
 
 
-def test_the_page_holds_all_and_escapes_it(file, tmp_path):
+def test_sweep_page_is_complete_and_escaped(file, tmp_path):
     case = load("mcpherson_strut")
     found = sweep_designs(
         case, vary(tmp_path, case, **POINTS), samples=20, command="<script>alert(1)</script>"
@@ -118,7 +118,7 @@ def test_the_page_holds_all_and_escapes_it(file, tmp_path):
     assert addresses <= {"http://www.w3.org/2000/svg"}
 
 
-def test_json_goes_to_standard_output_alone(file, capsys):
+def test_sweep_json_to_standard_output(file, capsys):
     options = f"--vary {file} --samples 5 --output wheelbase_change --json -"
     assert main(["sweep", "mcpherson_strut", *options.split()]) == 0
     output = capsys.readouterr()
@@ -126,7 +126,7 @@ def test_json_goes_to_standard_output_alone(file, capsys):
     assert "5 variants of mcpherson_strut" in output.err
 
 
-def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
+def test_unsolved_variants_give_status_1(tmp_path, capsys):
     path = vary_file(tmp_path, {"rod": {"at": "joints.rod.length", "half_width": 3500.0}})
     assert main(f"sweep rssr --vary {path} --samples 30 --out {tmp_path / 'out'}".split()) == 1
     told = capsys.readouterr().out
@@ -137,7 +137,7 @@ def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
     assert "Variants without a solution" in (tmp_path / "out" / "sweep.html").read_text()
 
 
-def test_without_pyarrow_there_is_a_message(file, tmp_path, capsys, monkeypatch):
+def test_store_without_pyarrow_is_refused(file, tmp_path, capsys, monkeypatch):
     real = importlib.import_module
 
     def without(name, *rest):
@@ -255,7 +255,7 @@ def numbers(folder):
 
 
 @pytest.mark.parametrize("chunks", [1, 3])
-def test_resumed_sweep_has_the_same_bits(arguments, whole, tmp_path, capsys, stop, chunks):
+def test_resumed_sweep_is_bit_equal(arguments, whole, tmp_path, capsys, stop, chunks):
     (_, whole), out = whole, tmp_path / "out"
     stop(chunks)
     assert main([*arguments, "--out", str(out), *CHECK]) == 130
@@ -302,7 +302,7 @@ def test_stopped_sweep_reduces_first_variants(tmp_path, stop):
     assert found.gradients == whole.gradients
 
 
-def test_stored_values_are_marked_partial(arguments, tmp_path, stop):
+def test_stopped_store_is_marked_partial(arguments, tmp_path, stop):
     parquet = pytest.importorskip("pyarrow.parquet")
     out, stored, whole = (tmp_path / name for name in ("out", "part.parquet", "whole.parquet"))
     assert main([*arguments, "--store", str(whole)]) == 0
@@ -319,14 +319,12 @@ def test_stored_values_are_marked_partial(arguments, tmp_path, stop):
     assert parquet.read_table(stored).equals(parquet.read_table(whole))
 
 
-@pytest.mark.parametrize(
-    "change", [["--seed", "4"], ["--samples", "700"], ["--order", "1"], ["--tol", "1e-11"]]
-)
+@pytest.mark.parametrize("change", ["--seed 4", "--samples 700", "--order 1", "--tol 1e-11"])
 def test_resume_refuses_part_of_another_sweep(arguments, stopped, tmp_path, capsys, change):
     out = tmp_path / "out"
     shutil.copytree(stopped, out)
     kept = (out / "sweep.part").read_bytes()
-    assert main([*arguments, *change, "--out", str(out), "--resume"]) == 2
+    assert main([*arguments, *change.split(), "--out", str(out), "--resume"]) == 2
     assert "is the part of another study" in capsys.readouterr().err
     assert (out / "sweep.part").read_bytes() == kept
 
@@ -352,13 +350,13 @@ def test_resume_without_part_starts_over(arguments, tmp_path, capsys):
     assert "--resume continues from a folder of results. Give --out DIR" in capsys.readouterr().err
 
 
-def test_interrupt_before_first_chunk(arguments, tmp_path, capsys, stop):
+def test_sweep_interrupt_before_first_chunk(arguments, tmp_path, capsys, stop):
     stop(0)
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err == "kincheck: interrupted\n"
 
 
-def test_unwritable_part_costs_no_result(arguments, tmp_path, capsys):
+def test_unwritable_part_file_keeps_results(arguments, tmp_path, capsys):
     out = tmp_path / "out"
     (out / "sweep.part").mkdir(parents=True)
     assert main([*arguments, "--out", str(out)]) == 2

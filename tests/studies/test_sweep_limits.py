@@ -6,7 +6,6 @@ import json
 import math
 import re
 from dataclasses import replace
-from importlib import import_module
 
 import msgspec
 import numpy as np
@@ -22,7 +21,6 @@ from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.execution import solve_in_process
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
-from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.studies.tolerance.conformance import sparkline
@@ -34,11 +32,11 @@ from kincheck.core.studies.tolerance.tables import limit_notes, limits_csv, prin
 from kincheck.core.studies.variation.study_choices import Incomplete, Sampling
 from kincheck.core.studies.variation.variation import FileUnits, Limit
 from kincheck.core.studies.variation.variation_file import limits_of_texts, read_variation
-from scipy.stats import beta
+from scipy import stats
 
 from ..report.page import Page
-from ..support.fakes import crank
-from .test_vary import HEAD, vary, vary_file
+from ..support.fakes import crank, swept
+from ..support.variations import HEAD, vary, vary_file
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 
@@ -47,7 +45,7 @@ TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 def found(tmp_path_factory):
     """The crank at its design: y of the tip is normal, of one millimetre, about zero."""
     case = crank()
-    still = replace(case, sweep=replace(case.sweep, values=case.sweep.values[4:5]))
+    still = swept(case, case.sweep.values[4:5])
     assert still.sweep.change == pytest.approx(0.0)
     variation = vary(tmp_path_factory.mktemp("limits"), still, tip=TIP)
     limits = (Limit("y", -2e-3, 3e-3), Limit("x", high=1.0))
@@ -56,13 +54,7 @@ def found(tmp_path_factory):
     )
 
 
-@pytest.fixture(scope="module")
-def stats():
-    """It takes a second to import, and others collect these tests too."""
-    return import_module("scipy.stats")
-
-
-def test_yield_and_capability_of_a_normal_output(found, stats):
+def test_yield_and_capability_of_normal_output(found):
     y, x, whole = found.limits
     expected = stats.norm.cdf(3.0) - stats.norm.cdf(-2.0)
     assert y.share == pytest.approx(expected, abs=2.0 / 4096)
@@ -75,19 +67,11 @@ def test_yield_and_capability_of_a_normal_output(found, stats):
     )
     assert y.by_quantiles == pytest.approx(2.0 / 3.0, rel=2e-2)
     assert (x.share, x.cp, x.cpk) == (1.0, None, None)  # x from the design does not change
+    assert x.interval == pytest.approx((0.025 ** (1.0 / 4096), 1.0), rel=1e-9)
     assert (whole.output, whole.outside, whole.share) == ("", y.outside, y.share)
 
 
-def test_the_interval_is_that_of_clopper_and_pearson(found, stats):
-    y = found.limits[0]
-    inside = y.known - y.outside
-    low = stats.beta.ppf(0.025, inside, y.outside + 1)
-    high = stats.beta.ppf(0.975, inside + 1, y.outside)
-    assert y.interval == pytest.approx((low, high), rel=1e-9)
-    assert found.limits[1].interval == pytest.approx((0.025 ** (1.0 / 4096), 1.0), rel=1e-9)
-
-
-def test_the_histogram_counts_every_variant(found, stats):
+def test_histogram_counts_every_variant(found):
     each = found.outputs["y"].histogram
     assert sum(each.counts) == 4096
     assert len(each.edges) == len(each.counts) + 1 == 31
@@ -101,7 +85,7 @@ def test_the_histogram_counts_every_variant(found, stats):
     assert found.outputs["x"].histogram is None
 
 
-def test_the_page_has_limits_histograms_and_legends(found):
+def test_sweep_page_has_limits_and_histograms(found):
     text = page(found)
     assert "Specification limits" in text
     assert text.count('tabindex="0" aria-label="Histogram of y') == 1
@@ -122,28 +106,18 @@ def test_the_page_has_limits_histograms_and_legends(found):
         ({}, "assumes independent variants; for sobol sampling it is usually too wide", True),
         ({"sampling": "random"}, "assumes independent variants", False),
     ],
+    ids=[
+        *("power of two", "no power of two", "random", "few unsolved", "many unsolved"),
+        *("sobol interval", "random interval"),
+    ],
 )
-def test_remarks_of_a_study(found, changes, said, told):
+def test_study_remarks(found, changes, said, told):
     results = msgspec.structs.replace(found, **changes)
     lines = [*remarks(results), *limit_notes(results)]
     assert any(said in line for line in lines) is told, lines
 
 
-def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):
-    case = crank()
-    limits = (Limit("y", high=0.4995),)
-    variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
-    one, three = (
-        sweep_designs(case, variation, samples=300, seed=1, jobs=jobs).limits for jobs in (1, 3)
-    )
-    assert one == three
-    values = np.array([variation.of_variant(1, k)[0] for k in range(300)])
-    angle = case.sweep.change[:, None]
-    y = 0.5 * np.sin(angle) + np.cos(angle) * values
-    assert one[0].above == int((y > 0.4995).any(axis=0).sum())
-
-
-def test_limits_of_a_rate_take_its_order(tmp_path):
+def test_rate_limits_raise_derivative_order(tmp_path):
     case = crank()
     limits = (Limit("y.velocity", high=0.4),)
     variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
@@ -159,7 +133,7 @@ def file(tmp_path):
     return vary_file(tmp_path, {"ball": {"at": "ball", "sigma": 1.0}}, limits=limits)
 
 
-def test_limits_use_units_of_the_file(file, tmp_path, capsys):
+def test_limits_use_file_units(file, tmp_path, capsys):
     out = tmp_path / "out"
     command = f"sweep mcpherson_strut --vary {file} --samples 50".split()
     limits = "--limit wheelbase_change::3.5 --limit half_track_change:-11:1".split()
@@ -193,13 +167,13 @@ def test_limits_use_units_of_the_file(file, tmp_path, capsys):
         ("toe:-1e-1:0.1rad", -math.degrees(0.1), math.degrees(0.1)),
     ],
 )
-def test_limits_take_a_unit(limit, low, high):
+def test_limits_with_own_unit(limit, low, high):
     (found,) = limits_of_texts([limit], load("mcpherson_suspension"), FileUnits("mm", "rad"))
     ends = [math.radians(low), math.radians(high)]
     assert [found.low, found.high] == pytest.approx(ends, rel=1e-15)
 
 
-def test_limits_of_a_table_are_in_degrees(tmp_path, capsys):
+def test_limits_of_table_in_degrees(tmp_path, capsys):
     main(["templates", "mcpherson"])
     car, out = tmp_path / "car.csv", tmp_path / "out"
     car.write_text(capsys.readouterr().out)
@@ -216,7 +190,7 @@ def test_limits_of_a_table_are_in_degrees(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("limit", ["toe:-2:2mm", "toe:-2deg:2rad", "toe:-2:2dgr", "toe:deg:deg"])
-def test_limits_of_another_unit_are_refused(limit):
+def test_limits_of_wrong_unit_are_refused(limit):
     with pytest.raises(
         KincheckError, match=r"--limit.*(expected one such as rad|OUTPUT:LOW:HIGH|neither)"
     ):
@@ -281,7 +255,7 @@ def studied(tmp_path_factory):
     return found, len(complete), int(sum(each.min() >= LOW for each in complete))
 
 
-def test_incomplete_variants_are_outside_unless_ignored(studied):
+def test_incomplete_variants_outside_unless_ignored(studied):
     found, complete, inside = studied
     assert VARIANTS / 4 < complete < 0.75 * VARIANTS
     assert 0 < inside < complete
@@ -294,14 +268,14 @@ def test_incomplete_variants_are_outside_unless_ignored(studied):
             assert each.share == inside / known
             assert each.share_of_all == inside / VARIANTS
             assert each.share_of_complete == inside / complete
-            low = beta.ppf(0.025, inside, known - inside + 1)
-            high = beta.ppf(0.975, inside + 1, known - inside)
+            low = stats.beta.ppf(0.025, inside, known - inside + 1)
+            high = stats.beta.ppf(0.975, inside + 1, known - inside)
             assert each.interval == pytest.approx((low, high), rel=1e-9)
     below = [results.limits[0].below for results in found.values()]
     assert below[0] > below[1] == complete - inside
 
 
-def test_variants_are_counted_by_side_and_whether_complete():
+def test_outside_variants_by_side_and_completeness():
     nan = np.nan
     values = np.array(
         [
@@ -319,7 +293,7 @@ def test_variants_are_counted_by_side_and_whether_complete():
     ]
 
 
-def test_samples_without_a_nominal_value_are_not_judged():
+def test_samples_without_nominal_are_unjudged():
     """Ackermann of straight wheels has no value in any variant; a lock-up is of one."""
     values, reached = np.zeros((1, 4, 5)), np.ones((4, 5), dtype=np.bool_)
     nominal = np.array([[0.0, 0.0, np.nan, 0.0]])
@@ -363,14 +337,23 @@ def near(value, **tolerance):
     return None if value is None else pytest.approx(value, **tolerance)
 
 
-NOTHING = {"share": 0.0, "interval": (0.0, 0.25), "share_of_all": 0.0, "share_of_complete": None}
-UNKNOWN = {"share": None, "interval": None, "share_of_all": 0.5, "share_of_complete": 0.0}
+CHANGES = {
+    "as found": {},
+    "no yield": {
+        "share": 0.0,
+        "interval": (0.0, 0.25),
+        "share_of_all": 0.0,
+        "share_of_complete": None,
+    },
+    "unknown": {"share": None, "interval": None, "share_of_all": 0.5, "share_of_complete": 0.0},
+    "zeros": {"cp": 0.0, "cpk": 0.0, "below": 0},
+}
 
 
 @pytest.mark.parametrize("judgement", Incomplete)
 @pytest.mark.parametrize("cells", [on_page, on_terminal])
-@pytest.mark.parametrize("changed", [{}, NOTHING, UNKNOWN, {"cp": 0.0, "cpk": 0.0, "below": 0}])
-def test_printed_limits_are_those_of_the_results(studied, judgement, cells, changed):
+@pytest.mark.parametrize("changed", CHANGES.values(), ids=CHANGES)
+def test_printed_limits_equal_results(studied, judgement, cells, changed):
     """Zero is a number, and no number is a dash."""
     found, _, _ = studied
     first, whole = found[judgement].limits
@@ -395,7 +378,7 @@ def test_printed_limits_are_those_of_the_results(studied, judgement, cells, chan
         ]
 
 
-def test_csv_of_limits_is_that_of_the_results(studied):
+def test_limits_csv_equals_results(studied):
     for judgement, results in studied[0].items():
         for row, each in zip(
             csv.DictReader(io.StringIO(limits_csv(results))), results.limits, strict=True
@@ -412,17 +395,17 @@ def test_csv_of_limits_is_that_of_the_results(studied):
 @pytest.mark.parametrize(
     ("option", "judgement", "words"),
     [
-        ([], "outside", "Incomplete, and so outside: "),
-        (["--incomplete", "ignore"], "ignore", "Incomplete, and left out: "),
+        ("", "outside", "Incomplete, and so outside: "),
+        ("--incomplete ignore", "ignore", "Incomplete, and left out: "),
     ],
 )
-def test_command_states_how_incomplete_variants_count(tmp_path, capsys, option, judgement, words):
+def test_sweep_command_counts_incomplete_variants(tmp_path, capsys, option, judgement, words):
     file, points, out = tmp_path / "bars.toml", tmp_path / "vary.json", tmp_path / "out.json"
     file.write_text(case_text(four_bar()))
     tables = {**HEAD, "mode": "monte_carlo", "hardpoints": {"end": JOINT}}
     points.write_text(json.dumps(tables | {"limits": {"height": {"low": 1000.0 * LOW}}}))
     command = f"sweep {file} --vary {points} --samples 40 --json {out}".split()
-    assert main([*command, *option]) == 1
+    assert main([*command, *option.split()]) == 1
     found = json.loads(out.read_text())
     limit = found["limits"][0]
     assert (found["incomplete"], limit["known"]) == (
@@ -439,70 +422,45 @@ def test_command_states_how_incomplete_variants_count(tmp_path, capsys, option, 
 
 
 COUNT = 4
-SLIDER_CRANK = {
-    "pin": {"at": "joints.crank_pin.point", "half_width": [0.5, 0.5, 0.0]},
-    "mass": {"at": "bodies.slider.mass", "half_width": 0.1},
+# The rows of the slider-crank are redundant: some components are not determined.
+LOADED = {
+    "planar_slider_crank": {
+        "pin": {"at": "joints.crank_pin.point", "half_width": [0.5, 0.5, 0.0]},
+        "mass": {"at": "bodies.slider.mass", "half_width": 0.1},
+    },
+    "mcpherson_strut_loaded": {
+        "rate": {"at": "forces.spring.stiffness", "half_width": 2.0},
+        "mass": {"at": "bodies.knuckle.mass", "half_width": 3.0},
+        "ball": {"at": "ball", "sigma": 1.0},
+    },
 }
 
 
-def ready(tmp_path, name, **hardpoints):
-    case = load(name)
-    return Ready.of(Study(case, vary(tmp_path, case, **hardpoints), COUNT, 3))
-
-
-def values_of(made):
-    study = made.study
-    values, solved, _, messages = made.values(study.variation.offsets(study.seed, 0, COUNT))
+@pytest.mark.parametrize("name", LOADED)
+def test_sweep_forces_equal_single_variants(tmp_path, name):
+    case, native = load(name), adapters.engine("native")
+    ready = Ready.of(Study(case, vary(tmp_path, case, **LOADED[name]), COUNT, 3))
+    study = ready.study
+    found, solved, _, messages = ready.values(study.variation.offsets(3, 0, COUNT))
     assert solved.all(), messages
-    return values
-
-
-def alone(study, index):
-    """The rows of one variant, solved as a case of its own."""
-    case = study.of_variant(index)
-    solver = NativeSolver().prepare(case.mechanism, case.sweep.path, case.points, (), case.forces)
-    found = solver(1e-12)
-    return np.array([output_series(case, row.output, found).position for row in study.rows])
-
-
-@pytest.fixture(scope="module")
-def slider_crank(tmp_path_factory):
-    """Its rows are redundant: some components are not determined."""
-    return ready(tmp_path_factory.mktemp("forces"), "planar_slider_crank", **SLIDER_CRANK)
-
-
-def test_forces_are_those_of_single_variants(slider_crank):
-    found = values_of(slider_crank)
-    assert any(row.output.forces for row in slider_crank.study.rows)
-    for index in (0, 3):
-        right = alone(slider_crank.study, index)
+    assert any(row.output.forces for row in study.rows)
+    for index in range(COUNT):
+        own = study.of_variant(index)
+        motion = native.solve(native.build(own), own, 1e-12)
+        right = np.array([output_series(own, row.output, motion).position for row in study.rows])
         scale = np.nanmax(np.abs(right), axis=1, keepdims=True)
-        np.testing.assert_allclose(found[:, :, index] / scale, right / scale, atol=1e-13)
-    assert not np.allclose(found[:, :, 0], found[:, :, 1], equal_nan=True)
+        np.testing.assert_allclose(found[:, :, index] / scale, right / scale, atol=1e-12)
+    assert not np.isclose(found[:, :, 0], found[:, :, 1], rtol=1e-6).all(axis=1).any()
 
 
-def test_a_spring_moves_with_its_hardpoint_and_its_rate_varies(tmp_path):
-    made = ready(
-        tmp_path,
-        "mcpherson_strut_loaded",
-        rate={"at": "forces.spring.stiffness", "half_width": 2.0},
-        mass={"at": "bodies.knuckle.mass", "half_width": 3.0},
-        ball={"at": "ball", "sigma": 1.0},
-    )
-    units = {each.name: each.unit for each in made.study.variation.coordinates}
-    assert (units["rate"], units["mass"]) == ("N/m", "kg")
-    assert made.study.variation.coordinates[0].scale == pytest.approx(2000.0)  # of N/mm
-    found, right = values_of(made)[:, :, 2], alone(made.study, 2)
-    scale = np.abs(right).max(axis=1, keepdims=True)
-    np.testing.assert_allclose(found / scale, right / scale, atol=1e-12)
-    spring = [row.name for row in made.study.rows].index("spring_force")
-    changed = made.study.of_variant(2).mechanism.force("spring").stiffness
-    nominal = load("mcpherson_strut_loaded").mechanism.force("spring").stiffness
-    assert abs(changed - nominal) > 1.0
-    assert not np.allclose(found[spring], made.nominal[spring], rtol=1e-6)
+def test_units_of_varied_stiffness_and_mass(tmp_path):
+    case = load("mcpherson_strut_loaded")
+    rate, mass, *_ = vary(tmp_path, case, **LOADED["mcpherson_strut_loaded"]).coordinates
+    assert (rate.unit, mass.unit) == ("N/m", "kg")
+    assert rate.scale == pytest.approx(2000.0)  # of N/mm
 
 
-def test_a_mass_that_may_become_negative_is_refused(tmp_path):
+def test_possibly_negative_mass_is_refused(tmp_path):
     case = load("planar_slider_crank")
     mass = case.mechanism.body("slider").mass
     with pytest.raises(CaseError, match=r"found offsets down to .+ expected zero or more"):

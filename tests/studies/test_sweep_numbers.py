@@ -15,7 +15,7 @@ from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..report.page import Page
 from ..support.printed import assert_printed, assert_row, blocks, cells_of
-from .test_vary import vary_file
+from ..support.variations import vary_file
 
 VARIED = {
     "ball": {"at": "ball", "sigma": 2.0},
@@ -117,7 +117,7 @@ def test_printed_distributions_equal_json(shown):
         )
 
 
-def test_place_of_the_least_index_is_on_the_page(shown):
+def test_sweep_page_shows_least_index_place(shown):
     found, _, html = shown
     for each, (*_, where) in zip(found["limits"], html.rows("Specification limits"), strict=True):
         k = each["sample"]
@@ -190,7 +190,7 @@ def ends_of(found, name):
     return [(end, limit[end]) for end in ("low", "high") if limit[end] is not None]
 
 
-def test_speed_of_a_study_counts_its_processes(shown):
+def test_study_speed_counts_processes(shown):
     found, text, html = shown
     measured = found["measured"]
     per_sample = measured["seconds"] / (SAMPLES * len(found["driver"]["stroke"]))

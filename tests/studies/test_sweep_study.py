@@ -1,7 +1,6 @@
 """Studies of designs: draws, chunks, and what is reduced."""
 
 from dataclasses import replace
-from importlib import import_module
 from io import StringIO
 from itertools import pairwise
 from types import SimpleNamespace
@@ -32,11 +31,11 @@ from kincheck.core.studies.tolerance.study import Ready, Study, gradients
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.tolerance.tables import print_sweep
 from kincheck.core.studies.variation.study_choices import Sampling
-from kincheck.core.studies.variation.variation import DRAWN, Law
-from kincheck.core.studies.variation.variation_file import read_variation
+from kincheck.core.studies.variation.variation import DRAWN, Law, Limit
+from scipy import stats
 
-from ..support.fakes import crank, exact
-from .test_vary import vary, vary_file
+from ..support.fakes import crank, exact, swept
+from ..support.variations import vary
 
 TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
 PIVOT = {"at": "pivot", "half_width": [0.0, 5.0, 0.0]}
@@ -53,14 +52,14 @@ def cranks(case, variation, seed, count):
     shape (2, n, count).
     """
     angle = case.sweep.change[:, None]
-    dx, dy, py = np.array([variation.of_variant(seed, k) for k in range(count)]).T
+    dx, dy, py = variation.offsets(seed, 0, count)
     ax, ay = 0.5 + dx, dy - py
     x = np.cos(angle) * ax - np.sin(angle) * ay
     return np.stack([x - ax, py + np.sin(angle) * ax + np.cos(angle) * ay])
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
-def test_a_sweep_is_the_closed_form_of_every_variant(tmp_path, jobs):
+def test_sweep_equals_closed_form(tmp_path, jobs):
     case, count = crank(), 700
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     found = sweep_designs(case, variation, samples=count, seed=11, jobs=jobs)
@@ -83,25 +82,23 @@ def test_a_sweep_is_the_closed_form_of_every_variant(tmp_path, jobs):
     np.testing.assert_allclose(found.outputs["y"].nominal, p[:, 1], atol=1e-15)
 
 
-def test_sweep_results_ignore_number_of_jobs(tmp_path):
+def test_sweep_results_ignore_job_count(tmp_path):
     case = load("mcpherson_strut")
-    variation = vary(tmp_path, case, **STRUT)
+    limits = (Limit("half_track_change", high=1e-3),)
+    variation = replace(vary(tmp_path, case, **STRUT), limits=limits)
 
-    def swept(jobs):
+    def results(jobs):
         found = sweep_designs(case, variation, samples=1500, seed=3, order=1, jobs=jobs)
         return msgspec.json.encode(msgspec.structs.replace(found, run={}, measured={}))
 
-    assert swept(1) == swept(2) == swept(5)
+    assert results(1) == results(2) == results(5)
 
 
-def test_many_quantiles_are_of_a_random_subset(tmp_path, monkeypatch):
-    from kincheck.core.studies.tolerance import sweep
-
-    monkeypatch.setattr(sweep, "KEPT", 400)
-    case, count = crank(), 4000
+def test_quantiles_of_large_sweep_use_subset(tmp_path):
+    case, count = crank(), 40_000
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     found = sweep_designs(case, variation, samples=count, seed=1, jobs=2)
-    assert 300 < found.quantiles_of < 500  # five standard errors of a share of a tenth
+    assert 9_500 < found.quantiles_of < 10_500  # five standard errors of a share of a quarter
     right = np.quantile(cranks(case, variation, 1, count), 0.95, axis=2)[1]
     each = found.outputs["y"]
     off = (np.array(each.quantiles["0.95"]) - right) / np.array(each.standard_errors["0.95"])
@@ -160,21 +157,19 @@ def test_sweep_order_adds_derivatives(tmp_path):
     assert found.outputs["y.acceleration"].unit == "m/s^2"
 
 
-def test_large_chunks_are_solved_in_parts(tmp_path, monkeypatch):
-    case = crank()
+def test_large_chunks_are_solved_in_parts(tmp_path):
+    case = crank(reference=False)
+    case = swept(case, np.linspace(-1.0, 1.0, 6001))
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
-    study = Study(case, variation, 300, 4)
-    whole = Ready.of(study).chunk(0)
-    monkeypatch.setattr("kincheck.core.kinematics.native_solver.RECYCLED", 22_000)
-    ready = Ready.of(study)
-    assert 8 < ready.lanes < 100
-    parts = ready.chunk(0)
-    np.testing.assert_array_equal(np.concatenate(parts.kept, axis=2), whole.kept[1])
-    np.testing.assert_allclose(parts.summary.mean, whole.summary.mean, rtol=0, atol=1e-16)
-    np.testing.assert_array_equal(parts.summary.extremes, whole.summary.extremes)
+    ready = Ready.of(Study(case, variation, 300, 4))
+    assert 8 < ready.lanes < 64
+    parts, right = ready.chunk(0), cranks(case, variation, 4, 64)
+    np.testing.assert_allclose(np.concatenate(parts.kept, axis=2), right, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(parts.summary.mean, right.mean(axis=2), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(parts.summary.most, right.max(axis=2), rtol=0, atol=1e-14)
 
 
-def test_one_at_a_time_gives_effects(tmp_path):
+def test_one_at_a_time_effects(tmp_path):
     case = crank()
     variation = vary(
         tmp_path, case, "one_at_a_time", tip={"at": "tip", "values": [[-2, 2], [1], [0]]}
@@ -199,7 +194,7 @@ def test_one_at_a_time_gives_effects(tmp_path):
         sweep_designs(case, variation, samples=3)
 
 
-def test_a_grid_is_swept_as_a_whole(tmp_path):
+def test_grid_sweep_covers_all_combinations(tmp_path):
     case = crank()
     variation = vary(
         tmp_path, case, "grid", tip={"at": "tip", "values": [[-2, 2], [-1, 0, 3], [0]]}
@@ -261,11 +256,7 @@ def test_unsolved_variants_are_counted_and_named(tmp_path):
 # What is made of many variants: extremes, moments, quantiles and gradients, held against closed
 
 
-BALL = {"at": "ball", "sigma": 1.0}
-AXIS = {"at": "joints.lca_pivot.axis", "sigma": 0.1}
-
-
-def test_summaries_of_parts_are_the_summary_of_all():
+def test_merged_summaries_equal_whole_summary():
     """Ten thousand times as far from zero as they are apart: the sum of squares must not be a
     difference of large numbers.
     """
@@ -299,7 +290,7 @@ def test_summaries_of_parts_are_the_summary_of_all():
     assert nothing(1, 2).extremes.tolist() == [[-1, -1]]
 
 
-def test_quantiles_and_their_standard_errors():
+def test_quantiles_and_standard_errors():
     """The spread of quantiles over many samples is the standard error that each of them is given,
     to the fifth of it.
     """
@@ -325,7 +316,7 @@ def rotated(axis, angle, arm):
     return arm * c + np.cross(h, arm) * s + h * (h @ arm) * (1 - c)
 
 
-def test_gradients_are_the_closed_form(tmp_path):
+def test_sweep_gradients_equal_closed_form(tmp_path):
     """Of a crank by its tip, its pivot, and the components of its axis, at the samples and at
     design.
     """
@@ -351,7 +342,7 @@ def test_gradients_are_the_closed_form(tmp_path):
     assert (found.error < 1e-7).all()
 
 
-def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
+def test_coarse_variants_count_nominal_turns(tmp_path):
     """At the samples and at design, where gradients are read too."""
     output = JointAngle("turned", 1e-9, 0.0, "test", "pivot")
     attitude = Orientation("e0", 1e-9, 0.0, "test", "arm", Component.E0)
@@ -372,40 +363,15 @@ def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
     assert not np.abs(found.design).max() > 1e-9
 
 
-def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
-    from kincheck.core.studies.tolerance import study as room
-
-    monkeypatch.setattr(room, "STEP", 0.2)
+def test_gradients_beside_stroke_end_are_rough(tmp_path):
     case = load("mcpherson_strut")
-    assert not gradients(
-        Ready.of(Study(case, vary(tmp_path, case, axis=AXIS), 1, 0))
-    ).accurate.all()
-
-
-def test_gradients_agree_with_differences_of_whole_sweeps(tmp_path):
-    """Of the strut, against `solve` of mechanisms made anew, over another step."""
-    case = load("mcpherson_strut")
-    study = Study(case, vary(tmp_path, case, ball=BALL), 1, 0)
-    found = gradients(Ready.of(study))
-    h, values = 1e-4, case.sweep.change
-    for k in range(3):
-        sides = []
-        for sign in (1, -1):
-            offset = np.zeros(3)
-            offset[k] = sign * h
-            joint = replace(
-                case.mechanism.joint("ball"),
-                point=tuple(np.array(case.mechanism.joint("ball").point) + offset),
-            )
-            joints = [joint if each.name == "ball" else each for each in case.mechanism.joints]
-            sides.append(
-                solve(replace(case.mechanism, joints=joints), "stroke", values)
-                .points["wheel_center"]
-                .position
-            )
-        rough = (sides[0] - sides[1]) / (2 * h)
-        np.testing.assert_allclose(found.along[k, 0], rough[:, 1], rtol=0, atol=1e-7)
-        np.testing.assert_allclose(found.along[k, 1], rough[:, 0], rtol=0, atol=1e-7)
+    variation = vary(tmp_path, case, axis={"at": "joints.lca_pivot.axis", "sigma": 0.1})
+    right, rough = (
+        gradients(Ready.of(Study(each, variation, 1, 0)))
+        for each in (case, swept(case, np.linspace(0.0, 0.2933, 20)))
+    )
+    assert not rough.accurate.all()
+    assert right.accurate.all()
 
 
 # Distributions, samplings and correlations of drawn variants, held against scipy's
@@ -424,14 +390,8 @@ TIP_LAWS = {
 }
 
 
-@pytest.fixture(scope="module")
-def stats():
-    """It takes a second to import, and others collect these tests too."""
-    return import_module("scipy.stats")
-
-
 @pytest.fixture
-def of_scipy(stats, law):
+def of_scipy(law):
     """The law in mm."""
     return {
         "normal": stats.norm(scale=2.0),
@@ -441,32 +401,31 @@ def of_scipy(stats, law):
     }[law]
 
 
-def variation(tmp_path, tables=None, **hardpoints):
-    return read_variation(vary_file(tmp_path, hardpoints, **(tables or {})), crank())
-
-
 @pytest.mark.parametrize("law", TIP_LAWS)
 @pytest.mark.parametrize("sampling", [Sampling.LATIN, Sampling.SOBOL])
 def test_stratified_sampling_fills_every_interval(tmp_path, law, sampling, of_scipy):
     """A Latin hypercube has that for any number, a Sobol sequence for powers of two."""
     count = 1000 if sampling is Sampling.LATIN else 1024
-    found = variation(tmp_path, tip=TIP_LAWS[law]).sampled(sampling, count)
+    found = vary(tmp_path, crank(), tip=TIP_LAWS[law]).sampled(sampling, count)
     assert found.coordinates[0].law == Law(law)
     shares = np.sort(of_scipy.cdf(1e3 * found.offsets(3, 0, count)[0]))
     np.testing.assert_array_equal(np.floor(shares * count + 1e-9), np.arange(count))
 
 
 @pytest.mark.parametrize("law", ["truncated_normal", "triangular"])
-def test_random_draws_have_the_distribution(tmp_path, law, stats, of_scipy):
-    drawn = 1e3 * variation(tmp_path, tip=TIP_LAWS[law]).offsets(1, 0, 4 * DRAWN)[0]
+def test_random_draws_follow_distribution(tmp_path, law, of_scipy):
+    drawn = 1e3 * vary(tmp_path, crank(), tip=TIP_LAWS[law]).offsets(1, 0, 4 * DRAWN)[0]
     assert stats.kstest(drawn, of_scipy.cdf).pvalue > 0.01  # of a fixed seed
     assert np.abs(drawn).max() <= {"truncated_normal": 3.0, "triangular": 2.0}[law]
 
 
 def test_random_draws_equal_earlier_versions(tmp_path):
     """Equal seeds give equal numbers: normal and uniform coordinates are drawn as ever."""
-    found = variation(
-        tmp_path, tip=TIP_LAWS["normal"], pivot={"at": "pivot", "half_width": [3.0, 0.0, 0.0]}
+    found = vary(
+        tmp_path,
+        crank(),
+        tip=TIP_LAWS["normal"],
+        pivot={"at": "pivot", "half_width": [3.0, 0.0, 0.0]},
     ).offsets(5, DRAWN, 2)
     seed = np.random.SeedSequence(5, spawn_key=(1, 0))
     random = np.random.Generator(np.random.Philox(seed))
@@ -477,8 +436,8 @@ def test_random_draws_equal_earlier_versions(tmp_path):
 
 @pytest.mark.parametrize("sampling", Sampling)
 def test_variant_depends_on_seed_and_index(tmp_path, sampling):
-    found = variation(
-        tmp_path, tip=TIP_LAWS["triangular"], pivot={"at": "pivot", "sigma": 1.0}
+    found = vary(
+        tmp_path, crank(), tip=TIP_LAWS["triangular"], pivot={"at": "pivot", "sigma": 1.0}
     ).sampled(sampling, 700)
     whole = found.offsets(4, 0, 700)
     assert len(np.unique(whole)) == whole.size
@@ -496,15 +455,14 @@ def correlated(tmp_path, law, r, count=8192):
         "normal": {"sigma": 2.0},
         "uniform": {"half_width": 2.0},
     }[law]
-    tables = {
-        "correlations": {"a": {"coordinates": ["tip.x", "tip.z"], "matrix": [[1, r], [r, 1]]}}
-    }
-    found = variation(tmp_path, tables, tip={"at": "tip", **keys})
+    matrix = {"coordinates": ["tip.x", "tip.z"], "matrix": [[1, r], [r, 1]]}
+    tables = {"correlations": {"a": matrix}}
+    found = vary(tmp_path, crank(), tables=tables, tip={"at": "tip", **keys})
     return found.sampled(Sampling.SOBOL, count).offsets(1, 0, count)
 
 
 @pytest.mark.parametrize("r", [0.8, -0.5, 1.0])
-def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
+def test_correlated_normal_draws_have_correlation(tmp_path, r):
     x, y, z = correlated(tmp_path, "normal", r)
     found = np.corrcoef([x, y, z])
     assert found[0, 2] == pytest.approx(r, abs=5e-3)
@@ -514,7 +472,7 @@ def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
         np.testing.assert_allclose(x, z, rtol=1e-12)
 
 
-def test_correlated_uniform_coordinates_follow_copula(tmp_path):
+def test_correlated_uniform_draws_follow_copula(tmp_path):
     x, _, z = correlated(tmp_path, "uniform", 0.8)
     assert np.corrcoef(x, z)[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=5e-3)
     assert np.abs([x, z]).max() <= 2e-3
@@ -522,12 +480,11 @@ def test_correlated_uniform_coordinates_follow_copula(tmp_path):
 
 
 def test_impossible_samplings_are_refused(tmp_path):
-    found = variation(tmp_path, tip={"at": "tip", "sigma": 1.0})
+    found = vary(tmp_path, crank(), tip={"at": "tip", "sigma": 1.0})
     with pytest.raises(KincheckError, match=r"6 GB of memory, expected at most 1. Take fewer"):
         found.sampled(Sampling.LATIN, 500_000_000)
     with pytest.raises(KincheckError, match=r"expected at most 4294967296. Take fewer"):
         found.sampled(Sampling.SOBOL, 2**32 + 1)
-    tables = {"mode": "grid"}
-    grid = variation(tmp_path, tables, tip={"at": "tip", "values": [-1, 1]})
+    grid = vary(tmp_path, crank(), "grid", tip={"at": "tip", "values": [-1, 1]})
     with pytest.raises(KincheckError, match="--sampling latin: grid draws nothing"):
         grid.sampled(Sampling.LATIN, 8)

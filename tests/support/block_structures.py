@@ -5,9 +5,7 @@ import math
 import numpy as np
 from kincheck.core import Body, Inline, JointAngle, Mechanism, Point, Revolute, Spherical
 from kincheck.core.kinematics import Method, NativeSolver
-
-LEAN = 0.3
-"""Angle of the cranks at design [rad]."""
+from kincheck.core.studies.bench.size import LEAN, pivot
 
 
 def solve_as(method, mechanism, path, points=(), bodies=(), order=2, tol=1e-12, *, compiled=True):
@@ -77,11 +75,8 @@ def torus(rows, columns):
     several singular values vanish together, so the determinant keeps its sign.
     """
 
-    def folded(k, n):
-        return 2.0 * k if 2 * k < n else 2.0 * (n - k) - 1.0
-
     cranks = [(i, j) for i in range(rows) for j in range(columns)]
-    at = {(i, j): (folded(i, rows), 1.37 * folded(j, columns)) for i, j in cranks}
+    at = {(i, j): (pivot(i, rows), 1.37 * pivot(j, columns)) for i, j in cranks}
     tip = {k: (x + math.sin(LEAN), y + math.cos(LEAN), 0.0) for k, (x, y) in at.items()}
     up = (0.0, 0.0, 1.0)
     joints = [Revolute(f"pivot{k}", "ground", f"crank{k}", (*at[k], 0.0), up) for k in cranks]

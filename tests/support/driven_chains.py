@@ -29,6 +29,7 @@ from kincheck.core.mechanism.motions import (
 )
 
 from ..oracles import free_bodies
+from .loads import random_inertia
 from .splines import through
 
 GRAVITY = (0.7, -2.0, -9.3)
@@ -151,9 +152,7 @@ def direction(rng):
 
 def heavy(rng, name, near):
     """A body with a frame of its own, somewhere near."""
-    points = 0.1 * rng.normal(size=(6, 3))
-    matrix = np.trace(points.T @ points) * np.eye(3) - points.T @ points
-    six = [*np.diag(matrix), matrix[0, 1], matrix[1, 2], matrix[0, 2]]
+    inertia = tuple(random_inertia(rng))
     q = rng.normal(size=4)
     return Body(
         name,
@@ -161,7 +160,7 @@ def heavy(rng, name, near):
         tuple(q / np.linalg.norm(q)),
         mass=float(rng.uniform(1.0, 5.0)),
         center_of_mass=tuple(near + 0.2 * rng.normal(size=3)),
-        inertia=tuple(six),
+        inertia=inertia,
     )
 
 

@@ -3,11 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from kincheck import adapters
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.measures import Axis, DriverEffort, ElementForce, JointForce, JointMoment
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+
+from .engine_motion import installed
 
 UNUSED = {"atol": 1.0, "rtol": 0.0, "why": "not judged here"}
 
@@ -28,8 +29,13 @@ def every_force(mechanism, names=None):
 
 def force_case(mechanism, values, rate=1.0, names=None):
     """A sweep of the first driver with all forces as outputs."""
-    outputs = every_force(mechanism, names)
     sweep = Sweep(mechanism.drivers[0].name, np.asarray(values, dtype=float), rate)
+    return sweep_case(mechanism, sweep, names)
+
+
+def sweep_case(mechanism, sweep, names=None):
+    """A case with all forces as outputs, or those of the joints named."""
+    outputs = every_force(mechanism, names)
     marked = with_markers(mechanism, outputs)
     return Case(mechanism.name, "made here", Truth.CONSENSUS_ONLY, marked, sweep, outputs)
 
@@ -91,7 +97,7 @@ class Beside:
 
 def values(case, engine):
     """Values of all outputs by an engine, and its trajectory."""
-    given = adapters.engine(engine)
+    given = installed(engine)
     assert given.unsupported(case) is None
     found = given.solve(given.build(case), case, 1e-12)
     assert found.solved.all(), found.message

@@ -12,15 +12,18 @@ import pytest
 from kincheck import adapters
 from kincheck.core import Body, JointAngle, Mechanism, Point
 from kincheck.core import solve as solve_natively
-from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.case import TIME, Case, Output, Sweep, Truth
 from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational, Universal
 from kincheck.core.mechanism.tree import SpanningTree, spanning_tree
+
+from .mechanisms import X
 
 TOL = 1e-12
 TREES = ("mujoco", "pinocchio", "drake", "dart", "simbody")
 """The simulators whose unknowns are the coordinates of a tree."""
 SIMULATORS = ("exudyn", *TREES)
 ENGINES = pytest.mark.parametrize("engine", SIMULATORS)
+BOTH_ORDERS = pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
 # Exudyn's coordinates are absolute: no joint is cut. The rows of cut joints are shared code, which
 # the last three enter as Pinocchio does.
 IN_TREE_OR_CUT = pytest.mark.parametrize(
@@ -38,8 +41,8 @@ TOLERANCES = (1e-13, 1e-12, 1e-11)
 EXUDYN_TOLERANCES = (1e-12, 1e-11, 1e-9)
 
 
-def installed(name):
-    engine = adapters.engine(name)
+def installed(name, mode="projection"):
+    engine = adapters.engine(name, mode)
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
     return engine
@@ -48,11 +51,13 @@ def installed(name):
 def motion_case(mechanism, values, rate=1.0, design=0.0, motions=None):
     """A sweep of the first driver, with all points wanted."""
     outputs = tuple(
-        Output(point.name, point.name, (1.0, 0.0, 0.0), False, 1e-9, 0.0, "")
+        Output(f"{point.name}.{axis}", point.name, direction, False, 1e-9, 0.0, "")
         for point in mechanism.points
+        for axis, direction in zip("xyz", np.eye(3).tolist(), strict=True)
     )
     values = np.array(values, dtype=float)
-    sweep = Sweep(mechanism.drivers[0].name, values, rate, design, motions=motions or {})
+    swept = mechanism.drivers[0].name if mechanism.drivers else TIME
+    sweep = Sweep(swept, values, rate, design, motions=motions or {})
     return Case(mechanism.name, "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
@@ -78,7 +83,8 @@ def cutting(*names):
 
     def tree(mechanism, first=()):
         kept = [each for each in mechanism.joints if each.name not in names]
-        rest = spanning_tree(replace(mechanism, joints=kept, drivers=(), couplers=()))
+        bare = replace(mechanism, joints=kept, drivers=(), couplers=(), forces=())
+        rest = spanning_tree(bare)
         return SpanningTree(rest.branches, (*rest.cut, *map(mechanism.joint, names)))
 
     return mock.patch("kincheck.adapters.shared.tree_plan.spanning_tree", tree)
@@ -93,6 +99,11 @@ def assert_motion(motion, *expected, atol=TOLERANCES):
     found = (motion.position, motion.velocity, motion.acceleration)
     for values, wanted, error in zip(found, expected, atol, strict=False):
         np.testing.assert_allclose(values, wanted, rtol=0, atol=error)
+
+
+def planar(x, y):
+    """Position, velocity and acceleration of a point in the plane z = 0, from jets."""
+    return [np.column_stack([getattr(x, k), getattr(y, k), 0.0 * x.x]) for k in "xva"]
 
 
 def assert_as_native(engine, mechanism, values, rate=1.0, cut=(), **more):
@@ -125,6 +136,10 @@ def mechanism_of(joints, points, drivers, couplers=(), fixed=()):
     bodies = [Body(name, fixed=name in fixed) for name in names]
     places = [Point(name, body, tuple(position)) for name, (body, position) in points.items()]
     return Mechanism("test", bodies, joints, places, drivers, couplers)
+
+
+def ordered(joint, mirrored):
+    return joint.reversed() if mirrored else joint
 
 
 def rotation(axis, angle):
@@ -161,7 +176,7 @@ B0 = np.array([[0.1, 0.0, 0.0]])
 C0 = tuple(rocker(B0, 0.76)[0])
 RSSR = (
     Revolute("a", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    Revolute("c", "rocker", "ground", (0.6, 0.3, 0.1), (1.0, 0.0, 0.0)),
+    Revolute("c", "rocker", "ground", (0.6, 0.3, 0.1), X),
     Distance("rod", "crank", "rocker", (tuple(B0[0]), C0)),
 )
 
@@ -170,7 +185,7 @@ def slider_crank():
     """The spatial slider-crank of the IFToMM benchmarks, with a peg on the rod."""
     axes = ((0.48, 0.6, -0.64), (0.0, 0.64, 0.6))
     joints = [
-        Revolute("pivot", "ground", "crank", (0.0, 0.1, 0.12), (1.0, 0.0, 0.0)),
+        Revolute("pivot", "ground", "crank", (0.0, 0.1, 0.12), X),
         Spherical("pin", "crank", "rod", (0.0, 0.1, 0.2)),
         Universal("gudgeon", "rod", "slider", (0.2, 0.0, 0.0), axes),
         Translational("guide", "ground", "slider", (0.2, 0.0, 0.0), (2.0, 0.0, 0.0)),

@@ -21,7 +21,7 @@ class Reading:
 
     Attributes:
         residuals: of its own constraints, at the start.
-        freedom: its coordinates less the rank of their Jacobian.
+        freedom: its coordinates less the rank of their Jacobian, where they are told.
         bodies: origin and rotation matrix, by name.
         points: positions, by name.
     """
@@ -39,12 +39,14 @@ def _rank(J, part):
     return int(np.linalg.matrix_rank(J, tol=part * np.linalg.norm(J, 2))) if J.size else 0
 
 
-def _mjcf(texts, mechanism, folder):
+def _mjcf(texts, mechanism, folder, values):
     mj = importlib.import_module("mujoco")
     model = mj.MjModel.from_xml_string(texts[".xml"])
     model.opt.jacobian = mj.mjtJacobian.mjJAC_DENSE
     data = mj.MjData(model)
     mj.mj_resetDataKeyframe(model, data, model.key("start").id)
+    for name, value in values.items():
+        data.joint(name).qpos[:] = value
     mj.mj_forward(model, data)
     J = data.efc_J.reshape(-1, model.nv)[: data.ne]
     return Reading(
@@ -58,7 +60,7 @@ def _mjcf(texts, mechanism, folder):
     )
 
 
-def _exudyn(texts, mechanism, folder):
+def _exudyn(texts, mechanism, folder, values):
     exu = importlib.import_module("exudyn")
     exu.config.printToConsole = False
     script = folder / "model.py"
@@ -94,15 +96,15 @@ def _exudyn(texts, mechanism, folder):
     )
 
 
-def _urdf(texts, mechanism, folder):
+def _urdf(texts, mechanism, folder, values):
     """The tree is Pinocchio's; the equations are those that the JSON file says in words."""
     pin = importlib.import_module("pinocchio")
     model, beside = pin.buildModelFromXML(texts[".urdf"]), json.loads(texts[".constraints.json"])
     data, q = model.createData(), pin.neutral(model)
     assert model.nq == sum(map(len, beside["start"]["coordinates"].values()))
-    for name, values in beside["start"]["coordinates"].items():
+    for name, value in (beside["start"]["coordinates"] | values).items():
         joint = model.getJointId(name)
-        q[model.idx_qs[joint] :][: model.nqs[joint]] = values
+        q[model.idx_qs[joint] :][: model.nqs[joint]] = value
 
     def link(name):  # a joint may have the same name
         return data.oMf[model.getFrameId(name, pin.FrameType.BODY)]
@@ -112,6 +114,9 @@ def _urdf(texts, mechanism, folder):
 
     def axis(vector):
         return link(vector["link"]).rotation @ vector["direction"]
+
+    def coordinate(name, q):
+        return q[model.idx_qs[model.getJointId(name)]]
 
     def equation(each, q):
         match each["kind"]:
@@ -124,22 +129,13 @@ def _urdf(texts, mechanism, folder):
             case "offset":
                 return [axis(each["x"]) @ (point(each["j"]) - point(each["i"])) - each["value"]]
             case "linear":
-                return [
-                    sum(
-                        weight * q[model.idx_qs[model.getJointId(name)]]
-                        for name, weight in each["weights"].items()
-                    )
-                ]
+                return [sum(x * coordinate(name, q) for name, x in each["weights"].items())]
             case "polynomial":
-                driven, driving = (
-                    q[model.idx_qs[model.getJointId(each[name])]] for name in ("driven", "driving")
-                )
-                return [driven - np.polynomial.Polynomial(each["coefficients"])(driving)]
+                law = np.polynomial.Polynomial(each["coefficients"])
+                return [coordinate(each["driven"], q) - law(coordinate(each["driving"], q))]
             case "spline":
-                driven, driving = (
-                    q[model.idx_qs[model.getJointId(each[name])]] for name in ("driven", "driving")
-                )
-                return [driven - through(each["points"])(driving)[0]]
+                law = through(each["points"])
+                return [coordinate(each["driven"], q) - law(coordinate(each["driving"], q))[0]]
 
     def residuals(q):
         pin.framesForwardKinematics(model, data, q)
@@ -154,20 +150,39 @@ def _urdf(texts, mechanism, folder):
         ]
     )
     found = residuals(q)
-    bodies = {}
-    for name, frame in beside["bodies"].items():
-        bodies[name] = (
-            link(frame["link"]).act(np.array(frame["origin"])),
-            link(frame["link"]).rotation @ naive.A(frame["euler_parameters"]),
-        )
+    bodies = {
+        name: _of_link(link(frame["link"]).homogeneous, frame)
+        for name, frame in beside["bodies"].items()
+    }
     points = {each.name: point(beside["points"][each.name]) for each in mechanism.points}
     return Reading(found, model.nv - _rank(J, 1e-7), bodies, points)
+
+
+def _of_link(place, frame):
+    """A body's origin and rotation matrix, from the place of its link (4, 4)."""
+    R = place[:3, :3]
+    return R @ frame["origin"] + place[:3, 3], R @ naive.A(frame["euler_parameters"])
+
+
+def _urdf_in_dart(texts, mechanism, folder, values):
+    dart = importlib.import_module("dartpy")
+    (file := folder / "model.urdf").write_text(texts[".urdf"])
+    loaders = getattr(dart, "io", None) or dart.utils
+    skeleton = loaders.DartLoader().parseSkeleton(str(file))
+    for name, value in values.items():
+        skeleton.getJoint(name).setPosition(0, value)
+    frames = json.loads(texts[".constraints.json"])["bodies"]
+    bodies = {
+        name: _of_link(skeleton.getBodyNode(frame["link"]).getWorldTransform().matrix(), frame)
+        for name, frame in frames.items()
+    }
+    return Reading(np.zeros(0), None, bodies, {})
 
 
 DRAKE = "{http://drake.mit.edu}"
 
 
-def _sdf(texts, mechanism, folder):
+def _sdf(texts, mechanism, folder, values):
     """The tree is Drake's; its plant does not tell the residuals of its constraints, whose points
     are read from the file.
     """
@@ -178,6 +193,10 @@ def _sdf(texts, mechanism, folder):
     parsing.Parser(plant).AddModelsFromString(texts[".sdf"], "sdf")
     plant.Finalize()
     context, world = plant.CreateDefaultContext(), plant.world_frame()
+    for name, value in values.items():
+        joint = plant.GetJointByName(name)
+        is_hinge = joint.type_name() == "revolute"
+        (joint.set_angle if is_hinge else joint.set_translation)(context, value)
     root = ET.fromstring(texts[".sdf"])
     balls = [*root.iter(f"{DRAKE}ball_constraint")]
     mimics = {
@@ -208,25 +227,23 @@ def _sdf(texts, mechanism, folder):
         row[0, one.velocity_start()], row[0, other.velocity_start()] = 1.0, -factor
         found.append([q[one.position_start()] - factor * q[other.position_start()]])
         rows.append(row)
-    poses = {
-        body.name: plant.GetFrameByName(body.name).CalcPoseInWorld(context)
-        for body in mechanism.bodies
-    }
+
+    def pose(name):
+        return plant.GetFrameByName(name).CalcPoseInWorld(context)
+
+    n = plant.num_velocities()
     return Reading(
         np.concatenate([np.zeros(0), *found]),
-        plant.num_velocities()
-        - _rank(np.concatenate([np.zeros((0, plant.num_velocities())), *rows]), 1e-10),
-        {name: (pose.translation(), pose.rotation().matrix()) for name, pose in poses.items()},
+        n - _rank(np.concatenate([np.zeros((0, n)), *rows]), 1e-10),
         {
-            point.name: plant.GetFrameByName(f"point.{point.name}")
-            .CalcPoseInWorld(context)
-            .translation()
-            for point in mechanism.points
+            body.name: (pose(body.name).translation(), pose(body.name).rotation().matrix())
+            for body in mechanism.bodies
         },
+        {point.name: pose(f"point.{point.name}").translation() for point in mechanism.points},
     )
 
 
-def _osim(texts, mechanism, folder):
+def _osim(texts, mechanism, folder, values):
     """OpenSim assembles a model that it reads, so its coordinates are set to the file's again."""
     o = importlib.import_module("opensim")
     o.Logger.setLevelString("Off")
@@ -235,7 +252,8 @@ def _osim(texts, mechanism, folder):
     model = o.Model(str(file))
     state = model.initSystem()
     for each in model.getCoordinateSet():
-        each.setValue(state, each.getDefaultValue(), False)
+        value = values.get(each.getName(), each.getDefaultValue())
+        each.setValue(state, value, False)
     model.realizePosition(state)
     G, bodies = o.Matrix(), model.getBodySet()
     model.getMatterSubsystem().calcG(state, G)
@@ -243,25 +261,18 @@ def _osim(texts, mechanism, folder):
     def named(name):  # as OpenSim has it
         return re.sub(r"[^A-Za-z0-9_.-]", "_", name)
 
-    placed = {
-        body.name: bodies.get(named(body.name)).getTransformInGround(state)
-        for body in mechanism.bodies
-    }
+    def pose(body):
+        place = bodies.get(named(body.name)).getTransformInGround(state)
+        R = np.array([[place.R().get(i, j) for j in range(3)] for i in range(3)])
+        return place.p().to_numpy(), R
+
+    markers = model.getMarkerSet()
     return Reading(
         state.getQErr().to_numpy(),
         state.getNU() - _rank(G.to_numpy(), 1e-10),
+        {body.name: pose(body) for body in mechanism.bodies},
         {
-            name: (
-                at.p().to_numpy(),
-                np.array([[at.R().get(i, j) for j in range(3)] for i in range(3)]),
-            )
-            for name, at in placed.items()
-        },
-        {
-            point.name: model.getMarkerSet()
-            .get(named(point.name))
-            .getLocationInGround(state)
-            .to_numpy()
+            point.name: markers.get(named(point.name)).getLocationInGround(state).to_numpy()
             for point in mechanism.points
         },
     )
@@ -276,8 +287,12 @@ READERS = {
 }
 
 
-def read(name, texts, mechanism, folder):
-    """What the simulator of a format makes of its files."""
-    simulator, reader = READERS[name]
+IN_TREES = {each: READERS[each] for each in ("mjcf", "urdf", "sdf", "osim")}
+IN_TREES["urdf in dart"] = "dartpy", _urdf_in_dart
+
+
+def read(name, texts, mechanism, folder, values=None):
+    """What the simulator of a format makes of its files, at the start but for given coordinates."""
+    simulator, reader = (READERS | IN_TREES)[name]
     pytest.importorskip(simulator, reason=f"{simulator} is not installed")
-    return reader(texts, mechanism, folder)
+    return reader(texts, mechanism, folder, values or {})

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from kincheck import adapters
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Revolute
@@ -48,6 +49,11 @@ def crank(name="crank", *, truth=Truth.CLOSED_FORM, reference=True, rate=2.0, at
             "y": Series(p[:, 1].copy(), v[:, 1], a[:, 1]),
         },
     )
+
+
+def swept(case, values):
+    """The case with other samples, of which it has no reference."""
+    return replace(case, sweep=replace(case.sweep, values=np.array(values)), reference={})
 
 
 def solution(case, *, solved=None, message="", **changed):
@@ -108,6 +114,12 @@ def record_of(engine, case=None, **options):
     """Return the one record of a case in an engine, by default of the crank."""
     (record,) = run_case(case or crank(), engine, **options).records
     return record
+
+
+def native_but(change, name="native"):
+    """An engine whose answer is the native one, changed by a function of it and the case."""
+    native = adapters.engine("native")
+    return Fake(name, lambda case: change(native.solve(native.build(case), case, 1e-12), case))
 
 
 def raising(error):

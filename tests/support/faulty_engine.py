@@ -1,43 +1,27 @@
 """An engine with a fault of its own for some cases, and the same without faults."""
 
-from dataclasses import dataclass
+from .engine_faults import Wrapped
 
-import kincheck.adapters
-import numpy as np
-from kincheck.core.trajectory import PointMotion
+FAULTS = {
+    "screw": "position shifted",
+    "planar": "acceleration off by ten millionths",
+    "gear": "a state",
+    "beyond_a_fold": "frozen beyond a fold",
+}
+"""By case; each is one that engines have had."""
 
 
-@dataclass
-class Sound:
+class Sound(Wrapped):
     """The native engine by another name, run in worker processes."""
 
     name = "sound"
-    mode = "projection"
-    loop = "python"
-
-    def __post_init__(self):
-        self.settings = {}
-        self.native = kincheck.adapters.engine("native")
-
-    def version(self):
-        return "1.0"
-
-    def unsupported(self, case):
-        known = case.mechanism.joints[1].type != "unknown_to_engines"
-        return None if known else "joint 'tested' is of an unknown type"
-
-    def build(self, case):
-        return self.native.build(case)
-
-    def solve(self, model, case, tol):
-        return self.native.solve(model, case, tol)
+    in_process = False
 
 
 class Faulty(Sound):
-    """Each fault is one that engines have had."""
+    """Its faults are those of the cases, and two of its manners."""
 
     name = "faulty"
-    solved = 0
 
     def unsupported(self, case):
         return None
@@ -48,32 +32,8 @@ class Faulty(Sound):
         return super().build(case)
 
     def solve(self, model, case, tol):
-        found = super().solve(model, case, tol)
-        self.solved += 1
-        if case.name == "screw":  # a wrong position, with the rates of the right one
-            return _moved(found, lambda p, v, a: (p + 1e-6, v, a))
-        if case.name == "planar":  # a wrong acceleration
-            return _moved(found, lambda p, v, a: (p, v, a * (1.0 + 1e-5)))
-        if case.name == "gear":  # a state that outlives the case
-            return _moved(found, lambda p, v, a: (p + 1e-15 * self.solved, v, a))
-        if case.name == "beyond_a_fold":  # the last pose, for all that cannot be reached
-            return _called_solved(_moved(found, lambda *each: tuple(map(np.nan_to_num, each))))
-        return found
-
-
-def _moved(found, change):
-    points = {
-        name: PointMotion(*change(each.position, each.velocity, each.acceleration))
-        for name, each in found.points.items()
-    }
-    return type(found)(
-        points, found.solved, found.iterations, found.residual, found.message, found.details
-    )
-
-
-def _called_solved(found):
-    solved = np.ones_like(found.solved)
-    return type(found)(found.points, solved, found.iterations, found.residual, "", found.details)
+        self.fault = FAULTS.get(case.name, "")
+        return super().solve(model, case, tol)
 
 
 class Shy(Sound):

@@ -40,6 +40,7 @@ def written(
     turn=None,
     cross=None,
     twin=None,
+    last="revolute",
     **more,
 ):
     """The case as a file.
@@ -51,6 +52,7 @@ def written(
         turn: rotation of everything.
         cross: second axis of a universal joint in place of hinge "c".
         twin: point of a second hinge, "twin", of the bodies of "d".
+        last: type of joint "d".
         more: further tables of the file, such as closure and units; in millimetres the numbers are
             a thousand times larger.
     """
@@ -78,6 +80,9 @@ def written(
         }
     if twin is not None:
         joints["twin"] = joints["d"] | {"point": place(twin)}
+    joints["d"]["type"] = last
+    if last == "spherical":
+        del joints["d"]["axis"]
     about = [length**2 * INERTIA] * 3 + [0.0] * 3
     masses = {
         name: {"mass": MASS, "center_of_mass": place(CENTERS[name]), "inertia": about}

@@ -1,6 +1,5 @@
 """A body that hangs on a crank by a joint of any type, in a closed loop, with its native motion."""
 
-from collections.abc import Collection
 from functools import cache
 
 import numpy as np
@@ -16,7 +15,6 @@ from kincheck.core import (
     solve,
 )
 from kincheck.core import joints as library
-from kincheck.core.mechanism.tree import Branch, SpanningTree
 from kincheck.core.trajectory import Trajectory
 
 HINGE = (0.2, -0.1, 0.3)
@@ -101,14 +99,6 @@ def on_crank(kind: str, first: str, second: str) -> Mechanism:
         [CRANK, joint, *rods],
         points,
         [JointAngle("turn", "crank")],
-    )
-
-
-def crank_only(mechanism: Mechanism, first: Collection[str] = ()) -> SpanningTree:
-    """B is free, all joints but the crank's are cut."""
-    branches = (Branch(GROUND, "A", mechanism.joint("crank")), Branch(GROUND, "B", None))
-    return SpanningTree(
-        branches, tuple(joint for joint in mechanism.joints if joint.name != "crank")
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from kincheck.core.kinematics import Method, NativeSolver, Style, with_forces
 from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 
-from ..oracles import naive, newton_euler
+from ..oracles import newton_euler
 
 GRAVITY = (0.3, -2.0, -9.6)
 
@@ -16,31 +16,22 @@ def six(matrix):
     return [*np.diag(matrix), matrix[0, 1], matrix[1, 2], matrix[0, 2]]
 
 
-def ball(moment):
-    return [moment] * 3 + [0.0] * 3
+def random_inertia(rng):
+    """Entries of the inertia of six points."""
+    points = 0.1 * rng.normal(size=(6, 3))
+    return six(np.trace(points.T @ points) * np.eye(3) - points.T @ points)
 
 
 def loaded(mechanism, seed=1, gravity=GRAVITY):
     """The mechanism with random masses, with products of inertia."""
-    random = np.random.default_rng(seed)
-    bodies = []
+    random, bodies = np.random.default_rng(seed), []
     for body in mechanism.bodies:
-        if body.fixed:
-            bodies.append(body)
-            continue
-        points = random.normal(size=(6, 3)) * 0.1
-        matrix = np.trace(points.T @ points) * np.eye(3) - points.T @ points
-        entries = [
-            matrix[0, 0],
-            matrix[1, 1],
-            matrix[2, 2],
-            matrix[0, 1],
-            matrix[1, 2],
-            matrix[0, 2],
-        ]
-        center = np.array(body.origin) + random.normal(size=3) * 0.2
-        mass = random.uniform(1.0, 5.0)
-        bodies.append(replace(body, mass=mass, center_of_mass=tuple(center), inertia=entries))
+        if not body.fixed:
+            inertia = random_inertia(random)
+            center = np.array(body.origin) + random.normal(size=3) * 0.2
+            mass = random.uniform(1.0, 5.0)
+            body = replace(body, mass=mass, center_of_mass=tuple(center), inertia=inertia)
+        bodies.append(body)
     return replace(mechanism, bodies=bodies, gravity=gravity)
 
 
@@ -70,12 +61,6 @@ def pushes(mechanism, trajectory, k):
     def add(name, force, at, torque):
         found.setdefault(name, []).append((np.array(force), np.array(at), np.array(torque)))
 
-    def turned(name, vector):
-        if name not in trajectory.bodies:
-            return np.array(vector)
-        A_design = naive.A(np.array(mechanism.body(name).euler_parameters))
-        return naive.A(trajectory.bodies[name].p[k]) @ A_design.T @ np.array(vector)
-
     for driver in mechanism.drivers:
         effort = trajectory.forces.drivers[driver.name][k]
         if isinstance(driver, PointCoordinate):
@@ -86,7 +71,10 @@ def pushes(mechanism, trajectory, k):
             add(point.body, effort * d, at, np.zeros(3))
             continue
         joint = mechanism.joint(driver.joint)
-        axis = turned(joint.i, np.array(joint.axis) / np.linalg.norm(joint.axis))
+        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        if joint.i in trajectory.bodies:
+            first = trajectory.bodies[joint.i]
+            axis = newton_euler.turn_of(mechanism.body(joint.i), first, k) @ axis
         for name, sign in ((joint.i, -1.0), (joint.j, 1.0)):
             if isinstance(driver, JointAngle):
                 add(name, np.zeros(3), np.zeros(3), sign * effort * axis)

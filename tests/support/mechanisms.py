@@ -1,20 +1,27 @@
 """Mechanisms that several tests solve, and ways to write the same mechanism differently."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from kincheck.cases.jet import constant, cos, sin, sqrt, steady
 from kincheck.core import (
     Body,
     Distance,
+    Gear,
     JointAngle,
+    JointDisplacement,
     Mechanism,
     Point,
     PointCoordinate,
+    RackPinion,
     Revolute,
+    Screw,
     Spherical,
     Translational,
+    Universal,
+    solve,
 )
+from kincheck.core.joints import Kind
 
 ORIGIN, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -120,23 +127,11 @@ def placed(mechanism, where, turn=tuple, factor=1.0):
 
     Drivers along global directions stay as they are.
     """
-    ways = {
-        "point": where,
-        "points": lambda pair: tuple(where(point) for point in pair),
-        "axis": turn,
-        "length": lambda length: factor * length,
-    }
-    joints = []
-    for joint in mechanism.joints:
-        given = {
-            each.name: getattr(joint, each.name) for each in fields(joint) if each.name in ways
-        }
-        changes = {name: ways[name](value) for name, value in given.items() if value is not None}
-        joints.append(replace(joint, **changes))
+    ways = {Kind.POSITION: where, Kind.DIRECTION: turn, Kind.LENGTH: lambda length: factor * length}
     return replace(
         mechanism,
         bodies=[replace(body, origin=where(body.origin)) for body in mechanism.bodies],
-        joints=joints,
+        joints=[replace(joint, **joint.mapped(ways)) for joint in mechanism.joints],
         points=[replace(point, position=where(point.position)) for point in mechanism.points],
     )
 
@@ -154,3 +149,146 @@ def without_fixed_bodies(mechanism):
 
     joints = [replace(joint, i=name(joint.i), j=name(joint.j)) for joint in mechanism.joints]
     return replace(mechanism, bodies=mechanism.moving, joints=joints)
+
+
+LEAN = 0.3
+"""Of the cranks of a chain at design [rad]."""
+BRANCH = LEAN + np.pi / 2.0
+"""Where all links of the chain are in line."""
+
+
+def chain(loops, lean=LEAN):
+    """A chain of four-bar loops (IFToMM A02): cranks at (k, 0) that lean alike, tied by couplers of
+    length one; only the first is driven.
+    """
+    s, c, n = np.sin(lean), np.cos(lean), range(loops)
+    cranks = [
+        Revolute(f"pivot{k}", "ground", f"crank{k}", (k, 0.0, 0.0), Z) for k in range(loops + 1)
+    ]
+    balls = [Spherical(f"ball{k}", f"crank{k}", f"coupler{k}", (k + s, c, 0.0)) for k in n]
+    crosses = [
+        Universal(f"cross{k}", f"crank{k + 1}", f"coupler{k}", (k + 1 + s, c, 0.0), (Z, Y))
+        for k in n
+    ]
+    return Mechanism(
+        "chain",
+        [*(Body(f"crank{k}") for k in range(loops + 1)), *(Body(f"coupler{k}") for k in n)],
+        [*cranks, *balls, *crosses],
+        [Point("end", f"crank{loops}", (loops + s, c, 0.0))],
+        [JointAngle("turn", "pivot0")],
+    )
+
+
+def chain_end(loops, turn):
+    """Closed form of the last crank's pin, its velocity and acceleration at rate one."""
+    return crank_tip(loops, LEAN - turn)
+
+
+def crank_tip(at, lean):
+    """Closed form of the tip of a crank with its pivot at (at, 0), its velocity and acceleration,
+    where the crank's angle grows at rate one.
+    """
+    s, c, zero = np.sin(lean), np.cos(lean), 0.0 * lean
+    return [np.column_stack(each) for each in ([at + s, c, zero], [-c, s, zero], [-s, -c, zero])]
+
+
+def pushed(angle=1.0):
+    """A slider that drives its crank from an angle, with the slider's x and the pin at design."""
+    design = float(slider_crank_motion([angle]).x[0])
+    pin, m = (CRANK * np.cos(angle), 0.0, -CRANK * np.sin(angle)), slider_crank()
+    rod = Distance("rod", "crank", "slider", (pin, (design, 0.0, 0.0)))
+    guide = Translational("guide", "ground", "slider", (design, 0.0, 0.0), X)
+    driven = replace(m, joints=[m.joint("pivot"), rod, guide], points=[Point("pin", "crank", pin)])
+    return replace(driven, drivers=[JointDisplacement("push", "guide")]), design, pin
+
+
+def circles_meet(center, radius, other, other_radius):
+    """Where two circles in the plane z = 0 meet, on the left from the first center to the other:
+    arrays of shape (..., 3). Circles that do not reach each other meet in between.
+    """
+    d = np.subtract(other, center)
+    square = (d * d).sum(axis=-1, keepdims=True)
+    along = 0.5 * (1.0 + (radius**2 - other_radius**2) / square)
+    off = np.sqrt(np.maximum(radius**2 / square - along**2, 0.0))
+    return center + along * d + off * np.cross(Z, d)
+
+
+def planar_four_bar(pin, meet, rest, ends="hinges", across=X, crank="crank"):
+    """A crank about the origin, a rod and a rocker in the plane z = 0, by where their joints are.
+
+    Args:
+        ends: of the rod: hinges make three rows more than are needed, universals one, and a hinge
+            and a ball none.
+        across: the universals' other axis.
+    """
+    pin, meet, rest = (tuple(np.asarray(each).tolist()) for each in (pin, meet, rest))
+    rod = {
+        "hinges": (
+            Revolute("pin", crank, "rod", pin, Z),
+            Revolute("end", "rod", "rocker", meet, Z),
+        ),
+        "universals": (
+            Universal("pin", crank, "rod", pin, (across, Z)),
+            Universal("end", "rod", "rocker", meet, (Z, across)),
+        ),
+        "ball": (Revolute("pin", crank, "rod", pin, Z), Spherical("end", "rod", "rocker", meet)),
+    }
+    pivot = Revolute("pivot", "ground", crank, ORIGIN, Z)
+    return Mechanism(
+        "four_bar",
+        [Body(crank), Body("rod"), Body("rocker")],
+        [pivot, Revolute("rest", "ground", "rocker", rest, Z), *rod[ends]],
+        [Point("meet", "rocker", meet)],
+        [JointAngle("turn", "pivot")],
+    )
+
+
+def gears():
+    """A wheel, a pinion that rolls on a rack, and a nut on its thread, whose height is held."""
+    return Mechanism(
+        "gears",
+        [Body("wheel"), Body("pinion", X), Body("rack"), Body("nut")],
+        [
+            Revolute("first", "ground", "wheel", ORIGIN, Z),
+            Revolute("second", "pinion", "ground", X, Z),
+            Translational("guide", "ground", "rack", (1.0, 0.3, 0.0), X),
+            Screw("thread", "pinion", "nut", (1.0, 0.0, 0.5), Z, 0.02),
+        ],
+        [Point("tooth", "rack", (1.0, 0.3, 0.0)), Point("top", "nut", (1.2, 0.1, 0.5))],
+        [JointAngle("turn", "first"), PointCoordinate("height", "top", Z)],
+        [Gear("mesh", ("first", "second"), -2.0), RackPinion("rolls", ("second", "guide"), 0.3)],
+    )
+
+
+def indexing():
+    """A wheel that turns a second one by a quarter of its turns, and a slide that tells the
+    time.
+    """
+    return Mechanism(
+        "indexing",
+        [Body("wheel"), Body("driven"), Body("slide")],
+        [
+            Revolute("first", "ground", "wheel", ORIGIN, Z),
+            Revolute("second", "ground", "driven", X, Z),
+            Translational("guide", "ground", "slide", Z, X),
+        ],
+        [Point("rim", "driven", (1.2, 0.0, 0.0))],
+        [JointDisplacement("clock", "guide"), JointAngle("turn", "first")],
+        [Gear("gear", ("second", "first"), 0.25)],
+    )
+
+
+def solve_all(mechanism, driver, values, **options):
+    """Solve a mechanism, and assert that every sample is solved."""
+    found = solve(mechanism, driver, values, **options)
+    assert found.solved.all(), found.message
+    return found
+
+
+def errors(motion, expected):
+    """The largest errors of a point's position, velocity and acceleration, or of as many of them as
+    there are on both sides.
+    """
+    found = [motion.position, motion.velocity, motion.acceleration]
+    pairs = [(a, b) for a, b in zip(found, expected, strict=False) if a is not None]
+    return np.array([np.abs(a - b).max() for a, b in pairs])

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from kincheck.core.algebra import Quat, X, Y, Z, vec
-from kincheck.core.case.models.files import read_tree
+from kincheck.core.case.models.files import load, read_tree
+
+from .model_poses import EXACT, near
 
 mujoco = pytest.importorskip("mujoco")
+differences = pytest.importorskip("tests.oracles.public_robots").differences
 
 
-# MuJoCo's residuals at kincheck's poses: rounding of metre-sized coordinates, some operations deep.
-EXACT = 1e-13
 # Without it MuJoCo refuses a moving body; masses move nothing here.
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 
@@ -27,6 +28,13 @@ def model(tmp_path, text, name="model.xml"):
     return file
 
 
+def closes_in_mujoco(file, supplied):
+    """All samples are solved, and stand where Newton's method on MuJoCo's equalities puts them."""
+    solved, reached, worst = differences(file, supplied)
+    assert reached == solved == len(load(file, supplied).sweep.values)
+    assert worst.max() < EXACT
+
+
 def agree(file):
     """Compare what the tree holds at qpos0 with MuJoCo: places and turns of bodies, points and axes
     of joints, sites.
@@ -37,24 +45,21 @@ def agree(file):
     mujoco.mj_kinematics(loaded, data)
     for name, place in tree.places.items():
         body = data.body(name)
-        assert np.allclose([*place.at], body.xpos, rtol=0, atol=EXACT), name
+        assert near([*place.at], body.xpos), name
         between = place.turn.conjugate() * Quat(body.xquat[0], vec(body.xquat[1:]))
         assert np.abs([*between.e]).max() < EXACT, name
     for name, joint in tree.joints.items():
         there = data.joint(name)
-        assert np.allclose([*joint.point], there.xanchor, rtol=0, atol=EXACT), name
+        assert near([*joint.point], there.xanchor), name
         if joint.kind != "ball":
-            assert np.allclose([*joint.axis], there.xaxis, rtol=0, atol=EXACT), name
+            assert near([*joint.axis], there.xaxis), name
             assert np.isclose(
                 joint.reference, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT
             ), name
     for name, (_, place) in tree.sites.items():
-        assert np.allclose([*place.at], data.site(name).xpos, rtol=0, atol=EXACT), name
+        assert near([*place.at], data.site(name).xpos), name
         for column, axis in enumerate((X, Y, Z)):
-            assert np.allclose(
-                [*place.direction(axis)],
-                data.site(name).xmat.reshape(3, 3)[:, column],
-                rtol=0,
-                atol=EXACT,
-            ), name
+            assert near([*place.direction(axis)], data.site(name).xmat.reshape(3, 3)[:, column]), (
+                name
+            )
     return tree

@@ -46,7 +46,7 @@ def line(*numbers):
     return tagged("LinearFunction", texts(coefficients=numbers))
 
 
-def model(bodies, joints, constraints="", forces="", more="", version="40000"):
+def model(bodies, joints, constraints="", forces="", more=""):
     """A document; bodies are names, or texts of elements."""
     inside = "".join(x if x.startswith("<") else f'<Body name="{x}"/>' for x in bodies)
     sets = {"Body": inside, "Joint": "".join(joints), "Constraint": constraints, "Force": forces}
@@ -55,7 +55,7 @@ def model(bodies, joints, constraints="", forces="", more="", version="40000"):
         for kind, text in sets.items()
     )
     return (
-        f'<OpenSimDocument Version="{version}"><Model name="m"><Ground name="ground"/>'
+        '<OpenSimDocument Version="40000"><Model name="m"><Ground name="ground"/>'
         f"{parts}{more}</Model></OpenSimDocument>"
     )
 
@@ -67,15 +67,8 @@ FOUR_BAR = model(
         joint("PinJoint", "B", "a", "b", coordinate("B"), p=[(0, 2, 0)]),
         joint("PinJoint", "D", "", "c", coordinate("D"), p=[(4, 0, 0)]),
     ],
-    tagged(
-        "PointConstraint",
-        texts(
-            socket_body_1="/bodyset/b",
-            socket_body_2="/bodyset/c",
-            location_body_1=(4, 0, 0),
-            location_body_2=(0, 2, 0),
-        ),
-        "C",
-    ),
+    """<PointConstraint name="C"><socket_body_1>/bodyset/b</socket_body_1>
+    <socket_body_2>/bodyset/c</socket_body_2><location_body_1>4 0 0</location_body_1>
+    <location_body_2>0 2 0</location_body_2></PointConstraint>""",
 )
 """A parallelogram of 2 and 4, closed at a point."""

@@ -7,6 +7,9 @@ import json
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .usd_texts import EXCLUDED, body, joint, stage
 
 BASE = "base"
 
@@ -49,13 +52,6 @@ class RandomRobot:
         return R.T @ (at - r), R.T @ (np.eye(3) if turn is None else turn)
 
 
-def rotation(rng):
-    q = rng.normal(size=4)
-    e0, *e = q / np.linalg.norm(q)
-    cross = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
-    return (2 * e0 * e0 - 1) * np.eye(3) + 2 * (np.outer(e, e) + e0 * cross)
-
-
 def random_robot(seed: int) -> RandomRobot:
     """Return a planar robot with parallel hinges, or a spatial one with all kinds of joints."""
     rng = np.random.default_rng(seed)
@@ -74,7 +70,13 @@ def random_robot(seed: int) -> RandomRobot:
                 at -= (at @ normal) * normal
             links.append(
                 Link(
-                    *(f"{chain}{k}", outer, str(rng.choice(kinds)), at, rotation(rng)),
+                    *(
+                        f"{chain}{k}",
+                        outer,
+                        str(rng.choice(kinds)),
+                        at,
+                        Rotation.from_quat(rng.normal(size=4), scalar_first=True).as_matrix(),
+                    ),
                     axis / np.linalg.norm(axis),
                     *(float(rng.uniform(0.5, 2.0)), rng.uniform(1.0, 1.9, size=3)),
                     *(
@@ -102,21 +104,11 @@ def text(*numbers):
 
 
 def rpy(R):
-    """Roll, pitch and yaw of a rotation matrix."""
-    pitch = np.arcsin(np.clip(-R[2, 0], -1.0, 1.0))
-    return np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])
+    return Rotation.from_matrix(R).as_euler("xyz")
 
 
 def quaternion(R):
-    q = np.array(
-        [
-            1 + R[0, 0] + R[1, 1] + R[2, 2],
-            R[2, 1] - R[1, 2],
-            R[0, 2] - R[2, 0],
-            R[1, 0] - R[0, 1],
-        ]
-    )
-    return q / np.linalg.norm(q)
+    return Rotation.from_matrix(R).as_quat(scalar_first=True).tolist()
 
 
 def inertia(link, of):
@@ -239,10 +231,35 @@ def mjcf(robot):
     }
 
 
+def usd(robot):
+    """A loop as an excluded joint; the frames of joints are in single precision."""
+    prims = [
+        body(each.name, at=each.at, ops=f"quatd xformOp:orient = {tuple(quaternion(each.turn))}")
+        for each in robot.links
+    ]
+    kinds = {"hinge": "Revolute", "slide": "Prismatic"}
+    joints = [
+        (kinds[each.kind], f"j{each.name}", each.outer, each.name, each.at, each.axis, "")
+        for each in robot.links
+    ]
+    kind = "Revolute" if robot.planar else "Spherical"
+    joints.append((kind, "loop", *robot.ends, robot.point, robot.links[0].axis, EXCLUDED))
+    for kind, name, outer, inner, at, axis, more in joints:
+        frame = Rotation.align_vectors([axis], [[0, 0, 1]])[0].as_matrix()
+        (p, P), (q, Q) = (robot.seen(link, at, frame) for link in (outer, inner))
+        turns = [
+            f"quatf physics:localRot{k} = {tuple(quaternion(R))}" for k, R in enumerate((P, Q))
+        ]
+        first = "" if outer == BASE else outer
+        prims.append(joint(kind, name, first, inner, more, *turns, p=p, q=q, axis="Z"))
+    return {"usda": stage(*prims)}
+
+
 FORMATS = {
     "MJCF": mjcf,
     "URDF with <constraint>": urdf,
     "URDF with constraints.json": urdf_json,
     "URDF with YAML": urdf_yaml,
     "SDF": sdf,
+    "USD": usd,
 }

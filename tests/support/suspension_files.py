@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from kincheck import cases
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 
 STRUT = tomllib.loads((cases.FOLDER / "mcpherson_suspension.toml").read_text())
 AXES = {"convention": "iso8855", "forward": [1, 0, 0], "up": [0, 0, 1]}
@@ -16,6 +19,15 @@ MIRROR = np.diag([1, -1, 1])
 
 
 TABLE = (cases.FOLDER / "mcpherson_suspension.csv").read_text()
+
+
+TOE = {"outputs": {"toe": {"type": "toe"}}}
+
+
+def changed(table="suspension", data=STRUT, **keys):
+    """The data with keys of a top-level table changed, or left out where None."""
+    table_keys = (data[table] | keys).items()
+    return data | {table: {key: value for key, value in table_keys if value is not None}}
 
 
 def unreferenced(data):
@@ -30,6 +42,13 @@ def loaded(data, csv=TABLE):
         file = Path(folder) / "case.json"
         file.write_text(json.dumps(data))
         return load_case(file)
+
+
+def strut_of_table(folder, travel, more=""):
+    """The case of the sample table of a strut, with further rows."""
+    file = folder / "car.csv"
+    file.write_text(sample_table(TEMPLATES["mcpherson"]) + more)
+    return load(file, Supplied(travel=travel))
 
 
 def mirrored(data, turn=MIRROR):

@@ -1,77 +1,78 @@
 """Stages of USD as texts."""
 
+from functools import partial
 
-def stage(*prims, units='metersPerUnit = 1\n    upAxis = "Z"', layer=""):
+from .case_texts import write
+
+
+def stage(*prims, units='metersPerUnit = 1\n    upAxis = "Z"'):
     """A stage of prims."""
     inside = "\n".join(prims)
-    return f'#usda 1.0\n(\n    {units}\n    {layer}\n)\ndef Xform "r"\n{{\n{inside}\n}}\n'
+    return f'#usda 1.0\n(\n    {units}\n)\ndef Xform "r"\n{{\n{inside}\n}}\n'
 
 
-def prim(kind, name, apis="", lines=(), metadata=""):
-    """A prim with schemas, by their names without PhysicsXAPI around, and lines."""
+def prim(kind, name, *lines, apis="", metadata=""):
+    """A prim with lines and schemas, by their names without PhysicsXAPI around."""
     applied = ", ".join(f'"{api if "API" in api else f"Physics{api}API"}"' for api in apis.split())
     schemas = f"prepend apiSchemas = [{applied}]\n" * bool(applied) + metadata
     inside = "\n".join(lines)
     return f'def {kind} "{name}" (\n{schemas}\n)\n{{\n{inside}\n}}'
 
 
-def body(name, at=(0, 0, 0), *lines, apis="RigidBody", ops=""):
+def body(name, *lines, at=(0, 0, 0), apis="RigidBody", ops=""):
     """A body at a place, with further operations behind its translation."""
     order = "".join(f', "{op.split()[1]}"' for op in ops.splitlines() if op)
-    return prim(
-        "Xform",
-        name,
-        apis,
-        [
-            f"double3 xformOp:translate = {tuple(at)}",
-            ops,
-            f'uniform token[] xformOpOrder = ["xformOp:translate"{order}]',
-            *lines,
-        ],
-    )
+    place = f"double3 xformOp:translate = {tuple(map(float, at))}\n{ops}"
+    order = f'uniform token[] xformOpOrder = ["xformOp:translate"{order}]'
+    return prim("Xform", name, place, order, *lines, apis=apis)
 
 
-def joint(kind, name, first, second, p=(0, 0, 0), q=(0, 0, 0), *lines, axis="Y", apis=""):
+heavy = partial(body, apis="RigidBody Mass")
+ZERO = (0, 0, 0)
+
+
+def joint(kind, name, first, second, *lines, p=ZERO, q=ZERO, axis="Y", apis=""):
     """A joint between two bodies of the stage; none for the world."""
     ends = [f"rel physics:body{k} = </r/{each}>" for k, each in enumerate((first, second)) if each]
-    given = [f"point3f physics:localPos{k} = {tuple(at)}" for k, at in enumerate((p, q)) if at]
+    given = [
+        f"point3f physics:localPos{k} = {tuple(map(float, at))}"
+        for k, at in enumerate((p, q))
+        if at is not None
+    ]
     along = [f'uniform token physics:axis = "{axis}"'] if axis else []
     limited = {each.split(":")[1] for each in lines if each.startswith("float limit:")}
     apis += "".join(f" PhysicsLimitAPI:{each}" for each in sorted(limited))
-    return prim(f"Physics{kind}Joint", name, apis, [*ends, *given, *along, *lines])
+    return prim(f"Physics{kind}Joint", name, *ends, *given, *along, *lines, apis=apis)
 
 
+hinge = partial(joint, "Revolute")
 EXCLUDED = "bool physics:excludeFromArticulation = true"
-FOUR_BAR = (
-    body("a"),
-    body("b", (0, 0, 2)),
-    body("c", (4, 0, 0)),
-    joint("Revolute", "A", "", "a"),
-    joint("Revolute", "B", "a", "b", (0, 0, 2)),
-    joint("Revolute", "C", "b", "c", (4, 0, 0), (0, 0, 2), EXCLUDED),
-    joint("Revolute", "D", "", "c", (4, 0, 0)),
-)
-"""A parallelogram of 2 and 4, whose last joint closes the loop."""
+
+
+def parallelogram(width, height, axis):
+    """Links and hinges, the third of which closes the loop."""
+    return (
+        body("a"),
+        body("b", at=height),
+        body("c", at=width),
+        hinge("A", "", "a", axis=axis),
+        hinge("B", "a", "b", p=height, axis=axis),
+        hinge("C", "b", "c", EXCLUDED, p=width, q=height, axis=axis),
+        hinge("D", "", "c", p=width, axis=axis),
+    )
+
+
+FOUR_BAR = parallelogram((4, 0, 0), (0, 0, 2), "Y")
+ARM = (body("a"), body("b"), hinge("j", "", "a"))
+"""A body on a hinge, and a free one."""
 
 
 def locked(axes):
-    """Lines that lock axes of a generic joint."""
-    return [
-        line
-        for axis in axes.split()
-        for line in (
-            f"float limit:{axis}:physics:low = 1",
-            f"float limit:{axis}:physics:high = -1",
-        )
-    ]
+    """Lines that lock axes of a generic joint: low above high, or zero for both."""
+    ends = {"trans": ("low = 1", "high = -1"), "rot": ("low = 0", "high = 0")}
+    return [f"float limit:{x}:physics:{end}" for x in axes.split() for end in ends[x[:-1]]]
 
 
-def written(folder, *prims, name="m.usda", **more):
+def write_stage(folder, *prims, name="m.usda", **units):
     """Write a stage into a folder, and return its file."""
-    file = folder / name
-    file.write_text(stage(*prims, **more))
-    return file
-
-
-ARM = (body("a"), body("b"), joint("Revolute", "j", "", "a"))
-"""A body on a hinge, and a free one."""
+    return write(folder, stage(*prims, **units), name)

@@ -60,12 +60,13 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
             )
     written = Section(file, "units", keys.units).typed(UnitsKeys)
     units = FileUnits(LENGTHS[written.length], ANGLES[written.angle])
-    mechanism = read_mechanism(root, keys, units)
+    root = replace(root, units=units)
+    mechanism = read_mechanism(root, keys)
     columns = None
     if keys.reference is not None:
         columns = root.at("reference").typed(ReferenceKeys)
-    free = read_free(root, mechanism, units)
-    sweep, driver, own_grid = read_sweep(root, mechanism, units, columns)
+    free = read_free(root, mechanism)
+    sweep, driver, own_grid = read_sweep(root, mechanism, columns)
     case = Case(
         *(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()),
         length_unit=units.length.name,
@@ -82,14 +83,13 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
                 case = at_rest(case, resting)
             except SolveError as error:
                 raise fault(file, "equilibrium", str(error)) from None
-    case = _with_outputs(root, case, units)
+    case = _with_outputs(root, case)
     if resting is not None:
         from .resting import with_efforts
 
         case = with_efforts(case, resting)
     if keys.compliance is not None:
-        rig = read_rig(root.at("compliance"), case.mechanism, units)
-        case = replace(case, rig=rig)
+        case = replace(case, rig=read_rig(root.at("compliance"), case.mechanism))
     with explained(file, "closure", units.length):
         closing = Section(file, "closure", keys.closure).typed(ClosureKeys)
         case = _within_digits(case, closing, closure)
@@ -137,7 +137,7 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
     return within_digits(case, closure, why, keys.carrying)
 
 
-def _with_outputs(root: Section, case: Case, units: FileUnits) -> Case:
+def _with_outputs(root: Section, case: Case) -> Case:
     """Return the case with its outputs and the additional points they need."""
     if not (root.at("points").value or root.at("outputs").value):
         raise root.at("points").fault(
@@ -146,11 +146,11 @@ def _with_outputs(root: Section, case: Case, units: FileUnits) -> Case:
         )
     table = None
     if root.at("suspension").value is not None:
-        table = read_suspension(root.at("suspension"), case, units)
+        table = read_suspension(root.at("suspension"), case)
         wheels = tuple(each for each in (table.vehicle, table.other) if each)
         case = replace(case, wheels=wheels)
     named = root.at("outputs").each()
-    outputs = tuple(read_output(name, section, table, case, units) for name, section in named)
+    outputs = tuple(read_output(name, section, table, case) for name, section in named)
     outputs = outputs or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
     slopes = table is not None and table.per_travel

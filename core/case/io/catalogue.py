@@ -70,12 +70,12 @@ ON_OUTPUTS = (
 def catalogue() -> Iterator[str]:
     """Yield lines to print, one for each type of joint, coupler, driver, motion and force."""
     yield from ON_TYPES
-    yield from _printed(type_tables())
+    yield from _table_lines(type_tables())
 
 
 def output_catalogue() -> Iterator[str]:
     """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
-    yield from _printed(output_tables())
+    yield from _table_lines(output_tables())
     yield ON_OUTPUTS
 
 
@@ -172,7 +172,7 @@ def _meaning(cls: type[Any]) -> str:
     return "" if paragraph.startswith(f"{cls.__name__}(") else _SENTENCES.split(paragraph)[0]
 
 
-def _printed(tables: Mapping[str, Rows]) -> Iterator[str]:
+def _table_lines(tables: Mapping[str, Rows]) -> Iterator[str]:
     for heading, rows in tables.items():
         yield heading
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -266,14 +266,14 @@ def struct_schema(struct: Keys) -> dict[str, Any]:
     """Return the schema of a struct, with all references replaced by their definitions."""
     (ref,), parts = msgspec.json.schema_components([struct], ref_template=TEMPLATE)
 
-    def written_out(value: Any) -> Any:
+    def inline_references(value: Any) -> Any:
         if isinstance(value, dict):
             table = cast("dict[str, Any]", value)
             if "$ref" in table:
-                return written_out(parts[table["$ref"].rpartition("/")[2]])
-            return {key: written_out(each) for key, each in table.items()}
+                return inline_references(parts[table["$ref"].rpartition("/")[2]])
+            return {key: inline_references(each) for key, each in table.items()}
         if isinstance(value, list):
-            return [written_out(each) for each in cast("list[Any]", value)]
+            return [inline_references(each) for each in cast("list[Any]", value)]
         return value
 
-    return written_out(ref)
+    return inline_references(ref)

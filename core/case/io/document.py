@@ -15,7 +15,7 @@ import reprlib
 import tomllib
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -24,7 +24,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 import msgspec
 
 from ...errors import LONGEST_NAME, CaseError, MechanismError, brief, remedy, similar, with_article
-from ..units import METRE, Unit
+from ..units import METRE, FileUnits, Unit
 from .escape import visible
 from .foreign import binary, foreign
 
@@ -362,11 +362,13 @@ class Section:
 
     Attributes:
         key: path of the keys to it; empty for the whole document.
+        units: of the numbers of the document.
     """
 
     file: Path
     key: str
     value: object
+    units: FileUnits = FileUnits()  # noqa: RUF009 - it is frozen
 
     @property
     def _entries(self) -> dict[str, Any]:
@@ -375,7 +377,7 @@ class Section:
 
     def at(self, name: str) -> Section:
         """Return the value of a key in this table; None without it, or if this is no table."""
-        return Section(self.file, join(self.key, name), self._entries.get(name))
+        return Section(self.file, join(self.key, name), self._entries.get(name), self.units)
 
     def each(self) -> Iterator[tuple[str, Section]]:
         """Yield names and values of this table; nothing without it."""
@@ -384,6 +386,10 @@ class Section:
     def fault(self, problem: str) -> CaseError:
         """Return the error of this value; see `fault`."""
         return fault(self.file, self.key, problem)
+
+    def explained(self) -> AbstractContextManager[None]:
+        """Turn a MechanismError on this value into an error of the file; see `explained`."""
+        return explained(self.file, self.key, self.units.length, self.value)
 
     def unknown(self, name: object, known: Iterable[str], expected: str) -> CaseError:
         """Return the error of a name here that is none of the known ones; see `unknown_name`."""

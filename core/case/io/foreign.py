@@ -60,7 +60,7 @@ def foreign(data: bytes) -> str:
     """Return the kind of a file of another program, and a remedy: "found a PDF document, expected
     text; export ..."; empty if the file may be a text.
     """
-    what, advice = recognised(data)
+    what, advice = recognise_format(data)
     return f"found {what}, expected text; {advice}" if what else ""
 
 
@@ -69,7 +69,7 @@ def binary(data: bytes) -> bool:
     return _CONTROL.search(data) is not None
 
 
-def recognised(data: bytes) -> tuple[str, str]:
+def recognise_format(data: bytes) -> tuple[str, str]:
     """Return the kind of a file and the remedy; two empty texts if it may be a text."""
     if data.startswith(_ZIP):
         return _archive(data)

@@ -31,7 +31,7 @@ from ...mechanism.motions import (
 )
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Free, Load, Resting, Rig, Sweep
-from ..units import LENGTHS, RADIAN, SECOND, FileUnits, Unit, plain
+from ..units import RADIAN, SECOND, FileUnits, Unit, plain
 from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
 from .schema import (
@@ -62,23 +62,24 @@ _EVEN: Mapping[str, str] = {
 """Keys of an even grid of samples, and their expected values."""
 
 
-def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism:
+def read_mechanism(root: Section, keys: CaseKeys) -> Mechanism:
     """Return the mechanism of a case file.
 
     Raises:
         CaseError: an unknown type, key or name, a name in both tables of joints and couplers, or
             values that no such part can have.
     """
-    bodies = [_body(name, section, units) for name, section in root.at("bodies").each()]
+    units = root.units
+    bodies = [_body(name, section) for name, section in root.at("bodies").each()]
     points = list[Point]()
     for name, section in root.at("points").each():
         point = section.typed(PointKeys)
         points.append(Point(name, point.body, units.place(point.position)))
-    joints, couplers = _joints(root, units)
+    joints, couplers = _joints(root)
     free = any(root.at(table).value is not None for table in ("free", "equilibrium"))
-    drivers = _drivers(root.at("drivers"), units, free=free)
+    drivers = _drivers(root.at("drivers"), free=free)
     forces = [
-        _built(section, section.class_of("force", ELEMENTS), units, name)
+        _build(section, section.class_of("force", ELEMENTS), name)
         for name, section in root.at("forces").each()
     ]
     gravity = units.power(ACCELERATION, keys.gravity)
@@ -87,11 +88,11 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
             *(keys.name, bodies, joints, points, drivers, couplers),
             gravity=gravity,
             forces=forces,
-            bushings=read_bushings(root, joints, units),
+            bushings=read_bushings(root, joints),
         )
 
 
-def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> list[Bushing]:
+def read_bushings(root: Section, joints: Sequence[Joint]) -> list[Bushing]:
     """Return the bushings of joints, [joints.NAME.bushings.X]; bodies and point are by default the
     joint's.
     """
@@ -103,20 +104,20 @@ def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> l
         given = table.at("bushings")
         for own, section in given.each() if given.value is not None else ():
             keys: Any = section.typed(bushing_keys())
-            numbers = _in_si(Bushing, keys, units)
+            numbers = _in_si(Bushing, keys, section.units)
             places = joint.points_on()
             if numbers["point"] is None and not places:
                 raise section.at("point").fault("missing, expected a point [x, y, z]; add it")
             numbers["point"] = numbers["point"] or places[0]
             i, j = keys.bodies or joint.bodies
-            with explained(section.file, section.key, units.length, section.value):
+            with section.explained():
                 name = f"{joint.name}.{own}"
                 found.append(Bushing(name, i, j, joint=joint.name, **numbers))
     return found
 
 
-def _body(name: str, section: Section, units: FileUnits) -> Body:
-    keys = section.typed(BodyKeys)
+def _body(name: str, section: Section) -> Body:
+    keys, units = section.typed(BodyKeys), section.units
     center, inertia = keys.center_of_mass, keys.inertia
     with explained(section.file, section.key):
         if inertia is not None:  # an error is in the unit of the file
@@ -135,9 +136,7 @@ def _body(name: str, section: Section, units: FileUnits) -> Body:
         )
 
 
-def _built(
-    section: Section, cls: Any, units: FileUnits, *name: str, driver: Unit | None = None
-) -> Any:
+def _build(section: Section, cls: Any, *name: str, driver: Unit | None = None) -> Any:
     """Return a joint, coupler, driver, motion or force element of a class.
 
     Args:
@@ -145,19 +144,19 @@ def _built(
     """
     if cls.type in Joint.registry:  # bushings are read with the mechanism
         own = {name: each for name, each in section.table.items() if name != "bushings"}
-        section = Section(section.file, section.key, own)
+        section = replace(section, value=own)
     sprung = cls.type in (SpringDamper.type, TorsionSpringDamper.type)
     if sprung and not {"stiffness", "curve"} & section.table.keys():
         raise section.at("stiffness").fault(
             "missing, expected a number; add the key 'stiffness', or a curve"
         )
     keys: Any = section.typed(keys_of(cls))
-    given = _in_si(cls, keys, units, driver)
+    given = _in_si(cls, keys, section.units, driver)
     if hasattr(keys, "joints"):
         given["joints"] = keys.joints
     given |= zip("ij", getattr(keys, "bodies", ()), strict=False)
     make: Any = cls  # type checkers would take the classes of the conditions
-    with explained(section.file, section.key, units.length, section.value):
+    with section.explained():
         return make(*name, **given)
 
 
@@ -166,11 +165,11 @@ def _in_si(cls: Any, keys: Any, units: FileUnits, driver: Unit | None = None) ->
     return {each.name: units.in_si(each, getattr(keys, each.name), driver) for each in own}
 
 
-def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]]:
+def _joints(root: Section) -> tuple[list[Joint], list[Coupler]]:
     sections = dict(root.at("joints").each())
     known = Joint.registry | Coupler.registry
     parts: list[Joint | Coupler] = [
-        _built(section, section.class_of("joint", known), units, name)
+        _build(section, section.class_of("joint", known), name)
         for name, section in sections.items()
     ]
     for name, section in root.at("couplers").each():
@@ -178,7 +177,7 @@ def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]
             raise section.fault(
                 f"found {name!r} in [joints] too, expected one name; rename one of them"
             )
-        parts.append(_built(section, section.class_of("coupler", Coupler.registry), units, name))
+        parts.append(_build(section, section.class_of("coupler", Coupler.registry), name))
         sections[name] = section
     freedoms = {part.name: part.freedoms for part in parts if isinstance(part, Joint)}
     couplers = list[Coupler]()
@@ -187,13 +186,13 @@ def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]
             if "freedoms" not in sections[part.name].table:
                 own = ((*freedoms.get(name, ()), "rotation")[0] for name in part.joints)
                 part = replace(part, freedoms=(*own,))
-            part = part.in_units(units.length.size, units.angle.size)
+            part = part.in_units(root.units.length.size, root.units.angle.size)
         if isinstance(part, Coupler):
             couplers.append(part)
     return [part for part in parts if isinstance(part, Joint)], couplers
 
 
-def _drivers(section: Section, units: FileUnits, *, free: bool) -> list[Driver]:
+def _drivers(section: Section, *, free: bool) -> list[Driver]:
     """Return the drivers. `read_sweep` reads their motions, since they depend on the sweep."""
     if not section.value and not free:
         raise section.fault("found no driver, expected at least one that moves; add [drivers.NAME]")
@@ -202,7 +201,7 @@ def _drivers(section: Section, units: FileUnits, *, free: bool) -> list[Driver]:
             f"found the name {TIME!r}, which [sweep] has for time itself; rename the driver"
         )
     found: list[Driver] = [
-        _built(each, each.class_of("driver", DRIVERS), units, name) for name, each in section.each()
+        _build(each, each.class_of("driver", DRIVERS), name) for name, each in section.each()
     ]
     driven = dict[tuple[str, str], str]()
     for each in found:
@@ -222,10 +221,7 @@ def _drivers(section: Section, units: FileUnits, *, free: bool) -> list[Driver]:
 
 
 def read_sweep(
-    root: Section,
-    mechanism: Mechanism,
-    units: FileUnits,
-    reference: ReferenceKeys | None = None,
+    root: Section, mechanism: Mechanism, reference: ReferenceKeys | None = None
 ) -> tuple[Sweep, Unit, bool]:
     """Read the sweep, with the motions of all other drivers.
 
@@ -246,10 +242,10 @@ def read_sweep(
         if (motion := each.at("motion")).value is not None
     }
     _require_moved(section, sweep, drivers, moved, free=root.at("free").value is not None)
-    motions = {name: _motion(mechanism, name, each, units) for name, each in moved.items()}
+    motions = {name: _motion(mechanism, name, each) for name, each in moved.items()}
     convert, design = SECOND, 0.0
     if sweep.driver != TIME:
-        convert = _unit(mechanism.driver(sweep.driver), units)
+        convert = _unit(mechanism.driver(sweep.driver), root.units)
         design = mechanism.design_value(sweep.driver)
     grid = np.array(_samples(section, sweep, convert, reference))
     rate = convert(1.0 if sweep.rate is None else sweep.rate)
@@ -335,10 +331,10 @@ def _require_moved(
         )
 
 
-def _motion(mechanism: Mechanism, name: str, section: Section, units: FileUnits) -> Motion:
+def _motion(mechanism: Mechanism, name: str, section: Section) -> Motion:
     cls = section.class_of("motion", Motion.registry)
-    driver = _unit(mechanism.driver(name), units)
-    motion = _built(section, cls, units, driver=driver)
+    driver = _unit(mechanism.driver(name), section.units)
+    motion = _build(section, cls, driver=driver)
     design = mechanism.design_value(name)
     return Absolute(motion, design) if design else motion
 
@@ -365,7 +361,7 @@ def _unit(driver: Driver, units: FileUnits) -> Unit:
     return units.angle if driver.turns else units.length
 
 
-def read_free(root: Section, mechanism: Mechanism, units: FileUnits) -> Free | None:
+def read_free(root: Section, mechanism: Mechanism) -> Free | None:
     """Read the free motion; None without one."""
     section = root.at("free")
     if section.value is None:
@@ -375,7 +371,7 @@ def read_free(root: Section, mechanism: Mechanism, units: FileUnits) -> Free | N
     for name, rate in keys.rates.items():
         expected = "a driver or a joint with a rotation or translation"
         section.at("rates").require(name, known, expected)
-        rates[name] = _unit(known[name], units)(rate)
+        rates[name] = _unit(known[name], root.units)(rate)
     return Free(keys.duration, keys.samples, rates)
 
 
@@ -403,10 +399,10 @@ def mechanism_lines(case: Case) -> Iterator[str]:
         between = (
             {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         )
-        yield from toml_table(_own(joint, **between), "joints", joint.name)
+        yield from toml_table(_table_of(joint, **between), "joints", joint.name)
         for each in mechanism.bushings:
             if each.joint == joint.name:
-                own = {key: x for key, x in _own(each).items() if key != "type"}
+                own = {key: x for key, x in _table_of(each).items() if key != "type"}
                 name = each.name.removeprefix(f"{joint.name}.")
                 table = {"bodies": each.bodies, **own}
                 yield from toml_table(table, "joints", joint.name, "bushings", name)
@@ -415,16 +411,16 @@ def mechanism_lines(case: Case) -> Iterator[str]:
             place = {"body": point.body, "position": point.position}
             yield from toml_table(place, "points", point.name)
     for driver in mechanism.drivers:
-        yield from toml_table(_own(driver), "drivers", driver.name)
+        yield from toml_table(_table_of(driver), "drivers", driver.name)
         if motion := case.sweep.motions.get(driver.name):
             moved = _from_design(motion, mechanism.design_value(driver.name))
-            yield from toml_table(_own(moved), "drivers", driver.name, "motion")
+            yield from toml_table(_table_of(moved), "drivers", driver.name, "motion")
     for force in mechanism.forces:
         ends = {"bodies": force.bodies} if len(force.bodies) == 2 else {}
-        yield from toml_table(_own(force, **ends), "forces", force.name)
+        yield from toml_table(_table_of(force, **ends), "forces", force.name)
 
 
-def _own(item: Any, **between: Any) -> Mapping[str, Any]:
+def _table_of(item: Any, **between: Any) -> Mapping[str, Any]:
     """Return type and fields for a file, without optional fields at their defaults."""
     described: Any = type(item)  # pyright: ignore[reportUnknownVariableType]
     own = {f.name: getattr(item, f.name) for f in own_fields(described)}
@@ -507,14 +503,14 @@ def with_bushings(case: Case, file: Path) -> Case:
     names = [joint.name for joint in joints]
     for name, section in root.at("joints").each():
         section.require(name, names, "a joint")
-    found = read_bushings(root, joints, FileUnits())
+    found = read_bushings(root, joints)
     if not found:
         raise root.at("joints").fault(
             "found no bushing, expected tables [joints.NAME.bushings.X], or, for a table of"
             " hardpoints, [bushings.ROLE]; add one"
         )
     bushings = (*case.mechanism.bushings, *found)
-    with explained(file, "joints", LENGTHS["m"], root.at("joints").value):
+    with root.at("joints").explained():
         return replace(case, mechanism=replace(case.mechanism, bushings=bushings))
 
 
@@ -553,7 +549,7 @@ def read_resting(section: Section, mechanism: Mechanism) -> Resting:
     return Resting(keys.held)
 
 
-def read_rig(section: Section, mechanism: Mechanism, units: FileUnits) -> Rig:
+def read_rig(section: Section, mechanism: Mechanism) -> Rig:
     """Return the rig of a file, in SI.
 
     Raises:
@@ -570,5 +566,5 @@ def read_rig(section: Section, mechanism: Mechanism, units: FileUnits) -> Rig:
         given: Any = getattr(keys, key)
         for name in [given] if isinstance(given, str) else given or ():
             section.at(key).require(name, names, what[key])
-    stiffness = keys.tire_stiffness and units.power(STIFFNESS, keys.tire_stiffness)
+    stiffness = keys.tire_stiffness and section.units.power(STIFFNESS, keys.tire_stiffness)
     return Rig(keys.wheel, keys.contact, keys.held, keys.loads, stiffness)

@@ -127,7 +127,7 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
                 f"case {case.name!r}: there is no way from the design to {case.sweep.driver} ="
                 f" {stop:.9g}: {why}"
             )
-        whole = {name: _joined([each.bodies[name] for each in found]) for name in bodies}
+        whole = {name: _join_motions([each.bodies[name] for each in found]) for name in bodies}
         if max(map(_turn, whole.values())) <= LARGEST_TURN:
             return whole
     raise SolveError(
@@ -136,7 +136,7 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
     )
 
 
-def _joined(parts: Sequence[BodyMotion]) -> BodyMotion:
+def _join_motions(parts: Sequence[BodyMotion]) -> BodyMotion:
     """Return motions one after the other."""
     return BodyMotion(
         np.concatenate([each.r for each in parts]),

@@ -27,9 +27,9 @@ from ..measures import (
 from ..quantity import AXES, own_keys, with_markers
 from ..suspension import AxleOutput, PerTravel, Rate, Side, SuspensionOutput, Vehicle
 from ..suspension.base import WheelOutput
-from ..units import Convert, FileUnits
+from ..units import Convert
 from .document import Section, explained, shown, toml_table
-from .reference_samples import DERIVATIVES
+from .reference_samples import RATES
 from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
 from .suspension_section import SuspensionTable, check_point, direction, wheels_of
 
@@ -155,9 +155,7 @@ def with_all_motions(case: Case, at_design: Mapping[str, float] | None = None) -
     return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))
 
 
-def read_output(
-    name: str, section: Section, table: SuspensionTable | None, case: Case, units: FileUnits
-) -> Quantity:
+def read_output(name: str, section: Section, table: SuspensionTable | None, case: Case) -> Quantity:
     """Return an output that the file names.
 
     Args:
@@ -168,7 +166,7 @@ def read_output(
         CaseError: an unknown type, key or name, a missing input of the type, or an output that this
             joint or wheel does not have.
     """
-    if name.endswith((*DERIVATIVES, PER_TRAVEL)):
+    if any(name.endswith(ending) for ending in (*RATES, PER_TRAVEL) if ending):
         raise section.fault(
             "a name with this ending is a derivative in reference tables; give the output another"
             " name"
@@ -177,9 +175,9 @@ def read_output(
         known = {COORDINATE: Output, **Measure.registry, **SuspensionOutput.registry}
         cls = section.class_of("output", known)
         if issubclass(cls, Measure):
-            return _measure(name, section, cls, case, units)
+            return _measure(name, section, cls, case)
         if issubclass(cls, SuspensionOutput):
-            return _of_wheel(name, section, cls, table, case, units)
+            return _of_wheel(name, section, cls, table, case)
     keys = section.typed(OutputKeys)
     check_point(section.at("point"), keys.point, case.mechanism)
     match keys.component, keys.direction:
@@ -193,13 +191,11 @@ def read_output(
                 f'found {what} direction, expected one of them; give component = "x" or direction ='
                 " [x, y, z]"
             )
-    given = _tolerance(section, keys, units.length, size(case))
+    given = _tolerance(section, keys, section.units.length, size(case))
     return Output(name, keys.point, along, keys.relative, *given)
 
 
-def _measure(
-    name: str, section: Section, cls: type[Measure], case: Case, units: FileUnits
-) -> Measure:
+def _measure(name: str, section: Section, cls: type[Measure], case: Case) -> Measure:
     keys: Any = section.typed(keys_of(cls))
     given = {each.name: getattr(keys, key_of(each)) for each in own_keys(cls)}
     with explained(section.file, section.key):
@@ -210,7 +206,7 @@ def _measure(
     if isinstance(output, ForceMeasure):
         loads = largest_load(case.mechanism, scale, pace(case))
         scale = loads * scale if output.turns else loads
-    _, convert = units.of(output.unit)
+    _, convert = section.units.of(output.unit)
     atol, rtol, why = _tolerance(section, keys, convert, scale, output.unit)
     if isinstance(output, JointAngle | JointDisplacement):
         output = replace(output, at_design=convert(output.at_design))
@@ -254,7 +250,6 @@ def _of_wheel(
     cls: type[SuspensionOutput],
     table: SuspensionTable | None,
     case: Case,
-    units: FileUnits,
 ) -> SuspensionOutput:
     suspension = Section(section.file, "suspension", None)
     what = f"for {section.key} of type {cls.type!r}"
@@ -272,7 +267,7 @@ def _of_wheel(
     given: dict[str, Any] = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
     if issubclass(cls, AxleOutput):
         given["other"] = table.other
-    _, convert = units.of(cls.measure)
+    _, convert = section.units.of(cls.measure)
     tolerance = _tolerance(section, keys, convert, size(case), cls.measure)
     output = cls(name, vehicle, *tolerance, **given)
     if problem := output.problem:

@@ -24,16 +24,25 @@ from numpy.typing import NDArray
 from ...errors import number_of
 from ...trajectory import QUANTITIES, Array
 from ..case import Case, Origin, Quantity, Series, Truth
-from ..curves import FEWEST, Printed, bounded, even, interpolated, matched, multiples, slopes
+from ..curves import (
+    FEWEST,
+    Printed,
+    bound_rounding,
+    have_common_factor,
+    interpolate,
+    is_even_grid,
+    match_rows,
+    slopes,
+)
 from ..units import Convert, FileUnits, Unit
 from .document import fault, shown, toml_table
 from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
-    DERIVATIVES,
+    RATES,
     Columns,
     Samples,
     driver_unit,
-    inline,
+    inline_table,
     read_columns,
     read_table,
     samples_of,
@@ -58,7 +67,7 @@ def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[fl
         CaseError: the file is unreadable or lies elsewhere.
     """
     if keys.file is not None and keys.file.endswith(PROVED):
-        grids = [*read(_beside(case_file, keys)).driver.values()]
+        grids = [*read(_reference_file(case_file, keys)).driver.values()]
         return grids[0] if grids else []
     if keys.file is None and keys.rows is not None and keys.columns is None:
         # the columns are the outputs, and `read_reference` checks them
@@ -72,7 +81,7 @@ def _samples(
     case_file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity], truth: Truth
 ) -> Samples:
     if keys.file is None:
-        samples = samples_of(inline(case_file, keys, outputs))
+        samples = samples_of(inline_table(case_file, keys, outputs))
         if truth is Truth.THIRD_PARTY_DATA:
             return samples
         # values of a formula: those with few digits, such as 0.5 and 1.0, are exact
@@ -82,7 +91,7 @@ def _samples(
             for rounded, each in zip(few, samples.printed, strict=True)
         ]
         return replace(samples, printed=printed)
-    file = _beside(case_file, keys)
+    file = _reference_file(case_file, keys)
     if keys.sheet is not None and file.suffix.lower() not in WORKBOOKS:
         problem = f"found {shown(keys.sheet)}, but {keys.file} is no workbook (.xlsx)"
         raise fault(case_file, "reference.sheet", f"{problem}, expected none; remove it")
@@ -113,7 +122,7 @@ def read_reference(
             sample within the grid, or the signs differ from the case's signs.
     """
     if keys.file is not None and keys.file.endswith(PROVED):
-        file = _beside(case_file, keys)
+        file = _reference_file(case_file, keys)
         known = series(file, read(file), case.sweep.values, case.outputs)
         origin = replace(_origin(case_file, keys), signs=convention)
         return replace(case, reference=known, origin=origin)
@@ -129,12 +138,12 @@ def read_reference(
         )
         raise fault(samples.file, "signs", problem)
     origin = _origin(case_file, keys)
-    case = compared(samples, columns, replace(case, origin=origin), own=own_grid)
+    case = compare_at_samples(samples, columns, replace(case, origin=origin), own=own_grid)
     assert case.origin is not None
     return replace(case, origin=replace(case.origin, signs=samples.signs or convention))
 
 
-def compared(samples: Samples, columns: Columns, case: Case, *, own: bool) -> Case:
+def compare_at_samples(samples: Samples, columns: Columns, case: Case, *, own: bool) -> Case:
     """Return the case with the values of the columns at the samples of its sweep, and its origin
     with their units, grid and known errors.
 
@@ -152,7 +161,7 @@ def compared(samples: Samples, columns: Columns, case: Case, *, own: bool) -> Ca
             continue
         found = {
             quantity: grid.column(columns.of[name].place, columns.of[name].convert)
-            for quantity, ending in zip(QUANTITIES, ("", *DERIVATIVES), strict=True)
+            for quantity, ending in zip(QUANTITIES, RATES, strict=True)
             if (name := output.name + ending) in columns.of
         }
         known[output.name] = Series(
@@ -188,7 +197,7 @@ def _origin(case_file: Path, keys: ReferenceKeys) -> Origin:
                 " the case file",
             )
         return Origin(citation)
-    found = sha256(_beside(case_file, keys))
+    found = sha256(_reference_file(case_file, keys))
     if keys.digest not in (None, DIGEST + found):
         raise fault(
             case_file,
@@ -199,7 +208,7 @@ def _origin(case_file: Path, keys: ReferenceKeys) -> Origin:
     return Origin(citation, keys.file, found, own=keys.file.endswith(PROVED))
 
 
-def _beside(case_file: Path, keys: ReferenceKeys) -> Path:
+def _reference_file(case_file: Path, keys: ReferenceKeys) -> Path:
     """Return the path of the file, which must be the only source, in or below the case file's
     folder; any other path is refused.
     """
@@ -274,10 +283,10 @@ class Grid:
         self._written = samples.numbers[:, 0]
         rows = np.array([driver(x) for x in self._written.tolist()])
         self._allowed = allowed = SAME_GRID * float(np.max(np.abs(values)))
-        self._index = np.arange(len(rows)) if own else matched(rows, values, allowed)
+        self._index = np.arange(len(rows)) if own else match_rows(rows, values, allowed)
         self._full = any(printed.exact for printed in samples.printed[1:])
         half = samples.printed[0].half(self._written) * abs(driver(1.0))
-        if (self._index is not None and not own) or self._set():
+        if (self._index is not None and not own) or self._is_set():
             half = np.zeros_like(half)  # the driver values are exact as printed
         self._order = np.argsort(rows, kind="stable")
         self._x, self._half = rows[self._order], float(half.max())
@@ -286,10 +295,14 @@ class Grid:
         if self._index is None:
             self._check(driver, values)
 
-    def _set(self) -> bool:
+    def _is_set(self) -> bool:
         """Return whether somebody set the driver values, so that they are not rounded."""
         printed, values = self._samples.printed[0], self._written
-        return printed.as_set or even(values) or multiples(values, printed.decimals or 0)
+        return (
+            printed.as_set
+            or is_even_grid(values)
+            or have_common_factor(values, printed.decimals or 0)
+        )
 
     def _check(self, driver: Unit, values: Array) -> None:
         """Refuse rows unfit for interpolation."""
@@ -356,7 +369,7 @@ class Grid:
         printed = self._samples.printed[k]
         y = np.array([scale(value) for value in written.tolist()])
         half = np.where(np.isnan(written), 0.0, printed.half(written)) * abs(scale(1.0))
-        if self._full and even(written):  # a file of all digits has them here too
+        if self._full and is_even_grid(written):  # a file of all digits has them here too
             half = np.zeros_like(half)
         error = np.zeros_like(self._at)
         filled = self._order[~np.isnan(y[self._order])]
@@ -367,13 +380,13 @@ class Grid:
             values = np.where(there, y[self._index], np.nan)
             rounding = np.where(there, half[self._index], 0.0)
         else:
-            values, error = interpolated(x, y[filled], self._at)
+            values, error = interpolate(x, y[filled], self._at)
             values = np.where(within, values, np.nan)
             above = np.clip(np.searchsorted(x, self._at), 1, len(x) - 1)
             around = np.stack([above - 1, above])
             at_row = (np.abs(x[around] - self._at) <= self._allowed).any(axis=0)
             error = np.where(within & ~at_row, error, 0.0)
-            rounding = bounded(x, half[filled], self._at, within)
+            rounding = bound_rounding(x, half[filled], self._at, within)
         shifted = np.zeros_like(self._at)
         if self._half and len(x) > 1:
             shifted = self._half * slopes(x, y[filled], self._at)
@@ -421,7 +434,7 @@ def _columns(case: Case) -> dict[str, Array]:
     found = dict[str, Array]()
     for name, known in case.reference.items():
         quantities: Sequence[Array | None] = [getattr(known, each) for each in QUANTITIES]
-        for ending, values in zip(("", *DERIVATIVES), quantities, strict=True):
+        for ending, values in zip(RATES, quantities, strict=True):
             if values is not None:
                 found[name + ending] = values
     return found

@@ -22,7 +22,7 @@ from ..suspension import Convention, PerTravel, SuspensionOutput
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import decimal, fault, require_known, shown
 from .reader_options import CurveOptions
-from .reference import compared
+from .reference import compare_at_samples
 from .reference_file import sha256
 from .reference_samples import (
     Column,
@@ -37,7 +37,7 @@ from .reference_samples import (
     samples_of,
 )
 from .schema import MOST_SAMPLES
-from .table import required_unit, split_head, unit_of_head
+from .table import require_unit, split_head, unit_of_head
 
 MAP = "--map"
 _WRITTEN = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
@@ -66,7 +66,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     found = match(file, where, heads, driver, known, stated, _side(case))
     left_out = [head for k, head in enumerate(heads) if head and k not in found]
     targets = [*found.values()]
-    samples, equal = _once(samples_of(table, [*found], remarks=True, gaps=True))
+    samples, equal = _without_equal_rows(samples_of(table, [*found], remarks=True, gaps=True))
     columns = zip(samples.columns, targets, strict=True)
     samples = replace(
         samples, columns=[f"{text} [{each.unit}]" if each.unit else text for text, each in columns]
@@ -104,7 +104,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
             signs=convention + " (assumed: the file names none)" * assumed,
         ),
     )
-    case = compared(samples, Columns(unit, driver, of), case, own=options.own_samples)
+    case = compare_at_samples(samples, Columns(unit, driver, of), case, own=options.own_samples)
     assert case.origin is not None
     rows = [*samples.left_out, *equal]
     return case, _notes(file, case.origin, left_out, rows, bare, convention if assumed else "")
@@ -116,7 +116,7 @@ def _side(case: Case) -> str:
     return "right" if sides == {"right"} else "left"
 
 
-def _once(samples: Samples) -> tuple[Samples, list[str]]:
+def _without_equal_rows(samples: Samples) -> tuple[Samples, list[str]]:
     """Return the samples, of equal rows one, such as those before and after an event, and the
     places of the others.
 
@@ -149,7 +149,7 @@ def _columns(
     turns = driver != TIME and case.mechanism.driver(driver).turns
     _, unit = driver_unit(samples, SECOND if driver == TIME else RADIAN if turns else METRE)
     if targets[0].opposite:
-        unit = Unit(unit.name, unit.size, _opposite(unit.convert))
+        unit = Unit(unit.name, unit.size, _negate(unit.convert))
     of = dict[str, Column]()
     for k, (text, target) in enumerate(zip(samples.columns, targets, strict=True)):
         if k == 0:
@@ -161,19 +161,22 @@ def _columns(
             words += f", column {shown(text)}"
         if target.opposite:
             words += ", with the opposite sign"
-            found = replace(found, convert=_opposite(found.convert))
+            found = replace(found, convert=_negate(found.convert))
         of[target.name] = replace(found, unit=words)
     for name in of:
         require_positions(samples, name, of)
     return unit, of
 
 
-def _opposite(convert: Convert) -> Convert:
+def _negate(convert: Convert) -> Convert:
     return lambda number: -convert(number)
 
 
 def _with_accuracy(
-    file: Path, outputs: Sequence[Quantity], compared: Mapping[str, Column], texts: Sequence[str]
+    file: Path,
+    outputs: Sequence[Quantity],
+    columns: Mapping[str, Column],
+    texts: Sequence[str],
 ) -> tuple[Quantity, ...]:
     """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT". Without a
     unit the number is in that of the output's column; without an output it holds for all of them.
@@ -182,7 +185,7 @@ def _with_accuracy(
         CaseError: no such output, no such unit, or a number alone for columns of several units.
     """
     stated = dict[str, float]()
-    units = {output.name: output.unit for output in outputs if output.name in compared}
+    units = {output.name: output.unit for output in outputs if output.name in columns}
     for text in texts:
         name, equals, right = (part.strip() for part in text.partition("="))
         names, alone = [name], not equals and name not in units
@@ -197,7 +200,7 @@ def _with_accuracy(
             )
         for name in names:
             require_known(file, "--accuracy", name, units, "an output with a column")
-            bare = compared[name].convert
+            bare = columns[name].convert
             stated[name] = size_of(file, "--accuracy", name, right, units[name], bare)
     why = f"the accuracy of {file.name}, as its user states it"
     found: list[Any] = [*outputs]
@@ -232,7 +235,7 @@ def size_of(file: Path, option: str, name: str, text: str, unit: str, bare: Conv
             f' "{name}=0.02 {"deg" if unit == "rad" else unit}"',
         )
     if stated := stated.strip():
-        bare = required_unit(file, option, name, stated, unit).convert
+        bare = require_unit(file, option, name, stated, unit).convert
     return abs(bare(size) - bare(0.0))
 
 
@@ -358,7 +361,7 @@ def match(
     Raises:
         CaseError: two columns hold the same, a stated column is missing, or none holds an output.
     """
-    names = [_bare(head, known) for head in heads]
+    names = [_without_units(head, known) for head in heads]
     found = dict[int, Target]()
     for head, target in stated.items():
         places = [k for k, each in enumerate(heads) if head in (each, names[k])]
@@ -382,7 +385,7 @@ def match(
     by_name = {_normal(name): name for name in (*known, driver)}
     matches = dict[str, list[int]]()
     for k, name in enumerate(names):
-        wanted = _named(name, by_name, side)
+        wanted = _column_of_name(name, by_name, side)
         if k not in found and wanted and wanted not in taken:
             matches.setdefault(wanted, []).append(k)
     for name, places in matches.items():
@@ -416,13 +419,13 @@ def match(
     return {k: found[k] for k in (*drives, *outputs)}
 
 
-def _bare(head: str, known: Mapping[str, str]) -> str:
+def _without_units(head: str, known: Mapping[str, str]) -> str:
     """Return a head without its units."""
     name, unit = split_head(head, known)
-    return _bare(name, known) if unit else name
+    return _without_units(name, known) if unit else name
 
 
-def _named(name: str, by_name: Mapping[str, str], side: str) -> str:
+def _column_of_name(name: str, by_name: Mapping[str, str], side: str) -> str:
     """Return the driver or column of an output of a name, of a rig's name for it, or of one of
     these of a side; empty if there is none.
 

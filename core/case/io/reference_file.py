@@ -195,7 +195,7 @@ def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> 
     return np.array([np.nan if text is None else float(text) for text in column])
 
 
-def judged_by(
+def with_proved_references(
     cases: Sequence[Case], files: Sequence[Path], unused: list[str] | None = None
 ) -> list[Case]:
     """Return the cases with the proved references in these files. Their truth becomes

@@ -40,9 +40,9 @@ from .table import (
     numeral,
     one_sheet,
     read_sheets,
-    required_unit,
+    require_unit,
     text_table,
-    trimmed,
+    trim,
     unit_of_head,
 )
 
@@ -52,7 +52,8 @@ MOST_LINES = 2_000_000
 MOST_ABOVE = 1000
 COLUMNS, ROWS = "reference.columns", "reference.rows"
 """Places of a table in a case file."""
-DERIVATIVES = (".velocity", ".acceleration")
+RATES: Mapping[str, str] = {"": "", ".velocity": "/s", ".acceleration": "/s^2"}
+"""Endings of the columns of a quantity and of its rates, with their part of the unit."""
 _SIGNS = re.compile(r"\"?\s*#\s*signs:\s*(\w+)")
 
 
@@ -163,18 +164,20 @@ def layout_of(table: Table) -> Layout:
     first = list[tuple[str, Sequence[Cell]]]()
     all_numbers: int | None = None
     for where, cells in islice(table.rows(), MOST_ABOVE):
-        first.append((where, trimmed(cells)))
-        headed = any(_filled(row) > 1 and not _numbers(row) for _, row in first[:-1])
+        first.append((where, trim(cells)))
+        headed = any(_count_filled(row) > 1 and not _count_numbers(row) for _, row in first[:-1])
         # below a head, a lone number is a sample with gaps
-        if _numbers(cells) == _filled(cells) > (0 if headed else 1):
+        if _count_numbers(cells) == _count_filled(cells) > (0 if headed else 1):
             all_numbers = len(first) - 1
             break
-    most_numbers = (k for k, (_, cells) in enumerate(first) if 2 * _numbers(cells) > _filled(cells))
-    several = (k + 1 for k, (_, cells) in enumerate(first) if _filled(cells) > 1)
+    most_numbers = (
+        k for k, (_, cells) in enumerate(first) if 2 * _count_numbers(cells) > _count_filled(cells)
+    )
+    several = (k + 1 for k, (_, cells) in enumerate(first) if _count_filled(cells) > 1)
     body = all_numbers
     if body is None:
         body = next(most_numbers, next(several, min(1, len(first))))
-    above = [row for row in first[:body] if _filled(row[1]) > 1] or first[: max(body, 1)]
+    above = [row for row in first[:body] if _count_filled(row[1]) > 1] or first[: max(body, 1)]
     if not above:
         raise fault(
             table.file,
@@ -186,14 +189,14 @@ def layout_of(table: Table) -> Layout:
     where, heads = above[len(texts) - 1][0], texts[-1]
     named = [*filter(None, heads)]
     if len(texts) > 1 and (len({*named}) < len(named) or "" in heads):
-        heads = [f"{a} {b}".strip() for a, b in zip(*_grouped(texts[-2], heads), strict=True)]
+        heads = [f"{a} {b}".strip() for a, b in zip(*_group_names(texts[-2], heads), strict=True)]
     rows = [texts[-1], *[units] * bool(units)]
     units = [unit.strip("[]() ") for unit in units] + [""] * len(heads)
     heads = [f"{a} [{b}]" if a and b else a for a, b in zip(heads, units, strict=False)]
     return Layout(where, heads, rows, max(body, 1))
 
 
-def _grouped(above: Sequence[str], heads: Sequence[str]) -> tuple[list[str], list[str]]:
+def _group_names(above: Sequence[str], heads: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the names of groups, each over the blank cells behind it, and the heads below."""
     width = max(len(above), len(heads))
     groups, below = ([*row, *[""] * (width - len(row))] for row in (above, heads))
@@ -202,11 +205,11 @@ def _grouped(above: Sequence[str], heads: Sequence[str]) -> tuple[list[str], lis
     return groups, below
 
 
-def _filled(cells: Sequence[Cell]) -> int:
+def _count_filled(cells: Sequence[Cell]) -> int:
     return sum(cell != "" for cell in cells)
 
 
-def _numbers(cells: Sequence[Cell]) -> int:
+def _count_numbers(cells: Sequence[Cell]) -> int:
     return sum(map(is_number, cells))
 
 
@@ -236,7 +239,7 @@ def samples_of(
     places, numbers, left_out = list[str](), array("d"), list[str]()
     printed = [Printed() for _ in wanted]
     for place, cells in islice(table.rows(), layout.body, None):
-        cells = trimmed(cells)
+        cells = trim(cells)
         first = cells[wanted[0]] if wanted[0] < len(cells) else ""
         if remarks and not is_number(first) and _is_remark(file, place, cells, layout):
             left_out.append(f"{place} ({brief(', '.join(map(str, filter(None, cells))))})")
@@ -283,9 +286,15 @@ def _is_remark(file: Path, place: str, cells: Sequence[Cell], layout: Layout) ->
         CaseError: it is another head, so that another table follows.
     """
     texts = [str(cell).strip() for cell in cells]
-    if _numbers(cells) or any(text.startswith(("=", "#N", "#R", "#V", "#D")) for text in texts):
+    if _count_numbers(cells) or any(
+        text.startswith(("=", "#N", "#R", "#V", "#D")) for text in texts
+    ):
         return False
-    if texts in layout.rows or 2 * _filled(cells) <= len(layout.heads) or _filled(cells) == 1:
+    if (
+        texts in layout.rows
+        or 2 * _count_filled(cells) <= len(layout.heads)
+        or _count_filled(cells) == 1
+    ):
         return not texts or texts[0].lower().lstrip("+-") != "nan"
     raise fault(
         file,
@@ -299,7 +308,7 @@ def _decimal_sign(table: Table, layout: Layout, wanted: Sequence[int]) -> str:
     texts = [
         (place, cell)
         for place, cells in islice(table.rows(), layout.body, None)
-        if _numbers(cells)
+        if _count_numbers(cells)
         for cell in (cells[n] for n in wanted if n < len(cells))
         if isinstance(cell, str) and cell
     ]
@@ -320,7 +329,7 @@ def _number(file: Path, where: str, cell: object, text: str) -> float:
     return number if abs(number) >= SMALLEST else 0.0  # far below any tolerance
 
 
-def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Table:
+def inline_table(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Table:
     """Return the table of the rows in a case file.
 
     Raises:
@@ -376,7 +385,7 @@ def known_columns(outputs: Iterable[Quantity]) -> dict[str, str]:
     return {
         output.name + ending: output.unit + time
         for output in outputs
-        for ending, time in zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
+        for ending, time in RATES.items()
     }
 
 
@@ -393,7 +402,7 @@ def driver_unit(samples: Samples, default: Unit) -> tuple[str, Unit]:
     name, unit = unit_of_head(samples.file, samples.header, text)
     if not unit:
         return text, default
-    return name, required_unit(samples.file, samples.header, text, unit, si_of(default))
+    return name, require_unit(samples.file, samples.header, text, unit, si_of(default))
 
 
 def read_columns(
@@ -460,7 +469,7 @@ def column_of(samples: Samples, k: int, unit: str, si: str, units: FileUnits) ->
     """
     if not unit:
         return Column(k, *units.of(si.removesuffix("^2").removesuffix("/s")))
-    found = required_unit(samples.file, samples.header, samples.columns[k], unit, si)
+    found = require_unit(samples.file, samples.header, samples.columns[k], unit, si)
     return Column(k, found.name, found.convert)
 
 

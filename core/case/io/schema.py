@@ -191,8 +191,7 @@ from msgspec import Meta
 
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import ANGLE, SIX_NUMBERS, Inertia, dimension_of
-from ...mechanism.curves import dimensions_of
-from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper
+from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper, dimensions_of
 from ...mechanism.mechanism import Vector
 from ...mechanism.motions import Driver, Motion
 from ..case import TIME, Truth

@@ -16,7 +16,6 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...mechanism.motions import PointCoordinate
 from ..case import Case
 from ..suspension import AxleOutput, PerTravel, Side, SuspensionOutput, Vehicle
-from ..units import FileUnits
 from .document import Section, shown, toml_table
 from .schema import OtherWheelKeys, SuspensionKeys
 
@@ -53,7 +52,7 @@ class SuspensionTable:
     other: Vehicle | None = None
 
 
-def read_suspension(section: Section, case: Case, units: FileUnits) -> SuspensionTable:
+def read_suspension(section: Section, case: Case) -> SuspensionTable:
     """Read the table, in SI.
 
     Args:
@@ -62,7 +61,7 @@ def read_suspension(section: Section, case: Case, units: FileUnits) -> Suspensio
     Raises:
         CaseError: invalid axes, unknown points or drivers, or a wheel on the wrong side.
     """
-    keys, angle = section.typed(SuspensionKeys), units.angle
+    keys, units = section.typed(SuspensionKeys), section.units
     forward, up = (direction(section.at(name), getattr(keys, name)) for name in ("forward", "up"))
     if abs(vec(forward) @ vec(up)) > SQUARE:
         raise section.at("up").fault(
@@ -72,10 +71,10 @@ def read_suspension(section: Section, case: Case, units: FileUnits) -> Suspensio
     given = msgspec.structs.asdict(keys)
     given = {name: each for name, each in given.items() if name not in _NOT_OF_VEHICLE}
     given |= {name: units.length(given[name]) for name in _LENGTHS if given[name] is not None}
-    given |= {name: angle(given[name]) for name in ("static_toe", "static_camber")}
+    given |= {name: units.angle(given[name]) for name in ("static_toe", "static_camber")}
     given["kingpin"] = _kingpin(section, keys, case.mechanism)
     given |= {"forward": forward, "up": up, "middle": units.place(keys.center_plane)}
-    vehicle = _checked(section, Vehicle(**given), case.mechanism, units)
+    vehicle = _check_vehicle(section, Vehicle(**given), case.mechanism)
     travel = _travel(section, keys.travel, vehicle, case)
     if keys.other is None:
         alone = [travel] == list(case.sweep.path.motions)
@@ -89,13 +88,13 @@ def read_suspension(section: Section, case: Case, units: FileUnits) -> Suspensio
         side=Side.RIGHT if vehicle.side is Side.LEFT else Side.LEFT,
         wheel_center=of_other.wheel_center,
         kingpin=_kingpin(section, of_other, case.mechanism),
-        static_toe=vehicle.static_toe if toe is None else angle(toe),
-        static_camber=vehicle.static_camber if camber is None else angle(camber),
+        static_toe=vehicle.static_toe if toe is None else units.angle(toe),
+        static_camber=vehicle.static_camber if camber is None else units.angle(camber),
         wheel_axis=of_other.wheel_axis,
         wheel_radius=keys.wheel_radius and vehicle.wheel_radius,
         wheel_contact=of_other.wheel_contact,
     )
-    other = _checked(section, other, case.mechanism, units)
+    other = _check_vehicle(section, other, case.mechanism)
     beside = _travel(section, of_other.travel, other, case)
     both = () if travel is None or beside is None else (travel, beside)
     vehicle, other = (replace(each, travel=both) for each in (vehicle, other))
@@ -142,7 +141,7 @@ def _kingpin(
     return keys.kingpin or rods
 
 
-def _checked(section: Section, vehicle: Vehicle, mechanism: Mechanism, units: FileUnits) -> Vehicle:
+def _check_vehicle(section: Section, vehicle: Vehicle, mechanism: Mechanism) -> Vehicle:
     """Return the vehicle with the radius by the point of the wheel's contact, after checks of its
     side and its points. The most common mistake is hardpoints of the other side, or in mirrored
     axes.
@@ -157,9 +156,9 @@ def _checked(section: Section, vehicle: Vehicle, mechanism: Mechanism, units: Fi
     if aside <= 0.0:
         raise section.at("side").fault(
             f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is"
-            f" {units.length.written(-aside)} on the other side of the centre plane, expected the"
-            " side on which it is, looking forward with up upwards; correct side, forward, up or"
-            " center_plane"
+            f" {section.units.length.written(-aside)} on the other side of the centre plane,"
+            " expected the side on which it is, looking forward with up upwards; correct side,"
+            " forward, up or center_plane"
         )
     ends = [vec(mechanism.point(name).position) for name in vehicle.kingpin_points]
     if len(ends) == 2 and vec(vehicle.up) @ (ends[1] - ends[0]) <= 0.0:

@@ -25,7 +25,7 @@ from ...errors import MOST_NAMED, KincheckError, brief, remedy, shortened
 from ...extras import library
 from ..units import ANGLES, LENGTHS, Unit
 from .document import decimal, fault, read_bytes, shown
-from .foreign import ARCHIVE, EXCEL, MOST_MEMBERS, binary, members, recognised
+from .foreign import ARCHIVE, EXCEL, MOST_MEMBERS, binary, members, recognise_format
 
 WORKBOOKS = (".xlsx", ".xlsm")
 DELIMITERS = ";\t,"
@@ -291,7 +291,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Table]:
                 if formulas:
                     computed = computed or workbook(data_only=True)
                     values, _ = _rows(file, computed[name], most_rows)
-                    rows = _computed(rows, dict(values))
+                    rows = _with_computed_values(rows, dict(values))
                 if rows:
                     sheets.append(Table(file, name=name, sheet=rows))
             return sheets
@@ -325,7 +325,7 @@ def one_sheet(file: Path, sheets: Sequence[Table], option: str) -> Table:
 
 def _require_workbook(file: Path, data: bytes) -> None:
     """Refuse a file unless it is a zip archive of reasonable unpacked size."""
-    what, advice = recognised(data)
+    what, advice = recognise_format(data)
     if not data:
         raise fault(file, "", "is empty, expected a workbook (.xlsx); save the workbook anew")
     if what not in (EXCEL, ARCHIVE):
@@ -385,11 +385,11 @@ def _rows(file: Path, sheet: Any, most: int) -> tuple[list[Row], bool]:
                 raise fault(file, f"sheet {shown(sheet.title)}", problem)
         if filled:
             formulas = formulas or any(cell.data_type == "f" for cell in cells)
-            rows.append((f"row {k}", trimmed([_cell(cell.value) for cell in cells])))
+            rows.append((f"row {k}", trim([_cell(cell.value) for cell in cells])))
     return rows, formulas
 
 
-def _computed(rows: Sequence[Row], values: Mapping[str, Sequence[Cell]]) -> list[Row]:
+def _with_computed_values(rows: Sequence[Row], values: Mapping[str, Sequence[Cell]]) -> list[Row]:
     """Return rows with the values of formulas; a formula without a value stays a formula."""
 
     def value(cell: Cell, found: Cell) -> Cell:
@@ -401,7 +401,7 @@ def _computed(rows: Sequence[Row], values: Mapping[str, Sequence[Cell]]) -> list
     ]
 
 
-def trimmed(cells: Sequence[Cell]) -> Sequence[Cell]:
+def trim(cells: Sequence[Cell]) -> Sequence[Cell]:
     """Return cells without empty cells at the end."""
     filled = len(cells)
     while filled and cells[filled - 1] == "":
@@ -492,7 +492,7 @@ def unit_of_head(file: Path, where: str, text: str, names: Container[str] = ()) 
     return name, unit
 
 
-def required_unit(file: Path, where: str, column: str, unit: str, si: str) -> Unit:
+def require_unit(file: Path, where: str, column: str, unit: str, si: str) -> Unit:
     """Return the unit of a column, which must measure what an SI unit does.
 
     Raises:

@@ -166,7 +166,7 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
 
             root = whole_mjcf(file, root)
     omitted: list[tuple[str, Element]] = []
-    tree = read(file, root.pruned(without, omitted))
+    tree = read(file, root.without_named(without, omitted))
     tree.without = {name for name, _ in omitted}
     if omitted:
         tree.notes.append(f"{WITHOUT}{', '.join(str(each) for _, each in omitted)}")
@@ -181,7 +181,7 @@ def require_used(file: Path, without: Collection[str], used: Collection[str]) ->
     """
     for name in without:
         if name not in used:
-            elements = [*root_of(file).below()]
+            elements = [*root_of(file).descendants()]
             known = {each.tag for each in elements}
             known |= {each.attributes.get("name", each.tag) for each in elements}
             raise unknown_name(file, "--without", name, known, "an element of the file")

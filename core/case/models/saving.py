@@ -41,7 +41,7 @@ def save_table(
             " dashes and blanks; give another"
         )
     path = table.file.parent / name
-    content = _edited(table, points) or _written(table, supplied, points)
+    content = _text_with_changes(table, points) or _new_text(table, supplied, points)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
     try:
         with open(os.open(path, flags, 0o644), "w", encoding="utf-8", newline="") as file:
@@ -53,7 +53,7 @@ def save_table(
             f"save {name}: cannot be written ({error.strerror}); give another name, or start"
             " kincheck with a file in a folder that is writable"
         ) from None
-    if not _same(path, supplied, table, points):
+    if not _reads_back(path, supplied, table, points):
         path.unlink()
         raise KincheckError(
             f"save {name}: the file would be read with other numbers; nothing was written: save"
@@ -62,7 +62,7 @@ def save_table(
     return path
 
 
-def _same(
+def _reads_back(
     path: Path, supplied: Supplied, table: HardpointTable, points: Sequence[Sequence[float]]
 ) -> bool:
     """Return whether a file is read as these points."""
@@ -76,7 +76,7 @@ def _same(
     return angles and positions == wanted
 
 
-def _edited(table: HardpointTable, points: Sequence[Sequence[float]]) -> str | None:
+def _text_with_changes(table: HardpointTable, points: Sequence[Sequence[float]]) -> str | None:
     """Return the text of a table with the changed numbers replaced; None unless each point is a
     line of text with plain numbers.
     """
@@ -96,13 +96,13 @@ def _edited(table: HardpointTable, points: Sequence[Sequence[float]]) -> str | N
             return None
         for axis, (number, before) in enumerate(zip(row, old.position, strict=True)):
             if number != before:
-                fields[first + 2 * axis + 2] = _plain(number)
+                fields[first + 2 * axis + 2] = _number_text(number)
         end = lines[k][len(lines[k].rstrip("\r\n")) :]
         lines[k] = "".join(fields) + end
     return "".join(lines)
 
 
-def _written(table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]) -> str:
+def _new_text(table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]) -> str:
     """Return a new table as CSV, with unit, axes and template."""
     known = {
         "template": table.template or supplied.template,
@@ -114,10 +114,10 @@ def _written(table: HardpointTable, supplied: Supplied, points: Sequence[Sequenc
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["name", "x", "y", "z"])
     for name, row in zip(table.points, points, strict=True):
-        writer.writerow([name, *map(_plain, row)])
+        writer.writerow([name, *map(_number_text, row)])
     return text.getvalue()
 
 
-def _plain(number: float) -> str:
+def _number_text(number: float) -> str:
     """Return the shortest exact text of a number."""
     return str(int(number)) if number == int(number) and abs(number) < 1e15 else repr(number)

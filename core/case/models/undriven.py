@@ -12,7 +12,7 @@ from ...joints import Revolute, Translational
 from ...mechanism.mechanism import Mechanism
 from ..case import Case
 from .files import MODEL, kind_of, load, read_tree, root_of
-from .trees.case import undriven
+from .trees.case import undriven_mechanism
 from .trees.element import Element, printed_digits
 from .trees.tree import NO_LIMIT, Limit
 
@@ -112,7 +112,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     if kind_of(file) != MODEL:
         return undriven_case(load(file), file.name)
     root = root_of(file)
-    mechanism, tree, spinning = undriven(read_tree(file, without))
+    mechanism, tree, spinning = undriven_mechanism(read_tree(file, without))
     coordinates = {
         name: Coordinate(move.kind == "hinge", move.value, move.limit, name in tree.actuated)
         for name, move in tree.joints.items()
@@ -126,9 +126,10 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         [body.name for body in mechanism.moving if body.name in tree.places],
         spinning,
         10.0**-digits if digits else 0.0,
-        max(map(_angle_error, root.below()), default=0.0),
+        max(map(_angle_error, root.descendants()), default=0.0),
         is_model=True,
-        says_gravity=root.tag == "mujoco" or any(each.tag in _SCENES for each in root.below()),
+        says_gravity=root.tag == "mujoco"
+        or any(each.tag in _SCENES for each in root.descendants()),
         notes=[f"{file.name}: {note}" for note in tree.notes],
         without=tree.without,
     )

@@ -313,7 +313,7 @@ class _Run:
                 way = wanted - near.time
                 passed = self.pass_over(path, ahead.sound, near, near.time, way, rates=False)
             if passed is None:
-                self.end(path.ended(ahead.time, wanted, last, str(failure)), failure.kind)
+                self.end(path.end_message(ahead.time, wanted, last, str(failure)), failure.kind)
                 return None
             self.notes.append(f"crosses a singular pose near {path.where(ahead.time)}; {CONTINUED}")
             start = passed.poses[-1]

@@ -228,19 +228,18 @@ def compile_model(mechanism: Mechanism, request: Request, alike: Alike | None = 
     return Model(mechanism, request, traced(mechanism, request, alike))
 
 
-@cache_last(RECENT)
-def _recent(mechanism: Mechanism, request: Request) -> Model:
-    return compile_model(mechanism, request)
+def is_known(mechanism: Mechanism, _: Request) -> bool:
+    """Return whether what is made of a mechanism for a request may be kept; see `is_builtin`."""
+    return is_builtin(mechanism)
 
 
+@cache_last(RECENT, when=is_known)
 def recent_model(mechanism: Mechanism, request: Request) -> Model:
     """Return the compiled model of a mechanism and a request; the last few are kept.
 
     Threads with the same request at the same time may each make one.
     """
-    return (
-        _recent(mechanism, request) if is_builtin(mechanism) else compile_model(mechanism, request)
-    )
+    return compile_model(mechanism, request)
 
 
 class Model(Tracing):

@@ -408,18 +408,15 @@ def _in_parts(start: float, times: Array, parts: int) -> Array:
     return found.ravel()
 
 
+def _is_kept(mechanism: Mechanism, _: Request, path: Path) -> bool:
+    return len(path.times) <= LONGEST_KEPT and path.is_builtin and is_builtin(mechanism)
+
+
+@cache_last(RECENT, when=_is_kept)
 def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
     """A route, and the same for the same mechanism, request and path as long as it is among the
     last few asked for.
 
     To make one and bind it to lanes takes twenty times as long as to solve it.
     """
-    kept = len(path.times) <= LONGEST_KEPT and path.is_builtin and is_builtin(mechanism)
-    return (
-        _recent(mechanism, request, path) if kept else Route(recent_model(mechanism, request), path)
-    )
-
-
-@cache_last(RECENT)
-def _recent(mechanism: Mechanism, request: Request, path: Path) -> Route:
     return Route(recent_model(mechanism, request), path)

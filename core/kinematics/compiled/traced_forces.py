@@ -89,7 +89,7 @@ class TracedForces:
         drives: Mapping[str, Drive],
     ) -> None:
         self._mechanism, self._rows, self._states, self._drives = mechanism, rows, states, drives
-        self._equations = ForceEquations.traced(mechanism, rows.formulation, at, states)
+        self._equations = ForceEquations.with_angles(mechanism, rows.formulation, at, states)
 
     @cached_property
     def _multipliers(self) -> list[Scalar]:

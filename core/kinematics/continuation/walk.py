@@ -384,7 +384,9 @@ class Marcher:
         if failure.kind is not FailureKind.TOO_MANY_PARTS:
             failure = replace(failure, sigma=float(anchor[self.slots[FROM + SIGMA]]))
         last, wanted = float(side.samples[0, at - 1]) if at else None, float(side.samples[0, at])
-        message = self.route.path.ended(time_of(self.model, anchor), wanted, last, str(failure))
+        message = self.route.path.end_message(
+            time_of(self.model, anchor), wanted, last, str(failure)
+        )
         return End(message, self.route, anchor, wanted, failure.kind)
 
 

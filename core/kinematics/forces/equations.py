@@ -34,15 +34,16 @@ from ...algebra import ZERO, Mat3, Quat, Scalar, Vec3, cross, is_literal_zero, r
 from ...errors import SolveError
 from ...joints.base import Joint, unit
 from ...mechanism.body import Body
-from ...mechanism.curves import Curve, pieces
 from ...mechanism.loads import (
     Axes,
     Bushing,
+    Curve,
     Force,
     Law,
     SpringDamper,
     Torque,
     TorsionSpringDamper,
+    pieces,
 )
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Driver
@@ -106,7 +107,7 @@ class BodyStates:
         """Return the angular velocity of a body [rad/s]."""
         return self.twists.get(body, GROUND_TWIST).w
 
-    def turned(self, body: str, vector: Sequence[float]) -> Vec3:
+    def turn(self, body: str, vector: Sequence[float]) -> Vec3:
         """Return a vector fixed in a body, given at design, in its current direction."""
         return self._pose(body).turn(vec(vector))
 
@@ -233,7 +234,7 @@ def torsion(
 ) -> Applied:
     """Return a torsional spring-damper at work at its joint's angle."""
     joint: Any = mechanism.joint(each.joint)
-    axis = at.turned(joint.i, [*unit(joint.axis)])
+    axis = at.turn(joint.i, [*unit(joint.axis)])
     rate = axis @ (at.spin(joint.j) - at.spin(joint.i))
     elastic = _elastic(each, angle - each.free_angle)
     amount = -(elastic + each.damping * rate)
@@ -245,7 +246,7 @@ def torsion(
 def constant(each: Force | Torque, at: BodyStates) -> Applied:
     """Return a constant force or torque at work."""
     body = each.body
-    vector = vec(each.vector) if each.frame is Axes.GLOBAL else at.turned(body, each.vector)
+    vector = vec(each.vector) if each.frame is Axes.GLOBAL else at.turn(body, each.vector)
     amount = root(sum(x * x for x in each.vector))
     if isinstance(each, Torque):
         return Applied(amount, {body: Wrench(ZERO, vector)}, 0.0, -(vector @ at.spin(body)))
@@ -272,7 +273,7 @@ def bushing(each: Bushing, at: BodyStates) -> Applied:
     """Return a bushing at work; its amount is the size of its force, or torque if it has none."""
     i, j, place = each.i, each.j, each.point
     d = at.place(j, place) - at.place(i, place)
-    axes = [at.turned(i, axis) for axis in each.triad]
+    axes = [at.turn(i, axis) for axis in each.triad]
     reach = at.arm(i, place) + d
     seen = at.velocity(j, place) - at.velocity(i, place) - cross(at.spin(i), d)
     turn = at.spin(j) - at.spin(i)
@@ -312,7 +313,7 @@ def _torque(each: Bushing, at: BodyStates) -> Vec3:
         for axis, k in zip(axes, each.turning_stiffness, strict=True):
             t = t + (2.0 * k * (axis @ turn.e)) * axis
         found = turn.e0 * t + cross(turn.e, t)
-    return at.turned(each.i, [*found])
+    return at.turn(each.i, [*found])
 
 
 def _cardan(stiffness: tuple[float, float, float], turn: Quat) -> Vec3:
@@ -375,7 +376,7 @@ class ForceEquations:
     left_out: Cartesian
 
     @classmethod
-    def traced(
+    def with_angles(
         cls, mechanism: Mechanism, formulation: Cartesian, at: Configuration, states: BodyStates
     ) -> ForceEquations:
         """Return the equations at a configuration that has the angles of torsional springs."""
@@ -410,7 +411,7 @@ class ForceEquations:
         return found
 
     @cached_property
-    def _numbered(self) -> list[tuple[int, Constraint | Relation]]:
+    def _numbered_rows(self) -> list[tuple[int, Constraint | Relation]]:
         """Return the constraint and number of every row: joints, couplers, drivers, left out."""
         return [*enumerate((*self.formulation.of_rows, *self.left_out.of_rows))]
 
@@ -423,7 +424,7 @@ class ForceEquations:
         found: dict[str, list[tuple[int, Constraint | Relation]]] = {
             joint.name: [] for joint in mechanism.given_joints
         }
-        for k, c in self._numbered:
+        for k, c in self._numbered_rows:
             if id(c) in own:
                 found[mechanism.given_name(c.owner)].append((k, c))
         return found
@@ -438,7 +439,7 @@ class ForceEquations:
         for k, c in self._of_joints[joint.name]:
             if isinstance(c, Relation):
                 for name, weight in c.weights.items():
-                    measuring = self.formulation.measuring[name]
+                    measuring = self.formulation.measuring_rows[name]
                     share = self.rows[measuring][self.formulation.coordinates[name]]
                     yield measuring, -(weight / share) * multipliers[k]
             elif not c.coordinate:
@@ -475,7 +476,7 @@ class ForceEquations:
         """Return the effort of a driver [N or N m]."""
         drivers = self.mechanism.drivers
         c: Any = self.formulation.constraints[drivers.index(driver) - len(drivers)]
-        first = next(k for k, each in self._numbered if each is c)
+        first = next(k for k, each in self._numbered_rows if each is c)
         # nu is linear in the driver's rate: at rate one it is the power per unit multiplier
         at_rate_one = replace(c.primitive, drive=replace(c.primitive.drive, c_t=1.0))
         pair = (self.at.poses.get(b, GROUND_POSE) for b in (c.i, c.j))

@@ -144,7 +144,7 @@ class ForceRows:
         The angle of a driven joint, or of a joint geared to one, is exact. Other angles follow the
         rates from the sample nearest to the design, and `follow` corrects their turns.
         """
-        known = self._driven.get((name, "rotation"))
+        known = self._driven_coordinates.get((name, "rotation"))
         if known is not None or not self.n:
             return np.zeros(0) if known is None else known
         angle, rate = (
@@ -159,7 +159,7 @@ class ForceRows:
         return self._follow(name, angle, rate) if self._follow else angle
 
     @cached_property
-    def _driven(self) -> Mapping[tuple[str, str], Array]:
+    def _driven_coordinates(self) -> Mapping[tuple[str, str], Array]:
         """Return coordinates given by drivers or their couplers: joint and freedom -> value."""
         found: dict[tuple[str, str], Array] = {
             (each.joint, each.freedom): self.values[each.name]
@@ -226,7 +226,7 @@ class ForceRows:
         each = [np.hstack(self.wrench(joint, multipliers)) for multipliers in columns]
         return np.stack(each, axis=2) if each else np.empty((self.n, 6, 0))
 
-    def left(self, at: Configuration | None = None) -> Iterator[tuple[Array, Array]]:
+    def remainders(self, at: Configuration | None = None) -> Iterator[tuple[Array, Array]]:
         """Yield what is left of the rows by order of the motion, phi, J v - nu and J a - gamma, and
         their right-hand sides, shape (n, rows) each.
 
@@ -259,7 +259,7 @@ class ForceRows:
             for row, b in zip(rows, right, strict=True)
         ]
         own: list[Any] = [0.0] * (formulation.unknowns - bodies)
-        for name, k in formulation.measuring.items():
+        for name, k in formulation.measuring_rows.items():
             column = formulation.coordinates[name]
             own[column - bodies] = -left[k] / rows[k][column]
         moved = (sum(x * own[c - bodies] for c, x in row.items() if c >= bodies) for row in rows)
@@ -375,7 +375,7 @@ def motion_defects(mechanism: Mechanism, path: Path, motion: Trajectory) -> Mapp
     orders, bodies = with_rates(motion.bodies)
     lines = ForceRows(mechanism, path, replace(motion, bodies=bodies))
     found, speed = dict[str, Array](), 1.0
-    for order, (defects, right) in enumerate(islice(lines.left(), orders)):
+    for order, (defects, right) in enumerate(islice(lines.remainders(), orders)):
         largest = float(np.abs(right).max(initial=0.0))
         speed = largest or 1.0 if order == 1 else speed
         scale = (1.0, speed, max(largest, speed**2))[order]

@@ -171,6 +171,9 @@ def regular_between(ratio: Array) -> bool:
         return False
     if np.linalg.norm(change) <= LARGEST_CHANGE:  # never smaller than that eigenvalue, and cheap
         return True
+    y = change.sum(axis=1)
+    if (change @ y <= LARGEST_CHANGE * y).all():  # bounds it too (Collatz and Wielandt)
+        return True
     return bool(np.abs(np.linalg.eigvals(change)).max() <= LARGEST_CHANGE)
 
 
@@ -252,11 +255,15 @@ def margins(pose: Candidate, limits: Limits) -> dict[str, Scalar]:
         "on the branch": pose.branch,
         "continued": LARGEST_CORRECTION * pose.moved + NEGLIGIBLE - pose.gap,
         "near": LONGEST_STEP - pose.reach,
-        **({"not turned round": reduce(minimum, map(_unturned, pose.turns))} if pose.turns else {}),
+        **(
+            {"not turned round": reduce(minimum, map(_turn_margin, pose.turns))}
+            if pose.turns
+            else {}
+        ),
         "as regular": reduce(minimum, map(_as_regular, pose.blocks)) + crossing,
         "on this side": 0.5 - absolute(pose.reversal) + crossing,
         "regular between": (
-            reduce(minimum, (_between(block, pose.moved) for block in pose.blocks)) + crossing
+            reduce(minimum, (_zero_margin(block, pose.moved) for block in pose.blocks)) + crossing
         ),
         "certain": FOLLOWED * sigma * sigma - uncertain,
         "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, pose.before - sigma),
@@ -278,7 +285,7 @@ def least_slope(slope: Scalar) -> Scalar:
     return maximum(FALLS * slope, EPSILON)
 
 
-def _unturned(turn: Scalar) -> Scalar:
+def _turn_margin(turn: Scalar) -> Scalar:
     """Positive if a driver has turned too little to lose a whole turn."""
     return LONGEST_TURN - absolute(turn)
 
@@ -290,6 +297,6 @@ def _as_regular(block: Block) -> Scalar:
     )
 
 
-def _between(block: Block, moved: Scalar) -> Scalar:
+def _zero_margin(block: Block, moved: Scalar) -> Scalar:
     """Positive if sigma cannot have been zero during the step."""
     return block.sigma + block.before - minimum(STEEPER * block.slope, STEEPEST) * moved

@@ -93,7 +93,7 @@ class Cartesian:
     @property
     def owners(self) -> Sequence[tuple[str, str]]:
         """For every row, its joint or driver and its primitive."""
-        return [*map(_named, self.of_rows)]
+        return [*map(_names, self.of_rows)]
 
     @cached_property
     def of_rows(self) -> Sequence[Constraint | Relation]:
@@ -101,7 +101,7 @@ class Cartesian:
         return [c for c in self.constraints for _ in range(c.n)]
 
     @cached_property
-    def measuring(self) -> Mapping[str, int]:
+    def measuring_rows(self) -> Mapping[str, int]:
         """Number of the row that measures a named coordinate."""
         rows = enumerate(self.of_rows)
         return {c.coordinate: k for k, c in rows if isinstance(c, Constraint) and c.coordinate}
@@ -215,7 +215,7 @@ class Cartesian:
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
         """Return the right-hand sides of the acceleration equations at unknown rates v."""
-        twists = self._own(v) | {name: each.twist for name, each in self.prescribed.items()}
+        twists = self._by_body(v) | {name: each.twist for name, each in self.prescribed.items()}
         carried = {
             name: Twist(each.acceleration.v_t, each.acceleration.w_t)
             for name, each in self.prescribed.items()
@@ -246,7 +246,7 @@ class Cartesian:
             if body in carried:
                 rows = self._bound(c, at).rows(*_pair(c, at))
                 found = [
-                    x - row.along(place, carried[body]) for x, row in zip(found, rows, strict=True)
+                    x - row.part(place, carried[body]) for x, row in zip(found, rows, strict=True)
                 ]
         return found
 
@@ -266,7 +266,7 @@ class Cartesian:
         """Return the twists of the bodies at unknown rates v."""
         return {
             name: Twist(twist.v, self._global(at.poses[name], twist.w))
-            for name, twist in self._own(v).items()
+            for name, twist in self._by_body(v).items()
         }
 
     def accelerations(
@@ -276,10 +276,10 @@ class Cartesian:
         # A w' differentiated is A w'dot + w x w, and the last is zero
         return {
             name: Acceleration(twist.v, self._global(at.poses[name], twist.w))
-            for name, twist in self._own(a).items()
+            for name, twist in self._by_body(a).items()
         }
 
-    def _own(self, v: Sequence[Scalar]) -> dict[str, Twist]:
+    def _by_body(self, v: Sequence[Scalar]) -> dict[str, Twist]:
         """Return the unknowns by body, in the axes of the rows."""
         return {
             name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS]))
@@ -299,14 +299,14 @@ class Cartesian:
         return entries
 
 
-def _named(c: Constraint | Relation) -> tuple[str, str]:
+def _names(c: Constraint | Relation) -> tuple[str, str]:
     """Return the names of the joint or driver, and of the primitive."""
     return c.owner, "Relation" if isinstance(c, Relation) else type(c.primitive).__name__
 
 
 def _condition(c: Constraint | Relation) -> tuple[object, ...]:
     """Return the names, and what tells a driver from a joint or coupler of its name."""
-    return _named(c), c.coordinate if isinstance(c, Constraint) else len(c.weights)
+    return _names(c), c.coordinate if isinstance(c, Constraint) else len(c.weights)
 
 
 def _values(c: Relation, at: Configuration) -> list[Scalar]:

@@ -68,7 +68,7 @@ class Frames:
         """Return a point of a body: its position and arm."""
         return position, self.arm(body, position)
 
-    def attached(self, joint: _Joint) -> tuple[_Joint, Attachment, Attachment]:
+    def attach(self, joint: _Joint) -> tuple[_Joint, Attachment, Attachment]:
         """Return a joint in units, and how it is attached to both bodies."""
         i, j = (Attachment(self.origins[body]) for body in joint.bodies)
         return joint.scaled(1.0 / self.unit), i, j
@@ -163,28 +163,28 @@ def constraints(
             fixed_last = mechanism.is_fixed(joint.j)
             found += _axial(joint, frame, coupled, mixed=mixed, fixed_last=fixed_last)
         else:
-            found += _composed(mechanism, joint, frame)
+            found += _compose(mechanism, joint, frame)
     for coupler in mechanism.couplers:
         weights = {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}
         found.append(_relation(coupler.name, weights, frame, coupler.curve))
     found += [
-        _driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
+        _driver_constraint(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
         for each in mechanism.drivers
     ]
-    return _restyled(found, style)
+    return _restyle(found, style)
 
 
 def constraints_left_out(mechanism: Mechanism, frame: Frames) -> list[Constraint]:
     """Return the constraints of reduced joints that are left out."""
     joints = (joint for each in mechanism.reduced for joint in each.left_out)
-    return [each for joint in joints for each in _composed(mechanism, joint, frame)]
+    return [each for joint in joints for each in _compose(mechanism, joint, frame)]
 
 
-def _composed(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Constraint]:
+def _compose(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Constraint]:
     # the ground as body i: its rows are constant and the simplified ones need nothing of body j
     backwards = original.symmetric and mechanism.is_fixed(original.j)
     joint = original.reversed() if backwards else original
-    scaled, i, j = frame.attached(joint)
+    scaled, i, j = frame.attach(joint)
     composed = scaled.primitives(i, j)
     return [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
 
@@ -206,7 +206,7 @@ def _axial(
     # the ground as body i: its rows are constant; but a named coordinate is that of body j relative
     # to body i, in this order
     joint = original.reversed() if fixed_last and not named else original
-    scaled, i, j = frame.attached(joint)
+    scaled, i, j = frame.attach(joint)
     composed = (
         [*scaled.mixed(i, j)]
         if mixed
@@ -245,7 +245,7 @@ def _relation(
     )
 
 
-def _driven(
+def _driver_constraint(
     mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool
 ) -> Constraint | Relation:
     """Return the constraint of a driver with the motion of its drive."""
@@ -269,12 +269,12 @@ def _driven(
         )
     if mixed:
         return Relation(driver.name, {f"{joint.name}.{driver.freedom}": 1.0}, drive)
-    scaled, i, j = frame.attached(joint)
+    scaled, i, j = frame.attach(joint)
     primitive: Any = scaled.measured(driver.freedom, i, j)
     return Constraint(driver.name, replace(primitive, drive=drive), joint.i, joint.j)
 
 
-def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
+def _restyle(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
     """Return the constraints with every primitive replaced by its equivalents in the style."""
     if style not in (Style.PAPER, Style.CONVENTIONAL):
         return list(found)

@@ -79,12 +79,12 @@ def with_loads(
             changes.setdefault(place.part, {})[place.field] = (
                 tuple(given) if place.dimension is None else given[0]
             )
-    bodies = [_changed(each, changes.get(f"bodies.{each.name}")) for each in mechanism.bodies]
-    forces = [_changed(each, changes.get(f"forces.{each.name}")) for each in mechanism.forces]
+    bodies = [_change(each, changes.get(f"bodies.{each.name}")) for each in mechanism.bodies]
+    forces = [_change(each, changes.get(f"forces.{each.name}")) for each in mechanism.forces]
     return bodies, forces
 
 
-def _changed(part: _Part, changes: Mapping[str, Any] | None) -> _Part:
+def _change(part: _Part, changes: Mapping[str, Any] | None) -> _Part:
     if not changes:
         return part
     other = copy(part)
@@ -129,7 +129,7 @@ def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mech
     joints = [joint.changed(**_changes(joint, values)) for joint in mechanism.joints]
     reduced = [each.changed(partial(_at_points, values)) for each in mechanism.reduced]
     points = [
-        _moved(point, values.get(f"points.{point.name}.position")) for point in mechanism.points
+        _move(point, values.get(f"points.{point.name}.position")) for point in mechanism.points
     ]
     bodies, forces = with_loads(mechanism, values)
     return replace(
@@ -162,7 +162,7 @@ def _changes(joint: Joint, values: Mapping[str, Sequence[Scalar]]) -> dict[str, 
     return changes
 
 
-def _moved(point: Point, position: Sequence[Scalar] | None) -> Point:
+def _move(point: Point, position: Sequence[Scalar] | None) -> Point:
     if position is None:
         return point
     x, y, z = position

@@ -314,13 +314,13 @@ class Relative:
         return self.closed.branch(at)
 
     def rows(self, at: Configuration) -> Rows:
-        return [self._transformed(row, _posed(at)) for row in self.closed.rows(at)]
+        return [self._transform(row, _of_tree(at)) for row in self.closed.rows(at)]
 
     def nu(self, at: Configuration) -> list[Scalar]:
         return self.closed.nu(at)
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        moved = self._moved(at, v, [0.0] * len(v))
+        moved = self._motions(at, v, [0.0] * len(v))
         rates, bias = [0.0] * self.closed.unknowns, [0.0] * self.closed.unknowns
         for name, k in self.closed.columns.items():
             twist, acceleration = moved[name]
@@ -335,20 +335,20 @@ class Relative:
         ]
 
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
-        moved = self._moved(at, v, [0.0] * len(v))
+        moved = self._motions(at, v, [0.0] * len(v))
         return {name: twist for name, (twist, _) in moved.items()}
 
     def accelerations(
         self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
     ) -> Mapping[str, Acceleration]:
-        return {name: acceleration for name, (_, acceleration) in self._moved(at, v, a).items()}
+        return {name: acceleration for name, (_, acceleration) in self._motions(at, v, a).items()}
 
-    def _moved(
+    def _motions(
         self, configuration: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
     ) -> dict[str, tuple[Twist, Acceleration]]:
         """Return velocities and accelerations of all bodies at rates v and accelerations a."""
         found: dict[str, tuple[Twist, Acceleration]] = {}
-        k, at = 0, _posed(configuration)
+        k, at = 0, _of_tree(configuration)
         for chain in self.chains:
             pose = at.poses.get(chain.parent, GROUND_POSE)
             twist, acceleration = found.get(chain.parent, (GROUND_TWIST, GROUND_ACCELERATION))
@@ -357,8 +357,8 @@ class Relative:
             v_P, v_P_t = twist.of(arm), acceleration.of(arm, twist)
             for step in chain.steps:
                 axes = [column.axis for column in at.columns[k : k + step.unknowns]]
-                rate = _weighted(v[k : k + step.unknowns], axes)
-                rate_t = _weighted(a[k : k + step.unknowns], axes)
+                rate = _weighted_sum(v[k : k + step.unknowns], axes)
+                rate_t = _weighted_sum(a[k : k + step.unknowns], axes)
                 if step.slides:
                     slid = at.state[step.name][0] * axes[0]
                     v_P = v_P + rate + cross(w, slid)
@@ -380,7 +380,7 @@ class Relative:
             )
         return found
 
-    def _transformed(self, row: Mapping[int, Scalar], at: TreeConfiguration) -> dict[int, Scalar]:
+    def _transform(self, row: Mapping[int, Scalar], at: TreeConfiguration) -> dict[int, Scalar]:
         """Return a Cartesian row times B, over the unknowns that move a body of the row."""
         entries: dict[int, Scalar] = {}
         for name, first in self.closed.columns.items():
@@ -402,12 +402,12 @@ class Relative:
         return {k: value for k, value in entries.items() if not is_literal_zero(value)}
 
 
-def _posed(at: Configuration) -> TreeConfiguration:
+def _of_tree(at: Configuration) -> TreeConfiguration:
     assert isinstance(at, TreeConfiguration)
     return at
 
 
-def _weighted(weights: Sequence[Scalar], axes: Sequence[Vec3]) -> Vec3:
+def _weighted_sum(weights: Sequence[Scalar], axes: Sequence[Vec3]) -> Vec3:
     total = ZERO
     for weight, axis in zip(weights, axes, strict=True):
         total = total + weight * axis

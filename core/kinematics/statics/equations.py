@@ -103,8 +103,8 @@ class StaticEquations:
                 mechanism.joint(each.joint), AxialJoint
             ):
                 raise SolveError(
-                    f"{each}: statics follow the angle of hinges and of other joints about one"
-                    f" axis; {mechanism.joint(each.joint)} is none, give the spring another joint"
+                    f"{each}: {mechanism.joint(each.joint)} does not turn about one axis, and"
+                    " statics follow no other angle; give the spring another joint"
                 )
         self.mechanism, self.loads, self.frame = mechanism, tuple(loads), frames(mechanism)
         self._tape, self._layout = Tape(), Layout()
@@ -210,7 +210,7 @@ class StaticEquations:
         still = dict.fromkeys(bodies, Twist(ZERO, ZERO))
         rests = dict.fromkeys(bodies, GROUND_ACCELERATION)
         states = BodyStates(self.frame, at.poses, still, rests)
-        equations = ForceEquations.traced(self.mechanism, self._formulation, at, states)
+        equations = ForceEquations.with_angles(self.mechanism, self._formulation, at, states)
         demand = [*equations.demand]
         for each, first in zip(self.loads, range(0, len(pulls), 6), strict=True):
             force, torque = vec(pulls[first : first + 3]), vec(pulls[first + 3 : first + 6])

@@ -31,6 +31,7 @@ from ...program.llvm.compiler import available
 from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array, BodyMotion
+from ..compiled.request import slots_of
 from ..forces.equations import BodyStates
 from ..formulation.cartesian import COLUMNS
 from ..formulation.state_vectors import columns_of, placed_bodies
@@ -126,9 +127,9 @@ class Equilibria:
         """Return a point of a body, given at design [m], shape (n, 3)."""
         return np.array(position) + columns_of(self._at.place(body, position), len(self.share))
 
-    def turned(self, body: str, direction: Sequence[float]) -> Array:
+    def direction(self, body: str, design: Sequence[float]) -> Array:
         """Return a direction fixed in a body, given at design [-], shape (n, 3)."""
-        return columns_of(self._at.turned(body, direction), len(self.share))
+        return columns_of(self._at.turn(body, design), len(self.share))
 
     def motion(self, step: Array, body: str, position: Sequence[float]) -> Array:
         """Return the motion of a point and the turn of its body [m, rad], shape (n, 6, ...), for
@@ -174,8 +175,8 @@ class StaticModel:
         self.drivers = [each.name for each in mechanism.drivers]
         vectors = self.equations.vectors
         names = [*self.equations.design, MULTIPLIERS]
-        self._state = [slot for name in names for slot in vectors[name]]
-        self._tests = [slot for name in (STEP, SIGNS, DETERMINANT) for slot in vectors[name]]
+        self._state = slots_of(vectors, names)
+        self._tests = slots_of(vectors, (STEP, SIGNS, DETERMINANT))
         if compiled := available():
             make_loops_ready()
         self._code = LlvmCode(self.equations.plan) if compiled else None
@@ -281,7 +282,7 @@ class StaticModel:
         executor.run("compliance")
         if "tangent" in kept:
             executor.run("tangent")
-        return share, iterations, executor.get([k for name in kept for k in vectors[name]])
+        return share, iterations, executor.get(slots_of(vectors, kept))
 
     def _walk(
         self, executor: Executor, put: Callable[[Array], None], start: float

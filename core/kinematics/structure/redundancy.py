@@ -376,7 +376,7 @@ def largest_residual(
     poses = displaced(mechanism, frame, {name: (each.r, each.p) for name, each in bodies.items()})
     found = 0.0
     for joint in joints:
-        scaled, i, j = frame.attached(joint)
+        scaled, i, j = frame.attach(joint)
         pair = [poses.get(body, GROUND_POSE) for body in joint.bodies]
         for each in scaled.primitives(i, j):
             found = max(found, *(float(np.max(np.abs(x), initial=0.0)) for x in each.phi(*pair)))

@@ -30,7 +30,7 @@ from ...program.tape import jacobian
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames, constraints, frames
-from .exact_forces import ExactForces, ForceInputs, ForcePrograms, numbered
+from .exact_forces import ExactForces, ForceInputs, ForcePrograms, numbered_program
 
 Reading = Callable[[float], Fraction]
 """Interpretation of a float of a description as a fraction."""
@@ -164,7 +164,7 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
     for coupler in mechanism.couplers:
         if isinstance(coupler, Spline):
             raise SolveError(
-                f"{coupler} has pieces, and proofs know none; give a polynomial in its place"
+                f"{coupler} is a spline, and proofs know none; give a polynomial in its place"
             )
 
     def number(value: Any) -> Any:
@@ -173,10 +173,10 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
         whole = isinstance(value, int) and not isinstance(value, bool)
         return Exact.of(Fraction(value)) if whole else value
 
-    return _converted(mechanism, number)
+    return _convert(mechanism, number)
 
 
-def _converted(mechanism: Mechanism, number: Callable[[Any], Any]) -> Mechanism:
+def _convert(mechanism: Mechanism, number: Callable[[Any], Any]) -> Mechanism:
     """Return a mechanism with its numbers passed to a function.
 
     They are checked already: the checks of its members take doubles.
@@ -185,23 +185,23 @@ def _converted(mechanism: Mechanism, number: Callable[[Any], Any]) -> Mechanism:
     def member(item: Any) -> Any:
         new: Any = object.__new__(cast("type[Any]", type(item)))
         for each in fields(item):
-            object.__setattr__(new, each.name, _mapped(getattr(item, each.name), number))
+            object.__setattr__(new, each.name, _map(getattr(item, each.name), number))
         return new
 
     kinds = ("points", "drivers", "couplers", "bodies", "forces")
     changes = {kind: [*map(member, getattr(mechanism, kind))] for kind in kinds}
-    gravity = _mapped(mechanism.gravity, number)
+    gravity = _map(mechanism.gravity, number)
     return mechanism.with_joints(member, grounded=(), gravity=gravity, **changes)
 
 
-def _mapped(value: Any, number: Callable[[Any], Any]) -> Any:
+def _map(value: Any, number: Callable[[Any], Any]) -> Any:
     """Return a value with the numbers in it passed to a function."""
     if isinstance(value, Mapping):
-        return {key: _mapped(each, number) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
+        return {key: _map(each, number) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
     if isinstance(value, tuple):
-        return tuple(_mapped(each, number) for each in value)  # pyright: ignore[reportUnknownVariableType]
+        return tuple(_map(each, number) for each in value)  # pyright: ignore[reportUnknownVariableType]
     if is_dataclass(value) and not isinstance(value, type):
-        changes = {f.name: _mapped(getattr(value, f.name), number) for f in fields(value)}
+        changes = {f.name: _map(getattr(value, f.name), number) for f in fields(value)}
         return replace(value, **changes)
     return number(value)
 
@@ -220,7 +220,7 @@ class _Inputs:
 
     def lift(self, value: Any) -> Any:
         """Return a value with its exact numbers as program inputs, or literals if trivial."""
-        return _mapped(value, self.number)
+        return _map(value, self.number)
 
     def number(self, value: Any) -> Any:
         """Return an exact number as an input, or a literal if it is trivial."""
@@ -327,7 +327,7 @@ def equations(
     forces: ForcePrograms | None = None
     if wanted is not None and given is not None:
         exact = ExactForces.of(
-            _converted(mechanism, inputs.number),
+            _convert(mechanism, inputs.number),
             inputs.lift(frame),
             formulation,
             at,
@@ -341,10 +341,12 @@ def equations(
         points,
         {name: len(value) for name, value in design.items()},
         inputs.geometry,
-        numbered("residuals", inputs.tape, [*(phi[k] for k in kept), *lengths]),
+        numbered_program("residuals", inputs.tape, [*(phi[k] for k in kept), *lengths]),
         program("derivative", inputs.tape, entries),
-        numbered("points", inputs.tape, moved),
-        numbered("tests", inputs.tape, [*(phi[k] for k in left_out), *formulation.branch(at)]),
+        numbered_program("points", inputs.tape, moved),
+        numbered_program(
+            "tests", inputs.tape, [*(phi[k] for k in left_out), *formulation.branch(at)]
+        ),
         kept,
         left_out,
         forces,

@@ -106,7 +106,7 @@ class ForcePrograms:
     forces: Program
 
 
-def numbered(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
+def numbered_program(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
     """Return the program of values, in slots by their number."""
     return program(name, tape, dict(enumerate(values)))
 
@@ -205,11 +205,11 @@ class ExactForces(ForceEquations):
             len(self.gradients),
             len(self.gradients) - len(mechanism.couplers) - len(mechanism.drivers),
             [*self.inputs.angles],
-            numbered("half angles", tape, [*self._half_angles()]),
-            numbered("demand", tape, self._by_state(self.demand)),
-            numbered("acting", tape, self._by_state(self.by_unknowns(acting))),
-            numbered("rows left out", tape, rows),
-            numbered("forces", tape, found),
+            numbered_program("half angles", tape, [*self._half_angles()]),
+            numbered_program("demand", tape, self._by_state(self.demand)),
+            numbered_program("acting", tape, self._by_state(self.by_unknowns(acting))),
+            numbered_program("rows left out", tape, rows),
+            numbered_program("forces", tape, found),
         )
 
     @cached_property
@@ -243,20 +243,26 @@ class ExactForces(ForceEquations):
                 push = efforts[driver.name] * vec([*unit(driver.direction)])
                 yield point.body, Wrench.at(states.arm(point.body, point.position), push)
             elif isinstance(driver, JointDriver):
-                yield from self._along(driver.joint, driver.freedom, efforts[driver.name])
+                yield from self._coordinate_wrenches(
+                    driver.joint, driver.freedom, efforts[driver.name]
+                )
         first = len(multipliers) - len(mechanism.drivers) - len(mechanism.couplers)
         for k, coupler in enumerate(mechanism.couplers, first):
             for joint, freedom, _ in coupler.terms:
                 slope = self.gradients[k].get(self.first[f"x {joint}.{freedom}"], 0.0)
                 unit_of = states.frame.unit if freedom == "translation" else 1.0
-                yield from self._along(joint, freedom, (1.0 / unit_of) * slope * multipliers[k])
+                yield from self._coordinate_wrenches(
+                    joint, freedom, (1.0 / unit_of) * slope * multipliers[k]
+                )
 
-    def _along(self, name: str, freedom: str, load: Scalar) -> Iterator[tuple[str, Wrench]]:
+    def _coordinate_wrenches(
+        self, name: str, freedom: str, load: Scalar
+    ) -> Iterator[tuple[str, Wrench]]:
         """Yield the wrenches of a coordinate's load on both bodies: couples about the axis, or
         forces along it, at each body's own copy of the joint's point.
         """
         joint: Any = self.mechanism.joint(name)
-        on_second = load * self.states.turned(joint.i, [*unit(joint.axis)])
+        on_second = load * self.states.turn(joint.i, [*unit(joint.axis)])
         for body, push in ((joint.i, -on_second), (joint.j, on_second)):
             if freedom == "rotation":
                 yield body, Wrench(ZERO, push)
@@ -372,7 +378,7 @@ def enclose_forces(
     rows = run(programs.left_out, further(nothing, angles))
     off = {row: rows[k * size : (k + 1) * size] for k, row in enumerate(left_out)}
 
-    def balancing(right: Sequence[Ball], given: Collection[int]) -> list[Ball]:
+    def balance(right: Sequence[Ball], given: Collection[int]) -> list[Ball]:
         """Return the multipliers of all rows: one of the given rows, zero of others left out."""
         column = [x - sum((off[row][k] for row in given), arb(0)) for k, x in enumerate(right)]
         solved = (inverse.transpose() * matrix(size, 1, column)).entries()
@@ -387,10 +393,10 @@ def enclose_forces(
         """Return the forces in balance with generalised forces, and the multipliers left to the
         rows of drivers and couplers: zero.
         """
-        every = further(balancing(right, given), angles)
+        every = further(balance(right, given), angles)
         _, drivers, rest = _split(programs, run(programs.forces, every))
         left = [x - y for x, y in zip(right, run(programs.acting, every), strict=True)]
-        own = balancing(left, [row for row in given if row < programs.of_joints])
+        own = balance(left, [row for row in given if row < programs.of_joints])
         joints, *_ = _split(programs, run(programs.forces, further(own, angles)))
         return (joints, drivers, rest), own[programs.of_joints :]
 

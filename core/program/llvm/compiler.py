@@ -70,7 +70,7 @@ def processor() -> Processor:
 
     An emulator that hides instructions of the processor (valgrind) needs a separate cache.
     """
-    known = _described()
+    known = _describe()
     return _read(_ask_llvm()) if known is None else load_or_make(known, _ask_llvm, _read)
 
 
@@ -85,7 +85,7 @@ def vector_width() -> int:
     return 8 if "+avx512f" in features else 4 if "+avx" in features else 2
 
 
-def emitted(text: str) -> bytes:
+def emit(text: str) -> bytes:
     """Return the machine code of a text: an object file."""
     here = processor()
     # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line
@@ -99,7 +99,7 @@ def emitted(text: str) -> bytes:
     return machine.emit_object(llvm().parse_assembly(text))
 
 
-def loaded(file: bytes) -> Callable[[str], int]:
+def load_object(file: bytes) -> Callable[[str], int]:
     """Load an object file by LLVM; return a function from name to address, which also keeps the
     code alive.
     """
@@ -122,7 +122,7 @@ def _ask_llvm() -> bytes:
     ).encode()
 
 
-def _described() -> bytes | None:
+def _describe() -> bytes | None:
     """Return the system's description of the first processor and the llvmlite version; None if
     unknown.
     """
@@ -197,7 +197,7 @@ def possible() -> bool:
     return True
 
 
-def joined(file: bytes) -> Image:
+def image_of(file: bytes) -> Image:
     """Return the image of an object file. Raise ValueError for a relocation other than a relative
     address.
     """
@@ -240,7 +240,7 @@ def joined(file: bytes) -> Image:
     return Image(bytes(code), places)
 
 
-def placed(image: Image) -> Callable[[str], int]:
+def load_image(image: Image) -> Callable[[str], int]:
     """Load an image; return a function from name to address, which also keeps the memory alive."""
     memory = _runnable(image.code)
     start = _address(memory)

@@ -41,7 +41,7 @@ class LlvmExecutor:
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `NumpyExecutor`."""
         # equal values of all lanes need no arrangement
-        self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self._arranged(values)
+        self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self._arrange(values)
 
     def get(self, slots: Sequence[int]) -> Array:
         """See `NumpyExecutor`."""
@@ -53,7 +53,7 @@ class LlvmExecutor:
         """See `NumpyExecutor`."""
         return self._memory[:, _places(slots)]
 
-    def _arranged(self, table: Array) -> Array:
+    def _arrange(self, table: Array) -> Array:
         """Return a table of slots by lanes in memory layout; the last lane fills up the last
         vector.
         """

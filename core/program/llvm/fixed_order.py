@@ -44,7 +44,7 @@ class FixedOrder:
         n: int,
         given: NDArray[np.intp],
     ) -> None:
-        pattern = _filled(rows, columns, n)
+        pattern = _fill_in(rows, columns, n)
         sizes = [len(row) for row in pattern]
         every = np.fromiter((j for row in pattern for j in sorted(row)), np.int64)
         row, starts = np.repeat(np.arange(n), sizes), np.cumsum([0, *sizes])
@@ -93,7 +93,7 @@ class FixedOrder:
         return np.signbit(self._signs)
 
 
-def _filled(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[set[int]]:
+def _fill_in(rows: NDArray[np.intp], columns: NDArray[np.intp], n: int) -> list[set[int]]:
     """Return the columns of the factors' entries in each row."""
     pattern = [{k} for k in range(n)]
     places: list[tuple[int, int]] = np.stack([rows, columns], axis=1).tolist()

@@ -19,7 +19,7 @@ import msgspec
 from ...caches import cache_last
 from .. import disk_cache, plan, straight_line, tape
 from ..plan import Plan
-from ..straight_line import Bytecode, bytecode, packed, unpacked
+from ..straight_line import Bytecode, bytecode, pack, unpack
 from . import compiler
 from .loops import follow, parts, run, run_motions, settle
 from .plan import PlanInMemory, rows
@@ -41,9 +41,9 @@ class Code:
 
     def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
         self.address = (
-            compiler.placed(msgspec.msgpack.decode(code, type=compiler.Image))
+            compiler.load_image(msgspec.msgpack.decode(code, type=compiler.Image))
             if compiler.possible()
-            else compiler.loaded(code)
+            else compiler.load_object(code)
         )
         # integers are passed as addresses: ctypes takes a third of the time for those
         types = {
@@ -62,7 +62,7 @@ def load(
 ) -> Code:
     """Return the cached code of a content; compile the text if there is none."""
     return disk_cache.load_or_make(
-        cache_key(content), lambda: _emitted(text()), lambda code: Code(code, signatures or {})
+        cache_key(content), lambda: _emit(text()), lambda code: Code(code, signatures or {})
     )
 
 
@@ -78,9 +78,9 @@ def cache_key(content: str) -> bytes:
     ).encode()
 
 
-def _emitted(text: str) -> bytes:
-    file = compiler.emitted(text)
-    return msgspec.msgpack.encode(compiler.joined(file)) if compiler.possible() else file
+def _emit(text: str) -> bytes:
+    file = compiler.emit(text)
+    return msgspec.msgpack.encode(compiler.image_of(file)) if compiler.possible() else file
 
 
 _NEEDED = rows, settle
@@ -140,7 +140,7 @@ class LlvmCode:
         # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width])
         code = None if tables else find(self._content)
-        again = not tables and code is None and disk_cache.known(self._of_tables)
+        again = not tables and code is None and disk_cache.contains(self._of_tables)
         self.interpreted, tables = code is None, tables or ({} if code else self._tables())
         self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
         self.memory = PlanInMemory(plan, self.width, self.stride)
@@ -186,13 +186,13 @@ class LlvmCode:
     def _tables(self) -> dict[str, Bytecode]:
         slots = len(self.plan.slots)
 
-        def made() -> bytes:
+        def make() -> bytes:
             tables = {
                 name: bytecode(each, slots, self.width) for name, each in self.plan.programs.items()
             }
-            return packed(tables)
+            return pack(tables)
 
-        return disk_cache.load_or_make(self._of_tables, made, unpacked)
+        return disk_cache.load_or_make(self._of_tables, make, unpack)
 
     @property
     def _of_tables(self) -> bytes:
@@ -215,7 +215,7 @@ def make_loops_ready() -> None:
     missing = [
         name
         for name in ("interpret", "follow")
-        if not disk_cache.known(cache_key(_content(name, width)))
+        if not disk_cache.contains(cache_key(_content(name, width)))
     ]
     if missing:
         compiler.llvm()

@@ -277,7 +277,7 @@ pass:
   br label %head
 onward:
   {over("copy", "shifted")}
-  {over("calls", "remaining")}
+  {over("calls", "rest")}
   br label %take
 take:
   %before = sub i64 %accepted, 1
@@ -457,7 +457,7 @@ continue:
   {over("copy", "continued")}
   br label %carry
 onward:
-  {over("calls", "remaining")}
+  {over("calls", "rest")}
   {over("copy", "carried")}
   br label %carry
 carry:
@@ -485,10 +485,10 @@ end:
         "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)\ndeclare i1"
         f" @llvm.vector.reduce.or.v{width}i1({mask})\n"
     )
-    return f"{declared}{_kept(width)}{function(head, body)}"
+    return f"{declared}{_keep(width)}{function(head, body)}"
 
 
-def _kept(width: int) -> str:
+def _keep(width: int) -> str:
     """Return functions that store a sample (NaN for an ended motion), remember it, and mark ended
     motions in the worst.
     """

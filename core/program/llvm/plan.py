@@ -23,7 +23,7 @@ and "state" the number of remembered slots. "behind" is zero without extrapolati
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Addresses of calls: each holds the address of a function of lanes and a table, and of the table.
 """
-CALLS = ("after", "alone", "joined", "onward", "remaining")
+CALLS = ("after", "alone", "joined", "onward", "rest")
 PAIRS = ("carried", "returned", "moves", "continued", "remembered", "shifted")
 TABLES: Mapping[str, int] = {
     **dict.fromkeys(CALLS, 1),
@@ -210,7 +210,7 @@ class PlanInMemory:
         pairs: dict[str, Sequence[tuple[int, ...]]] = {
             "carried": plan.carried,
             "returned": [pair[::-1] for pair in reversed(plan.carried)],
-            "moves": in_order(plan.moved if extrapolates else plan.carried),
+            "moves": in_order(plan.moves if extrapolates else plan.carried),
             "continued": in_order(plan.carried_on),
             "remembered": [(slot, k) for k, slot in enumerate(plan.remembered)],
             "shifted": shifted(plan.past, plan.remembered, plan.behind),
@@ -230,7 +230,7 @@ class PlanInMemory:
                 name: vector * _table(getattr(plan, name), 1)
                 for name in ("sampled", "kept", "fixed", "taken")
             },
-            "left": _table([(vector * slot, k) for slot, k in plan.left], 2),
+            "left": _table([(vector * slot, k) for slot, k in plan.fixed_targets], 2),
             "worst": _table(
                 [
                     (vector * x, _bits(sign), _bits(start))

@@ -5,7 +5,7 @@ The text calls LLVM instructions only: no library, no runtime. Sine and cosine a
 summed in place. The W lanes of a vector are contiguous, slot by slot: a program touches one stretch
 of a few kilobytes.
 
-`ordered` puts the operations with the longest chain of dependent operations first. A processor
+`reschedule` puts the operations with the longest chain of dependent operations first. A processor
 begins several operations per cycle, but looks only a few hundred ahead for ready ones. The pivots
 of an elimination form a chain, each with a division. The other operations of a program belong
 between them, but are traced before or after. The method is list scheduling by the longest path to
@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 
-from ..straight_line import ARITY, FUSED, KINDS, Program, lowered, unrolled
+from ..straight_line import ARITY, FUSED, KINDS, Program, lower, unroll
 from ..tape import LEAVES, Node, operands, place_of
 
 # The first term left out, x^19/19! or x^18/18!, is below 1e-17 at pi/4, the largest argument after
@@ -292,7 +292,7 @@ path gain little and lose more: many values are computed too early.
 """
 
 
-def ordered(program: Program) -> Program:
+def reschedule(program: Program) -> Program:
     """Return the same program, rescheduled if its critical path dominates; else unchanged."""
     nodes = program.nodes
     reads = [operands(node) for node in nodes]
@@ -353,9 +353,9 @@ def function(program: Program, width: int) -> str:
     The order with the shortest waits is used if 32 registers allow it: with 16 it takes up to half
     as long again.
     """
-    program = lowered(unrolled(program))
+    program = lower(unroll(program))
     straight = _Straight(program, width)
-    if width == WIDE and (waiting := ordered(program)) is not program:
+    if width == WIDE and (waiting := reschedule(program)) is not program:
         other = _Straight(waiting, width)
         if len(other.lines) - len(straight.lines) <= PUT_AWAY * len(program.nodes):
             straight = other
@@ -390,9 +390,9 @@ class _Straight(Lines):
 
     def _step(self, number: int, node: Node) -> None:
         wanted = operands(node)
-        values = [self._held.get(k) or self._fetched(k, wanted) for k in wanted]
+        values = [self._held.get(k) or self._fetch(k, wanted) for k in wanted]
         result = self.operation(node[0], values)
-        self._used(wanted)
+        self._release(wanted)
         if node[0] == "larger":
             self._masks[number] = result
         else:
@@ -400,12 +400,12 @@ class _Straight(Lines):
 
     def _write_all(self, writes: Sequence[tuple[int, int]]) -> None:
         """Write slots; all reads of old values come first."""
-        values = [(slot, self._held.get(k) or self._fetched(k, ())) for slot, k in writes]
+        values = [(slot, self._held.get(k) or self._fetch(k, ())) for slot, k in writes]
         for slot, value in values:
             self.write(slot, value)
-        self._used(k for _, k in writes)
+        self._release(k for _, k in writes)
 
-    def _fetched(self, k: int, wanted: Sequence[int]) -> str:
+    def _fetch(self, k: int, wanted: Sequence[int]) -> str:
         """Return the name of a value loaded again; no operand in `wanted` is spilled for it."""
         node = self._nodes[k]
         if node[0] == "const":
@@ -435,7 +435,7 @@ class _Straight(Lines):
                 )
         self._held[k] = name
 
-    def _used(self, values: Iterable[int]) -> None:
+    def _release(self, values: Iterable[int]) -> None:
         """Release the places of values without a further use."""
         for k in values:
             due = self._due[k]

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from ...algebra import triple
-from ...case.joint_probe import fitting, required
+from ...case.joint_probe import make_fitting, required_fields
 from ...errors import KincheckError, MechanismError
 from ...harness.engine import Engine
 from ...joints import Joint, Kind
@@ -208,7 +208,7 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
     given = {"name": joint_class.__name__, **dict(zip("ij", BODIES, strict=True))}
     unknown = [
         each.name
-        for each in required(joint_class)
+        for each in required_fields(joint_class)
         if each.name not in given and "kind" not in each.metadata
     ]
     if unknown:
@@ -218,7 +218,7 @@ def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
         )
     makers = (partial(_value, rng=rng, angle=math.radians(angle)) for angle in ANGLES)
     try:
-        return fitting(joint_class, given, makers)
+        return make_fitting(joint_class, given, makers)
     except MechanismError as refused:
         raise SpecimenError(
             f"{joint_class.__name__}: no specimen can be made of random geometry ({refused});"

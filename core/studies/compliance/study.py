@@ -311,7 +311,7 @@ class _Study:
             axis,
             at,
             blank(found.place(wheel.body, wheel.center)),
-            blank(found.turned(wheel.body, wheel.spin)),
+            blank(found.direction(wheel.body, wheel.spin)),
             blank(found.efforts[wheel.travel]),
             blank(self._matrix(found)),
             {name: replace(x, values=blank(x.values)) for name, x in outputs.items()},

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...algebra import triple, vec
-from ...case.models.trees.tree import Mass, together
+from ...case.models.trees.tree import Mass, sum_of_masses
 from ...case.models.undriven import Coordinate, Undriven
 from ...joints import Fixed
 from ...kinematics import Poses
@@ -160,7 +160,7 @@ def _whole(file: Undriven, link: str, matched: Collection[str]) -> Body:
                 found.append(mechanism.body(other))
     if len(found) == 1 or not all(body.mass for body in found):
         return found[0]
-    whole = together(
+    whole = sum_of_masses(
         [Mass(body.mass, vec(body.center_of_mass or body.origin), _inertia(body)) for body in found]
     )
     xx, yy, zz, xy, xz, yz = whole.inertia[np.triu_indices(3)][[0, 3, 5, 1, 2, 4]].tolist()

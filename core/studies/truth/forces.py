@@ -111,7 +111,7 @@ class _Loaded:
             map_[:, row] = scale
         elif isinstance(output, JointForce | JointMoment):
             wrench = self._wrench(output.joint)[isinstance(output, JointMoment)]
-            map_ = np.einsum("i,nir->nr", np.array(output.along), wrench)
+            map_ = np.einsum("i,nir->nr", np.array(output.unit_direction), wrench)
         else:
             raise TypeError(f"{output}: the stress truth has no such force")
         loose = np.abs(np.einsum("nr,nrk->nk", map_, self.balanced)).max(axis=1, initial=0.0)

@@ -1,5 +1,7 @@
 """The rows of a mechanism, written independently of the solver: full products of vectors, in
-extended precision, without simplification.
+extended precision, without simplification. The tests' naive equations state the joints a second
+time: their rows and rates follow from residuals alone, those here are derived by hand, so neither
+repeats a slip of the other.
 
 They share only the meaning of a joint's fields with the tested primitives, rows and programs. A row
 is a sum of terms minus a constant: its value at design, or zero; the row of a curve has a function

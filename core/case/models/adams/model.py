@@ -111,7 +111,7 @@ class Frame:
     axes: Array
     turned: bool = True
 
-    def seen_from(self, other: Frame) -> Frame:
+    def relative_to(self, other: Frame) -> Frame:
         """Return this frame of another one in the frame of the latter."""
         turned = self.turned and other.turned
         return Frame(other.origin + other.axes @ self.origin, other.axes @ self.axes, turned)
@@ -185,7 +185,7 @@ def read_markers(dataset: Dataset, units: Units) -> dict[int, Marker]:
                     "RM: found no marker of the part that is stated in its frame, expected one;"
                     " correct it"
                 )
-            place = marker.place.seen_from(other.place)
+            place = marker.place.relative_to(other.place)
             found[marker.statement.id] = replace(marker, place=place)
     return found
 
@@ -254,7 +254,7 @@ class Model:
 
     def frame(self, marker: Marker) -> Frame:
         """Return the frame of a marker, global."""
-        return marker.place.seen_from(self.places[marker.part])
+        return marker.place.relative_to(self.places[marker.part])
 
     def body(self, marker: Marker) -> str:
         """Return the name of a marker's body."""
@@ -336,11 +336,11 @@ def read_bodies(model: Model) -> list[Body]:
         x, y, z, w = rotations().from_matrix(place.axes).as_quat(canonical=True).tolist()
         body = Body(part.name, coordinates(place.origin), (w, x, y, z))
         with explained(part.file, part.label):
-            found.append(_weighed(body, part, model))
+            found.append(_with_mass(body, part, model))
     return found
 
 
-def _weighed(body: Body, part: Statement, model: Model) -> Body:
+def _with_mass(body: Body, part: Statement, model: Model) -> Body:
     units, place = model.units, model.places[part.id]
     mass = units.mass * part.one("MASS", 0.0)
     own = dict[str, Marker]()
@@ -359,7 +359,7 @@ def _weighed(body: Body, part: Statement, model: Model) -> Body:
         raise part.fault("found MASS without CM, expected the marker of its centre; add CM = ...")
     if center is None:
         return body
-    at = center.place.seen_from(place)
+    at = center.place.relative_to(place)
     body = replace(body, mass=mass, center_of_mass=coordinates(at.origin))
     if not mass or "IP" not in part.values:
         return body
@@ -370,7 +370,7 @@ def _weighed(body: Body, part: Statement, model: Model) -> Body:
         return body
     # products are positive integrals, about the inertia marker and along its axes
     xx, yy, zz, xy, xz, yz = [*numbers, 0.0, 0.0, 0.0][:6]
-    about = own.get("IM", center).place.seen_from(place)
+    about = own.get("IM", center).place.relative_to(place)
     moments = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
     turned = units.mass * units.length**2 * about.axes @ moments @ about.axes.T
     arm = at.origin - about.origin

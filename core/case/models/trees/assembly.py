@@ -131,7 +131,7 @@ class Pose:
                 about[:, column], along[:, column] = [*a], [*cross(a, arm)]
         return along, about
 
-    def after(self, step: Array) -> Pose:
+    def step(self, step: Array) -> Pose:
         """Return the pose after a step of the unknowns."""
         values: list[Value] = []
         for move, value in zip(self.tree.moves.values(), self.values, strict=True):
@@ -230,7 +230,7 @@ class FreeMotions:
         """Return the part of a move's unknowns in the motions, shape (motions, unknowns)."""
         return self.basis[:, [*self.columns[move]]]
 
-    def leave(self, rows: Array) -> None:
+    def restrict(self, rows: Array) -> None:
         """Leave the motions on which rows over them vanish, shape (rows, motions).
 
         Each independent row is turned to the first motion by a reflection, which is left out.
@@ -300,7 +300,7 @@ class Closing:
         """Return the largest residual [m or rad]."""
         return self.gaps(pose)[0][0] if self.ties else 0.0
 
-    def apart(self, pose: Pose) -> float:
+    def closure_gap(self, pose: Pose) -> float:
         """Return the largest gap of closures [m], angles at arms of the size; offsets of coupled
         coordinates are meant, and do not count.
         """
@@ -354,7 +354,7 @@ class Closing:
 
     def _null(self, rows: Array) -> Array:
         """Return an orthonormal basis of the motions left by rows, shape (freedoms, n)."""
-        lonely = _lonely(rows)
+        lonely = _unknowns_of_rows(rows)
         given = {*lonely.values()}
         rest = [k for k in range(rows.shape[1]) if k not in given]
         others = np.delete(rows, [*lonely], axis=0)[:, rest]
@@ -369,7 +369,7 @@ class Closing:
         return np.linalg.qr(found).Q.T if lonely else found.T
 
 
-def _lonely(rows: Array) -> Mapping[int, int]:
+def _unknowns_of_rows(rows: Array) -> Mapping[int, int]:
     """Return rows that give an unknown, by its column, which no other row but earlier ones has.
 
     They are independent of all others, as couplings of many joints with one are: what is left of a
@@ -476,7 +476,7 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
     opened = closing.gap(pose)
     if opened > CLOSED * closing.size:
         # who gives some moves' values leaves the others to the assembly
-        if start.closes and (apart := closing.apart(pose)) > FAR * closing.size:
+        if start.closes and (apart := closing.closure_gap(pose)) > FAR * closing.size:
             raise closing.gaps(pose)[0][1].element.fault(
                 f"is open in the start ({start.text}) by {apart:.4g} m, expected"
                 f" {FAR * closing.size:.3g} m at most, a tenth of the model's size; give a start"
@@ -486,7 +486,7 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
         pose = _nearest_closed(closing, pose, ((*start.given, *driven), start.given, ()))
         left = closing.gaps(pose)
         if left[0][0] > closing.limit:
-            raise _open(closing, start, opened, left)
+            raise _open_error(closing, start, opened, left)
         notes.append(_note(closing, start, pose, left[0][0]))
     closed = Pose.of(pose.as_tree())
     # of the tree in this pose, whose changes since the zero pose it knows itself
@@ -531,11 +531,11 @@ def _descend(closing: Closing, pose: Pose, moving: Array) -> Pose:
             mu, last = DAMPING * min(1.0, float(residual @ residual)), math.inf
             damped = slope @ slope.T + mu * np.eye(len(slope))
             step = -slope.T @ np.linalg.lstsq(damped, residual, rcond=None)[0]
-        pose = pose.after(metres * moving * step)
+        pose = pose.step(metres * moving * step)
     return best
 
 
-def _open(
+def _open_error(
     closing: Closing, start: Start, opened: float, left: Sequence[tuple[float, Tie]]
 ) -> CaseError:
     """Return the error of an open model."""

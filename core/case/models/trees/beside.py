@@ -154,9 +154,9 @@ class Beside:
             tree.places[name] = tree.places[name].then(frame)
             if name in tree.moving:
                 tree.moving[name] = tree.moving[name].then(frame)
-                back = ORIGIN.seen_from(frame)
+                back = ORIGIN.relative_to(frame)
                 masses = tree.masses.get(name, ())
-                tree.masses |= {name: [mass.seen_in(back) for mass in masses]} if masses else {}
+                tree.masses |= {name: [mass.in_frame(back) for mass in masses]} if masses else {}
 
 
 def read_beside(file: Path, root: Element) -> Beside:
@@ -175,7 +175,7 @@ def read_beside(file: Path, root: Element) -> Beside:
     pairs = _pairs(paired)
     for name, kind in zip(pairs.joint_name, pairs.joint_type, strict=True):
         types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
-        if all(each.attributes.get("name") != name for each in root.only("joint")):
+        if all(each.attributes.get("name") != name for each in root.findall("joint")):
             raise fault(
                 paired,
                 "joint_name",

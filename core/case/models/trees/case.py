@@ -50,7 +50,7 @@ from .driving import (
 )
 from .element import Names
 from .place import Place, coordinates, rotation_vector
-from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, together
+from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 
 FREEDOMS = {"hinge": "rotation", "slide": "translation"}
 NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -75,7 +75,7 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
     return _Parts(*model_of(tree, supplied)).case()
 
 
-def undriven(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
+def undriven_mechanism(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
     """Return the mechanism of a tree without drivers, the tree in its closed start, and its links
     with a free turn about themselves.
 
@@ -204,7 +204,7 @@ class _Parts:
                 forces=[*self._springs()],
             )
 
-    def _unused(self, wanted: str) -> str:
+    def _free_name(self, wanted: str) -> str:
         """Return an unused name: ties, moves and links of a model may share names."""
         while wanted in self.joints or wanted in self.couplers or wanted in self.bodies:
             wanted += "'"
@@ -223,7 +223,7 @@ class _Parts:
                 f"body {spin.move.inner!r} and its turn about itself: it is a rod of constant"
                 " length"
             )
-        still = {*_locked(self.tree), *self.driving.fixed}
+        still = {*_locked_moves(self.tree), *self.driving.fixed}
         for name, move in self.tree.joints.items():
             if id(move) in replaced:
                 continue
@@ -241,11 +241,11 @@ class _Parts:
             if isinstance(each, Coupling):
                 self._couple(each)
             elif id(each) not in replaced:
-                name = self._unused(each.name)
+                name = self._free_name(each.name)
                 self.joints[name] = _joint_of(each, name)
         for spin in self.spins.values():
             if not spin.is_rod:
-                name = self._unused(f"{spin.move.inner}: no spin")
+                name = self._free_name(f"{spin.move.inner}: no spin")
                 self.joints[name] = spin.lock(name)
                 self.left_out.append(
                     f"turn of body {spin.move.inner!r} about itself: it is a rod between balls"
@@ -255,7 +255,7 @@ class _Parts:
         free = [x for x in coupling.moves if not isinstance(self.joints[x], Fixed)]
         if len(coupling.moves) < 2 or not free:  # one is locked, none says nothing
             return
-        name = self._unused(coupling.name)
+        name = self._free_name(coupling.name)
         if not coupling.is_linear:
             self.couplers[name] = self._follower(coupling, name)
             return
@@ -295,7 +295,7 @@ class _Parts:
         """
         tree = self.tree
         masses = {
-            name: [each.seen_in(place) for each in tree.masses.get(name, ())]
+            name: [each.in_frame(place) for each in tree.masses.get(name, ())]
             for name, place in self.bodies.items()
         }
         unknown = tree.unweighed - self.fixed
@@ -303,7 +303,7 @@ class _Parts:
         for spin in self.spins.values():
             link = spin.move.inner
             if spin.is_rod and (rod := tree.masses.get(link)):
-                whole = together(rod).seen_in(tree.moving[link])
+                whole = sum_of_masses(rod).in_frame(tree.moving[link])
                 if _lump(whole, spin, masses):
                     lumped.append(link)
                 else:
@@ -312,7 +312,7 @@ class _Parts:
             e0, e1, e2, e3 = (float(x) if abs(x) >= SMALLEST else 0.0 for x in place.turn)
             body = Body(name, coordinates(place.at), (e0, e1, e2, e3), name in self.fixed)
             if masses[name] and not body.fixed:
-                heavy = _with_mass(body, together(masses[name]))
+                heavy = _with_mass(body, sum_of_masses(masses[name]))
                 if heavy is None:
                     unknown.add(name)
                 body = heavy or body
@@ -345,7 +345,7 @@ class _Parts:
             try:
                 if len({*strut.links} & {GROUND, *self.bodies}) < 2:
                     raise MechanismError("it joins no two bodies of the mechanism")
-                yield _between(strut, names.new(strut.name))
+                yield _force_element(strut, names.new(strut.name))
             except MechanismError:
                 self.tree.count(strut.described)
 
@@ -385,7 +385,7 @@ class _Parts:
         return Sweep(swept, values, design=design, motions=motions)
 
 
-def _between(strut: Strut, name: str) -> ForceElement:
+def _force_element(strut: Strut, name: str) -> ForceElement:
     """Return the force element between two links.
 
     Raises:
@@ -396,7 +396,7 @@ def _between(strut: Strut, name: str) -> ForceElement:
     if isinstance(law, Spring):
         stiffness = law.stiffness, law.damping
         return SpringDamper(name, *strut.links, (p, q), *stiffness, free_length=law.rest)
-    apart = second.seen_from(first)
+    apart = second.relative_to(first)
     turned = float(np.linalg.norm([*rotation_vector(apart.turn)]))
     if turned > PARALLEL and any((*law.turning_stiffness, *law.turning_damping)):
         raise strut.element.fault(
@@ -409,7 +409,7 @@ def _between(strut: Strut, name: str) -> ForceElement:
     return Bushing(name, *strut.links, q, (x, y), **vars(law), preload=preload)
 
 
-def _locked(tree: Tree) -> set[str]:
+def _locked_moves(tree: Tree) -> set[str]:
     """Return the moves locked by couplings, alone or by other locked ones."""
     couplings = [each.moves for each in tree.ties if isinstance(each, Coupling)]
     found: set[str] = set()

@@ -123,7 +123,7 @@ def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = N
         raise error(f"the quaternion of {move.name!r} is zero, expected one of length one")
     turn, frame = unit_quaternion(quat(numbers[-4:])), tree.moving[move.inner]
     if move.kind == "free":
-        return Place(vec(numbers[:3]), turn).then(ORIGIN.seen_from(frame))
+        return Place(vec(numbers[:3]), turn).then(ORIGIN.relative_to(frame))
     # MuJoCo has the turn in the axes of the body
     turn = frame.turn * turn * frame.turn.conjugate()
     return Place(move.point - Place(turn=turn).direction(move.point), turn)
@@ -176,7 +176,7 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     driven: dict[str, Array] = {}
     given: dict[str, int] = {}
     for text in supplied.drive:
-        name, values, samples = _swept(tree, text)
+        name, values, samples = _read_drive(tree, text)
         if name in driven:
             raise tree.fault("--drive", f"found {name!r} twice; give one range")
         driven[name] = values
@@ -207,7 +207,7 @@ def read_driving(tree: Tree, supplied: Supplied) -> Driving:
     return Driving(driven, tuple(held), tuple(fixed))
 
 
-def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
+def _read_drive(tree: Tree, text: str) -> tuple[str, Array, int | None]:
     """Return the move, its values, and how many were asked for; names may hold colons too."""
     form = (
         "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates, rad or m unless"
@@ -290,11 +290,11 @@ class Freedom:
         self._part_of = {move: part for part in self._parts for move in part.columns}
         for name, axis in spins.items():
             part = self._part_of[name]
-            part.leave(axis[None] @ part.of(name)[:, -3:].T)
-        self.dof, self.taken = self.left, 0
+            part.restrict(axis[None] @ part.of(name)[:, -3:].T)
+        self.dof, self.taken = self.remaining, 0
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         """Number of motions left."""
         return sum(len(each.basis) for each in self._parts)
 
@@ -316,7 +316,7 @@ class Freedom:
         """Drive or hold a move."""
         part = self._part_of[move]
         self.taken += len(part.columns[move])
-        part.leave(part.of(move).T)
+        part.restrict(part.of(move).T)
 
 
 def choose_held(
@@ -357,8 +357,8 @@ def choose_held(
                         if move.is_axial
                         else replace(driving, fixed=driving.fixed + more)
                     )
-    if freedom.left or freedom.taken != freedom.dof or not driving.driven:
-        raise _undriven(tree, driving, freedom)
+    if freedom.remaining or freedom.taken != freedom.dof or not driving.driven:
+        raise _freedom_error(tree, driving, freedom)
     passive = [each for each in driving.held if each not in (*named, *tree.actuated)]
     if len(passive) > MOST_HELD:
         raise tree.fault(
@@ -383,7 +383,7 @@ def _candidates(tree: Tree, driving: Driving) -> list[Move]:
     return sorted(loose, key=order)
 
 
-def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
+def _freedom_error(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
     """Return the error of a model whose degrees of freedom differ from the driven ones."""
     dof, count = freedom.dof, freedom.taken
     if dof == 0:
@@ -398,7 +398,7 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
     advice: list[str] = []
     if not driving.driven:
         advice.append("--drive JOINT:START:STOP for the one that moves")
-    wanted = freedom.left - (not driving.driven)
+    wanted = freedom.remaining - (not driving.driven)
     if wanted > 0:
         bodies = " (a free body counts for 6, a ball for 3)" * (
             not all(move.is_axial for move in tree.moves.values())
@@ -406,10 +406,9 @@ def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
         advice.append(f"--hold JOINT for {wanted} more{bodies}, or --hold-rest")
     elif count > dof:
         advice.append(f"fewer --hold, by {count - dof}")
-    if count <= dof < freedom.left + count:
-        advice.append(
-            f"others for {freedom.left + count - dof} that depend on each other by the equalities"
-        )
+    if count <= dof < freedom.remaining + count:
+        tied = freedom.remaining + count - dof
+        advice.append(f"others for {tied} that depend on each other by the equalities")
     return tree.fault(
         "",
         f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}. Say"

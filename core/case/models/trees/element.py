@@ -95,7 +95,7 @@ class Element:
             f"found more than {MOST_ELEMENTS} elements, expected fewer; take out what does not move"
         )
 
-    def only(self, *tags: str) -> Iterator[Element]:
+    def findall(self, *tags: str) -> Iterator[Element]:
         """Yield the elements of these tags in it."""
         return (child for child in self.children if child.tag in tags)
 
@@ -105,12 +105,12 @@ class Element:
         Raises:
             CaseError: there are several.
         """
-        found = [*self.only(tag)]
+        found = [*self.findall(tag)]
         if len(found) > 1:
             raise found[1].fault("found again, expected one; remove the others")
         return found[0] if found else None
 
-    def below(self) -> Iterator[Element]:
+    def descendants(self) -> Iterator[Element]:
         """Yield all elements in it, at any depth, in order."""
         waiting = self.children[::-1]
         while waiting:
@@ -118,7 +118,7 @@ class Element:
             yield element
             waiting += element.children[::-1]
 
-    def rebuilt(self, change: Callable[[Element], Iterable[Element]]) -> Element:
+    def rebuild(self, change: Callable[[Element], Iterable[Element]]) -> Element:
         """Return the element with all below it changed, at any depth, innermost ones first.
 
         Args:
@@ -137,7 +137,7 @@ class Element:
                 return whole
             open_[-1][2].extend(change(whole))
 
-    def pruned(self, names: Collection[str], found: list[tuple[str, Element]]) -> Element:
+    def without_named(self, names: Collection[str], found: list[tuple[str, Element]]) -> Element:
         """Return the element without those in it of a tag, a name or TAG/NAME; add the names that
         are used, with their elements.
         """
@@ -150,7 +150,7 @@ class Element:
                 return ()
             return (element,)
 
-        return self.rebuilt(kept) if names else self
+        return self.rebuild(kept) if names else self
 
     def require_known(
         self, known: Sequence[str], format_name: str = "MJCF", *, closed: bool = True
@@ -248,7 +248,7 @@ class Element:
         child = self.child(tag)
         return "" if child is None else child.text
 
-    def required(self, name: str) -> str:
+    def require(self, name: str) -> str:
         """Return an attribute.
 
         Raises:
@@ -428,7 +428,7 @@ def printed_digits(root: Element) -> int:
     numbers are a designer's own.
     """
     counts: list[int] = []
-    for element in root.below():
+    for element in root.descendants():
         texts = [element.attributes.get(name, "") for name in _PLACES]
         texts += [element.text] * (element.tag in _TEXTS)
         for found in map(_NUMBER.fullmatch, " ".join(texts).split()):

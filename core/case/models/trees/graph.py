@@ -224,7 +224,7 @@ class _Hanging:
             self._mark_ends(strut.name, strut.links, strut.places, strut.element)
         self._walk()
         for closure in self.closures:
-            tree.tie(replace(closure, links=self._carriers(closure.links)))
+            tree.add_tie(replace(closure, links=self._carriers(closure.links)))
         for strut in struts:
             tree.add_strut(replace(strut, links=self._carriers(strut.links)))
         for coupling in graph.couplings:
@@ -298,7 +298,7 @@ class _Hanging:
         """Add a coupling of moves with one coordinate."""
         element, weights = coupling.element, [*coupling.driven, *coupling.driving]
         for name in weights:
-            self.tree.axial(element, "joint", name)
+            self.tree.require_axial(element, "joint", name)
         if len({*weights}) < len(weights):
             raise element.fault(
                 f"couples the joint {weights[0]!r} with itself, expected two; correct it"
@@ -308,7 +308,9 @@ class _Hanging:
             for side in (coupling.driven, coupling.driving)
         )
         coefficients = [x if abs(x) >= SMALLEST else 0.0 for x in coupling.coefficients]
-        self.tree.tie(replace(coupling, driven=driven, driving=driving, coefficients=coefficients))
+        self.tree.add_tie(
+            replace(coupling, driven=driven, driving=driving, coefficients=coefficients)
+        )
 
 
 @dataclass(frozen=True)
@@ -374,7 +376,7 @@ class FramedJoint:
                 moved.append((each, axis, value))
         return Place(at, unit_quaternion(turn)), moved
 
-    def between(self, places: Mapping[str, Place]) -> tuple[Place, Place]:
+    def global_frames(self, places: Mapping[str, Place]) -> tuple[Place, Place]:
         """Return its frames, global, by the places of links."""
         first, second = (
             places[link].then(frame) for link, frame in zip(self.links, self.frames, strict=True)
@@ -401,26 +403,26 @@ def join(graph: Graph, joints: Collection[FramedJoint]) -> dict[str, list[Move]]
     for each in spanning:
         joint = named[each.name]
         (a, b), (f, g) = joint.links, joint.frames
-        first, second = joint.between(own)
-        motion, _ = joint.motion(second.seen_from(first))
+        first, second = joint.global_frames(own)
+        motion, _ = joint.motion(second.relative_to(first))
         if each.links == joint.links:
             placed = graph.places[a].then(f).then(motion)
-            graph.places[b] = placed.then(ORIGIN.seen_from(g))
+            graph.places[b] = placed.then(ORIGIN.relative_to(g))
         else:
-            placed = graph.places[b].then(g).then(ORIGIN.seen_from(motion))
-            graph.places[a] = placed.then(ORIGIN.seen_from(f))
+            placed = graph.places[b].then(g).then(ORIGIN.relative_to(motion))
+            graph.places[a] = placed.then(ORIGIN.relative_to(f))
     moves: dict[str, list[Move]] = {}
     closing = [each.name for each in loops]
     closing += [each.name for each in joints if each.closes]
-    graph.joints = [_joined(graph, named[each.name], moves) for each in spanning]
-    graph.loops += [_joined(graph, named[name], moves) for name in closing]
+    graph.joints = [_graph_joint(graph, named[each.name], moves) for each in spanning]
+    graph.loops += [_graph_joint(graph, named[name], moves) for name in closing]
     return moves
 
 
-def _joined(graph: Graph, joint: FramedJoint, moves: dict[str, list[Move]]) -> Joint:
+def _graph_joint(graph: Graph, joint: FramedJoint, moves: dict[str, list[Move]]) -> Joint:
     """Return a joint of the graph with its frames, the first one behind its moves."""
-    first, second = joint.between(graph.places)
-    motion, moved = joint.motion(second.seen_from(first))
+    first, second = joint.global_frames(graph.places)
+    motion, moved = joint.motion(second.relative_to(first))
     behind = first.then(motion)
     moves[joint.name] = [
         Move(

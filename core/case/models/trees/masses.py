@@ -19,7 +19,7 @@ from ...io.document import usable
 from .element import Element
 from .mjcf_language import Classes, Compiler
 from .place import Place, turn_to, unit_quaternion
-from .tree import Mass, together
+from .tree import Mass, sum_of_masses
 
 WATER = 1000.0
 """Density of geoms unless given, as water has [kg/m^3]."""
@@ -52,16 +52,16 @@ def mass_of(
         element, at, _ = inertials[-1]
         found = _inertial(element)
         place = at.then(compiler.place(element))
-        return None if found.is_stand_in else _within_bounds(found.seen_in(place), compiler)
+        return None if found.is_stand_in else _within_bounds(found.in_frame(place), compiler)
     masses: list[Mass] = []
     for element, at, within in geoms if compiler.from_geoms != "false" else ():
         complete = classes.complete(element, "geom", within)
         if (found := _geom(complete, compiler)) is not None:
-            masses.append(found.seen_in(at.then(compiler.place(complete))))
+            masses.append(found.in_frame(at.then(compiler.place(complete))))
     if not masses and any(compiler.least):
         # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
         masses.append(Mass(0.0, compiler.place(body).at, np.zeros((3, 3))))
-    return _within_bounds(together(masses), compiler) if masses else None
+    return _within_bounds(sum_of_masses(masses), compiler) if masses else None
 
 
 def _inertial(element: Element) -> Mass:
@@ -88,7 +88,7 @@ def mass_in(place: Place, mass: float, entries: Sequence[float]) -> Mass | None:
         place: centre of mass and axes of the inertia, in the frame of the link.
         entries: see `inertia_of`.
     """
-    return Mass(mass, ZERO, inertia_of(entries)).seen_in(place) if mass >= 0.0 else None
+    return Mass(mass, ZERO, inertia_of(entries)).in_frame(place) if mass >= 0.0 else None
 
 
 def _geom(element: Element, compiler: Compiler) -> Mass | None:
@@ -215,7 +215,7 @@ class _Masses:
         has_center, has_moments = "inf" not in said, min(moments) > 0.0
         if not (mass > 0.0 and has_center and has_moments):
             parts = [self._part(body, each, place) for each in colliders]
-            whole = together(parts)
+            whole = sum_of_masses(parts)
             if not (whole.mass > 0.0 or (mass > 0.0 and not colliders)):
                 return None
             mass, share = (mass, mass / (whole.mass or mass)) if mass > 0.0 else (whole.mass, 1.0)
@@ -230,7 +230,7 @@ class _Masses:
         axes = body.numbers("physics:principalAxes", 4, default=(1.0, 0.0, 0.0, 0.0))
         turn = unit_quaternion(quat(axes if any(axes) else (1.0, 0.0, 0.0, 0.0)))
         unit = self.kilogram * self.metre**2
-        return Mass(mass, ZERO, unit * np.diag(moments)).seen_in(Place(center, turn))
+        return Mass(mass, ZERO, unit * np.diag(moments)).in_frame(Place(center, turn))
 
     def _part(self, body: Element, shape: Element, around: Place) -> Mass:
         """Return the mass of a collider in the frame of its body.
@@ -266,7 +266,7 @@ class _Masses:
             place = place.then(Place(turn=turn_to(axis)))
         own = 0.0 if shape is body else self.kilogram * shape.number("physics:mass", 0.0)
         mass = own if own > 0.0 else volume * self._density(body, shape)
-        return Mass(mass, ZERO, mass * np.diag(moments)).seen_in(place.seen_from(around))
+        return Mass(mass, ZERO, mass * np.diag(moments)).in_frame(place.relative_to(around))
 
     def _density(self, body: Element, shape: Element) -> float:
         """Return the density of a collider [kg/m^3]."""

@@ -105,8 +105,8 @@ def _require_written_out(element: Element) -> None:
 
 def _require_rigid(root: Element) -> None:
     """Refuse soft bodies between bodies."""
-    for section in root.only("deformable"):
-        for flex in section.only("flex"):
+    for section in root.findall("deformable"):
+        for flex in section.findall("flex"):
             names = {
                 name for key in ("body", "node") for name in flex.attributes.get(key, "").split()
             }
@@ -125,50 +125,50 @@ class _Reader:
         model = root.attributes.get("model", file.stem)
         described = f"MJCF model {model!r} of {file.name}"
         self.tree = Tree(file, described, "its pose qpos0", digits=significant_digits(root))
-        flags = [flag for option in root.only("option") for flag in option.only("flag")]
+        flags = [flag for option in root.findall("option") for flag in option.findall("flag")]
         self.disabled = {
             key for flag in flags for key, value in flag.attributes.items() if value == "disable"
         }
         self.stand_ins = any(
             text.attributes.get("name") == STAND_INS
-            for custom in root.only("custom")
-            for text in custom.only("text")
+            for custom in root.findall("custom")
+            for text in custom.findall("text")
         )
-        tendons = [each for section in root.only("tendon") for each in section.children]
+        tendons = [each for section in root.findall("tendon") for each in section.children]
         self.coupling = set[str]()
-        self.plugins = [(each, "") for part in root.only("extension") for each in part.children]
+        self.plugins = [(each, "") for part in root.findall("extension") for each in part.children]
         self.tendons = {each.attributes.get("name", ""): each for each in tendons}
 
     def read(self) -> Tree:
         """Return the tree."""
         root, tree = self.root, self.tree
-        worlds = [*root.only("worldbody")]
+        worlds = [*root.findall("worldbody")]
         for world in worlds:
-            bodies = (each for each in world.below() if each.tag == "body")
+            bodies = (each for each in world.descendants() if each.tag == "body")
             tree.names.update(
                 each.attributes["name"] for each in bodies if "name" in each.attributes
             )
-            self._inside(world)
+            self._read_bodies(world)
         tree.require_moving(root)
         unread = Unread({name: name for name in tree.places}, {}, (), "an <equality>")
         for plugin, link in self.plugins:
             unread.require_apart(plugin, link)
-        for section in root.only(*_LEFT_OUT):
+        for section in root.findall(*_LEFT_OUT):
             for element in section.children:
                 tree.count(f"{section.tag}: {element.tag}")
         self._equalities()
         self._springs()
-        keys = [each for section in root.only("keyframe") for each in section.only("key")]
+        keys = [each for section in root.findall("keyframe") for each in section.findall("key")]
         for k, key in enumerate(keys):
             qpos = key.attributes.get("qpos")
             numbers = None if qpos is None else qpos.split()
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
-        for section in root.only("actuator"):
-            for motor in section.only(*_ACTUATORS):
+        for section in root.findall("actuator"):
+            for motor in section.findall(*_ACTUATORS):
                 tendon = self.tendons.get(motor.attributes.get("tendon", ""))
                 moved = motor
                 if tendon is not None and tendon.tag == "fixed":  # of joints that move as one
-                    moved = next(tendon.only("joint"), motor)
+                    moved = next(tendon.findall("joint"), motor)
                 named = {moved.attributes.get(key, "") for key in ("joint", "jointinparent")}
                 tree.add_motor(f"actuator: {motor.tag}", named & tree.moves.keys())
         ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
@@ -177,9 +177,9 @@ class _Reader:
             tree.gravity = self._gravity()
         return tree
 
-    def _inside(self, world: Element) -> None:
+    def _read_bodies(self, world: Element) -> None:
         """Read the bodies of a world and what is in them, depth first."""
-        waiting = [(WORLD, self._in_frames(world, ORIGIN, MAIN))]
+        waiting = [(WORLD, self._parts_of(world, ORIGIN, MAIN))]
         while waiting:
             link, inside = waiting[-1]
             if (found := next(inside, None)) is None:
@@ -223,20 +223,20 @@ class _Reader:
             if element.number("gravcomp", 0.0) != 0.0:
                 tree.count("gravity compensation of bodies")
             self._weigh(element, name, childclass)
-        return name, self._in_frames(element, place, childclass)
+        return name, self._parts_of(element, place, childclass)
 
     def _weigh(self, element: Element, name: str, childclass: str) -> None:
         """Read the mass of a body, which motion does not need: what makes no sense is left out."""
         if self.stand_ins:
             return
         try:
-            parts = [*self._in_frames(element, ORIGIN, childclass)]
+            parts = [*self._parts_of(element, ORIGIN, childclass)]
             if (mass := mass_of(element, parts, self.classes, self.compiler)) is not None:
                 self.tree.weigh(name, mass)
         except CaseError:
             self.tree.weigh(name, None)
 
-    def _in_frames(self, around: Element, place: Place, childclass: str) -> Iterator[_Part]:
+    def _parts_of(self, around: Element, place: Place, childclass: str) -> Iterator[_Part]:
         """Yield what is in a body or its frames, with the place and the class of the frame."""
         waiting = [(each, place, childclass) for each in reversed(around.children)]
         while waiting:
@@ -257,7 +257,7 @@ class _Reader:
         """Yield the joints of a body."""
         found = [
             (element, at, within)
-            for element, at, within in self._in_frames(body, place, childclass)
+            for element, at, within in self._parts_of(body, place, childclass)
             if element.tag in ("joint", "freejoint")
         ]
         for k, (element, at, within) in enumerate(found, 1):
@@ -321,7 +321,7 @@ class _Reader:
 
     def _equalities(self) -> None:
         names = set[str]()
-        for section in self.root.only("equality"):
+        for section in self.root.findall("equality"):
             for k, bare in enumerate(section.children, 1):
                 element = self.classes.complete(bare, "equality")
                 if element.tag not in _EQUALITIES:
@@ -340,10 +340,10 @@ class _Reader:
                     case "connect" | "weld":
                         tie = self._closure(name, element)
                     case "joint":
-                        tie = self._coupling(name, element)
+                        tie = self._of_joints(name, element)
                     case _:
                         tie = self._of_tendon(name, element)
-                self.tree.tie(tie)
+                self.tree.add_tie(tie)
 
     def _closure(self, name: str, element: Element) -> Closure:
         tree, welded = self.tree, element.tag == "weld"
@@ -374,7 +374,7 @@ class _Reader:
             return Closure(name, links, (point, point), element, holds)
         relpose = element.numbers("relpose", 7, default=(0.0,) * 7)
         # zeros for the quaternion mean: as in qpos0
-        wanted = second.seen_from(first)
+        wanted = second.relative_to(first)
         if any(relpose[3:]):
             wanted = Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:])))
         return Closure(name, links, (first.then(wanted), second), element, holds)
@@ -385,11 +385,11 @@ class _Reader:
             raise element.unknown_name(key, name, self.tree.sites, "a site")
         return self.tree.sites[name]
 
-    def _coupling(self, name: str, element: Element) -> Coupling:
-        first = self.tree.axial(element, "joint1", element.attributes.get("joint1"))
+    def _of_joints(self, name: str, element: Element) -> Coupling:
+        first = self.tree.require_axial(element, "joint1", element.attributes.get("joint1"))
         driving: dict[str, float] = {}
         if "joint2" in element.attributes:
-            second = self.tree.axial(element, "joint2", element.attributes["joint2"])
+            second = self.tree.require_axial(element, "joint2", element.attributes["joint2"])
             if first == second:
                 raise element.fault(
                     f"couples the joint {first!r} with itself, expected two; correct joint2"
@@ -417,8 +417,8 @@ class _Reader:
                 " joint for it"
             )
         weights: dict[str, float] = {}
-        for wrap in self.tendons[name].only("joint"):
-            joint = self.tree.axial(wrap, "joint", wrap.attributes.get("joint"))
+        for wrap in self.tendons[name].findall("joint"):
+            joint = self.tree.require_axial(wrap, "joint", wrap.attributes.get("joint"))
             weights[joint] = weights.get(joint, 0.0) + wrap.number("coef")
         if not {"stiffness", "damping"} & self.tendons[name].attributes.keys():
             self.coupling.add(name)
@@ -464,7 +464,7 @@ class _Reader:
                 for key, what in (("stiffness", "springs"), ("damping", "damping")):
                     if {key, "springdamper"} & element.attributes.keys():
                         tree.count(f"{what} of joints")
-        for section in self.root.only("tendon"):
+        for section in self.root.findall("tendon"):
             for tendon in section.children:
                 self._limit(self.classes.complete(tendon, "tendon"))
                 try:
@@ -515,8 +515,8 @@ class _Reader:
     def _gravity(self) -> Vector:
         """Return the gravity [m/s^2]; the last option counts."""
         found = self.tree.gravity
-        for option in self.root.only("option"):
-            if any(flag.attributes.get("gravity") == "disable" for flag in option.only("flag")):
+        for option in self.root.findall("option"):
+            if any(flag.attributes.get("gravity") == "disable" for flag in option.findall("flag")):
                 return (0.0, 0.0, 0.0)
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z

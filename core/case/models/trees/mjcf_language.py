@@ -110,7 +110,7 @@ def require_known_attributes(root: Element) -> None:
     Raises:
         CaseError: there is one.
     """
-    waiting = [(root.tag, each) for each in root.only(*_READ, "keyframe")]
+    waiting = [(root.tag, each) for each in root.findall(*_READ, "keyframe")]
     while waiting:
         around, element = waiting.pop()
         inner = f"{around} {element.tag}"
@@ -134,7 +134,7 @@ class Classes:
 
     def __init__(self, root: Element) -> None:
         self._attributes: dict[str, dict[str, dict[str, str]]] = {MAIN: {}}
-        for top in root.only("default"):
+        for top in root.findall("default"):
             top.choice("class", (MAIN,), MAIN)
             waiting = [(top, MAIN, MAIN)]
             while waiting:
@@ -145,10 +145,10 @@ class Classes:
                         f"class: {problem}, expected a name of its own; name the class"
                     )
                 own = {kind: dict(values) for kind, values in self._attributes[around].items()}
-                for child in element.only(*_IN_CLASSES):
-                    own[child.tag] = _over(own.get(child.tag, {}), child.attributes)
+                for child in element.findall(*_IN_CLASSES):
+                    own[child.tag] = _merged(own.get(child.tag, {}), child.attributes)
                 self._attributes[name] = own
-                inner = [*element.only("default")][::-1]
+                inner = [*element.findall("default")][::-1]
                 waiting += [(each, each.attributes.get("class", ""), name) for each in inner]
 
     def complete(self, element: Element, kind: str, childclass: str = MAIN) -> Element:
@@ -158,11 +158,11 @@ class Classes:
         name = element.attributes.get("class", childclass)
         if name not in self._attributes:
             raise element.unknown_name("class", name, self._attributes, "a default class")
-        found = _over(self._attributes[name].get(kind, {}), element.attributes)
+        found = _merged(self._attributes[name].get(kind, {}), element.attributes)
         return replace(element, attributes=found)
 
 
-def _over(inherited: Mapping[str, str], own: Mapping[str, str]) -> dict[str, str]:
+def _merged(inherited: Mapping[str, str], own: Mapping[str, str]) -> dict[str, str]:
     """Return attributes, the own ones first; an orientation takes the place of another, however
     either is written.
     """
@@ -261,7 +261,7 @@ def read_compiler(root: Element) -> Compiler:
         CaseError: an unknown setting, or global coordinates, which MuJoCo does not read any more.
     """
     found = Compiler()
-    for element in root.only("compiler"):
+    for element in root.findall("compiler"):
         element.require_known(KNOWN["compiler"])
         degrees = element.choice("angle", ("degree", "radian"), _ANGLES[found.degrees])
         sequence = element.attributes.get("eulerseq", found.sequence)
@@ -315,9 +315,9 @@ class _Expansion:
     bytes: int = 0
     elements: int = 0
 
-    def expanded(self, around: Element) -> Element:
+    def expand(self, around: Element) -> Element:
         """Return an element with all in it expanded, at any depth."""
-        return around.rebuilt(self._expand)
+        return around.rebuild(self._expand)
 
     def _expand(self, element: Element) -> Iterator[Element]:
         """Yield what an element stands for, whose content is expanded."""
@@ -325,7 +325,7 @@ class _Expansion:
         if self.elements > MOST_ELEMENTS:
             raise element.too_many()
         if element.tag == "include":
-            yield from self.expanded(self._include(element)).children
+            yield from self.expand(self._include(element)).children
         elif element.tag == "replicate" and self.compiler is not None:
             yield from self._copies(element, element.children, self.compiler)
         else:
@@ -372,16 +372,16 @@ class _Expansion:
         count, separator = int(text), element.attributes.get("sep", "")
         offset = vec(element.numbers("offset", 3, default=(0.0, 0.0, 0.0)))
         turn = element.numbers("euler", 3, default=(0.0, 0.0, 0.0))
-        self.elements += count * sum(1 + sum(1 for _ in each.below()) for each in inside)
+        self.elements += count * sum(1 + sum(1 for _ in each.descendants()) for each in inside)
         if self.elements > MOST_ELEMENTS:
             raise element.fault(f"makes more than {MOST_ELEMENTS} elements; lower its count")
         digits, at = len(str(count - 1)), ZERO
         own = {key: text for key, text in element.attributes.items() if key == "childclass"}
         for k in range(count):
             place = Place(at, compiler.euler([k * angle for angle in turn]))
-            named = [_with_suffix(each, f"{separator}{k:0{digits}}") for each in inside]
+            renamed = [_with_suffix(each, f"{separator}{k:0{digits}}") for each in inside]
             attributes = {"pos": _text(place.at), "quat": _text(place.turn), **own}
-            yield replace(element, tag="frame", attributes=attributes, children=named)
+            yield replace(element, tag="frame", attributes=attributes, children=renamed)
             at = place.point(offset)
 
 
@@ -390,7 +390,7 @@ def _text(values: Iterable[float]) -> str:
 
 
 def _with_suffix(element: Element, suffix: str) -> Element:
-    def named(each: Element) -> Element:
+    def renamed(each: Element) -> Element:
         own = each.attributes
         return (
             replace(each, attributes={**own, "name": own["name"] + suffix})
@@ -398,7 +398,7 @@ def _with_suffix(element: Element, suffix: str) -> Element:
             else each
         )
 
-    return named(element.rebuilt(lambda each: (named(each),)))
+    return renamed(element.rebuild(lambda each: (renamed(each),)))
 
 
 def expand(file: Path, root: Element) -> Element:
@@ -408,5 +408,5 @@ def expand(file: Path, root: Element) -> Element:
         CaseError: a file is missing, elsewhere or taken twice, a replicate or a setting of the
             compiler makes no sense, or there is too much of either.
     """
-    whole = _Expansion(file.resolve()).expanded(root)
-    return _Expansion(file.resolve(), read_compiler(whole)).expanded(whole)
+    whole = _Expansion(file.resolve()).expand(root)
+    return _Expansion(file.resolve(), read_compiler(whole)).expand(whole)

@@ -139,7 +139,7 @@ class _Reader:
     """
 
     def __init__(self, file: Path, root: Element) -> None:
-        models = [*root.only("Model", "ModelComponentSet")]
+        models = [*root.findall("Model", "ModelComponentSet")]
         if len(models) != 1 or models[0].tag != "Model":
             raise root.fault("found no single <Model>, expected one; give a model of OpenSim")
         self.model = models[0]
@@ -177,14 +177,14 @@ class _Reader:
         for marker in self._all("Marker"):
             link, place = self._frame(marker, "socket_parent_frame")
             at = place.then(Place(_vector(marker, "location")))
-            name = marker.required("name")
+            name = marker.require("name")
             name += ".marker" * (name in graph.places)
             graph.frames[name] = link, graph.places[link].then(at)
         x, y, z = self.model.value("gravity", 3, GRAVITY)
         tree.gravity = x, y, z
         for section in self.model.children:
             if section.tag.endswith("Set") and section.tag not in _TIED:
-                for each in section.only("objects"):
+                for each in section.findall("objects"):
                     for other in each.children:
                         tree.count(other.tag)
         return graph.hang()
@@ -206,7 +206,7 @@ class _Reader:
         return (each for each in self.paths.values() if each.tag == tag)
 
     def _add_body(self, element: Element) -> None:
-        graph, name = self.graph, element.required("name")
+        graph, name = self.graph, element.require("name")
         if name in graph.places:
             raise element.repeated_name(name, "the bodies")
         graph.places[name], graph.elements[name] = ORIGIN, element
@@ -233,7 +233,7 @@ class _Reader:
             known = [path for path, each in self.paths.items() if each.tag == "Body"]
             raise element.unknown_name(key, text, ["/ground", *known], "a frame of the model")
         if frame.tag == "Body":
-            return frame.required("name"), ORIGIN
+            return frame.require("name"), ORIGIN
         if frame.tag == "Ground":
             return self.graph.add_world(), ORIGIN
         if depth > DEEPEST_FRAME:
@@ -245,7 +245,7 @@ class _Reader:
 
     def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
         """Return a joint; None of one that leaves its link free."""
-        graph, name = self.graph, element.required("name")
+        graph, name = self.graph, element.require("name")
         if element.tag not in (*CHAINS, CUSTOM):
             raise element.unknown_name("type", element.tag, (*CHAINS, CUSTOM), "a joint")
         element.require_children(IN_JOINT)
@@ -261,14 +261,16 @@ class _Reader:
         found = FramedJoint(name, element, (a, b), (f, g), freedoms)
         if element.tag == "FreeJoint" and a in graph.fixed and freedoms[-1].kind == "ball":
             motion, _ = found.motion(ORIGIN)
-            graph.places[b] = f.then(motion).then(ORIGIN.seen_from(g))
+            graph.places[b] = f.then(motion).then(ORIGIN.relative_to(g))
             return None
         return found
 
     def _coordinates(self, element: Element, name: str, count: int) -> list[Element]:
         """Return the coordinates of a joint, with those that have their default name."""
         given = [
-            each for around in element.only("coordinates") for each in around.only("Coordinate")
+            each
+            for around in element.findall("coordinates")
+            for each in around.findall("Coordinate")
         ]
         for each in given:
             each.require_children(IN_COORDINATE)
@@ -285,7 +287,7 @@ class _Reader:
         chain = CHAINS[element.tag]
         coordinates = self._coordinates(element, name, len(chain))
         whole = element.tag in ("BallJoint", "FreeJoint") and not any(
-            _flag(each, "locked") or each.required("name") in coupled for each in coordinates
+            _flag(each, "locked") or each.require("name") in coupled for each in coordinates
         )
         if not whole:
             return [self._freedom(coordinates[k], kind, axis) for kind, axis, k in chain]
@@ -300,7 +302,7 @@ class _Reader:
 
     def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> FramedFreedom:
         """Return the move of a coordinate; lock it if the file does."""
-        name = coordinate.required("name")
+        name = coordinate.require("name")
         if name in self.values:
             raise coordinate.repeated_name(name, "the coordinates")
         self.values[name] = self._default(coordinate)
@@ -314,11 +316,11 @@ class _Reader:
         """Return the moves of a custom joint: of each coordinate an axis moved as much as itself;
         other axes follow. One without such an axis turns a hinge, and another one back.
         """
-        coordinates = {each.required("name"): each for each in self._coordinates(element, name, 0)}
+        coordinates = {each.require("name"): each for each in self._coordinates(element, name, 0)}
         space = element.child(SPACE)
         if space is None:
             raise element.fault(f"<{SPACE}>: missing, expected six axes; add it")
-        given = {each.required("name"): each for each in space.only("TransformAxis")}
+        given = {each.require("name"): each for each in space.findall("TransformAxis")}
         curves: dict[str, tuple[str, PiecewisePolynomial]] = {}
         for each in AXES:
             curves[each] = _curve(given[each], coordinates) if each in given else ("", _ZERO)
@@ -375,11 +377,11 @@ class _Reader:
         self.ties.append(Coupling(name, *pair, coefficients, element, points))
 
     def _default_of(self, name: str) -> float:
-        coordinate = next((x for x in self._all("Coordinate") if x.required("name") == name), None)
+        coordinate = next((x for x in self._all("Coordinate") if x.require("name") == name), None)
         return self.values.get(name, 0.0) if coordinate is None else self._default(coordinate)
 
     def _constrain(self, element: Element) -> None:
-        graph, name = self.graph, element.required("name")
+        graph, name = self.graph, element.require("name")
         if element.tag not in CONSTRAINTS:
             raise element.fault(
                 f"is a {element.tag}, expected one of {', '.join(CONSTRAINTS)}; leave it out by"
@@ -433,8 +435,8 @@ class _Reader:
         tree = self.graph.tree
         forces = [
             each
-            for section in self.model.only("ForceSet")
-            for objects in section.only("objects")
+            for section in self.model.findall("ForceSet")
+            for objects in section.findall("objects")
             for each in objects.children
         ]
         for each in forces:
@@ -448,9 +450,9 @@ class _Reader:
                 ]
                 tree.springs[coordinate] = Spring(*numbers)
             elif each.tag == "BushingForce":
-                self._bush(each)
+                self._add_bushing(each)
             elif each.tag == "PointToPointSpring":
-                self._spring(each)
+                self._add_spring(each)
             else:
                 if each.tag.endswith("CoordinateActuator"):
                     tree.add_motor(each.tag, {coordinate} & self.values.keys())
@@ -470,29 +472,29 @@ class _Reader:
         element.require_two(*links)
         return (links[0], links[1]), (places[0], places[1])
 
-    def _spring(self, element: Element) -> None:
+    def _add_spring(self, element: Element) -> None:
         stiffness, rest = (element.value(key, 1, (0.0,))[0] for key in ("stiffness", "rest_length"))
         ends = self._ends(element, "socket_body{}", "point{}")
-        self._strut(element, *ends, Spring(stiffness, 0.0, rest))
+        self._add_strut(element, *ends, Spring(stiffness, 0.0, rest))
 
-    def _bush(self, element: Element) -> None:
+    def _add_bushing(self, element: Element) -> None:
         laws = [
             element.value(f"{kind}_{law}", 3, (0.0, 0.0, 0.0))
             for law in ("stiffness", "damping")
             for kind in ("translational", "rotational")
         ]
         numbers = [(x, y, z) for x, y, z in laws]
-        self._strut(element, *self._ends(element, "socket_frame{}"), BushingLaw(*numbers))
+        self._add_strut(element, *self._ends(element, "socket_frame{}"), BushingLaw(*numbers))
         self.graph.tree.notes.append(f"{element}: {HALFWAY}")
 
-    def _strut(
+    def _add_strut(
         self,
         element: Element,
         links: tuple[str, str],
         places: tuple[Place, Place],
         law: Spring | BushingLaw,
     ) -> None:
-        name = element.required("name")
+        name = element.require("name")
         self.graph.struts.append(Strut(name, links, places, law, element, element.tag))
 
 

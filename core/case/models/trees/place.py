@@ -46,7 +46,7 @@ class Place:
         """Return a direction given in this frame."""
         return a + rotation_less_identity(self.turn) @ a
 
-    def seen_from(self, outer: Place) -> Place:
+    def relative_to(self, outer: Place) -> Place:
         """Return this frame as the other one sees it, both given alike."""
         back = outer.turn.conjugate()
         return Place(Place(ZERO, back).direction(self.at - outer.at), back * self.turn)

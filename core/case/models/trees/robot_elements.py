@@ -121,7 +121,7 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
             except CaseError:
                 graph.tree.count(STRUT)
         elif element.tag == BUSHING:
-            graph.struts.append(_bushing(element, frame_of))
+            graph.struts.append(_bushing_strut(element, frame_of))
             graph.tree.notes.append(f"{element}: {HALFWAY}")
     names = Names()
 
@@ -166,7 +166,7 @@ def _strut(graph: Graph, element: Element, link_of: LinkOf) -> Strut:
     return Strut(_name(element, links), links, (first, second), spring, element, STRUT)
 
 
-def _bushing(element: Element, frame_of: FrameOf) -> Strut:
+def _bushing_strut(element: Element, frame_of: FrameOf) -> Strut:
     frames = [f"drake:bushing_frame{side}" for side in "AC"]
     laws = [f"drake:bushing_{each}" for each in BUSHING_LAW]
     element.require_children((*frames, *laws), closed=True)
@@ -269,26 +269,28 @@ class Unread:
                 f" and is not read, expected {self.advice}; write what joins them so, or leave it"
                 f" out by --without {element.tag}"
             )
-        if any(word in _bare(element.tag) for word in _CLOSING) and not _apart(element):
+        if any(word in _local_tag(element.tag) for word in _CLOSING) and not _joins_nothing(
+            element
+        ):
             raise element.fault(
                 f"may close a loop, and is not read, expected {self.advice}; write it so, or leave"
                 f" it out by --without {element.tag}"
             )
-        self._uncoupled(element)
+        self._require_uncoupled(element)
 
-    def _uncoupled(self, element: Element) -> set[str]:
+    def _require_uncoupled(self, element: Element) -> set[str]:
         """Return the joints that an element and those in it name, if it couples none."""
         joints = {*self._joints(element)}
         for child in element.children:
-            joints |= self._uncoupled(child)
+            joints |= self._require_uncoupled(child)
         if len(joints) < 2 or any(joints <= {*pair} for pair in self.followers):
             return joints
         why = ""
         if any(map(_says_coupled, (element, *element.children))):
             why = "couples the joints"
-        elif _bare(element.tag) == "transmission":
+        elif _local_tag(element.tag) == "transmission":
             free = joints - {follower for follower, _ in self.followers}
-            motors = sum("actuator" in _bare(each.tag) for each in element.children)
+            motors = sum("actuator" in _local_tag(each.tag) for each in element.children)
             why = "with fewer actuators than joints may couple" if len(free) > motors > 0 else ""
         if why:
             raise element.fault(
@@ -299,7 +301,7 @@ class Unread:
 
     def _links(self, element: Element) -> Iterator[str]:
         """Yield the links that an element and those in it name."""
-        if _apart(element):
+        if _joins_nothing(element):
             return
         for hint, word in _words(element):
             link = self.links.get(word)
@@ -313,7 +315,7 @@ class Unread:
 
     def _joints(self, element: Element) -> Iterator[str]:
         own = element.attributes.get("name", "")
-        if "joint" in _bare(element.tag) and own in self.joints:
+        if "joint" in _local_tag(element.tag) and own in self.joints:
             yield self.joints[own]
         for hint, word in _words(element):
             if word in self.joints and (
@@ -322,13 +324,13 @@ class Unread:
                 yield self.joints[word]
 
 
-def _bare(tag: str) -> str:
+def _local_tag(tag: str) -> str:
     """Return a tag in small letters, without its prefix."""
     return tag.rpartition(":")[2].lower()
 
 
-def _apart(element: Element) -> bool:
-    tag = _bare(element.tag)
+def _joins_nothing(element: Element) -> bool:
+    tag = _local_tag(element.tag)
     if tag == "plugin":
         said = " ".join(element.attributes.values()).lower()
         return any(word in said for word in _PUBLISHERS)
@@ -339,7 +341,7 @@ def _apart(element: Element) -> bool:
 
 
 def _says_coupled(element: Element) -> bool:
-    tag = _bare(element.tag)
+    tag = _local_tag(element.tag)
     said = [tag, *element.attributes]
     if tag in ("plugin", "param"):
         said += element.attributes.values()
@@ -348,10 +350,10 @@ def _says_coupled(element: Element) -> bool:
 
 def _words(element: Element) -> Iterator[tuple[str, str]]:
     """Yield the words of an element's attributes and text, each with what it is called."""
-    tag, own = _bare(element.tag), element.attributes.get("name", "")
+    tag, own = _local_tag(element.tag), element.attributes.get("name", "")
     for key, value in element.attributes.items():
         if key != "name":
-            yield from ((_bare(key), word) for word in _split(value))
+            yield from ((_local_tag(key), word) for word in _split(value))
         elif tag not in _NAMED:
             yield from ((tag, word) for word in _split(value))
     hint = f"{tag} {own}".lower() if tag == "param" else tag

@@ -44,9 +44,9 @@ from .sdf_frames import (
     Frames,
     endings,
     flag_of,
+    full_name_of,
     pose_of,
     text_of,
-    within,
 )
 from .tree import NO_LIMIT, WORLD, Coupling, Limit, Mass, Move, Tree, limit_of
 
@@ -103,7 +103,7 @@ def whole_sdf(file: Path, root: Element) -> Element:
         CaseError: a model is elsewhere, or an option of its inclusion is not read.
     """
     folder = file.parent.resolve()
-    return _Inclusion(folder, folder.parent, _version(root)).whole(root)
+    return _Inclusion(folder, folder.parent, _version(root)).with_models(root)
 
 
 @dataclass
@@ -122,9 +122,9 @@ class _Inclusion:
     version: tuple[int, ...]
     count: int = 0
 
-    def whole(self, around: Element) -> Element:
+    def with_models(self, around: Element) -> Element:
         """Return an element with included models in place of <include>, at any depth."""
-        return around.rebuilt(lambda each: (self._model(each) if each.tag == "include" else each,))
+        return around.rebuild(lambda each: (self._model(each) if each.tag == "include" else each,))
 
     def _model(self, element: Element) -> Element:
         element.require_known(("merge",), "SDF")
@@ -136,7 +136,7 @@ class _Inclusion:
             raise element.fault(f"found more than {MOST_INCLUDES} includes, or a ring of them")
         file = self._file(element, text_of(element, "uri"))
         root = parse_xml(file, read_text(file, LARGEST_FILE, "it holds one model"))
-        models = [*root.only("model")]
+        models = [*root.findall("model")]
         if root.tag != "sdf" or len(models) != 1:
             raise element.fault(
                 f"{file.name}: found <{root.tag}> with {len(models)} models, expected <sdf> with"
@@ -148,9 +148,9 @@ class _Inclusion:
                 f" meaning than those of the file around it; {_WRITE_OUT}"
             )
         folder, self.folder = self.folder, file.parent
-        model = self.whole(models[0])
+        model = self.with_models(models[0])
         self.folder = folder
-        own = [*element.only("pose", "static", "plugin")]
+        own = [*element.findall("pose", "static", "plugin")]
         given = {each.tag for each in own if each.tag != "plugin"}
         children = [*own, *(each for each in model.children if each.tag not in given)]
         attributes = dict(model.attributes)
@@ -181,7 +181,7 @@ class _Inclusion:
         if found[0].suffix != ".config":
             return found[0]
         config = parse_xml(found[0], read_text(found[0], LARGEST_FILE, "it describes one model"))
-        files = [*config.only("sdf")]
+        files = [*config.findall("sdf")]
         newest = max(files, key=_version, default=config)
         file = file_near(found[0].parent, newest.text, _SUFFIXES)
         if file is None or not file.is_file():
@@ -198,8 +198,8 @@ def read_sdf(file: Path, root: Element) -> Tree:
     name = root.attributes.get("name", file.stem)
     graph, frames = Graph.of(root, f"SDF model {name!r} of {file.name}"), Frames()
     graph.tree.gravity = GRAVITY
-    worlds = [*root.only("world")]
-    if not (worlds or any(root.only("model"))):
+    worlds = [*root.findall("world")]
+    if not (worlds or any(root.findall("model"))):
         raise root.fault("has no model, expected one; give a model that moves")
     for around in (root, *worlds):
         frames.read(around, "")
@@ -221,7 +221,7 @@ def read_sdf(file: Path, root: Element) -> Tree:
             graph.tree.gravity = x, y, z
     graph.joints += joints_of(graph, frames, _version(root))
     in_models = [
-        (child, partial(_link, frames, full), partial(_framed, frames, full))
+        (child, partial(_link, frames, full), partial(_link_and_place, frames, full))
         for full, framed in frames.models.items()
         for child in framed.element.children
     ]
@@ -230,21 +230,21 @@ def read_sdf(file: Path, root: Element) -> Tree:
     for full, framed in frames.found.items():
         if framed.element.tag == "frame" and (link := frames.link(framed.element, framed.attached)):
             place = frames.place(framed.element, full)
-            graph.frames[frames.short(full)] = frames.short(link), place
+            graph.frames[frames.short_name(full)] = frames.short_name(link), place
     return graph.hang()
 
 
 def _add_links(graph: Graph, frames: Frames) -> None:
     for full, framed in frames.links.items():
         framed.element.require_children(IN_LINK, closed=True)
-        name = frames.short(full)
+        name = frames.short_name(full)
         graph.places[name] = frames.place(framed.element, full)
         graph.elements[name] = framed.element
         if frames.is_still(full):
             graph.fixed.add(name)
-        for inertial in [*framed.element.only("inertial")][:1]:
+        for inertial in [*framed.element.findall("inertial")][:1]:
             graph.masses[name] = _mass(inertial)
-        for child in framed.element.only(*_COUNTED):
+        for child in framed.element.findall(*_COUNTED):
             graph.tree.count(child.tag)
     if not graph.places:
         raise graph.root.fault("has no link, expected a mechanism; give a model that moves")
@@ -259,7 +259,7 @@ def _mass(element: Element) -> Mass | None:
     """Return the mass of an <inertial>; None if it cannot be read, for motion does not need it."""
     element.require_known(("auto",), "SDF")
     element.require_children(IN_INERTIAL, closed=True)
-    for child in element.only("inertia"):
+    for child in element.findall("inertia"):
         child.require_children(ENTRIES, closed=True)
     try:
         if element.choice("auto", FLAGS, "false") in TRUE:
@@ -289,23 +289,23 @@ def _version(root: Element) -> tuple[int, ...]:
 
 def _link(frames: Frames, model: str, element: Element, name: str) -> str:
     """Return the link of an element of Drake."""
-    link = frames.link(element, within(model, name))
+    link = frames.link(element, full_name_of(model, name))
     if not link:
         raise element.fault("is the world, expected a link; fix a link to the world")
-    return frames.short(link)
+    return frames.short_name(link)
 
 
-def _framed(frames: Frames, model: str, element: Element, name: str) -> tuple[str, Place]:
+def _link_and_place(frames: Frames, model: str, element: Element, name: str) -> tuple[str, Place]:
     """Return link and place of a frame named by an element of Drake."""
-    return _link(frames, model, element, name), frames.place(element, within(model, name))
+    return _link(frames, model, element, name), frames.place(element, full_name_of(model, name))
 
 
 def _require_apart(graph: Graph, frames: Frames) -> None:
     """Refuse elements that are not read and may join links."""
-    joints = {name: frames.short(full) for full in frames.joints for name in endings(full)}
-    links = {name: frames.short(full) for name, full in frames.named().items()}
+    joints = {name: frames.short_name(full) for full in frames.joints for name in endings(full)}
+    links = {name: frames.short_name(full) for name, full in frames.link_names().items()}
     unread = Unread(links, joints, graph.followers, f"a <joint> or <{BALL}>")
-    around = [("", each) for each in (graph.root, *graph.root.only("world"))]
+    around = [("", each) for each in (graph.root, *graph.root.findall("world"))]
     around += [("", each.element) for each in frames.models.values()]
     around += [(full, each.element) for full, each in frames.links.items()]
     for link, element in around:
@@ -329,12 +329,12 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
     for full, framed in frames.joints.items():
         element = framed.element
         element.require_children(IN_JOINT, closed=True)
-        for each in element.only(*BARE):
+        for each in element.findall(*BARE):
             each.require_known((), "SDF")
         ends: list[str] = []
         for tag in ("parent", "child"):
-            link = frames.link(element, within(framed.scope, text_of(element, tag)))
-            ends.append(frames.short(link) if link else graph.add_world())
+            link = frames.link(element, full_name_of(framed.scope, text_of(element, tag)))
+            ends.append(frames.short_name(link) if link else graph.add_world())
         links = ends[0], ends[1]
         element.require_two(*links)
         if {*ends} <= graph.fixed:
@@ -348,7 +348,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
     for gear, links in gears:
         graph.couplings.append(gear.gearbox(links, [*graph.joints, *joints]))
     for scope, framed in frames.models.items():
-        for element in framed.element.only(DRAKE_JOINT):
+        for element in framed.element.findall(DRAKE_JOINT):
             joints.append(_planar(graph, frames, scope, element))
     return joints
 
@@ -367,12 +367,12 @@ def _planar(graph: Graph, frames: Frames, scope: str, element: Element) -> Joint
     ends: list[str] = []
     places: list[Place] = []
     for tag in IN_DRAKE[:2]:
-        full = within(scope, text_of(element, tag))
+        full = full_name_of(scope, text_of(element, tag))
         link = frames.link(element, full)
-        ends.append(frames.short(link) if link else graph.add_world())
+        ends.append(frames.short_name(link) if link else graph.add_world())
         places.append(frames.place(element, full))
     element.require_two(*ends)
-    apart = places[1].seen_from(places[0])
+    apart = places[1].relative_to(places[0])
     near = 10.0 ** (1 - graph.tree.digits)
     if apart.at @ apart.at > near**2 or apart.turn.e @ apart.turn.e > near**2:
         raise element.fault(
@@ -385,7 +385,7 @@ def _planar(graph: Graph, frames: Frames, scope: str, element: Element) -> Joint
         (".slide2", "slide", y),
         (".rotation", "hinge", z),
     ]
-    name = frames.short(within(scope, element.required("name")))
+    name = frames.short_name(full_name_of(scope, element.require("name")))
     return Joint.of(name, (ends[0], ends[1]), places[0].at, freedoms, element)
 
 
@@ -394,7 +394,7 @@ class _Joint:
 
     def __init__(self, graph: Graph, frames: Frames, full: str, version: tuple[int, ...]) -> None:
         self.graph, self.frames, self.version = graph, frames, version
-        self.framed, self.name = frames.joints[full], frames.short(full)
+        self.framed, self.name = frames.joints[full], frames.short_name(full)
         self.element = self.framed.element
         self.place = frames.place(self.element, full)
         self.kind = self.element.choice("type", TYPES, "")
@@ -405,7 +405,7 @@ class _Joint:
         moves = [replace(each, limit=self._limit(each)) for each in joint.moves]
         mimics: list[Coupling] = []
         for tag, move in zip(("axis", "axis2"), moves, strict=False):
-            for axis in self.element.only(tag):
+            for axis in self.element.findall(tag):
                 self._add_spring(move, axis)
                 if (element := axis.child("mimic")) is not None:
                     mimics.append(self._mimic(move, element))
@@ -430,8 +430,8 @@ class _Joint:
         (SDF 1.4 and later).
         """
         element, named = self.element, text_of(self.element, "gearbox_reference_body")
-        reference = self.frames.link(element, within(self.framed.scope, named))
-        around = self.frames.short(reference) if reference else WORLD
+        reference = self.frames.link(element, full_name_of(self.framed.scope, named))
+        around = self.frames.short_name(reference) if reference else WORLD
         (ratio,) = element.value("gearbox_ratio", 1, (1.0,))
         second = "axis2" if element.child("axis2") is not None else "axis"
         weights: dict[str, float] = {}
@@ -481,7 +481,7 @@ class _Joint:
             raise self.element.fault(f"<{tag}>: missing, expected an axis; add it")
         axis.require_known((), "SDF")
         axis.require_children(IN_AXIS, closed=True)
-        for limit in axis.only("limit"):
+        for limit in axis.findall("limit"):
             limit.require_known((), "SDF")
             limit.require_children(IN_LIMIT, closed=True)
         numbers: Sequence[float] = (0.0, 0.0, 1.0)
@@ -493,11 +493,11 @@ class _Joint:
         if flag_of(axis.child("use_parent_model_frame")) or self.version < _AXES_IN_JOINT:
             given = given or MODEL
         if given:
-            place = self.frames.place(axis, within(self.framed.scope, given))
+            place = self.frames.place(axis, full_name_of(self.framed.scope, given))
         return place.direction((xyz or axis).direction(numbers))
 
     def _add_spring(self, move: Move, axis: Element) -> None:
-        for dynamics in axis.only("dynamics"):
+        for dynamics in axis.findall("dynamics"):
             if self.kind == "screw":  # of the turn or of the shift
                 self.graph.tree.count("dynamics of screw joints")
                 return
@@ -510,10 +510,13 @@ class _Joint:
         element.require_known(("joint", "axis"), "SDF")
         element.require_children(("multiplier", "offset", "reference"), closed=True)
         leader = element.attributes.get("joint", "")
-        full = within(self.framed.scope, leader)
+        full = full_name_of(self.framed.scope, leader)
         if full not in self.frames.joints:
             raise element.fault(f"joint: found {shown(leader)}, expected a joint; correct the name")
-        name, other = self.frames.short(full), element.choice("axis", ("axis", "axis2"), "axis")
+        name, other = (
+            self.frames.short_name(full),
+            element.choice("axis", ("axis", "axis2"), "axis"),
+        )
         if self.frames.joints[full].element.attributes.get("type") in TWO_AXES:
             name = f"{name}.{1 + (other == 'axis2')}"
         factor, offset, reference = (
@@ -526,9 +529,9 @@ class _Joint:
         """Return the mimic of a joint in Drake's form."""
         element.require_known(("joint", "multiplier", "offset"), "SDF")
         name = element.attributes.get("joint", "")
-        leader = within(self.framed.scope, name)
+        leader = full_name_of(self.framed.scope, name)
         if leader not in self.frames.joints:
-            known = [*map(self.frames.short, self.frames.joints)]
+            known = [*map(self.frames.short_name, self.frames.joints)]
             raise element.unknown_name("joint", name, known, "a joint")
         if len(moves) != 1 or moves[0].kind == "ball":
             raise element.fault(
@@ -536,4 +539,4 @@ class _Joint:
                 " correct it"
             )
         factor, offset = element.number("multiplier", 1.0), element.number("offset", 0.0)
-        return mimic(self.name, self.frames.short(leader), offset, factor, element)
+        return mimic(self.name, self.frames.short_name(leader), offset, factor, element)

@@ -52,11 +52,11 @@ class Frames:
         """
         if depth > DEEPEST // 10:
             raise around.fault("nests too deeply, expected few models in models; flatten the file")
-        for element in around.only("link"):
+        for element in around.findall("link"):
             element.require_known(("name",), "SDF")
             full = self._add(element, scope, scope)
             self.links[full] = self.found[full]
-        for element in around.only("model"):
+        for element in around.findall("model"):
             element.require_known(("name", "canonical_link", PLACED), "SDF")
             full = self._add(element, scope, scope)
             self.models[full] = self.found[full]
@@ -65,16 +65,16 @@ class Frames:
             if flag_of(static):
                 self.static.add(full)
             self.read(element, full, depth + 1)
-        for element in around.only("joint"):
+        for element in around.findall("joint"):
             element.require_known(("name", "type"), "SDF")
-            child = within(scope, text_of(element, "child"))
+            child = full_name_of(scope, text_of(element, "child"))
             full = self._add(element, scope, child, child)
             self.joints[full] = self.found[full]
-        for element in around.only("frame"):
+        for element in around.findall("frame"):
             element.require_known(("name", "attached_to"), "SDF")
             element.require_children(("pose",), closed=True)
             base = element.attributes.get("attached_to", "")
-            attached = within(scope, base) if base else scope
+            attached = full_name_of(scope, base) if base else scope
             self._add(element, scope, attached, attached)
 
     def _add(self, element: Element, scope: str, default: str, attached: str = "") -> str:
@@ -87,14 +87,14 @@ class Frames:
         self.found[full] = Framed(element, scope, default, attached)
         return full
 
-    def put(self, name: str, element: Element, place: Place, link: str) -> None:
+    def add_given(self, name: str, element: Element, place: Place, link: str) -> None:
         """Take a frame of another format, at a place on a link."""
         self.found[name] = Framed(element, "", "", link)
         self._places[name] = place
         if name == link:
             self.links[name] = self.found[name]
 
-    def named(self) -> dict[str, str]:
+    def link_names(self) -> dict[str, str]:
         """Return the links by the names of links and frames, with and without their models.
 
         Raises:
@@ -114,13 +114,13 @@ class Frames:
         outside = any(not each.scope for each in (*self.links.values(), *self.joints.values()))
         return f"{tops[0]}{SCOPE}" if len(tops) == 1 and not outside else ""
 
-    def short(self, full: str) -> str:
+    def short_name(self, full: str) -> str:
         """Return a full name without the model, if there is only one at the top; not before all are
         read.
         """
         return full.removeprefix(self._prefix)
 
-    def known(self, element: Element, full: str) -> str:
+    def require_known_frame(self, element: Element, full: str) -> str:
         """Return a full name of a frame.
 
         Raises:
@@ -139,7 +139,7 @@ class Frames:
             CaseError: it is unknown, or given in itself by a ring of frames.
         """
         chain: list[str] = []
-        name = self.known(element, full)
+        name = self.require_known_frame(element, full)
         while name not in self._places:
             chain.append(name)
             if len(chain) > len(self.found):
@@ -147,7 +147,7 @@ class Frames:
                     "is given in itself by a ring of frames, expected poses from the model on;"
                     " correct relative_to"
                 )
-            name = self.known(self.found[name].element, self._base(name))
+            name = self.require_known_frame(self.found[name].element, self._base(name))
         for name in reversed(chain):
             self._places[name] = self._places[self._base(name)].then(self._pose(name))
         return self._places[full]
@@ -157,12 +157,12 @@ class Frames:
         element = self.found[full].element
         pose, name, inside = pose_of(element.child("pose")), full, ORIGIN
         if placed := element.attributes.get(PLACED, "") if full in self.models else "":
-            name = self.known(element, within(full, placed))
+            name = self.require_known_frame(element, full_name_of(full, placed))
         for _ in self.found:
             if name == full:
-                return pose.then(ORIGIN.seen_from(inside))
+                return pose.then(ORIGIN.relative_to(inside))
             inside = self._pose(name).then(inside)
-            name = self.known(element, self._base(name))
+            name = self.require_known_frame(element, self._base(name))
             if not name:
                 break
         raise element.fault(
@@ -175,7 +175,7 @@ class Frames:
         framed = self.found[full]
         pose = framed.element.child("pose")
         given = pose.attributes.get("relative_to", "") if pose is not None else ""
-        return within(framed.scope, given) if given else framed.default
+        return full_name_of(framed.scope, given) if given else framed.default
 
     def link(self, element: Element, full: str) -> str:
         """Return the link of a frame; empty for the world.
@@ -186,7 +186,7 @@ class Frames:
         for _ in range(len(self.found) + 1):
             if not full or full in self.links:
                 return full
-            self.known(element, full)
+            self.require_known_frame(element, full)
             full = self._canonical(full) if full in self.models else self.found[full].attached
         raise element.fault(
             f"found the frame {shown(full)}, which is attached to itself; correct attached_to"
@@ -212,7 +212,7 @@ class Frames:
         return bool(scope)
 
 
-def within(scope: str, name: str) -> str:
+def full_name_of(scope: str, name: str) -> str:
     """Return the full name of a name in a scope; whether there is such a frame is asked later, for
     it may follow.
     """

@@ -275,13 +275,13 @@ class Mass:
             for mass, moment in (STAND_IN, BETWEEN)
         )
 
-    def seen_in(self, place: Place) -> Mass:
+    def in_frame(self, place: Place) -> Mass:
         """Return the mass in another frame, in which the place of its own one is given."""
         axes = np.array([[*place.direction(axis)] for axis in (X, Y, Z)]).T
         return Mass(self.mass, place.point(self.center), axes @ self.inertia @ axes.T)
 
 
-def together(masses: Sequence[Mass]) -> Mass:
+def sum_of_masses(masses: Sequence[Mass]) -> Mass:
     """Return several masses in a frame as one."""
     total = sum(each.mass for each in masses)
     if len(masses) == 1 or total == 0.0:
@@ -427,7 +427,7 @@ class Tree:
         if mass is None:
             self.unweighed.add(carrier)
         else:
-            seen = mass.seen_in(self.places[link].seen_from(self.moving[carrier]))
+            seen = mass.in_frame(self.places[link].relative_to(self.moving[carrier]))
             self.masses.setdefault(carrier, []).append(seen)
 
     def require_moving(self, root: Element) -> None:
@@ -437,7 +437,7 @@ class Tree:
                 "has no body with a joint, expected a mechanism; give a model that moves"
             )
 
-    def tie(self, tie: Tie) -> None:
+    def add_tie(self, tie: Tie) -> None:
         """Add a tie; one between parts of the ground is counted.
 
         Raises:
@@ -474,7 +474,7 @@ class Tree:
         _require_few(strut.element, MOST_TIES, len(self.struts) + 1, f"springs; {_TAKE_OUT}")
         self.struts.append(strut)
 
-    def axial(self, element: Element, key: str, name: str | None) -> str:
+    def require_axial(self, element: Element, key: str, name: str | None) -> str:
         """Return the name of a move with one coordinate.
 
         Raises:

@@ -132,46 +132,46 @@ class _Robot:
         for name, element in self.joints.items():
             if (each := element.child("mimic")) is not None:
                 each.require_known(("joint", "multiplier", "offset"), "URDF")
-                leader = each.required("joint")
+                leader = each.require("joint")
                 if leader not in self.joints:
                     raise each.unknown_name("joint", leader, self.joints, "a joint")
                 offset, factor = each.number("offset", 0.0), each.number("multiplier", 1.0)
                 graph.couplings.append(mimic(name, leader, offset, factor, each))
-        for k, element in enumerate(root.only(*CONSTRAINTS), 1):
+        for k, element in enumerate(root.findall(*CONSTRAINTS), 1):
             graph.loops.append(self._constraint(element, f"{element.tag}{k}"))
         frames = self._gazebo()
 
         def framed(element: Element, name: str) -> tuple[str, Place]:
             return frames.link(element, name), frames.place(element, name)
 
-        add_ties(graph, ((each, self._named, framed) for each in root.children))
+        add_ties(graph, ((each, self._require_link, framed) for each in root.children))
         self.beside.add(graph)
         self._require_apart(frames)
-        for motor in root.only("transmission", "ros2_control"):
+        for motor in root.findall("transmission", "ros2_control"):
             names = {
                 joint.attributes.get("name", "")
-                for joint in motor.only("joint")
-                if motor.tag == "transmission" or any(joint.only("command_interface"))
+                for joint in motor.findall("joint")
+                if motor.tag == "transmission" or any(joint.findall("command_interface"))
             }
             graph.tree.add_motor(motor.tag, names & self.joints.keys())
-        limited = [any(self.joints[name].only("limit")) for name in graph.tree.actuated]
+        limited = [any(self.joints[name].findall("limit")) for name in graph.tree.actuated]
         graph.tree.motors["limit of joints"] = sum(limited)
 
     def _links(self) -> None:
         root, graph = self.root, self.graph
-        for element in root.only("link"):
-            name = element.required("name")
+        for element in root.findall("link"):
+            name = element.require("name")
             if name in graph.elements:
                 raise element.repeated_name(name, "the links")
             graph.elements[name] = element
             element.require_known(("name", "type"), "URDF", closed=False)
             element.require_children((*IN_LINK, *LOOKS))
-            for each in [*element.only("inertial")][:1]:
+            for each in [*element.findall("inertial")][:1]:
                 graph.masses[name] = _mass(each)
             for child in element.children:
                 if child.tag != "inertial":
                     graph.tree.count(child.tag)
-        parents = [each for joint in root.only(*JOINTS) for each in joint.only("parent")]
+        parents = [each for joint in root.findall(*JOINTS) for each in joint.findall("parent")]
         if any(each.attributes.get("link") == WORLD for each in parents):
             graph.elements.setdefault(WORLD, root)  # as in Drake, which has it without a link
         if not graph.elements:
@@ -182,9 +182,9 @@ class _Robot:
         graph = self.graph
         above: dict[str, str] = {}
         below: dict[str, list[tuple[str, Element]]] = {}
-        for element in self.root.only(*JOINTS):
+        for element in self.root.findall(*JOINTS):
             element.require_known(("name", "type"), "URDF")
-            name = element.required("name")
+            name = element.require("name")
             if name in self.joints:
                 raise element.repeated_name(name, "the joints")
             element.require_children(IN_JOINT, closed=True)
@@ -197,10 +197,10 @@ class _Robot:
                 )
             above[child], self.joints[name] = name, element
             self._damper(name, element)
-            for limit in element.only("limit"):
+            for limit in element.findall("limit"):
                 limit.require_known(IN_LIMIT, "URDF")
             for each in ("limit", "calibration", "safety_controller", "joint_properties"):
-                if any(element.only(each)):
+                if any(element.findall(each)):
                     graph.tree.count(f"{each} of joints")
         roots = [name for name in graph.elements if name not in above]
         if len(roots) != 1:
@@ -224,14 +224,14 @@ class _Robot:
             )
 
     def _damper(self, name: str, element: Element) -> None:
-        for dynamics in element.only("dynamics"):
+        for dynamics in element.findall("dynamics"):
             dynamics.require_known((*LAW, *FRICTION), "URDF")
             if element.attributes.get("type") in ("revolute", "continuous", "prismatic"):
                 add_spring(self.graph, name, dynamics.attributes)
             else:
                 self.graph.tree.count("dynamics of joints")
 
-    def _named(self, element: Element, name: str, key: str = "name") -> str:
+    def _require_link(self, element: Element, name: str, key: str = "name") -> str:
         """Return a name of a link."""
         if name not in self.graph.elements:
             raise element.unknown_name(key, name, self.graph.elements, "a link")
@@ -242,7 +242,7 @@ class _Robot:
         for each in (tag, *more):
             if (child := element.child(each)) is not None:
                 child.require_known(("link", *POSE) if each in IN_LOOP else ("link",), "URDF")
-                return self._named(child, child.required("link"), "link")
+                return self._require_link(child, child.require("link"), "link")
         raise element.fault(f"<{tag}>: missing, expected a link; add it")
 
     def _joint(self, name: str, element: Element) -> Joint:
@@ -329,18 +329,18 @@ class _Robot:
         """
         graph, root, frames = self.graph, self.root, Frames()
         for name, element in graph.elements.items():
-            frames.put(name, element, graph.places[name], name)
+            frames.add_given(name, element, graph.places[name], name)
         for name, element in self.joints.items():
             link = self._link(element, "child")
             if name not in frames.found:
-                frames.put(name, element, graph.places[link], link)
-        for element in root.only("frame"):  # of Drake
+                frames.add_given(name, element, graph.places[link], link)
+        for element in root.findall("frame"):  # of Drake
             link, name = element.attributes.get("link", ""), element.attributes.get("name", "")
             if link in graph.places and name and name not in frames.found:
-                frames.put(name, element, graph.places[link].then(_pose(element)), link)
-        for gazebo in root.only(GAZEBO):
+                frames.add_given(name, element, graph.places[link].then(_pose(element)), link)
+        for gazebo in root.findall(GAZEBO):
             gazebo.require_known(("reference",), "URDF")
-            for element in gazebo.only("link", "model"):
+            for element in gazebo.findall("link", "model"):
                 raise element.fault("is of SDF, expected links of URDF; write it as <link>")
             if any(_joints_of_sdf(gazebo)):
                 frames.read(gazebo, "")
@@ -362,14 +362,14 @@ class _Robot:
         names = {move.name: move.name for joint in graph.joints for move in joint.moves}
         names |= {joint.name: joint.name for joint in graph.joints}
         advice = f"a <joint>, <constraint> or <{BALL}>"
-        unread = Unread(frames.named(), names, graph.followers, advice)
-        for element in (self.root, *self.root.only("link")):
+        unread = Unread(frames.link_names(), names, graph.followers, advice)
+        for element in (self.root, *self.root.findall("link")):
             link = element.attributes["name"] if element.tag == "link" else ""
             if link:
                 unread.require_apart(replace(element, children=[]), link)
             unread.require_all_apart(element.children, (*READ, *IN_LINK, GAZEBO), link)
             element.require_children((*IN_LINK, *LOOKS) if link else IN_ROBOT, closed=True)
-        for gazebo in self.root.only(GAZEBO):
+        for gazebo in self.root.findall(GAZEBO):
             read = IN_GAZEBO if any(_joints_of_sdf(gazebo)) else ()
             link = gazebo.attributes.get("reference", "")
             unread.require_all_apart(gazebo.children, read, link)
@@ -404,7 +404,7 @@ def _mass(element: Element) -> Mass | None:
 def _joints_of_sdf(element: Element) -> Iterator[Element]:
     """Yield the joints and frames of SDF in a <gazebo> of the whole robot."""
     if element.tag == GAZEBO and "reference" not in element.attributes:
-        yield from element.only(*IN_GAZEBO)
+        yield from element.findall(*IN_GAZEBO)
 
 
 def _origin(element: Element | None) -> Place:

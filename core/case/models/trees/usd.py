@@ -106,9 +106,9 @@ class _Reader:
         self.root, self.graph = root, Graph.of(root, f"USD stage of {file.name}")
         self.graph.tree.zero = "its pose"
         self.metre, self.kilogram = (root.number(each) for each in UNITS[:2])
-        self.prims = {each.attributes["path"]: each for each in root.below()}
+        self.prims = {each.attributes["path"]: each for each in root.descendants()}
         bodies = [path for path, each in self.prims.items() if _is_body(each)]
-        self.names = _short(bodies)
+        self.names = _short_names(bodies)
         self.joints: dict[str, FramedJoint] = {}
         self.rods: list[tuple[str, Element, tuple[str, str], tuple[Place, Place], float]] = []
         self.moves: dict[str, list[Move]] = {}
@@ -122,8 +122,8 @@ class _Reader:
             tree.notes.append(f"metersPerUnit is not given: lengths are in {self.metre:g} m")
         for path, name in self.names.items():
             self._add_body(name, self.prims[path])
-        joints = [each for each in root.below() if each.tag in (*TYPES, GENERIC, ROD)]
-        self.joint_names = _short([each.attributes["path"] for each in joints])
+        joints = [each for each in root.descendants() if each.tag in (*TYPES, GENERIC, ROD)]
+        self.joint_names = _short_names([each.attributes["path"] for each in joints])
         self._require_apart()
         for element in joints:
             self._add_joint(element)
@@ -140,7 +140,7 @@ class _Reader:
         graph.masses |= masses_of(bodies, colliders, self.prims, self._frame, units)
         graph.hang()
         self._keyframes()
-        for each in filter(None, (each.attributes["variants"] for each in root.below())):
+        for each in filter(None, (each.attributes["variants"] for each in root.descendants())):
             tree.notes.append(f"variants that are read: {each}")
         return tree
 
@@ -230,7 +230,7 @@ class _Reader:
         if not element.flag("physics:jointEnabled", default=True):
             graph.tree.notes.append(f"{element} is switched off and joins nothing (jointEnabled)")
             return
-        (first, f), (second, g) = self._end(element, 0), self._end(element, 1)
+        (first, f), (second, g) = self._end_of_joint(element, 0), self._end_of_joint(element, 1)
         element.require_two(first or "the world", second or "the world")
         links = first or graph.add_world(), second or graph.add_world()
         if {*links} <= graph.fixed:
@@ -265,7 +265,7 @@ class _Reader:
         freedoms = [replace(each, limit=self._limit(element, each)) for each in freedoms]
         self.joints[name] = FramedJoint(name, element, links, (f, g), freedoms, closes)
 
-    def _end(self, element: Element, side: int) -> tuple[str, Place]:
+    def _end_of_joint(self, element: Element, side: int) -> tuple[str, Place]:
         """Return the body of a joint, empty for the world, and the joint's frame in it [m]."""
         at = element.numbers(f"physics:localPos{side}", 3, default=(0.0, 0.0, 0.0))
         numbers = element.numbers(f"physics:localRot{side}", 4, default=(1.0, 0.0, 0.0, 0.0))
@@ -287,7 +287,7 @@ class _Reader:
         if self.names.get(paths[0]):
             return name, frame
         frame = place.then(frame)
-        return name, frame.seen_from(self.graph.places[name]) if name else frame
+        return name, frame.relative_to(self.graph.places[name]) if name else frame
 
     def _add_rod(
         self, name: str, element: Element, links: tuple[str, str], frames: tuple[Place, Place]
@@ -310,7 +310,7 @@ class _Reader:
         """Place the bodies, and add joints and rods to the graph."""
         graph, own = self.graph, dict(self.graph.places)
         self.moves = join(graph, self.joints.values())
-        self._tell_moved(own)
+        self._note_moved_bodies(own)
         for name, element, links, frames, length in self.rods:
             places = [
                 Place(graph.places[link].point(frame.at))
@@ -387,7 +387,7 @@ class _Reader:
             name, _, instance = api.partition(":")
             start = f"physxMimicJoint:{instance}:"
             if name == PHYSX_MIMIC:
-                lead, unit, other = self._lead(joint, f"{start}referenceJoint")
+                lead, unit, other = self._leader(joint, f"{start}referenceJoint")
                 if unit != other:
                     raise element.fault(
                         f"{start}referenceJoint: turns where it slides; couple alike"
@@ -401,7 +401,7 @@ class _Reader:
                 offset = -element.number(f"{start}offset", 0.0) * unit
             elif name == MUJOCO_MIMIC:
                 key = "mjc:target" if said.get("mjc:target") else "newton:mimicJoint"
-                lead, unit, other = self._lead(joint, key, angle=1.0)
+                lead, unit, other = self._leader(joint, key, angle=1.0)
                 # both coordinates count from the stage's pose
                 yield lead, [c * unit / other**k for k, c in enumerate(_equality(element))]
                 continue
@@ -410,7 +410,7 @@ class _Reader:
                 and MUJOCO_MIMIC not in apis
                 and element.flag("newton:mimicEnabled", default=True)
             ):
-                lead, unit, other = self._lead(joint, "newton:mimicJoint")
+                lead, unit, other = self._leader(joint, "newton:mimicJoint")
                 factor = element.number("newton:mimicCoef1", 1.0) * unit / other
                 offset = element.number("newton:mimicCoef0", 0.0) * unit
             else:
@@ -418,7 +418,7 @@ class _Reader:
             move = self._one_move(element, joint.name)
             yield lead, (offset + factor * lead.reference - move.reference, factor)
 
-    def _lead(
+    def _leader(
         self, joint: FramedJoint, key: str, angle: float = DEGREE
     ) -> tuple[Move, float, float]:
         """Return the leader of a joint, and the units of both coordinates, of angles as given."""
@@ -441,7 +441,7 @@ class _Reader:
 
     def _gravity(self) -> Vector:
         """Return the gravity of the scene [m/s^2]."""
-        scenes = [each for each in self.root.below() if each.tag == "PhysicsScene"]
+        scenes = [each for each in self.root.descendants() if each.tag == "PhysicsScene"]
         if len(scenes) > 1:
             self.graph.tree.notes.append(f"gravity is that of {scenes[0]}, the first scene")
         size, down = EARTH, (0.0, 0.0, 0.0)
@@ -468,7 +468,7 @@ class _Reader:
                     value = joint.element.number(own) * self._unit(move.kind)
                     tree.starts.setdefault(name, []).append(f"{move.name}={value!r}")
 
-    def _tell_moved(self, own: Mapping[str, Place]) -> None:
+    def _note_moved_bodies(self, own: Mapping[str, Place]) -> None:
         """Note bodies with a transform beside the place given by their joints."""
         graph = self.graph
         places = [each.at for each in graph.places.values()]
@@ -504,7 +504,7 @@ def _equality(element: Element) -> list[float]:
     return found
 
 
-def _short(paths: Sequence[str]) -> dict[str, str]:
+def _short_names(paths: Sequence[str]) -> dict[str, str]:
     """Return short names of paths: as many of their last parts as tell them apart."""
     found: dict[str, str] = {}
     parts = {path: path.strip("/").split("/") for path in paths}

@@ -53,8 +53,8 @@ def root_of_usd(file: Path) -> Element:
             raise fault(file, "", f"cannot be composed: {shortened(errors, MOST_NAMED)}; {FLATTEN}")
         _require_units(file, stage)
         units = (
-            _written(pxr.UsdGeom.GetStageMetersPerUnit(stage)),
-            _written(pxr.UsdPhysics.GetStageKilogramsPerUnit(stage)),
+            _number_text(pxr.UsdGeom.GetStageMetersPerUnit(stage)),
+            _number_text(pxr.UsdPhysics.GetStageKilogramsPerUnit(stage)),
             str(pxr.UsdGeom.GetStageUpAxis(stage)),
         )
         said = [each for each in UNITS if stage.HasAuthoredMetadata(each)]
@@ -207,11 +207,11 @@ def _text(kind: str, value: Any) -> str:
     if kind == "bool":
         return str(value).lower()
     if kind in _SCALARS:
-        return _written(value, single=kind in _SINGLE)
+        return _number_text(value, single=kind in _SINGLE)
     numbers = [*value] if kind[:4] != "quat" else [value.GetReal(), *value.GetImaginary()]
     single = not (kind.endswith("d") or kind.startswith("double"))
-    return " ".join(_written(number, single=single) for number in numbers)
+    return " ".join(_number_text(number, single=single) for number in numbers)
 
 
-def _written(number: float, *, single: bool = False) -> str:
+def _number_text(number: float, *, single: bool = False) -> str:
     return str(np.float32(number)) if single else repr(float(number))

@@ -16,7 +16,7 @@ import numpy as np
 
 from ....algebra import triple
 from ....case.case import TIME
-from ....case.joint_probe import fitting
+from ....case.joint_probe import make_fitting
 from ....errors import MechanismError
 from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion, Revolute, Translational
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
@@ -303,7 +303,7 @@ class _Builder:
             return values[field.metadata["kind"]]
 
         try:
-            joint = fitting(Joint.registry[kind], given, [value])
+            joint = make_fitting(Joint.registry[kind], given, [value])
         except MechanismError:
             return False
         if accepted := self._take(self._rows(self._mechanism([joint]))):

@@ -1,0 +1,93 @@
+"""A driver that stands at two neighbouring samples and makes whole turns between them, in every
+style, as one program, a sparse system, and in every engine.
+
+Where it stands says nothing of the turns, but a wheel that is geared to it does.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.core import (
+    JointAngle,
+    JointDisplacement,
+    Point,
+    Screw,
+    Table,
+    Translational,
+)
+from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
+from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.studies.bench.size import ring
+
+from ..support.mechanisms import ORIGIN, X, Y, Z, indexing, solve_all
+
+
+def indexed(turns):
+    """The turns between time zero and one, and rest before and after."""
+    rest = np.arange(-40.0, 41.0) * 0.01
+    values = np.repeat([0.0, 2.0 * np.pi * turns], len(rest))
+    return Table(tuple(np.concatenate([rest, 1.0 + rest])), tuple(values))
+
+
+def test_engines_count_turns_between_samples():
+    angle, still = -1.5 * np.pi * np.array([0.0, 1.0]), np.zeros(2)
+    outputs = [
+        Output(name, "rim", along, False, 1e-12, 0.0, "round-off")
+        for name, along in (("x", X), ("y", Y))
+    ]
+    reference = {
+        "x": Series(1.0 + 0.2 * np.cos(angle), still, still),
+        "y": Series(0.2 * np.sin(angle), still, still),
+    }
+    sweep = Sweep("clock", np.array([0.0, 0.1]), 0.1, motions={"turn": indexed(-3)})
+    case = Case(
+        "indexing", "closed form", Truth.CLOSED_FORM, indexing(), sweep, tuple(outputs), reference
+    )
+    engines = [
+        each for each in map(adapters.engine, adapters.ENGINES) if each.version() is not None
+    ]
+    for record in run([case], engines, tol=1e-12).records:
+        assert record.outcome is Outcome.PASS, record
+
+
+@pytest.mark.parametrize("style", Style)
+@pytest.mark.parametrize("turns", [1, 2, 3, -1, -4])
+def test_styles_count_turns_between_samples(turns, style):
+    motions = {"turn": indexed(turns)}
+    found = solve_all(
+        indexing(), "clock", [0.0, 0.01], rate=0.01, motions=motions, style=style.value
+    )
+    angle = 0.5 * np.pi * turns * np.array([0.0, 1.0])
+    expected = np.stack([1.0 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0 * angle], axis=1)
+    assert np.abs(found.points["rim"].position - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (22, -2, 2), (22, 1, 11)]
+)
+def test_ring_counts_turns_between_samples(cranks, turns, count):
+    """A nut beside a ring, whose lead tells the turns: as one program, and as a sparse system."""
+    whole, lead, last = ring(cranks), 0.01, 0.01
+    joints = [
+        Screw("thread", "ground", "driven", ORIGIN, Z, lead=lead),
+        Translational("guide", "ground", "slide", Z, X),
+    ]
+    mechanism = replace(
+        whole,
+        bodies=[*whole.bodies, *indexing().bodies[1:]],
+        joints=[*whole.joints, *joints],
+        points=[Point("mark", "driven", (0.2, 0.0, 0.0))],
+        drivers=[
+            *whole.drivers,
+            JointDisplacement("clock", "guide"),
+            JointAngle("index", "thread"),
+        ],
+    )
+    values = np.linspace(0.0, last, count)
+    found = solve_all(mechanism, "clock", values, rate=last, motions={"index": indexed(turns)})
+    assert ("factor_entries" in found.details) == (cranks == 22)
+    assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
