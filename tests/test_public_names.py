@@ -12,6 +12,7 @@ import kincheck
 import kincheck.adapters
 import kincheck.core
 import pytest
+from kincheck.adapters.native import Native
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main, parser
 from kincheck.primitives import Dot10
@@ -114,27 +115,12 @@ def test_explain_of_built_in_case():
 
 
 def test_run_takes_files_and_engine_objects():
-    class Own:
-        name, mode, loop, settings = "own", "projection", "python", {}
-        in_process = True
-
-        def __init__(self):
-            self.native = kincheck.adapters.engine("native")
-
-        def version(self):
-            return "1"
-
+    class Own(Native):
         def unsupported(self, case):
             return "only native's" if case.name == "rssr" else None
 
-        def build(self, case):
-            return self.native.build(case)
-
-        def solve(self, model, case, tol):
-            return self.native.solve(model, case, tol)
-
     file = ROOT / "cases" / "hooke_joint.toml"
-    results = kincheck.run([kincheck.load("rssr"), file], [Own()])
+    results = kincheck.run([kincheck.load("rssr"), file], [Own(name="own")])
     assert [(each.case, each.engine, each.outcome) for each in results.records] == [
         ("rssr", "own", "unsupported"),
         ("hooke_joint", "own", "pass"),

@@ -302,7 +302,7 @@ def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequen
         design[name] = Vec3(*(_jet([x], [still], [still]) for x in position))
     columns: list[list[Ball | None]] = [[None] * len(found.samples) for _ in range(3)]
     if proved:
-        jet = _counted(case, output, at, design, proved)
+        jet = _output_jet(case, output, at, design, proved)
         for column, values in zip(columns, (jet.x, jet.v, jet.a), strict=True):
             for k, value in zip(
                 proved,
@@ -356,7 +356,7 @@ def _sample(
     )
 
 
-def _counted(
+def _output_jet(
     case: Case,
     output: Quantity,
     at: Mapping[str, Vec3],
@@ -390,7 +390,7 @@ def _series(
         known = [
             ball if sample.proved else None for ball, sample in zip(column, samples, strict=True)
         ]
-        texts = [None if ball is None else _printed(ball, digits) for ball in known]
+        texts = [None if ball is None else _decimal_text(ball, digits) for ball in known]
         bounds = [
             upper(ball - flint().arb(text))
             for ball, text in zip(known, texts, strict=True)
@@ -412,7 +412,7 @@ def _series(
     )
 
 
-def _printed(ball: Ball, digits: int) -> str:
+def _decimal_text(ball: Ball, digits: int) -> str:
     """Return a decimal with an error below 10^-digits."""
     whole = max(0, math.ceil(math.log10(1.0 + abs(float(ball.mid())))))
     return ball.mid().str(digits + SPARE_DIGITS + whole, radius=False)

@@ -12,9 +12,9 @@ from kincheck.core.studies.stress.families import FAMILIES
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, polar, slider_crank
 from kincheck.core.studies.stress.run import specimen
-from kincheck.core.studies.stress.verdicts import Verdict, judged, once
+from kincheck.core.studies.stress.verdicts import Verdict, judge_answer, once
 from kincheck.core.studies.truth.fold import first_fold
-from kincheck.core.studies.truth.motion import Reach, followed
+from kincheck.core.studies.truth.motion import Reach, follow_motion
 
 from ..support.engine_motion import SIMULATORS, installed, rotation
 
@@ -35,7 +35,7 @@ def test_fold_after_sample_ends_motion(name):
 def test_fold_by_two_continuations_agrees():
     """By arclength, and by steps of the driver in extended precision."""
     case = load_case(BEYOND)
-    assert followed(case).reach.tolist() == [Reach.REACHED, Reach.REACHED, Reach.BEYOND]
+    assert follow_motion(case).reach.tolist() == [Reach.REACHED, Reach.REACHED, Reach.BEYOND]
     assert first_fold(case, 0.143) == pytest.approx(0.05341366, rel=1e-6)
     assert first_fold(case, 0.053) is None
 
@@ -69,7 +69,7 @@ def test_simulator_steps_over_no_fold(name, past_folds):
     engine, verdicts = installed(name), Counter()
     for one in past_folds:
         answer = once(Pair(one.case, engine, one.specimen.tol))
-        verdicts += Counter(judged(one.specimen, one.case, one.truth, answer).counts)
+        verdicts += Counter(judge_answer(one.specimen, one.case, one.truth, answer).counts)
     assert verdicts == {Verdict.RIGHT: 6, Verdict.REFUSED_RIGHTLY: 2}
 
 

@@ -203,8 +203,7 @@ def test_adams_part_inertia_about_centre(tmp_path):
     deck = Deck(7)
     deck.part(2, f", MASS = {float(masses.sum())!r}, CM = 20, IM = 21, IP = {ip}")
     deck.marker(20, 2, centre, Rotation.random(random_state=rng)).marker(21, 2, at, turn)
-    deck.marker(11, 2, AT, AXES).marker(12, 1, AT, AXES).add("JOINT/1, REVOLUTE, I = 11, J = 12")
-    deck.add("MOTION/1, ROT, JOINT = 1, FUNCTION = TIME")
+    deck.joint(1, "REVOLUTE", 2).add("MOTION/1, ROT, JOINT = 1, FUNCTION = TIME")
     (body,) = read(tmp_path, deck).mechanism.bodies
     a = MM * (points - centre)
     tensor = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(masses, a, strict=True))
@@ -222,9 +221,8 @@ SPRINGS = [
 
 def sprung(line):
     deck = Deck(5).part(2, ", MASS = 2, CM = 11, IP = 900, 900, 900")
-    deck.marker(11, 2, AT + 30.0 * X, AXES).marker(12, 1, AT + 30.0 * X, AXES)
-    deck.marker(13, 1, AT + 110.0 * X, AXES)
-    deck.add("JOINT/1, TRANSLATIONAL, I = 11, J = 12", "ACCGRAV/, KGRAV = -9806.65", line)
+    deck.joint(1, "TRANSLATIONAL", 2, at=AT + 30.0 * X).marker(13, 1, AT + 110.0 * X, AXES)
+    deck.add("ACCGRAV/, KGRAV = -9806.65", line)
     return deck.add("MOTION/1, TRANSLATION, JOINT = 1, FUNCTION = 10*TIME")
 
 
@@ -267,8 +265,7 @@ def test_adams_loads_in_milliseconds(tmp_path):
 
 
 def test_adams_recorded_deck_drives_all_freedoms(tmp_path):
-    deck = driven("TIME").part(3)
-    deck.marker(21, 3, AT, AXES).marker(22, 2, AT, AXES).add("JOINT/2, REVOLUTE, I = 21, J = 22")
+    deck = driven("TIME").part(3).joint(2, "REVOLUTE", 3, 2)
     case = read(tmp_path, deck, recorded=True)
     assert not case.sweep.motions
     assert [each.name for each in case.mechanism.drivers] == ["MOTION_7", "JOINT_2"]
@@ -278,10 +275,9 @@ def test_adams_recorded_deck_drives_all_freedoms(tmp_path):
 
 def coupled(statement, kinds=("REVOLUTE", "REVOLUTE"), reverse=False):
     deck = Deck(8).part(2).part(3)
-    for number, part, at in ((11, 2, AT), (12, 1, AT), (21, 3, AT + 60 * X), (22, 1, AT + 60 * X)):
-        deck.marker(number, part, at, AXES)
-    deck.add(f"JOINT/1, {kinds[0]}, I = 11, J = 12")
-    deck.add(f"JOINT/2, {kinds[1]}, " + ("I = 22, J = 21" if reverse else "I = 21, J = 22"))
+    deck.joint(1, kinds[0], 2).joint(2, kinds[1], 3, at=AT + 60 * X)
+    if reverse:
+        deck.lines[-1] = deck.lines[-1].replace("I = 21, J = 22", "I = 22, J = 21")
     deck.add(statement, f"MOTION/1, {'ROTATION' if kinds[0][0] == 'R' else 'TRANSLATION'}, JOINT=1")
     return deck.add(", FUNCTION = TIME")
 
@@ -308,8 +304,7 @@ def test_adams_coupler_of_two_joints(tmp_path):
 def test_adams_coupler_of_three_joints(tmp_path):
     """r1 q1 + r2 q2 + r3 q3 = 0, the third one driven too."""
     deck = coupled("COUPLER/1, JOINTS = 1, 2, 3, TYPE = R:R:T, SCALES = 1, -2, 3").part(4)
-    deck.marker(31, 4, AT + 90 * X, AXES).marker(32, 1, AT + 90 * X, AXES)
-    deck.add("JOINT/3, TRANSLATIONAL, I = 31, J = 32")
+    deck.joint(3, "TRANSLATIONAL", 4, at=AT + 90 * X)
     deck.add("MOTION/3, TRANSLATION, JOINT = 3", ", FUNCTION = 0.2*TIME")
     assert second(tmp_path, deck)[0] == pytest.approx(0.5 * (1.0 + 3.0 * 0.2))
 
@@ -327,10 +322,8 @@ def test_adams_gear_ratio_by_pitch_point(tmp_path, reverse):
 def test_adams_rack_rolls_beside_marker(tmp_path, side):
     """The pitch point, 25 mm off along y, moves by 25 mm a radian, along x against the sense."""
     along = Rotation.from_matrix(np.stack([Y, Z, X], axis=1))
-    deck = Deck(8).part(2).part(3).marker(11, 2, AT, AXES).marker(12, 1, AT, AXES)
-    for number, part in ((21, 3), (22, 1)):
-        deck.marker(number, part, AT + side * 25.0 * Y, along)
-    deck.add("JOINT/1, REVOLUTE, I = 11, J = 12", "JOINT/2, TRANSLATIONAL, I = 21, J = 22")
+    deck = Deck(8).part(2).part(3).joint(1, "REVOLUTE", 2)
+    deck.joint(2, "TRANSLATIONAL", 3, at=AT + side * 25.0 * Y, axes=along)
     deck.add("JOINT/3, RACKPIN, I = 11, J = 21, PD = 50", "MOTION/1, ROT, JOINT=1, FUN = TIME")
     assert second(tmp_path, deck)[1] == pytest.approx(-side * 25.0)
     hidden = deck.text.replace("PD = 50", "PD = 90")
@@ -405,16 +398,10 @@ def test_adams_dialects_read_alike(tmp_path):
 def test_adams_separate_markers_are_assembled(tmp_path):
     """A four-bar whose last marker is 0.5 mm and 0.2 degrees off."""
     deck = Deck(4).part(2).part(3).part(4)
-    a, b, c, d = AT, AT + 80 * Y, AT + 200 * X + 150 * Y, AT + 200 * X
-    for k, at in enumerate((a, b, c), 1):
-        deck.marker(10 * k + 1, k + 1, at, AXES).marker(10 * k + 2, k, at, AXES)
-    off = AXES * Rotation.from_euler("x", 0.2, degrees=True)
-    deck.marker(41, 4, d + 0.5 * X, off).marker(42, 1, d, AXES)
-    deck.add(
-        "JOINT/1, REVOLUTE, I = 11, J = 12",
-        "JOINT/2, SPHERICAL, I = 21, J = 22",
-        "JOINT/3, CYLINDRICAL, I = 31, J = 32",
-    )
+    deck.joint(1, "REVOLUTE", 2).joint(2, "SPHERICAL", 3, 2, AT + 80 * Y)
+    deck.joint(3, "CYLINDRICAL", 4, 3, AT + 200 * X + 150 * Y)
+    last, off = AT + 200 * X, AXES * Rotation.from_euler("x", 0.2, degrees=True)
+    deck.marker(41, 4, last + 0.5 * X, off).marker(42, 1, last, AXES)
     deck.add("JOINT/4, REVOLUTE, I = 41, J = 42", "MOTION/1, ROT, JOINT = 1, FUNCTION = 0.1*TIME")
     case = read(tmp_path, deck)
     (note,) = [each for each in case.assembly if "assembled" in each]

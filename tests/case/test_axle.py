@@ -1,9 +1,7 @@
 """Whole axles against two independent carriers on rods, and wheels of a car."""
 
-import json
-import tomllib
+import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
 
 from ..oracles.rods import Carrier
-from ..support.case_texts import complains, rows, supplied
+from ..support.case_texts import complains, rows, supplied, write
 from ..support.rods_of_templates import RODS as ALL_RODS
 from ..support.rods_of_templates import solved
 from ..support.written_again import written_again
@@ -200,70 +198,45 @@ def test_axle_case_file_round_trip(tmp_path):
     written_again(axle(tmp_path, "five_link", "roll"), tmp_path)
 
 
-def changed(folder, edit):
-    """The file of an axle as data, changed."""
-    data = tomllib.loads(case_text(axle(folder, "double_wishbone", "roll", "0.02:3")))
-    edit(data)
-    file = Path(folder) / "case.json"
-    file.write_text(json.dumps(data))
-    return file
+def changed(folder, *edits):
+    """The case file of an axle with patterns replaced."""
+    text = case_text(axle(folder, "double_wishbone", "roll", "0.02:3"))
+    for old, new in edits:
+        text, count = re.subn(old, new, text, flags=re.DOTALL)
+        assert count
+    return write(folder, text)
 
 
-FAULTS = {
-    "other side": (
-        lambda data: data["outputs"]["left_toe"].update(side="middle"),
-        "outputs.left_toe ... 'middle' ... left, right",
-    ),
-    "no other": (
-        lambda data: data["suspension"].pop("other"),
-        ("outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]"),
-    ),
-    "no other for an axle": (
-        lambda data: (
-            data["suspension"].pop("other"),
-            data.update(outputs={"track": {"type": "track"}}),
-        ),
-        ("suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]"),
-    ),
-    "one wheel twice": (
-        lambda data: data["suspension"]["other"].update(wheel_center="left_wheel_center"),
-        "suspension.other.side ... 'right' ... on the other side",
-    ),
-    "no point": (
-        lambda data: data["suspension"]["other"].update(wheel_center="right_wheel_centre"),
-        "suspension.other.wheel_center ... 'right_wheel_center'",
-    ),
-    "upside down": (
-        lambda data: data["suspension"]["other"]["kingpin"].reverse(),
-        "suspension.other.kingpin ... the lower point, then the upper",
-    ),
-    "no driver": (
-        lambda data: data["suspension"]["other"].update(travel="right_strike"),
-        "suspension.other.travel ... 'right_stroke'",
-    ),
-    "side of an axle": (
-        lambda data: data["outputs"]["track"].update(side="left"),
-        "outputs.track ... side",
-    ),
-}
+FAULTS = """
+other side | (left_toe.*?side = )"left" | \\1"middle"
+    | outputs.left_toe ... 'middle' ... left, right
+no other | \\[suspension.other.*?(?=\\[outputs) |
+    | outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]
+no other for an axle | \\[suspension.other.*(?=\\[outputs.track) |
+    | suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]
+one wheel twice | (other.*?center = )"right | \\1"left
+    | suspension.other.side ... 'right' ... on the other side
+no point | (other.*?)right_wheel_center | \\1right_wheel_centre
+    | suspension.other.wheel_center ... 'right_wheel_center'
+upside down | ("right_lca_outer"), ("right_uca_outer") | \\2, \\1
+    | suspension.other.kingpin ... the lower point, then the upper
+no driver | travel = "right_stroke" | travel = "right_strike"
+    | suspension.other.travel ... 'right_stroke'
+side of an axle | type = "track" | type = "track"\\nside = "left" | outputs.track ... side
+"""
 
 
-@pytest.mark.parametrize("kind", FAULTS)
-def test_axle_case_file_faults(tmp_path, kind):
-    edit, fragments = FAULTS[kind]
-    complains(changed(tmp_path, edit), fragments)
+@pytest.mark.parametrize(("old", "new", "message"), rows(FAULTS))
+def test_axle_case_file_faults(tmp_path, old, new, message):
+    complains(changed(tmp_path, (old, new)), message)
 
 
 def test_roll_centre_needs_both_travel_drivers(tmp_path):
-    def edit(data):
-        for side in ("left", "right"):
-            data["drivers"][f"{side}_stroke"]["point"] = f"{side}_tierod_outer"
-        data["suspension"].pop("travel")
-        data["suspension"]["other"].pop("travel")
-        data["outputs"] = {"rc": {"type": "axle_roll_center_height"}}
-
+    points = r'point = "(left|right)_wheel_center"', r'point = "\1_tierod_outer"'
+    outputs = r"\[outputs.*", '[outputs.rc]\ntype = "axle_roll_center_height"\n'
+    file = changed(tmp_path, points, (r'travel = "\w+_stroke"\n', ""), outputs)
     with pytest.raises(CaseError, match=r"outputs\.rc: .* name them by suspension\.travel and"):
-        load_case(changed(tmp_path, edit))
+        load_case(file)
 
 
 def test_roll_centre_offset_in_sae_axes(tmp_path):
@@ -434,38 +407,32 @@ def test_contradictory_sides_are_refused(tmp_path, corner, above, options, messa
     complains(plain(tmp_path, "mcpherson", corner, above), message, of("mcpherson", **own))
 
 
-WORDS = {"FL": "Front,Left", "FR": "Front,Right", "RL": "Rear,Left", "RR": "Rear,Right"}
-TABLES = {
-    "column": lambda corner, row: ["corner,point,x,y,z", ",".join([corner, *row])],
-    "words": lambda corner, row: [
-        "wheel;name;x;y;z",
-        ";".join([WORDS[corner].replace(",", " "), *row]),
-    ],
-    "last column": lambda corner, row: ["name,x,y,z,corner", ",".join([*row, corner])],
-    "two columns": lambda corner, row: ["axle,side,point,x,y,z", ",".join([WORDS[corner], *row])],
-    "letters": lambda corner, row: ["axle,side,point,x,y,z", ",".join([*corner, *row])],
-    "merged cells": lambda corner, row: [
-        "corner,point,x,y,z",
-        ",".join([corner if row[0] == "uca_front" else "", *row]),
-    ],
-    "suffix": lambda corner, row: ["name,x,y,z", ",".join([f"{row[0]}_{corner}", *row[1:]])],
-    "prefix": lambda corner, row: ["name,x,y,z", ",".join([f"{corner}_{row[0]}", *row[1:]])],
-    "script": lambda corner, row: [
-        "% the car",
-        f"{corner}.{row[0]} = [{' '.join(row[1:])}];",
-    ],
-}
+TABLES = """
+column | corner,point,x,y,z | {corner},{name},{x},{y},{z}
+words | wheel;name;x;y;z | {axle} {side};{name};{x};{y};{z}
+last column | name,x,y,z,corner | {name},{x},{y},{z},{corner}
+two columns | axle,side,point,x,y,z | {axle},{side},{name},{x},{y},{z}
+letters | axle,side,point,x,y,z | {corner[0]},{corner[1]},{name},{x},{y},{z}
+merged cells | corner,point,x,y,z | {first},{name},{x},{y},{z}
+suffix | name,x,y,z | {name}_{corner},{x},{y},{z}
+prefix | name,x,y,z | {corner}_{name},{x},{y},{z}
+script | % the car | {corner}.{name} = [{x} {y} {z}];
+"""
+WORDS = {"F": "Front", "R": "Rear"}, {"L": "Left", "R": "Right"}
 
 
 @pytest.mark.parametrize("corner", CORNERS)
-@pytest.mark.parametrize("kind", TABLES)
-def test_corner_of_car_table_is_read(tmp_path, kind, corner):
-    name = "double_wishbone"
-    said = of(name, corner=corner)
-    pairs = [TABLES[kind](each, row) for each in CORNERS for row in points_at(name, each)]
-    lines = [pairs[0][0], *(line for _, line in pairs)]
-    case = load(written(tmp_path, lines, "car.m" if kind == "script" else "car.csv"), said)
-    alone = load(plain(tmp_path, name, corner), of(name))
+@pytest.mark.parametrize(("head", "form"), rows(TABLES))
+def test_corner_of_car_table_is_read(tmp_path, head, form, corner):
+    said = of("double_wishbone", corner=corner)
+    lines = [head]
+    for each in CORNERS:
+        axle, side = (words[letter] for words, letter in zip(WORDS, each, strict=True))
+        for k, (name, x, y, z) in enumerate(points_at("double_wishbone", each)):
+            place = {"name": name, "x": x, "y": y, "z": z, "first": "" if k else each}
+            lines.append(form.format(corner=each, axle=axle, side=side, **place))
+    case = load(written(tmp_path, lines, "car.m" if head[0] == "%" else "car.csv"), said)
+    alone = load(plain(tmp_path, "double_wishbone", corner), of("double_wishbone"))
     theirs, ours = solved(alone), solved(case)
     assert theirs.keys() == ours.keys()
     for output, values in ours.items():

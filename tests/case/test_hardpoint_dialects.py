@@ -83,54 +83,63 @@ def columns(head=("name", "x", "y", "z")):
     return "\n".join(";".join(each) for each in zip(*rows, strict=True)) + "\n"
 
 
+FORMS = """
+trailing separators | name;x;y;z; | {};{};{};{};
+trailing in rows | name;x;y;z | {};{};{};{};;;
+trailing in the head | name;x;y;z;; | {};{};{};{}
+trailing commas | name,x,y,z, | {},{},{},{},
+further columns | No;Name;X [mm];Y [mm];Z [mm];Remark | 1;{};{};{};{};is 1,5 off
+commas and further | name,x,y,z,mass,by | {},{},{},{},1.5,me
+other order | z;y;x;name | {3};{2};{1};{0}
+units below | name;x;y;z\\n;[mm];[mm];[mm] | {};{};{};{}
+points | Point;X_mm;Y_mm;Z_mm | {};{};{};{}
+Adams columns | hardpoint_name;x_value;y_value;z_value | {};{};{};{}
+three decimals | name;x;y;z | {};{:.3f};{:.3f};{:.3f}
+index of pandas | ,x,y,z | {},{},{},{}
+a name of its own for names | Bezeichnung;X;Y;Z | {};{};{};{}
+units in words | name;x in mm;y in mm;z in mm | {};{};{};{}
+long names of axes | name;X-coordinate [mm];Y-coordinate [mm];Z-coordinate [mm] | {};{};{};{}
+units with a slash | name;x/mm;y/mm;z/mm | {};{};{};{}
+blank columns | ;name;;x;y;z; | ;{};;{};{};{};
+spaces around | name ; x ; y ; z |  {} ;  {} ; {} ;{}
+quoted | "name";"x";"y";"z" | "{}";"{}";"{}";"{}"
+numbered | No.;Name;x;y;z | 7;{};{};{};{}
+comment of a spreadsheet | "# axes: rearward,right,up"\\n# units: mm;;;\\nname;x;y;z | {};{};{};{}
+comment in cells | # axes: rearward;right;up\\nname;x;y;z | {};{};{};{}
+title with a unit | units: mm\\nname;x;y;z | {};{};{};{}
+title | Front suspension, left\\n\\nDate;2026-11-26;;\\nname;x;y;z | {};{};{};{}
+"""
+
+
+@pytest.mark.parametrize(("head", "row"), rows(FORMS))
+def test_hardpoint_table_forms_read_alike(tmp_path, plain, head, row):
+    assert read(tmp_path, table(head, row)).mechanism == plain
+
+
 DIALECTS = {
     "decimal comma": comma(table()),
     "decimal comma, tabs": comma(table()).replace(";", "\t"),
     "quoted decimal comma": comma(table(row='{};"{}";"{}";"{}"')).replace(";", ","),
-    "trailing separators": table("name;x;y;z;", "{};{};{};{};"),
-    "trailing in rows": table(row="{};{};{};{};;;"),
-    "trailing in the head": table("name;x;y;z;;"),
-    "trailing commas": table("name,x,y,z,", "{},{},{},{},"),
     "sep line": "sep=;\n" + comma(table()),
     "sep bar": "\ufeffSEP=|\r\n" + table().replace(";", "|").replace("\n", "\r\n"),
-    "title": "Front suspension, left\n\nDate;2026-11-26;;\n" + table(),
-    "further columns": table("No;Name;X [mm];Y [mm];Z [mm];Remark", "1;{};{};{};{};is 1,5 off"),
-    "commas and further": table("name,x,y,z,mass,by", "{},{},{},{},1.5,me"),
-    "other order": table("z;y;x;name", "{3};{2};{1};{0}"),
-    "units below": table("name;x;y;z\n;[mm];[mm];[mm]"),
-    "points": table("Point;X_mm;Y_mm;Z_mm"),
-    "Adams columns": table("hardpoint_name;x_value;y_value;z_value"),
     "exponents": comma(table()).replace("228,25", "2,2825e2"),
     "grouped by nothing": comma(table()).replace("228,25", "228,250"),
-    "three decimals": table(row="{};{:.3f};{:.3f};{:.3f}"),
     "OptimumK": table("Point Name;X (mm);Y (mm);Z (mm)", points=renamed(OPTIMUM)),
     "Lotus": table(",x,y,z", "{},{},{},{}", renamed(LOTUS)),
     "corners": table(points={f"{name} FL": at for name, at in renamed(LOTUS).items()}),
     "corners before": table(points={f"FL_{name}": at for name, at in POINTS.items()}),
     "both sides": table(points=LEFT | RIGHT),
     "one side of a few": table(points=POINTS | {"spring_right": (1.5, 2.5, 3.5)}),
-    "index of pandas": table(",x,y,z", "{},{},{},{}"),
-    "a name of its own for names": table("Bezeichnung;X;Y;Z"),
-    "units in words": table("name;x in mm;y in mm;z in mm"),
-    "long names of axes": table("name;X-coordinate [mm];Y-coordinate [mm];Z-coordinate [mm]"),
-    "units with a slash": table("name;x/mm;y/mm;z/mm"),
     "columns of points": columns(),
     "columns, German": comma(columns()),
     "configuration below": table() + "Steering rack;XXXX;;\nWheelbase;1550;;\n",
     "notes below": table() + ";;;\nAll points from CAD, rev 3\n* not to scale;;;\n",
     "headings between": table().replace("lca_front", "Lower arm;;;\nlca_front"),
-    "comment of a spreadsheet": '"# axes: rearward,right,up"\n# units: mm;;;\n' + table(),
-    "comment in cells": "# axes: rearward;right;up\n" + table(),
-    "title with a unit": "units: mm\n" + table(),
-    "blank columns": table(";name;;x;y;z;", ";{};;{};{};{};"),
     "sign of typography": table().replace("-", "\u2212"),
-    "spaces around": table("name ; x ; y ; z", " {} ;  {} ; {} ;{} "),
     "plus signs": table().replace(";110.25", ";+110.25"),
     "lines of Windows": table().replace("\n", "\r\n"),
     "lines of an old Mac": table().replace("\n", "\r"),
     "Windows-1252": ("Radaufhängung, außen\n" + table()).encode("cp1252"),
-    "quoted": table('"name";"x";"y";"z"', '"{}";"{}";"{}";"{}"'),
-    "numbered": table("No.;Name;x;y;z", "7;{};{};{};{}"),
 }
 
 

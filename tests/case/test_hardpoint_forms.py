@@ -48,11 +48,34 @@ NESTED = {
     "wheel": {"center": "wheel_center"},
 }
 NESTED = {part: {end: POINTS[role] for end, role in ends.items()} for part, ends in NESTED.items()}
+PATTERNS = """
+a coordinate a row | car.csv | axes | {}_{},{} |
+axis in a cell | car.csv | axes | {};{};{} |
+no head | car.csv | lines | {};{};{};{} |
+no head, names last | car.csv | lines | {1},{2},{3},{0} |
+head, names last | car.csv | lines | {1},{2},{3},{0} | X,Y,Z,\\n(mm),(mm),(mm),\\n
+blanks | car.txt | lines | {}   {}  {} {} | name x [mm] y [mm] z [mm]\\n
+blanks, no head | car.dat | lines | {}   {}  {} {} |
+SolidWorks | car.txt | axes | "{}_{}" = {}mm |
+Python | car.txt | lines | p['{}'] = np.array([{}, {}, {}]) |
+one letter a line | car.m | axes | P.{}.{} = {}; |
+YAML | car.yaml | lines | {}: {{x: {}, y: {}, z: {}}} |
+YAML, lists | car.yml | lines | {}: [{}, {}, {}] | units: millimeters\\n
+YAML, named items | car.yaml | lines | - [{}, {}, {}, {}] | points:\\n
+"""
+
+
+@pytest.mark.parametrize(("name", "each", "pattern", "head"), rows(PATTERNS))
+def test_hardpoint_patterns_read_alike(tmp_path, plain, name, each, pattern, head):
+    if ".y" in name:
+        pytest.importorskip("yaml")
+    text = head + {"axes": axes, "lines": lines}[each](pattern)
+    assert load(write(tmp_path, text, name), SAID).mechanism == plain
+
+
 FORMS = {
-    "a coordinate a row": ("car.csv", axes("{}_{},{}")),
     "with a head and units": ("car.csv", axes("{} {};{};[mm];a note").join(["point;value\n", ""])),
     "a coordinate a row, decimal comma": ("car.csv", comma(axes("{}|{};{}")).replace("|", ".")),
-    "axis in a cell": ("car.csv", axes("{};{};{}", names="XYZ")),
     "one wide row": (
         "car.csv",
         "\n".join(
@@ -60,13 +83,7 @@ FORMS = {
             for each in zip(*(x.split(",") for x in axes("{}_{},{}").split()), strict=False)
         ),
     ),
-    "no head": ("car.csv", lines("{};{};{};{}")),
     "no head, decimal comma": ("car.csv", "Front axle\n" + comma(lines("{};{};{};{}"))),
-    "no head, names last": ("car.csv", lines("{1},{2},{3},{0}")),
-    "head, names last": ("car.csv", "X,Y,Z,\n(mm),(mm),(mm),\n" + lines("{1},{2},{3},{0}")),
-    "blanks": ("car.txt", "name x [mm] y [mm] z [mm]\n" + lines("{}   {}  {} {}")),
-    "blanks, no head": ("car.dat", lines("  {}   {}  {} {}")),
-    "SolidWorks": ("car.txt", axes('"{}_{}" = {}mm')),
     "MATLAB": (
         "car.m",
         "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]") + "d = 18; % [in]",
@@ -75,11 +92,7 @@ FORMS = {
         "car.m",
         lines("hp.left.{} = [{}, {}, {}];") + lines("hp.right.{} = [{}, {}, {}];", RIGHT),
     ),
-    "Python": ("car.txt", lines("p['{}'] = np.array([{}, {}, {}])")),
-    "one letter a line": ("car.m", axes("P.{}.{} = {};")),
     "YAML": ("car.yaml", "hardpoints:\n" + lines("  {}: {{x: {}, y: {}, z: {}}}")),
-    "YAML, lists": ("car.yml", "units: millimeters\nfront:\n" + lines("  {}: [{}, {}, {}]")),
-    "YAML, named items": ("car.yaml", "points:\n" + lines("- [{}, {}, {}, {}]")),
     "JSON": ("car.json", json.dumps({"unit": "mm", "hardpoints": {"left": tree()}})),
     "JSON, parts": ("car.json", json.dumps(NESTED)),
     "JSON, a list": ("car.json", json.dumps(LISTED)),

@@ -27,7 +27,7 @@ from kincheck.core import Body, CaseError, Distance, JointAngle, Mechanism, Poin
 from kincheck.core.case.case import Output, Truth, without_forces
 from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.studies.truth.forces import known_forces
-from kincheck.core.studies.truth.motion import followed
+from kincheck.core.studies.truth.motion import follow_motion
 
 from ..support.fakes import swept
 
@@ -351,7 +351,7 @@ def test_loaded_strut_moves_as_strut():
 def test_loaded_strut_file_equals_force_truth():
     case = CASES["mcpherson_strut_loaded"]
     few = swept(case, case.sweep.values[::8])
-    known = known_forces(few, followed(few))
+    known = known_forces(few, follow_motion(few))
     assert len(known) == 7
     for name, each in known.items():
         printed = case.reference[name].position[::8]

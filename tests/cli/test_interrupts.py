@@ -37,19 +37,23 @@ def listening():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def started(*command):
+    return subprocess.Popen(
+        [sys.executable, *map(str, command)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=listening,
+    )
+
+
 def ended(process):
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
 
 
 def stopped_at(kind, count, number, *arguments, text=""):
-    event = [kind, text, str(count), str(int(number))]
-    command = [sys.executable, "-c", AT, *event, *map(str, arguments)]
-    return ended(
-        subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
-        )
-    )
+    return ended(started("-c", AT, kind, text, count, int(number), *arguments))
 
 
 def lines(err):
@@ -80,11 +84,8 @@ def test_interrupted_run_writes_records(tmp_path):
     """While records come, and once more while they are written."""
     out = tmp_path / "out"
     # the strut and MuJoCo take long enough to be interrupted in time
-    command = [sys.executable, "-m", "kincheck", "run", "rssr", "mcpherson_strut"]
-    command += f"--engine native mujoco --jobs 1 --out {out}".split()
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
-    )
+    line = "-m kincheck run rssr mcpherson_strut --engine native mujoco --jobs 1"
+    process = started(*line.split(), "--out", out)
     first = process.stderr.readline()
     process.send_signal(signal.SIGINT)
     status, _, err = ended(process)
@@ -124,13 +125,7 @@ def test_interrupt_of_run_at_any_time(tmp_path, seconds):
         f"open({str(begun)!r}, 'w').close(); from kincheck.__main__ import main; import sys;"
         " sys.exit(main())"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, *map(str, command)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=listening,
-    )
+    process = started("-c", code, *command)
     while not begun.exists():
         time.sleep(0.01)
     time.sleep(seconds)

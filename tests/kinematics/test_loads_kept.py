@@ -12,7 +12,7 @@ from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.kinematics.structure.components import components, described
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.studies.stress.reduction import reduced, rounded
+from kincheck.core.studies.stress.reduction import reduce_case, round_geometry
 
 from ..support.loaded_slider_crank import GRAVITY, loaded, pushed
 
@@ -37,7 +37,7 @@ def same_loads(a: Mechanism, b: Mechanism) -> None:
         lambda m: replace(m, points=m.points),
         lambda m: placed(m, places(m)),
         with_joints_alone,
-        lambda m: rounded(case_of(m), 9).mechanism,
+        lambda m: round_geometry(case_of(m), 9).mechanism,
     ],
     ids=["replace", "placed", "jointed", "rounded"],
 )
@@ -103,7 +103,7 @@ def test_reduction_drops_loads_of_removed_parts():
     def still(smaller):
         return any(each.name == "clock" for each in smaller.mechanism.forces)
 
-    small, _ = reduced(case, still)
+    small, _ = reduce_case(case, still)
     assert [each.name for each in small.mechanism.forces] == ["clock"]
     assert [each.name for each in small.mechanism.moving] == ["crank"]
     assert small.mechanism.body("crank").mass == 2.0

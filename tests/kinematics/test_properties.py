@@ -17,12 +17,12 @@ from kincheck.core import PointCoordinate
 from kincheck.core.mechanism.motions import Sine
 from kincheck.core.studies.stress.families.base import bodies, swept
 from kincheck.core.studies.stress.families.loops import random_mechanism
-from kincheck.core.studies.stress.verdicts import interpreted
+from kincheck.core.studies.stress.verdicts import with_numpy_executor
 from scipy.spatial.transform import Rotation
 
 from ..support import mechanisms
 
-ENGINE = interpreted(adapters.engine("native"))
+ENGINE = with_numpy_executor(adapters.engine("native"))
 LOOPS, LARGEST, SAMPLES = 8, 5, 5
 # The part of the loop's own reach that is driven: far from where it may lock up, and where rounding
 # is magnified without bound.

@@ -18,7 +18,12 @@ from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.structure.redundancy import independent_rows, reduce_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
-from kincheck.core.studies.stress.families.linkages import any_plane, beside, crank_rocker, four_bar
+from kincheck.core.studies.stress.families.linkages import (
+    add_loop,
+    any_plane,
+    crank_rocker,
+    four_bar,
+)
 
 from ..support.mechanisms import Z, errors, planar_four_bar, solve_all
 
@@ -62,7 +67,7 @@ def test_redundant_rows_of_loops_sharing_crank(seed):
     """
     rng = np.random.default_rng(seed)
     plane, bars = any_plane(rng), crank_rocker(rng)
-    mechanism, _ = beside(four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
+    mechanism, _ = add_loop(four_bar(plane, *bars), plane, *bars, "revolutes", "twin ")
     frame = frames(mechanism)
     formulation = Cartesian(constraints(mechanism, frame, {}), frame.moving)
     selection = select_rows(mechanism, frame, formulation)

@@ -24,10 +24,10 @@ from kincheck.core.studies.paper.operations import (
     Pair,
     chain,
     conditions,
+    count_executed,
     count_operations,
-    executed,
+    count_traced,
     skew,
-    traced,
 )
 
 SEED = 943745
@@ -142,15 +142,15 @@ def test_operation_counts_fall_with_simplification(found):
 def test_tracing_shares_operations_between_rows():
     f, g, h, *arms = (Vec3(*np.random.default_rng(k).normal(size=3).tolist()) for k in range(5))
     condition = conditions(f, g, h, *arms)[1]
-    dots = condition.unsimplified("native")
-    one, both = traced(dots[:1]), traced(dots)
+    dots = condition.unsimplified_rows("native")
+    one, both = count_traced(dots[:1]), count_traced(dots)
     assert both.jacobian == 2 * one.jacobian - 15  # A_j h once
-    assert traced([*dots, *dots]).gamma == both.gamma
+    assert count_traced([*dots, *dots]).gamma == both.gamma
     tally = [0]
     pair = Pair.of(lambda: Executed(tally))
     alone, two = (
-        executed(each, pair, tally)
-        for each in (condition.printed(formed=True)[:1], condition.printed(formed=True))
+        count_executed(each, pair, tally)
+        for each in (condition.printed_rows(formed=True)[:1], condition.printed_rows(formed=True))
     )
     assert (two.jacobian, two.gamma) == (2 * alone.jacobian, 2 * alone.gamma)
 
@@ -219,7 +219,7 @@ def test_round_off_inputs_are_equal(rng):
         i, j = known.i, known.j
         assert np.sqrt(i.u @ i.u) == pytest.approx(distance, rel=1e-9)
         for condition in known.conditions[2:]:
-            for primitive in condition.simplified("paper"):
+            for primitive in condition.simplified_rows("paper"):
                 off = np.array(
                     primitive.phi(
                         bench_formulation.Pose.of(i.u, i.q), bench_formulation.Pose.of(j.u, j.q)
@@ -263,9 +263,9 @@ def test_far_sweeps_lose_rounded_digits_only(found):
 
 
 def test_mechanism_moved_back_is_rounded_once(case):
-    away = bench_formulation._moved(case.mechanism, bench_formulation.FAR)
-    back = bench_formulation._moved(away, tuple(-x for x in bench_formulation.FAR))
-    assert bench_formulation._moved(back, bench_formulation.FAR) == away
+    away = bench_formulation._shift_mechanism(case.mechanism, bench_formulation.FAR)
+    back = bench_formulation._shift_mechanism(away, tuple(-x for x in bench_formulation.FAR))
+    assert bench_formulation._shift_mechanism(back, bench_formulation.FAR) == away
     for one, other in zip(case.mechanism.points, back.points, strict=True):
         assert one.position != other.position
         assert other.position == pytest.approx(one.position, abs=1.2e-10)

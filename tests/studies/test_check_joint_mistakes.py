@@ -24,7 +24,13 @@ from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
 from kincheck.core.studies.checks.findings import Verdict
-from kincheck.core.studies.checks.joint_loops import driven, loaded, loops, reactions, solved
+from kincheck.core.studies.checks.joint_loops import (
+    loops,
+    reactions,
+    solve_probe,
+    with_loads,
+    with_own_drivers,
+)
 
 from ..support.engine_faults import changed
 from ..support.fakes import native_but
@@ -339,9 +345,9 @@ def test_equivalent_with_fixed_names_is_found(few):
 equations = importlib.import_module("kincheck.core.kinematics.forces.equations")
 
 
-def failing(joint_type, case_of=loaded):
+def failing(joint_type, case_of=with_loads):
     """The failing checks of reactions of a joint type, loaded or driven in its own coordinates."""
-    found = reactions(solved(case_of(probe(joint_type))))
+    found = reactions(solve_probe(case_of(probe(joint_type))))
     return [each.check.removeprefix("reaction: ") for each in found if each.verdict is Verdict.FAIL]
 
 
@@ -354,7 +360,7 @@ def at_origins(self, freedom, i, j):
 
 @pytest.mark.parametrize("base", [Translational, Screw])
 def test_slide_reaction_mistake_is_found(base):
-    assert "acts and reacts" in failing(mistaken(base, measured=at_origins), driven)
+    assert "acts and reacts" in failing(mistaken(base, measured=at_origins), with_own_drivers)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.execution import Pair, solve_in_process
 from kincheck.core.harness.record import Outcome
-from kincheck.core.studies.tolerance.cross_check import Check, chosen, judged
+from kincheck.core.studies.tolerance.cross_check import Check, choose_variants, judge_variant
 from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.trajectory import QUANTITIES
@@ -52,10 +52,10 @@ def instead(monkeypatch):
 def test_sweep_check_finds_deviating_variant(tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
-    (some,) = chosen(600, 1 / 600, 4)
-    picked = chosen(600, 0.05, 4)
+    (some,) = choose_variants(600, 1 / 600, 4)
+    picked = choose_variants(600, 0.05, 4)
     assert len(picked) == 30
-    assert chosen(600, 1e-9, 4) == {some}
+    assert choose_variants(600, 1e-9, 4) == {some}
     at = sorted(picked)[7]
     found = sweep_designs(
         case,
@@ -183,7 +183,7 @@ def test_sweep_check_of_variant_solved_alone(tmp_path):
     study, found, rows = nominal(tmp_path, swept(case, np.deg2rad([0.0, 60.0, 90.0, 110.0])))
     assert found.result.solved == 4
     rows[:, 2:] = np.nan  # as many at once leave them
-    record = judged(study, 0, found, rows)
+    record = judge_variant(study, 0, found, rows)
     assert (record.outcome, record.message) == ("pass", "")
 
 
@@ -196,7 +196,7 @@ def test_sweep_check_names_rows_without_values(tmp_path):
     }
     found = replace(found, result=replace(found.result, outputs=bare))
     derived = [row.name for row in study.rows if row.derivative]
-    record = judged(study, 0, found, values)
+    record = judge_variant(study, 0, found, values)
     assert record.outcome == "pass"
     assert derived
     assert record.message.startswith(f"not judged: {', '.join(derived[:3])}")

@@ -22,18 +22,18 @@ from kincheck.core.studies.stress.families import FAMILIES, Family, Specimen
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
 from kincheck.core.studies.stress.reduction import judge as judge_file
-from kincheck.core.studies.stress.reduction import rounded
+from kincheck.core.studies.stress.reduction import round_geometry
 from kincheck.core.studies.stress.report import report
 from kincheck.core.studies.stress.run import specimen, specimens, stress
 from kincheck.core.studies.stress.verdicts import (
     Verdict,
-    interpreted,
-    judged,
+    judge_answer,
     once,
     refused_description,
+    with_numpy_executor,
 )
 from kincheck.core.studies.truth.forces import known_forces
-from kincheck.core.studies.truth.motion import Reach, followed
+from kincheck.core.studies.truth.motion import Reach, follow_motion
 
 from ..support.engine_faults import changed
 from ..support.fakes import Fake, native_but, raising
@@ -53,7 +53,9 @@ def test_stress_corner_beside_small_loop():
     made = FAMILIES["corners"].specimen(rng, samples)
     case = made.case
     assert "beside a loop of 0.014" in made.name
-    found = judged(made, case, made.truth(case), once(Pair(case, interpreted(NATIVE), made.tol)))
+    found = judge_answer(
+        made, case, made.truth(case), once(Pair(case, with_numpy_executor(NATIVE), made.tol))
+    )
     assert found.counts[Verdict.RIGHT] == samples
 
 
@@ -131,7 +133,9 @@ def test_error_bounded_over_thousand_turns():
 
 
 def test_numpy_solver_in_singular_family():
-    found, _ = stress([FAMILIES["singular"]], [interpreted(NATIVE)], samples=6, seed=0, prove=False)
+    found, _ = stress(
+        [FAMILIES["singular"]], [with_numpy_executor(NATIVE)], samples=6, seed=0, prove=False
+    )
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
 
@@ -190,7 +194,7 @@ def case():
 
 @pytest.fixture(scope="module")
 def truth(case):
-    return followed(case)
+    return follow_motion(case)
 
 
 def fake(change=lambda motion: motion, failures=()):
@@ -205,7 +209,9 @@ def fake(change=lambda motion: motion, failures=()):
 
 
 def judge(case, truth, engine, **about):
-    return judged(Specimen("one", case, **about), case, truth, once(Pair(case, engine, 1e-12)))
+    return judge_answer(
+        Specimen("one", case, **about), case, truth, once(Pair(case, engine, 1e-12))
+    )
 
 
 def moved(by, quantity="position", samples=slice(None)):
@@ -294,7 +300,7 @@ def test_verdict_on_errors_and_crashes(case):
         (Outcome.UNSUPPORTED, Verdict.UNSUPPORTED),
     ):
         failure = Failure(outcome, "free", kind=FailureKind.FREE)
-        assert judged(one, case, None, failure).counts[verdict] == 5
+        assert judge_answer(one, case, None, failure).counts[verdict] == 5
     for refused, verdict in (
         (Specimen("one", free, None, reasons=reasons), Verdict.REFUSED_RIGHTLY),
         (Specimen("one", SolveError("odd"), None, reasons=reasons), Verdict.REFUSED_WRONGLY),
@@ -311,8 +317,8 @@ def test_verdict_on_unreported_contradiction(case, truth):
         replace(truth, violated=np.array([0.0, 1e-10, 0.0, 0.0, 0.0])),
     )
     told = replace(answer, details={"redundant_residual": 5e-11})
-    assert judged(one, case, violated, answer).counts[Verdict.SILENTLY_WRONG] == 1
-    assert judged(one, case, violated, told).counts[Verdict.SILENTLY_WRONG] == 0
+    assert judge_answer(one, case, violated, answer).counts[Verdict.SILENTLY_WRONG] == 1
+    assert judge_answer(one, case, violated, told).counts[Verdict.SILENTLY_WRONG] == 0
 
 
 # Forces in the stress run: what is right, and every kind of mistake found
@@ -322,7 +328,7 @@ demand = importlib.import_module("kincheck.core.kinematics.forces.equations")
 FORCES = FAMILIES["forces"]
 # Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast arm, a driven slide.
 TWICE, FOUR_BAR, SPINNING, SLIDING = 21, 4, 5, 12
-INTERPRETED = interpreted(NativeEngine())
+INTERPRETED = with_numpy_executor(NativeEngine())
 
 
 @pytest.fixture(scope="module")
@@ -351,7 +357,7 @@ class Changed:
 def verdicts(made, number, change=lambda forces: forces):
     one, trajectory = made[number]
     answer = once(Pair(one.case, Changed(trajectory, change), 1e-12))
-    return judged(one.specimen, one.case, one.truth, answer)
+    return judge_answer(one.specimen, one.case, one.truth, answer)
 
 
 def joints(forces: Forces, change) -> Forces:
@@ -402,7 +408,7 @@ def test_force_mistakes_are_named(made, change, verdict):
 
 def judge_specimen(number):
     one = specimen(FORCES, 0, number, 3)
-    return judged(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
+    return judge_answer(one.specimen, one.case, one.truth, once(Pair(one.case, INTERPRETED, 1e-12)))
 
 
 def test_missing_gyroscopic_moment_is_found(monkeypatch):
@@ -444,6 +450,6 @@ def test_force_case_is_rejudged_and_rounded(made):
     assert judge_file(one.case, engine, 1e-12).counts[Verdict.WRONG_FORCE] == len(
         one.case.sweep.values
     )
-    short = rounded(one.case, 9)
+    short = round_geometry(one.case, 9)
     assert short is not None
     assert short.forces == one.case.forces

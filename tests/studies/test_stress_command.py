@@ -15,7 +15,7 @@ from kincheck.core.cli import main
 from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
-from kincheck.core.studies.stress.reduction import fewer_samples, reduced, rounded
+from kincheck.core.studies.stress.reduction import fewer_samples, reduce_case, round_geometry
 from kincheck.core.studies.stress.report import headline, markdown, report
 from kincheck.core.studies.stress.run import Cell, Finding, Stress
 from kincheck.core.studies.stress.verdicts import Verdict
@@ -39,7 +39,7 @@ def shifted(monkeypatch):
     engine = native_but(shift)
     monkeypatch.setattr(kincheck.adapters, "engine", lambda name, mode="projection": engine)
     monkeypatch.setattr(
-        "kincheck.core.studies.stress.run.suited", lambda engine, case, number: engine
+        "kincheck.core.studies.stress.run.suitable_engine", lambda engine, case, number: engine
     )
 
 
@@ -230,7 +230,7 @@ def test_reduction_removes_unneeded_parts():
 
     few = fewer_samples(case, 3, bad)
     assert len(few.sweep.values) == 1
-    small, words = reduced(few, bad)
+    small, words = reduce_case(few, bad)
     assert bad(small)
     assert words
     assert len(small.mechanism.points) == 1
@@ -244,11 +244,11 @@ def test_unjudgeable_case_is_not_reduced(case):
         return True
 
     assert fewer_samples(case, 0, bad) is case
-    assert reduced(case, bad) == (case, [])
+    assert reduce_case(case, bad) == (case, [])
 
 
 def test_rounding_keeps_names_and_shapes(case):
-    short = rounded(case, 2)
+    short = round_geometry(case, 2)
     assert short is not None
     assert [j.name for j in short.mechanism.joints] == [j.name for j in case.mechanism.joints]
     assert short.mechanism != case.mechanism

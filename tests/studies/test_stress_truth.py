@@ -17,8 +17,8 @@ from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.degenerate import SOUND, WRONG
 from kincheck.core.studies.stress.families.linkages import (
+    add_loop,
     any_plane,
-    beside,
     crank_rocker,
     flats,
     four_bar,
@@ -31,7 +31,7 @@ from kincheck.core.studies.truth.motion import (
     Reach,
     by_body,
     closed,
-    followed,
+    follow_motion,
 )
 from kincheck.core.studies.truth.proofs import distance_from_proof
 from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
@@ -77,7 +77,7 @@ def test_truth_of_joint_types_equals_native(name):
     """
     case = PROBES[name]
     found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
-    truth = followed(case)
+    truth = follow_motion(case)
     assert (truth.reach == Reach.REACHED).all()
     assert worst(truth, {name: motion.position for name, motion in found.points.items()}) < 1.0
 
@@ -87,7 +87,7 @@ def test_truth_curve_rates_and_accelerations(name):
     """Against the native solver, whose curves other tests hold to closed forms."""
     case = PROBES[name]
     found = solve(case.mechanism, case.sweep.driver, case.sweep.values)
-    for point, (_, v, a) in followed(case).points.items():
+    for point, (_, v, a) in follow_motion(case).points.items():
         np.testing.assert_allclose(v.astype(float), found.points[point].velocity, atol=1e-12)
         np.testing.assert_allclose(a.astype(float), found.points[point].acceleration, atol=1e-11)
 
@@ -109,7 +109,7 @@ def test_followed_motion_equals_closed_form(name):
     library.
     """
     case = cases.load(name)
-    truth = followed(case)
+    truth = follow_motion(case)
     assert (truth.reach == Reach.REACHED).all()
     for output in without_forces(case).outputs:
         assert isinstance(output, Output)
@@ -162,12 +162,12 @@ def test_combined_loops_truth_equals_followed(ratio, seed):
     """
     rng = np.random.default_rng(seed)
     plane, first, second = any_plane(rng), crank_rocker(rng), crank_rocker(rng, ratio)
-    mechanism, motion = beside(four_bar(plane, *first), plane, *second, "rod", "second ")
+    mechanism, motion = add_loop(four_bar(plane, *first), plane, *second, "rod", "second ")
     case = as_case(mechanism, "turn", np.linspace(-3.0, 3.0, 7))
     truth = closed(case, motion)
     assert (truth.reach == Reach.REACHED).all()
     assert {"C", "second C"} < {*truth.points}
-    assert worst(truth, {name: x for name, (x, _, _) in followed(case).points.items()}) < 1.0
+    assert worst(truth, {name: x for name, (x, _, _) in follow_motion(case).points.items()}) < 1.0
 
 
 @pytest.mark.parametrize("off", [1e-9, 1e-3])
@@ -176,7 +176,7 @@ def test_truth_stops_at_narrow_gap(off):
     root of off.
     """
     case, motion = parallelogram(off)
-    truth, known = followed(case), closed(case, motion)
+    truth, known = follow_motion(case), closed(case, motion)
     assert (truth.reach == Reach.REACHED).all()
     assert worst(truth, {name: x for name, (x, _, _) in known.points.items()}) < 1.0
     x = known.points["C"][0] - known.points["B"][0]
@@ -187,7 +187,7 @@ def test_truth_stops_at_narrow_gap(off):
 @pytest.mark.parametrize("off", [-1e-9, -1e-3])
 def test_samples_past_gap_are_beyond(off):
     case, motion = parallelogram(off)
-    truth, known = followed(case), closed(case, motion)
+    truth, known = follow_motion(case), closed(case, motion)
     assert list(truth.reach) == list(known.reach)
     assert (truth.reach == Reach.BEYOND).sum() in (2, 3, 4, 5)
 
@@ -200,7 +200,7 @@ def test_stroke_end_to_last_digits():
     mechanism, motion = slider_crank(plane, b, complex(c), "rod", "slide")
     for part, reach in ((1.0 - 1e-7, Reach.REACHED), (1.0 + 1e-7, Reach.BEYOND)):
         case = as_case(mechanism, "slide", np.array([part * left]))
-        assert followed(case).reach[0] == reach
+        assert follow_motion(case).reach[0] == reach
         assert closed(case, motion).reach[0] == reach
 
 
@@ -219,7 +219,7 @@ def test_sample_behind_rounding_singularity_may_fail(off, told):
 
 def test_round_off_bound_grows_with_condition():
     near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
-    bounds = [followed(swept(case, [-1.2])).bounds["C"][0, 0] for case in (near, far)]
+    bounds = [follow_motion(swept(case, [-1.2])).bounds["C"][0, 0] for case in (near, far)]
     assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
 
 
@@ -242,7 +242,7 @@ def test_proof_confirms_truth(name):
     solution, to 19 digits.
     """
     case = PROBES.get(name) or cases.load(name)
-    truth = followed(case)
+    truth = follow_motion(case)
     assert distance_from_proof(truth, 3) < 1e-2
     off = {name: moved + [[[1e-14]], [[0.0]], [[0.0]]] for name, moved in truth.points.items()}
     assert distance_from_proof(replace(truth, points=off), 3) > 1e-2
@@ -253,7 +253,7 @@ def test_proof_chooses_rows_at_sample():
     other.
     """
     case = cases.load("bennett")
-    truth = followed(swept(case, np.radians([0.0, 45.0, 90.0])))
+    truth = follow_motion(swept(case, np.radians([0.0, 45.0, 90.0])))
     assert distance_from_proof(truth, 2) < 1e-2
 
 
@@ -264,7 +264,7 @@ def test_ground_point_needs_no_proof():
     case = replace(case, mechanism=replace(case.mechanism, points=points))
     few = with_all_coordinates(swept(case, [0.25]))
     assert "here" in few.points
-    assert distance_from_proof(followed(few), 0) < 1e-2
+    assert distance_from_proof(follow_motion(few), 0) < 1e-2
 
 
 def failures(make):

@@ -22,8 +22,8 @@ from kincheck.core.harness.compare import output_series
 from kincheck.core.jet import Jet
 from kincheck.core.studies.tolerance.statistics import (
     QUANTILES,
-    merged,
-    nothing,
+    empty_summary,
+    merge,
     quantiles,
     summary_of,
 )
@@ -266,9 +266,9 @@ def test_merged_summaries_equal_whole_summary():
     values[1, 2] = np.nan
     values[1, 0, 40:70] = np.nan
     for cuts in ([0, 100], [0, 1, 40, 70, 71, 100], [0, 55, 100]):
-        whole = nothing(2, 3)
+        whole = empty_summary(2, 3)
         for a, b in pairwise(cuts):
-            whole = merged(whole, summary_of(values[:, :, a:b], a))
+            whole = merge(whole, summary_of(values[:, :, a:b], a))
         np.testing.assert_array_equal(whole.count, (~np.isnan(values)).sum(axis=2))
         some = whole.count > 0
         with np.errstate(all="ignore"):
@@ -287,7 +287,7 @@ def test_merged_summaries_equal_whole_summary():
             low, high = whole.extremes[q]
             assert np.nanmin(values[q]) in values[q, :, low]
             assert np.nanmax(values[q]) in values[q, :, high]
-    assert nothing(1, 2).extremes.tolist() == [[-1, -1]]
+    assert empty_summary(1, 2).extremes.tolist() == [[-1, -1]]
 
 
 def test_quantiles_and_standard_errors():

@@ -12,7 +12,7 @@ import numpy as np
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.kinematics import solve
 from kincheck.core.studies.truth.forces import known_forces
-from kincheck.core.studies.truth.motion import followed
+from kincheck.core.studies.truth.motion import follow_motion
 
 HINGES = {"a": (0.0, 0.0, 0.0), "b": (0.0, 0.0, 0.3), "c": (0.5, 0.0, 0.5), "d": (0.6, 0.0, 0.0)}
 BODIES = {"a": ("ground", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker")}
@@ -137,7 +137,7 @@ def truth(cross=None):
     """
     with tempfile.TemporaryDirectory() as folder:
         case = load_case(written(Path(folder), cross=cross))
-    known = known_forces(case, followed(case))
+    known = known_forces(case, follow_motion(case))
     found = {name: np.where(each.determined, each.values, np.nan) for name, each in known.items()}
     reactions = [
         [found[f"{joint} {kind} {axis}"] for kind in ("force", "moment") for axis in "xyz"]

@@ -36,7 +36,7 @@ from ...harness.workers.pool import in_workers
 from ...joints import Revolute
 from ...trajectory import QUANTITIES, Array
 from .engine_cases import UnknownJoint, at_rate, force_cases, uneven_drives
-from .findings import Finding, Limit, Report, Verdict, agreement, judged, skipped, stated
+from .findings import Finding, Limit, Report, Verdict, agreement, fault_finding, judge_figures, skip
 
 Values: TypeAlias = Sequence[float | None] | None
 
@@ -62,11 +62,11 @@ def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
             if (share := _share(getattr(output, before), getattr(output, after), dt)) is not None
         ]
         if not shares:
-            yield skipped(f"rates: {after}", "the engine gives none")
+            yield skip(f"rates: {after}", "the engine gives none")
             continue
         worst, where = max(shares, key=lambda each: each[0])
         remedy = f"is not the rate of its {before}"
-        found = judged(f"rates: {after}", np.array([worst]), RATES, [where], remedy=remedy)
+        found = judge_figures(f"rates: {after}", np.array([worst]), RATES, [where], remedy=remedy)
         yield replace(found, pose=None)
 
 
@@ -184,26 +184,29 @@ def check_engine(
     solver = in_workers(1, Limits())
     answers: dict[str, dict[str, Attempt]] = {engine.name: {}, STANDARD: {}}
 
-    def kept(pairs: Sequence[Pair]) -> Attempts:
+    def keep_answers(pairs: Sequence[Pair]) -> Attempts:
         for index, attempt in solver(pairs):
             answers[pairs[index].engine.name][pairs[index].case.name] = attempt
             yield index, attempt
 
     every = [*cases.values(), *refused.values()]
     engines = [engine] if engine.name == STANDARD else [native, engine]
-    results = run(every, engines, tol=tol, solver=kept, progress=progress)
+    results = run(every, engines, tol=tol, solver=keep_answers, progress=progress)
     records = {record.case: record for record in results.records if record.engine == engine.name}
     mine, standards = answers[engine.name], answers[STANDARD]
     for name, case in cases.items():
         faults = faults_of_forces(case, engine.mode, mine[case.name], standards[case.name])
-        found.append(_compared(name, records[case.name], "; ".join(faults)))
+        found.append(_compare_case(name, records[case.name], "; ".join(faults)))
     found += rates([(case, records[case.name]) for case in cases.values()])
     beyond = refused[BEYOND].name
-    found += [_folded(records[beyond], mine[beyond]), _unknown(records[refused[UNKNOWN].name])]
+    found += [
+        _check_fold(records[beyond], mine[beyond]),
+        _check_unknown_joint(records[refused[UNKNOWN].name]),
+    ]
     again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
-    found.append(_same("determinism", again, mine, in_workers(1, Limits())))
+    found.append(_check_repetition("determinism", again, mine, in_workers(1, Limits())))
     if may_run_here(engine):
-        found.append(_same("isolation: in this process", again, mine, solve_in_process))
+        found.append(_check_repetition("isolation: in this process", again, mine, solve_in_process))
     return Report(engine.name, (), None, tuple(found))
 
 
@@ -224,20 +227,20 @@ def _protocol(engine: Engine) -> Iterator[Finding]:
     wrong = [
         f"{name} is {value!r}, expected {wanted}" for name, value, good, wanted in facts if not good
     ]
-    yield stated("protocol", "; ".join(wrong))
+    yield fault_finding("protocol", "; ".join(wrong))
     try:
         pickle.loads(pickle.dumps(engine))
     except Exception as error:  # any error of the engine's own code
         remedy = "worker processes need an engine that pickle takes"
-        yield stated("isolation: pickle", f"{error_text(error)}; {remedy}")
+        yield fault_finding("isolation: pickle", f"{error_text(error)}; {remedy}")
         return
-    yield stated("isolation: pickle", "")
+    yield fault_finding("isolation: pickle", "")
     (version,) = versions([engine])
     fault = "version() returns None: the engine is not installed, or cannot be imported"
-    yield stated("version", fault if version is None else "", version or "")
+    yield fault_finding("version", fault if version is None else "", version or "")
 
 
-def _compared(name: str, record: Record, faults: str) -> Finding:
+def _compare_case(name: str, record: Record, faults: str) -> Finding:
     """Return the agreement of a case with its reference and the native engine.
 
     Args:
@@ -249,10 +252,10 @@ def _compared(name: str, record: Record, faults: str) -> Finding:
     return replace(agreement(name, verdict, record.errors, AGREE_WHY, message), pose=None)
 
 
-def _folded(record: Record, attempt: Attempt) -> Finding:
+def _check_fold(record: Record, attempt: Attempt) -> Finding:
     """Check samples beyond a fold: they have no values, and a message gives the reason."""
     if record.outcome is Outcome.UNSUPPORTED:
-        return skipped(BEYOND, record.message)
+        return skip(BEYOND, record.message)
     beyond = sum(each.contradicted or 0 for each in record.errors.values())
     reached = record.solved or 0
     silent = isinstance(attempt.result, Answer) and not attempt.result.message
@@ -268,16 +271,16 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
     return Finding(BEYOND, verdict, float(beyond), *UNREACHED, message=message or text)
 
 
-def _unknown(record: Record) -> Finding:
+def _check_unknown_joint(record: Record) -> Finding:
     """Check a joint of an unknown type: it is refused with a reason, or solved correctly."""
     solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
     good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
     message = record.outcome.shown + (f": {record.message}" if record.message else "")
     remedy = "; unsupported() is to return the reason"
-    return stated(UNKNOWN, "" if good else message + remedy, message)
+    return fault_finding(UNKNOWN, "" if good else message + remedy, message)
 
 
-def _same(
+def _check_repetition(
     name: str, pairs: Sequence[Pair], first: Mapping[str, Attempt], solver: Solver
 ) -> Finding:
     """Check repeated solves: all give the same answers."""
@@ -287,7 +290,7 @@ def _same(
         off = _difference(first[case], attempt)
         if off > worst:
             worst, where = off, case
-    return replace(judged(name, np.array([worst]), SAME, [where]), pose=None)
+    return replace(judge_figures(name, np.array([worst]), SAME, [where]), pose=None)
 
 
 def _difference(one: Attempt, other: Attempt) -> float:

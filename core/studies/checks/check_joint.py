@@ -34,7 +34,7 @@ from ...errors import KincheckError, MechanismError
 from ...harness.engine import Engine
 from ...joints import Joint, Kind
 from ...trajectory import Array
-from .findings import Finding, Report, Verdict, skipped, stated, worst
+from .findings import Finding, Report, Verdict, fault_finding, skip, worst
 from .joint_equations import (
     axis_lengths,
     composition,
@@ -117,7 +117,7 @@ def check_joint(
     found = [
         finding
         for k, joint in enumerate(offered)
-        for finding in _examined(joint, k, samples, [seed, k])
+        for finding in _examine(joint, k, samples, [seed, k])
     ]
     by_name: dict[str, list[Finding]] = {}
     for each in found:
@@ -128,28 +128,28 @@ def check_joint(
     return Report(joint_class.__name__, tuple(map(repr, offered)), seed, (*findings, *loop))
 
 
-def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Iterator[Finding]:
+def _examine(joint: Joint, number: int, samples: int, seed: list[int]) -> Iterator[Finding]:
     """Yield all findings of one specimen."""
     rng = np.random.default_rng(seed)
     try:
-        joint = between(joint)
+        joint = between_test_bodies(joint)
         one = moved_specimen(joint, place(joint, rng), samples, rng)
     except Exception as error:  # any error of the joint's own code, reported with its line
         remedy = (
             "an equation is made of + - * / over any scalar, and of the functions of"
             " kincheck.core.program"
         )
-        failed = stated("equations", f"{_error_with_line(error)}; {remedy}")
+        failed = fault_finding("equations", f"{_error_with_line(error)}; {remedy}")
         yield replace(failed, specimen=number)
         return
     kinds = ", ".join(dict.fromkeys(name.split(" row")[0] for name in one.traced.names))
-    yield stated("equations", "", f"{len(one.traced.names)} rows of {kinds}")
+    yield fault_finding("equations", "", f"{len(one.traced.names)} rows of {kinds}")
     found = [each for examine in EQUATIONS for each in _run_check(examine, one)]
     failing = [each.check for each in found if each.check in FIRST and each.verdict is Verdict.FAIL]
     for examine, names in VARIANTS.items():
         # an axis that is not a unit vector is often the reason of the other failures
         if failing and examine is not axis_lengths:
-            found += [skipped(name, f"first repair {', '.join(failing)}") for name in names]
+            found += [skip(name, f"first repair {', '.join(failing)}") for name in names]
         else:
             found += _run_check(examine, one)
     yield from (replace(each, specimen=None if each.pose is None else number) for each in found)
@@ -162,7 +162,7 @@ def _run_check(examine: Check, one: Specimen) -> list[Finding]:
     try:
         return list(examine(one))
     except Exception as error:  # any error of the joint's own code
-        return [stated(examine.__name__.replace("_", " "), _error_with_line(error))]
+        return [fault_finding(examine.__name__.replace("_", " "), _error_with_line(error))]
 
 
 def _error_with_line(error: Exception) -> str:
@@ -234,8 +234,8 @@ def _value(field: Field[Any], rng: np.random.Generator, angle: float) -> Any:
     # directions may have any length
     stretch = rng.uniform(0.5, 2.0, 2)
     makers: Mapping[Kind, Callable[[], Any]] = {
-        Kind.POSITION: lambda: _snapped(centre),
-        Kind.POSITIONS: lambda: tuple(map(_snapped, ends)),
+        Kind.POSITION: lambda: _snap_to_grid(centre),
+        Kind.POSITIONS: lambda: tuple(map(_snap_to_grid, ends)),
         Kind.DIRECTION: lambda: triple(stretch[0] * a),
         Kind.DIRECTIONS: lambda: (triple(stretch[0] * a), triple(stretch[1] * b)),
         Kind.LENGTH: lambda: float(rng.uniform(0.5, 1.5) * SIZE),
@@ -250,21 +250,21 @@ def place(joint: Joint, rng: np.random.Generator) -> Place:
     extent = float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0
     size = max([extent, *(abs(x) for x in lengths if x)]) or SIZE
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
-    origins = (_snapped(centre + size * rng.uniform(-1.0, 1.0, 3)) for _ in BODIES)
+    origins = (_snap_to_grid(centre + size * rng.uniform(-1.0, 1.0, 3)) for _ in BODIES)
     first, second = origins
     return Place((first, second), 2.0 ** round(math.log2(size)))
 
 
-def between(joint: Joint) -> Joint:
+def between_test_bodies(joint: Joint) -> Joint:
     """Return the joint between the bodies i and j instead of its own, with its
     points on the grid.
     """
-    return replace(joint, i=BODIES[0], j=BODIES[1], **joint.mapped({Kind.POSITION: _snapped}))
+    return replace(joint, i=BODIES[0], j=BODIES[1], **joint.mapped({Kind.POSITION: _snap_to_grid}))
 
 
 def _unit(a: Array) -> Array:
     return np.asarray(a / np.linalg.norm(a))
 
 
-def _snapped(point: Any) -> tuple[float, ...]:
+def _snap_to_grid(point: Any) -> tuple[float, ...]:
     return triple(np.round(np.asarray(point) / GRID) * GRID)

@@ -17,7 +17,7 @@ from ...case.quantity import with_markers
 from ...joints import Attachment, Joint, Revolute
 from ...joints.base import directions, position, require_perpendicular, unit
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
-from .joint_loops import loaded
+from .joint_loops import with_loads
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def force_cases() -> Iterator[tuple[str, Case]]:
     redundant rows.
     """
     for case in probes():
-        yield case.name, replace(at_rate(loaded(case)), name=f"{case.name}_with_loads")
+        yield case.name, replace(at_rate(with_loads(case)), name=f"{case.name}_with_loads")
     yield "elements", _elements()
     yield "drivers", _with_forces(uneven_drives())
     for name in ("turns", "undetermined"):
@@ -90,7 +90,7 @@ def _with_forces(case: Case) -> Case:
 
 def _elements() -> Case:
     """Return a loaded probe with every force element."""
-    case = loaded(probe(Revolute))
+    case = with_loads(probe(Revolute))
     a, b = (body.name for body in case.mechanism.moving)
     forces = [
         *case.mechanism.forces,

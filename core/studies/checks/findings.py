@@ -81,12 +81,12 @@ def worst(*findings: Finding) -> Finding:
     return max(findings, key=lambda each: each.badness)
 
 
-def skipped(check: str, why: str) -> Finding:
+def skip(check: str, why: str) -> Finding:
     """Return the finding of a check without a run."""
     return Finding(check, Verdict.SKIP, message=why)
 
 
-def stated(check: str, fault: str, message: str = "") -> Finding:
+def fault_finding(check: str, fault: str, message: str = "") -> Finding:
     """Return the finding of a check without figures, by its fault; empty if there is none.
 
     Args:
@@ -147,7 +147,7 @@ REMEDIES["residual elsewhere"] = REMEDIES["rigid motion"]
 REMEDIES["in this process"] = REMEDIES["determinism"]
 
 
-def judged(
+def judge_figures(
     check: str,
     figures: Array,
     limit: Limit,

@@ -17,7 +17,17 @@ from ...joints import Attachment, AxialJoint, Kind
 from ...kinematics import Style
 from ...primitives.base import Drive, NoFormError, Pose, Twist
 from ...trajectory import Array
-from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated, worst
+from .findings import (
+    AMPLIFIED,
+    ROUND_OFF,
+    Finding,
+    Limit,
+    Verdict,
+    fault_finding,
+    judge_figures,
+    skip,
+    worst,
+)
 from .manifold import NEAR, STEP, Motion, Specimen, min_norm, newton, rank, smallest, times
 from .traced_joint import (
     COLUMNS,
@@ -27,7 +37,7 @@ from .traced_joint import (
     TracedJoint,
     execute,
     precise,
-    turned,
+    rotate_vectors,
 )
 
 INDEPENDENT = Limit(0.0, "rows must be independent")
@@ -44,7 +54,7 @@ AWAY = 1e6
 def composition(s: Specimen) -> Iterator[Finding]:
     """Check phi at the design position: zero, of finite numbers."""
     off = np.abs(s.traced.phi(s.traced.design(1)))
-    yield judged("design", off, ROUND_OFF, s.traced.names)
+    yield judge_figures("design", off, ROUND_OFF, s.traced.names)
 
 
 def freedoms(s: Specimen) -> Iterator[Finding]:
@@ -52,7 +62,7 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
     found, t = rank(s.traced.rows(s.state)), s.traced
     apart = f"smallest singular value {smallest(s.exact).min():.2g}, rows of size one"
     lost = np.abs(len(t.names) - found)[None, :].astype(float)
-    yield judged("rank", lost, INDEPENDENT, ["rows less rank"], apart)
+    yield judge_figures("rank", lost, INDEPENDENT, ["rows less rank"], apart)
     left = 6 - (found - len(t.coordinates))
     relations = len(s.joint.relations) if isinstance(s.joint, AxialJoint) else 0
     names, named = s.joint.freedoms, len(s.joint.freedoms) - relations
@@ -64,11 +74,13 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
         off = abs(s.joint.rows - t.rows_left)
         yield Finding("freedoms", Verdict.FAIL, off, 0.0, message=message)
     elif not names:
-        yield stated("freedoms", "", f"leaves {left.min()} and names none: none can be driven")
+        yield fault_finding(
+            "freedoms", "", f"leaves {left.min()} and names none: none can be driven"
+        )
     else:
         text = f"leaves {int(left.max())}, names {named}: {', '.join(names)}"
         wrong = np.abs(left - named)[None, :].astype(float)
-        yield judged("freedoms", wrong, NAMED, message=text)
+        yield judge_figures("freedoms", wrong, NAMED, message=text)
 
 
 def derivatives(s: Specimen) -> Iterator[Finding]:
@@ -83,7 +95,7 @@ def derivatives(s: Specimen) -> Iterator[Finding]:
     )
     astray = np.concatenate([_outside(declared, s.exact), _outside(s.exact, declared)])
     names = [*t.names, *(f"derivative of {name}" for name in t.names)]
-    yield judged("rows", astray, AMPLIFIED, names, kind)
+    yield judge_figures("rows", astray, AMPLIFIED, names, kind)
 
 
 def _outside(rows: Array, space: Array) -> Array:
@@ -101,8 +113,8 @@ def _outside(rows: Array, space: Array) -> Array:
 def right_sides(s: Specimen) -> Iterator[Finding]:
     """Check rows . v = nu and rows . a = gamma along motions admitted by phi."""
     _, velocity, acceleration = _defects(s.traced, s.motion)
-    yield judged("nu", velocity, AMPLIFIED, s.traced.names)
-    yield judged("gamma", acceleration, AMPLIFIED, s.traced.names)
+    yield judge_figures("nu", velocity, AMPLIFIED, s.traced.names)
+    yield judge_figures("gamma", acceleration, AMPLIFIED, s.traced.names)
 
 
 def _defects(t: TracedJoint, motion: Motion, units: Any = 1.0) -> tuple[Array, Array, Array]:
@@ -132,21 +144,21 @@ def convergence(s: Specimen) -> Iterator[Finding]:
     start = s.traced.retract(s.state, 1e-3 * off / np.linalg.norm(off, axis=0))
     _, taken = newton(s.traced, start, s.traced.rows, 20)
     names = ["iterations from 1e-3"]
-    yield judged("newton", taken[None, :].astype(float), QUADRATIC, names)
+    yield judge_figures("newton", taken[None, :].astype(float), QUADRATIC, names)
 
 
 def intended_branch(s: Specimen) -> Iterator[Finding]:
     """Check that the branch tests accept poses of the intended branch."""
     tests = len(s.traced.programs["branch"].outputs)
     if not tests:
-        yield stated("branch tests", "", "none declared")
+        yield fault_finding("branch tests", "", "none declared")
         return
     refused = (s.traced.branch(s.near) <= 0.0).astype(float)
     far = int((s.traced.branch(s.state) <= 0.0).sum())
     text = f"{tests} declared" + f"; {far} of {s.lanes} poses far from the design are refused" * (
         far > 0
     )
-    yield judged("branch tests", refused, ON_BRANCH, ["refused"], text)
+    yield judge_figures("branch tests", refused, ON_BRANCH, ["refused"], text)
 
 
 def cost(s: Specimen) -> Iterator[Finding]:
@@ -178,7 +190,7 @@ def round_off(s: Specimen) -> Iterator[Finding]:
     try:
         kind, lift = precise(40)
     except ModuleNotFoundError:
-        yield skipped("round-off", "mpmath is not installed: pip install mpmath")
+        yield skip("round-off", "mpmath is not installed: pip install mpmath")
         return
 
     def error(t: TracedJoint, state: Array) -> Array:
@@ -197,25 +209,25 @@ def round_off(s: Specimen) -> Iterator[Finding]:
         f"{x:.1g} {where}" for where, x in lost.items()
     )
     off = error(s.traced, s.state[:, :8])
-    yield judged("round-off", off, ROUND_OFF, s.traced.names, text)
+    yield judge_figures("round-off", off, ROUND_OFF, s.traced.names, text)
 
 
 def exchange(s: Specimen) -> Iterator[Finding]:
     """Check the same motion with both bodies exchanged."""
     if not s.joint.symmetric:
-        yield skipped("exchange", "symmetric = False: geometry belongs to one of the bodies")
+        yield skip("exchange", "symmetric = False: geometry belongs to one of the bodies")
         return
     back = replace(s.joint.reversed(), i=s.joint.i, j=s.joint.j)
     other = TracedJoint(back, Place((s.place.origins[1], s.place.origins[0]), s.place.unit))
 
-    def exchanged(a: Array, half: int) -> Array:
+    def exchange_bodies(a: Array, half: int) -> Array:
         # a coordinate describes body j relative to body i
         return np.concatenate([a[half : 2 * half], a[:half], -a[2 * half :]])
 
     motion = (
-        exchanged(s.state, POSES // 2),
-        exchanged(s.rate, COLUMNS),
-        exchanged(s.acceleration, COLUMNS),
+        exchange_bodies(s.state, POSES // 2),
+        exchange_bodies(s.rate, COLUMNS),
+        exchange_bodies(s.acceleration, COLUMNS),
     )
     yield _same("exchange", s, other, motion)
 
@@ -229,7 +241,7 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
     shift = s.rng.normal(size=(3, 1))
 
     def turn(a: Array) -> Array:
-        return turned(q[None], a.T).T
+        return rotate_vectors(q[None], a.T).T
 
     def pose(state: Array) -> Array:
         parts: list[Array] = []
@@ -253,7 +265,7 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
         ]
     )
     names = [s.traced.names[first].split(" row")[0] for first, _ in parts]
-    yield judged("residual elsewhere", apart, ROUND_OFF, names)
+    yield judge_figures("residual elsewhere", apart, ROUND_OFF, names)
 
 
 def axis_lengths(s: Specimen) -> Iterator[Finding]:
@@ -268,7 +280,7 @@ def axis_lengths(s: Specimen) -> Iterator[Finding]:
     off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
     apart = np.abs(s.traced.phi(off) - long.phi(off))
     where = "where it is not met"
-    unmet = judged("axis lengths", apart, ROUND_OFF, s.traced.names, where)
+    unmet = judge_figures("axis lengths", apart, ROUND_OFF, s.traced.names, where)
     yield worst(met, unmet)
 
 
@@ -294,7 +306,7 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
     """Check the same motion by the mixed formulation: the joint's coordinates are unknowns."""
     if not isinstance(s.joint, AxialJoint):
-        yield skipped("mixed style", "no AxialJoint: it has no coordinates of its own")
+        yield skip("mixed style", "no AxialJoint: it has no coordinates of its own")
         return
     mixed = TracedJoint(s.joint, s.place, Style.MIXED)
     own = slice(2 * COLUMNS, None)
@@ -315,7 +327,7 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
         for name, own_rate in zip(mixed.coordinates, rate[own], strict=True)
     ]
     remedy = "mixed() must name the joint's own coordinates, body j relative to body i"
-    named = judged("mixed style", np.array(off), AMPLIFIED, mixed.coordinates, remedy=remedy)
+    named = judge_figures("mixed style", np.array(off), AMPLIFIED, mixed.coordinates, remedy=remedy)
     yield worst(met, named)
 
 
@@ -334,7 +346,7 @@ def _same(
     mine = rank(s.exact) - len(s.traced.coordinates)
     theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)
     figures = np.vstack([largest, np.abs(theirs - mine)])
-    return judged(check, figures, AMPLIFIED, [*other.names, "rank"], message)
+    return judge_figures(check, figures, AMPLIFIED, [*other.names, "rank"], message)
 
 
 # Drivers of a joint's own coordinates, against the definition of these
@@ -350,20 +362,22 @@ def driver(s: Specimen) -> Iterator[Finding]:
     joint = s.joint
     driven = [each for each in joint.freedoms if each in FREEDOMS]
     if not isinstance(joint, AxialJoint) or not driven:
-        yield skipped("driver", "it has no coordinate that can be driven")
+        yield skip("driver", "it has no coordinate that can be driven")
         return
     names = [f"{freedom}: {what}" for freedom in driven for what in WHATS]
     figures = np.concatenate([_driver_defects(s, joint, freedom) for freedom in driven])
-    yield judged("driver", figures, AMPLIFIED, names)
+    yield judge_figures("driver", figures, AMPLIFIED, names)
 
 
-def _carried(s: Specimen, k: int, arm: Array) -> CarriedPoint:
+def _body_point(s: Specimen, k: int, arm: Array) -> CarriedPoint:
     state, rate, acceleration = (
         x[size * k : size * (k + 1)].T
         for x, size in ((s.state, 7), (s.rate, COLUMNS), (s.acceleration, COLUMNS))
     )
     rates = (*np.split(rate, 2, axis=1), *np.split(acceleration, 2, axis=1))
-    return CarriedPoint.of(turned(state[:, 3:], arm), s.traced.origins[k] + state[:, :3], *rates)
+    return CarriedPoint.of(
+        rotate_vectors(state[:, 3:], arm), s.traced.origins[k] + state[:, :3], *rates
+    )
 
 
 def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array], Array]:
@@ -376,8 +390,8 @@ def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array
     """
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     point = np.array(joint.point) / s.place.unit
-    i, j = (_carried(s, k, point - s.traced.origins[k]) for k in range(2))
-    h = turned(s.state[3:7].T, axis)
+    i, j = (_body_point(s, k, point - s.traced.origins[k]) for k in range(2))
+    h = rotate_vectors(s.state[3:7].T, axis)
     return _rotation(s, i, j, h, axis) if freedom == "rotation" else _slide(i, j, h)
 
 
@@ -387,7 +401,7 @@ def _driver_defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
     scaled = joint.scaled(1.0 / s.place.unit)
     attached = (Attachment(vec(tuple(origin))) for origin in s.traced.origins)
     measured: Any = scaled.measured(freedom, *attached)
-    primitive, per_rate = (_driving(measured, c, rate, c_tt) for rate in (c_t, 1.0))
+    primitive, per_rate = (_with_drive(measured, c, rate, c_tt) for rate in (c_t, 1.0))
     poses = _poses(s.state)
     twists = [Twist(vec(tuple(x[:3])), vec(tuple(x[3:]))) for x in (s.rate[:6], s.rate[6:12])]
     (row,), (phi,) = primitive.rows(*poses), primitive.phi(*poses)
@@ -419,18 +433,18 @@ def _poses(state: Array) -> list[Pose]:
     return [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (state[:7], state[7:POSES])]
 
 
-def _driving(measured: Any, c: Any, c_t: Any = 0.0, c_tt: Any = 0.0) -> Any:
+def _with_drive(measured: Any, c: Any, c_t: Any = 0.0, c_tt: Any = 0.0) -> Any:
     return replace(measured, drive=Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c)))
 
 
 def _turned_on(s: Specimen, joint: AxialJoint, angle: Array) -> Array:
     """Return the state with body j turned further about the axis."""
-    h, state = turned(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
+    h, state = rotate_vectors(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
     h /= np.linalg.norm(h, axis=1)[:, None]
     arm = np.array(joint.point) / s.place.unit - s.traced.origins[1]
     turn = Quat(np.cos(0.5 * angle), vec([*(np.sin(0.5 * angle) * h.T)]))
     state[10:14] = np.array([*(turn * quat(s.state[10:14]))])
-    state[7:10] += (turned(s.state[10:14].T, arm) - turned(state[10:14].T, arm)).T
+    state[7:10] += (rotate_vectors(s.state[10:14].T, arm) - rotate_vectors(state[10:14].T, arm)).T
     return state
 
 
@@ -442,7 +456,7 @@ def _turns(measured: Any, state: Array, c: Array, *, turning: bool) -> tuple[Arr
     wrong = np.zeros(state.shape[1], np.bool_)
     at_turns: list[Array] = []
     for turns in (0, 1) if turning else (0,):
-        primitive = _driving(measured, c + 2.0 * np.pi * turns)
+        primitive = _with_drive(measured, c + 2.0 * np.pi * turns)
         (phi,) = primitive.phi(*pair)
         tests = [np.ones_like(c), *primitive.branch(*pair)]
         accepted = np.min(np.broadcast_arrays(*tests), axis=0) > 0.0

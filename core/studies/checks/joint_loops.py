@@ -35,8 +35,8 @@ from ...mechanism.loads import SpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, declared_equivalent, with_equivalents
 from ...mechanism.motions import JointAngle, JointDisplacement, JointDriver, Sine
 from ...trajectory import Array, Trajectory
-from .findings import Finding, Limit, Verdict, agreement, judged, skipped, stated
-from .traced_joint import CarriedPoint, turned
+from .findings import Finding, Limit, Verdict, agreement, fault_finding, judge_figures, skip
+from .traced_joint import CarriedPoint, rotate_vectors
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
 # x1000.
@@ -59,17 +59,17 @@ def loops(
         failing: checks of the equations that fail: then there is no sense in forces.
     """
     try:
-        case, native = _unlocked(tested)
+        case, native = _solvable_probe(tested)
     except Exception as error:  # any error of the joint's own code
-        yield stated("loop", error_text(error))
+        yield fault_finding("loop", error_text(error))
         return
     n = len(case.sweep.values)
     if isinstance(native, Failure):
-        yield stated("loop", native.message)
+        yield fault_finding("loop", native.message)
         return
     reached = f"{native.solved} of {n} samples solved, to {case.sweep.values.max():.3g} rad"
     if native.solved < n:
-        yield stated("loop", f"{reached}: {native.message}")
+        yield fault_finding("loop", f"{reached}: {native.message}")
         return
     yield Finding("loop", Verdict.PASS, native.residual, TOL, TOL_WHY, message=reached)
     other: Case | str = "there is no equivalent() to solve instead"
@@ -78,34 +78,34 @@ def loops(
         equivalent = _equivalent(case)
         if equivalent is not None:
             other = equivalent
-            yield _compared(name, other, _solved(NativeEngine(), other), native.outputs)
+            yield _compare_answer(name, other, _solve_case(NativeEngine(), other), native.outputs)
     except Exception as error:  # any error of the joint's own code
         other = FAILING_EQUIVALENT
-        yield stated(name, error_text(error))
+        yield fault_finding(name, error_text(error))
     if not engines:
-        yield skipped("loop: simulators", "no engines were given")
+        yield skip("loop: simulators", "no engines were given")
     simulators = [engine for engine in engines if engine.name != STANDARD]
     for engine in simulators:
-        yield _simulated(engine, case, other, native.outputs, "loop")
+        yield _compare_engine(engine, case, other, native.outputs, "loop")
     if failing:
-        yield skipped("reaction", f"first repair {', '.join(failing)}")
+        yield skip("reaction", f"first repair {', '.join(failing)}")
         return
     try:
-        yield from _reactions(loaded(case), other, simulators, "reaction")
-        own = driven(case)
+        yield from _reactions(with_loads(case), other, simulators, "reaction")
+        own = with_own_drivers(case)
         if own is None:
-            yield skipped("driven reaction", "no AxialJoint: nothing drives it")
+            yield skip("driven reaction", "no AxialJoint: nothing drives it")
         else:
             yield from _reactions(own, other, simulators, "driven reaction")
     except Exception as error:  # any error of the joint's own code
-        yield stated("reaction", error_text(error))
+        yield fault_finding("reaction", error_text(error))
 
 
 def _reactions(
     heavy: Case, other: Case | str, engines: Sequence[Engine], what: str
 ) -> Iterator[Finding]:
     """Check the reaction in a loaded probe, and compare it with that of the engines."""
-    probe = solved(heavy)
+    probe = solve_probe(heavy)
     yield from reactions(probe, what)
     reference = {each.name: output_series(heavy, each, probe.motion) for each in heavy.outputs}
     if not isinstance(other, str):
@@ -119,10 +119,10 @@ def _reactions(
         except MechanismError as error:  # a driver or coupler names a joint that is replaced
             other = f"its equivalent cannot be driven: {error}"
     for engine in engines:
-        yield _simulated(engine, heavy, other, reference, what)
+        yield _compare_engine(engine, heavy, other, reference, what)
 
 
-def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Answer | Failure]:
+def _solvable_probe(tested: Joint | type[Joint]) -> tuple[Case, Answer | Failure]:
     """Return the first probe with all samples solved; the last one tried if none is."""
     first, *others = alternatives(tested)
     shorter = [
@@ -130,15 +130,15 @@ def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Answer | Failure]:
         for k in range(1, HALVINGS + 1)
     ]
     native = NativeEngine()
-    case, found = first, _solved(native, first)
+    case, found = first, _solve_case(native, first)
     for another in (*others, *shorter):
         if isinstance(found, Answer) and found.solved == len(case.sweep.values):
             break
-        case, found = another, _solved(native, another)
+        case, found = another, _solve_case(native, another)
     return case, found
 
 
-def _solved(engine: Engine, case: Case) -> Answer | Failure:
+def _solve_case(engine: Engine, case: Case) -> Answer | Failure:
     return attempt(Pair(case, engine, TOL, timed=False)).result
 
 
@@ -162,40 +162,40 @@ def _equivalent(case: Case) -> Case | None:
     return replace(case, name=f"{case.name}_equivalent", mechanism=mechanism)
 
 
-def _simulated(
+def _compare_engine(
     engine: Engine, case: Case, other: Case | str, reference: Mapping[str, Series], what: str
 ) -> Finding:
     """Compare an engine's answer with the native one; `other` is the equivalent case, or the reason
     for its absence.
     """
-    name, chosen, found = f"{what}: {engine.name}", case, _solved(engine, case)
+    name, chosen, found = f"{what}: {engine.name}", case, _solve_case(engine, case)
     if isinstance(found, Failure) and found.outcome is Outcome.UNSUPPORTED:
         if isinstance(other, str):
-            return skipped(name, f"{found.message}; {other}")
-        reason, chosen, found = found.message, other, _solved(engine, other)
+            return skip(name, f"{found.message}; {other}")
+        reason, chosen, found = found.message, other, _solve_case(engine, other)
         if isinstance(found, Failure) and found.outcome is Outcome.UNSUPPORTED:
-            return skipped(name, f"{reason}; nor its equivalent: {found.message}")
+            return skip(name, f"{reason}; nor its equivalent: {found.message}")
     if isinstance(found, Failure):
         if found.outcome is Outcome.UNAVAILABLE:
-            return skipped(name, "not installed")
+            return skip(name, "not installed")
         # engines replace joints too, and meet the same error
         if other == FAILING_EQUIVALENT:
-            return skipped(name, FAILING_EQUIVALENT)
-        return stated(name, found.message)
+            return skip(name, FAILING_EQUIVALENT)
+        return fault_finding(name, found.message)
     itself = chosen is case and "equivalents" not in found.details
-    finding = _compared(name, chosen, found, reference)
+    finding = _compare_answer(name, chosen, found, reference)
     how = "on the joint itself" if itself else "on the equivalent"
     return replace(finding, message="; ".join(filter(None, (how, finding.message))))
 
 
-def _compared(
+def _compare_answer(
     name: str, case: Case, found: Answer | Failure, reference: Mapping[str, Series]
 ) -> Finding:
     """Compare positions, velocities and accelerations, or forces, with the native ones of the joint
     itself.
     """
     if isinstance(found, Failure):
-        return stated(name, found.message)
+        return fault_finding(name, found.message)
     judgement = verdict_of(case, found, Standard(reference), TOL)
     verdict = {Outcome.PASS: Verdict.PASS, Outcome.UNJUDGED: Verdict.SKIP}.get(
         judgement.outcome, Verdict.FAIL
@@ -240,7 +240,7 @@ class Probe:
         return max(float(np.abs(each.force).max()) for each in every)
 
 
-def loaded(case: Case) -> Case:
+def with_loads(case: Case) -> Case:
     """Return the probe with loads, and the forces of joint and driver as outputs."""
     mechanism = case.mechanism
     bodies = [_with_mass(body, k, mechanism) for k, body in enumerate(mechanism.bodies)]
@@ -248,7 +248,7 @@ def loaded(case: Case) -> Case:
     ends = ((0.9, 0.4, -0.3), mechanism.points[0].position)
     spring = SpringDamper("spring", GROUND, last, ends, 50.0, 2.0, 0.5)
     heavy = replace(mechanism, bodies=bodies, gravity=GRAVITY, forces=[spring])
-    name, weight = _tested(case).name, 10.0 * len(bodies)
+    name, weight = _tested_joint(case).name, 10.0 * len(bodies)
     outputs: list[ForceMeasure] = [
         cls(f"{what}_{k}", *default(weight, "N"), joint=name, direction=axis)
         for cls, what in ((JointForce, "force"), (JointMoment, "moment"))
@@ -261,12 +261,12 @@ def loaded(case: Case) -> Case:
     return replace(case, mechanism=with_markers(heavy, bound), sweep=sweep, outputs=bound)
 
 
-def driven(case: Case) -> Case | None:
+def with_own_drivers(case: Case) -> Case | None:
     """Return the loaded probe with drivers of the joint's own coordinates in place of rods, and the
     joint seen from its second body, whose frame is then off the axis; None without coordinates.
     """
-    heavy = loaded(case)
-    mechanism, tested = heavy.mechanism, _tested(heavy)
+    heavy = with_loads(case)
+    mechanism, tested = heavy.mechanism, _tested_joint(heavy)
     if not isinstance(tested, AxialJoint):
         return None
     rods = [joint for joint in mechanism.joints if joint.name.startswith("rod_")]
@@ -293,7 +293,7 @@ def driven(case: Case) -> Case | None:
     )
 
 
-def _tested(case: Case) -> Joint:
+def _tested_joint(case: Case) -> Joint:
     # the probe's hinge or rods may be of the same type
     return next(joint for joint in case.mechanism.joints if {*joint.bodies} == {"a", "b"})
 
@@ -305,7 +305,7 @@ def _with_mass(body: Body, number: int, mechanism: Mechanism) -> Body:
     return replace(body, mass=2.0 + number, center_of_mass=(x, y, z), inertia=INERTIA)
 
 
-def solved(case: Case) -> Probe:
+def solve_probe(case: Case) -> Probe:
     """Solve the loaded probe natively.
 
     Raises:
@@ -318,13 +318,13 @@ def solved(case: Case) -> Probe:
     found = solver(TOL)
     if not found.solved.all() or found.forces is None:
         raise SolveError(f"the probe with masses cannot be solved: {found.message}")
-    return Probe(mechanism, mechanism.joint(_tested(case).name), found)
+    return Probe(mechanism, mechanism.joint(_tested_joint(case).name), found)
 
 
 # Balance of the bodies, which have their frame at the global origin at design.
 
 
-def _moving(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoint:
+def _body_point(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoint:
     """Return a point of a body over the samples."""
     at = np.asarray(point, dtype=np.float64)
     motion = probe.motion.bodies.get(body)
@@ -333,16 +333,16 @@ def _moving(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoi
         return CarriedPoint(at, still + at, *[still] * 4)
     assert motion.v is not None
     assert motion.a is not None
-    w, w_t = (turned(motion.p, each[:, 3:]) for each in (motion.v, motion.a))
-    arm = turned(motion.p, at)
+    w, w_t = (rotate_vectors(motion.p, each[:, 3:]) for each in (motion.v, motion.a))
+    arm = rotate_vectors(motion.p, at)
     return CarriedPoint.of(arm, motion.r, motion.v[:, :3], w, motion.a[:, :3], w_t)
 
 
 def work(probe: Probe) -> Array:
     """Return the power of the joint's reaction on both bodies [W], shape (n,)."""
     joint = probe.joint
-    j = _moving(probe, joint.j, probe.mechanism.reaction_point(joint))
-    i = _moving(probe, joint.i)
+    j = _body_point(probe, joint.j, probe.mechanism.reaction_point(joint))
+    i = _body_point(probe, joint.i)
     v = i.v + np.cross(i.w, j.place - i.place)
     force, moment = probe.reaction.force, probe.reaction.moment
     return (force * (j.v - v)).sum(axis=1) + (moment * (j.w - i.w)).sum(axis=1)
@@ -354,7 +354,7 @@ def speed(probe: Probe) -> float:
     return max(float(np.abs(each).max()) for each in motions)
 
 
-def unbalanced(probe: Probe, name: str) -> Array:
+def missing_wrench(probe: Probe, name: str) -> Array:
     """Return the wrench missing to a body's balance by Newton and Euler, shape (n, 6)."""
     n = len(probe.motion.solved)
     if probe.mechanism.is_fixed(name):
@@ -363,10 +363,10 @@ def unbalanced(probe: Probe, name: str) -> Array:
     assert motion.v is not None
     assert motion.a is not None
     assert body.inertia is not None
-    centre = _moving(probe, name, body.center_of_mass)
+    centre = _body_point(probe, name, body.center_of_mass)
     force = body.mass * (np.array(GRAVITY) - centre.a)
     inertia, w, w_t = inertia_matrix(body.inertia), motion.v[:, 3:], motion.a[:, 3:]
-    torque = -turned(motion.p, w_t @ inertia + np.cross(w, w @ inertia))
+    torque = -rotate_vectors(motion.p, w_t @ inertia + np.cross(w, w @ inertia))
     for push, at, moment in _pushes(probe, name):
         force, torque = force + push, torque + moment + np.cross(at - centre.place, push)
     return np.hstack([force, torque])
@@ -380,7 +380,7 @@ def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
         sign = {joint.j: 1.0, joint.i: -1.0}.get(name)
         if sign is not None:
             found = forces.joints[joint.name]
-            place = _moving(probe, joint.j, mechanism.reaction_point(joint)).place
+            place = _body_point(probe, joint.j, mechanism.reaction_point(joint)).place
             yield sign * found.force, place, sign * found.moment
     for driver in mechanism.drivers:
         effort = forces.drivers[driver.name][:, None]
@@ -388,7 +388,7 @@ def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
     (spring,) = (each for each in mechanism.forces if isinstance(each, SpringDamper))
     if name == spring.j:
         ends = zip((spring.i, spring.j), spring.points, strict=True)
-        start, end = (_moving(probe, body, at) for body, at in ends)
+        start, end = (_body_point(probe, body, at) for body, at in ends)
         length = np.linalg.norm(end.place - start.place, axis=1)
         along = (end.place - start.place) / length[:, None]
         rate = (along * (end.v - start.v)).sum(axis=1)
@@ -403,9 +403,9 @@ def _by_driver(
     joint: Any = probe.mechanism.joint(driver.joint)
     if name not in joint.bodies:
         return
-    axis = _moving(probe, joint.i, joint.axis).arm / np.linalg.norm(joint.axis)
+    axis = _body_point(probe, joint.i, joint.axis).arm / np.linalg.norm(joint.axis)
     push = (1.0 if name == joint.j else -1.0) * effort * axis
-    place = _moving(probe, joint.j, joint.point).place
+    place = _body_point(probe, joint.j, joint.point).place
     yield (0.0 * push, place, push) if driver.turns else (push, place, 0.0 * push)
 
 
@@ -426,10 +426,10 @@ def reactions(probe: Probe, what: str = "reaction") -> Iterator[Finding]:
     forces = probe.motion.forces
     assert forces is not None
     missing = np.abs(forces.power)[None] / float(np.nanmax(forces.largest_power))
-    yield judged(f"{what}: power", missing, LIMIT, ["power"])
+    yield judge_figures(f"{what}: power", missing, LIMIT, ["power"])
     done = np.abs(work(probe))[None] / (probe.size * speed(probe))
-    yield judged(f"{what}: no work", done, LIMIT, ["work"])
-    off = np.array([unbalanced(probe, body) for body in probe.joint.bodies])
+    yield judge_figures(f"{what}: no work", done, LIMIT, ["work"])
+    off = np.array([missing_wrench(probe, body) for body in probe.joint.bodies])
     names = [f"body {body}" for body in probe.joint.bodies]
     figures = np.abs(off).max(axis=2) / probe.size
-    yield judged(f"{what}: acts and reacts", figures, LIMIT, names)
+    yield judge_figures(f"{what}: acts and reacts", figures, LIMIT, names)

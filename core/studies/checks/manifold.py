@@ -47,12 +47,12 @@ def min_norm(matrix: Array, right: Array, columns: slice = slice(None)) -> Array
 
     Shapes (lanes, rows, columns), (rows, lanes) -> (columns, lanes).
     """
-    even, size = _even(matrix)
+    even, size = _scale_rows(matrix)
     inverse = np.linalg.pinv(even[:, :, columns], rcond=DEPENDENT)
     return (inverse @ (right.T / size)[:, :, None])[:, :, 0].T
 
 
-def along(matrix: Array, wanted: Array, columns: slice = slice(None)) -> Array:
+def admitted_rates(matrix: Array, wanted: Array, columns: slice = slice(None)) -> Array:
     """Return the part of the wanted rates admitted by the rows."""
     admitted = wanted.copy()
     admitted[columns] -= min_norm(matrix, times(matrix, wanted), columns)
@@ -109,7 +109,7 @@ def walk(
         state = states[-1]
         wanted = np.zeros_like(last)
         wanted[columns] = aims(state, last)[columns]
-        last = along(matrix, wanted, columns)
+        last = admitted_rates(matrix, wanted, columns)
         step = share * last
         off = joint.retract(state, step)
         there, taken = newton(joint, off, joint.exact, 6, columns)
@@ -140,7 +140,7 @@ def regular(joint: TracedJoint, matrix: Array, columns: slice = slice(None)) -> 
     the design position.
     """
     at_design = joint.exact_at_design[:, :, columns]
-    _, size = _even(at_design)
+    _, size = _scale_rows(at_design)
     found, there = (
         _smallest(each / size[:, :, None]) for each in (matrix[:, :, columns], at_design)
     )
@@ -151,7 +151,7 @@ def smallest(matrix: Array) -> Array:
     """Return the distance of each lane's rows from dependence: the smallest singular value, rows
     scaled to size one, shape (lanes,).
     """
-    return _smallest(_even(matrix)[0])
+    return _smallest(_scale_rows(matrix)[0])
 
 
 def _smallest(matrix: Array) -> Array:
@@ -161,10 +161,10 @@ def _smallest(matrix: Array) -> Array:
 
 def rank(matrix: Array) -> NDArray[np.int64]:
     """Return the numerical rank of each lane's rows, shape (lanes,)."""
-    return np.asarray(np.linalg.matrix_rank(_even(matrix)[0], tol=DEPENDENT), dtype=np.int64)
+    return np.asarray(np.linalg.matrix_rank(_scale_rows(matrix)[0], tol=DEPENDENT), dtype=np.int64)
 
 
-def _even(matrix: Array) -> tuple[Array, Array]:
+def _scale_rows(matrix: Array) -> tuple[Array, Array]:
     """Return the rows scaled to size one, and their sizes; zero rows stay, rows that are not
     finite become zero.
     """
@@ -224,9 +224,9 @@ def moved_specimen(joint: Joint, place: Place, lanes: int, rng: np.random.Genera
     way = walk(traced, start, straight(directions), STEPS)
     state = way[-1]
     exact = traced.exact(state)
-    rate = along(exact, rng.normal(size=directions.shape))
+    rate = admitted_rates(exact, rng.normal(size=directions.shape))
     bent = traced.jets(state, rate, np.zeros_like(rate))[2]
-    acceleration = along(exact, rng.normal(size=rate.shape)) - min_norm(exact, bent)
+    acceleration = admitted_rates(exact, rng.normal(size=rate.shape)) - min_norm(exact, bent)
     return Specimen(joint, place, traced, way[NEAR], state, rate, acceleration, exact, rng)
 
 
@@ -267,7 +267,7 @@ def branches(s: Specimen, starts: int) -> Iterator[Finding]:
     closed = (taken <= ITERATIONS) & (off < CLOSED) & regular(t, t.exact(ended), MOVING)
     caught, right = closed & (t.branch(ended) <= 0.0), np.zeros(starts, dtype=bool)
     asked = closed & ~caught
-    right[asked] = connected(s, ended[:, asked])
+    right[asked] = lie_on_branch(s, ended[:, asked])
     uncaught = asked & ~right
     counts = {
         "right": right,
@@ -291,12 +291,12 @@ def branches(s: Specimen, starts: int) -> Iterator[Finding]:
     yield Finding("spurious branches", verdict, float(count), *UNCAUGHT, message=text)
 
 
-def connected(s: Specimen, state: Array) -> Mask:
+def lie_on_branch(s: Specimen, state: Array) -> Mask:
     """Return whether each pose is on the intended branch."""
     t = s.traced
     directions = s.rng.normal(size=(t.columns, WALKS))
     directions[:COLUMNS] = 0.0
-    there = _led(t, state, np.repeat(t.design(1), state.shape[1], axis=1))
+    there = _reach_aim(t, state, np.repeat(t.design(1), state.shape[1], axis=1))
     if there.all():
         return there
     known = np.concatenate(walk(t, t.design(WALKS), straight(directions), STRIDES, MOVING), axis=1)
@@ -305,11 +305,11 @@ def connected(s: Specimen, state: Array) -> Mask:
         if len(astray):
             any_of_them = s.rng.integers(known.shape[1], size=len(astray))
             aims = any_of_them if k else _distances(state[:, astray], known).argmin(axis=1)
-            there[astray] = _led(t, state[:, astray], known[:, aims])
+            there[astray] = _reach_aim(t, state[:, astray], known[:, aims])
     return there
 
 
-def _led(t: TracedJoint, state: Array, aim: Array) -> Mask:
+def _reach_aim(t: TracedJoint, state: Array, aim: Array) -> Mask:
     """Return whether small steps over the manifold lead from each pose to its aim."""
     there, state = np.zeros(state.shape[1], dtype=bool), state.copy()
     waiting = np.flatnonzero(~there)

@@ -101,7 +101,7 @@ def execute(
     return [found[slot] for slot in sorted(found)]
 
 
-def turned(q: Array, a: Array) -> Array:
+def rotate_vectors(q: Array, a: Array) -> Array:
     """Return vectors turned by Euler parameters, shapes (n, 4), (n, 3) or (3,) -> (n, 3)."""
     twice = 2.0 * np.cross(q[:, 1:], a)
     return a + q[:, :1] * twice + np.cross(q[:, 1:], twice)

@@ -160,7 +160,7 @@ def compliance(
     return ComplianceResults(case.name, over_travel, curves, study.signs, tuple(cases))
 
 
-def _said(load: Load, value: float) -> str:
+def _load_text(load: Load, value: float) -> str:
     return f"{load} {value:.6g} {'N m' if load is Load.ALIGNING else 'N'}"
 
 
@@ -210,11 +210,11 @@ class _Study:
         if self.steering and self.mechanism.driver(self.steering).turns:
             unit = "rad"
 
-        def said(x: float, share: float) -> str:
-            under = [_said(load, share * float(value)) for load, value in loads.items()]
+        def sample_text(x: float, share: float) -> str:
+            under = [_load_text(load, share * float(value)) for load, value in loads.items()]
             return " with ".join([f"{what} {share * x:.6g} {unit}", *under])
 
-        curves = self._curves("travel", values, found, said)
+        curves = self._curves("travel", values, found, sample_text)
         return replace(curves, rigid=self._rigid(values), turning=unit == "rad")
 
     def case_of(
@@ -260,7 +260,7 @@ class _Study:
     def over_load(self, load: Load, values: Array) -> ComplianceCurves:
         """Return the curves over a load at design."""
         found = self.model.solve(self._loads({load: values}, len(values)), {})
-        return self._curves(load, values, found, lambda x, share: _said(load, share * x))
+        return self._curves(load, values, found, lambda x, share: _load_text(load, share * x))
 
     def _loads(self, loads: Mapping[Load, Array], n: int) -> dict[str, Array]:
         found = {point.name: np.zeros((n, 6)) for wheel in self.wheels for point in wheel.points}
@@ -277,7 +277,7 @@ class _Study:
         outputs = self._outputs(found) | self._rates(found)
 
         def blank(values: Array) -> Array:
-            return _blanked(values, lost)
+            return _blank_rows(values, lost)
 
         failures = [
             f"no equilibrium at {what(float(at[k]), 1.0)}: the last is at"
@@ -475,7 +475,7 @@ def _steering(case: Case, held: Sequence[str], wheels: Sequence[Wheel]) -> str:
     return case.sweep.driver if case.sweep.driver in others else others[0]
 
 
-def _blanked(values: Array, lost: NDArray[np.bool_]) -> Array:
+def _blank_rows(values: Array, lost: NDArray[np.bool_]) -> Array:
     found = np.array(values, dtype=np.float64)
     found[lost] = np.nan
     return found

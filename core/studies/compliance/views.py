@@ -79,21 +79,21 @@ def _largest(record: Record, wanted: Callable[[str], bool]) -> float | None:
 
 def _data(curves: ComplianceCurves) -> dict[str, Any]:
     return {
-        curves.axis: _listed(curves.at),
-        "wheel_center": _listed(curves.wheel_center),
-        "spin_axis": _listed(curves.spin_axis),
-        "wheel_load": _listed(curves.wheel_load),
-        "compliance": _listed(curves.compliance),
+        curves.axis: _rows_or_none(curves.at),
+        "wheel_center": _rows_or_none(curves.wheel_center),
+        "spin_axis": _rows_or_none(curves.spin_axis),
+        "wheel_load": _rows_or_none(curves.wheel_load),
+        "compliance": _rows_or_none(curves.compliance),
         "outputs": {
-            name: {"unit": each.unit, "sense": each.sense, "position": _listed(each.values)}
+            name: {"unit": each.unit, "sense": each.sense, "position": _rows_or_none(each.values)}
             for name, each in curves.outputs.items()
         },
-        "rigid": {name: _listed(values) for name, values in curves.rigid.items()},
+        "rigid": {name: _rows_or_none(values) for name, values in curves.rigid.items()},
         "notes": [*curves.notes],
     }
 
 
-def _listed(values: Array) -> Any:
+def _rows_or_none(values: Array) -> Any:
     found: Any = values.astype(object)
     found[~np.isfinite(values)] = None
     return found.tolist()

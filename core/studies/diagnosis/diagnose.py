@@ -30,7 +30,7 @@ from ...kinematics import (
 )
 from ...trajectory import Array, Trajectory
 from ..variation.varied_places import Geometry
-from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
+from .outputs import Budget, Sensitivity, binding_numbers, budgets, read_points, sensitivities
 
 # Samples to look at: the count of determined directions changes at special poses only.
 SAMPLES = 9
@@ -109,11 +109,11 @@ def determinacy(case: Case, motion: Trajectory) -> Determinacy:
 def _joint(name: str, found: Reaction) -> JointDeterminacy:
     force, moment, wrench = found.determined()
     known = float(np.ravel(found.known)[0])
-    along = [_along(part, known) for part in np.split(found.free[0], 2)]
+    along = [_undetermined_directions(part, known) for part in np.split(found.free[0], 2)]
     return JointDeterminacy(name, force, moment, wrench, *along)
 
 
-def _along(free: Array, known: float) -> list[list[float]]:
+def _undetermined_directions(free: Array, known: float) -> list[list[float]]:
     """Return the directions across all that are undetermined, shape (3, redundant rows)."""
     if not np.isfinite(free).all():
         return []
@@ -280,7 +280,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         redundant_residual=swept.trajectory.details["redundant_residual"] if swept else None,
         budgets=budgets(case, swept, tol, design) if swept and derived else [],
         sensitivities=sensitivities(case, swept, design, variables) if swept and derived else [],
-        binding=binding(swept, variables) if swept and derived else [],
+        binding=binding_numbers(swept, variables) if swept and derived else [],
         shims={each.name: each.shim.tolist() for each in case.hardpoints if each.shim is not None},
         no_bump_steer={
             each.name: [float(x) if np.isfinite(x) else None for x in each.no_bump_steer]

@@ -133,7 +133,7 @@ def sensitivities(
     return result
 
 
-def binding(found: Conditioning, variables: Sequence[Variable]) -> list[str]:
+def binding_numbers(found: Conditioning, variables: Sequence[Variable]) -> list[str]:
     """Return the numbers of the geometry not to be changed alone: redundant rows would contradict
     the others.
     """

@@ -138,7 +138,7 @@ def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
                 known = _states(
                     np.random.default_rng(seed), states, distance, turning=name in ("d10", "d11")
                 )
-                for rows, style, equations in _written(known.conditions[number]):
+                for rows, style, equations in _ways_to_write(known.conditions[number]):
                     j = replace(known.j, u=known.e0 + known.j.u) if style == "printed" else known.j
                     errors = _errors_of(equations, known.i, j, mpmath.mpf)
                     far = distance if name in ("d20", "d21") else None
@@ -146,13 +146,13 @@ def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
     return found
 
 
-def _written(condition: Condition) -> Iterator[tuple[str, str, Sequence[Any]]]:
+def _ways_to_write(condition: Condition) -> Iterator[tuple[str, str, Sequence[Any]]]:
     """Return rows, style and equations of all ways to write a condition."""
-    yield DOTS, "printed", condition.printed(formed=True)
+    yield DOTS, "printed", condition.printed_rows(formed=True)
     for style in ("conventional", "paper", "native"):
-        yield DOTS, style, condition.unsimplified(style)
+        yield DOTS, style, condition.unsimplified_rows(style)
     for style in ("paper", "native") if condition.is_simplified else ():
-        yield SIMPLIFIED, style, condition.simplified(style)
+        yield SIMPLIFIED, style, condition.simplified_rows(style)
 
 
 def _errors_of(
@@ -162,7 +162,9 @@ def _errors_of(
     to_exact = cast("Callable[[Any], Any]", np.frompyfunc(exact, 1, 1))
     motions = [each.motion(equations[0].body_axes) for each in (i, j)]
     rounded = _values(equations, (i, j), motions)
-    exactly = _values(*(_mapped(to_exact, each) for each in (list(equations), [i, j], motions)))
+    exactly = _values(
+        *(_map_numbers(to_exact, each) for each in (list(equations), [i, j], motions))
+    )
     found: list[Error] = []
     for values, true in zip(rounded, exactly, strict=True):
         off = [abs(to_exact(a) - b) for a, b in zip(values, true, strict=True)]
@@ -184,14 +186,16 @@ def _values(
     )
 
 
-def _mapped(number: Callable[[Any], Any], value: Any) -> Any:
+def _map_numbers(number: Callable[[Any], Any], value: Any) -> Any:
     """Return a copy with every number replaced."""
     if isinstance(value, list):
-        return [_mapped(number, each) for each in cast("list[Any]", value)]
+        return [_map_numbers(number, each) for each in cast("list[Any]", value)]
     if is_dataclass(value) and not isinstance(value, type):
         return replace(
             value,
-            **{each.name: _mapped(number, getattr(value, each.name)) for each in fields(value)},
+            **{
+                each.name: _map_numbers(number, getattr(value, each.name)) for each in fields(value)
+            },
         )
     return value if isinstance(value, bool) else number(value)
 
@@ -208,14 +212,14 @@ def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool)
     def rotation(axis: Vec3, angle: Array | float) -> Quat:
         return Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * axis)
 
-    def gridded(a: Vec3) -> Vec3:
+    def snap_to_grid(a: Vec3) -> Vec3:
         return Vec3(*(np.round(x * GRID) / GRID for x in a))
 
     h = unit(vector())
     f = unit(cross(vector(), h))
-    s_i, s_j = gridded(vector()), gridded(vector())
+    s_i, s_j = snap_to_grid(vector()), snap_to_grid(vector())
     u, q = (
-        gridded(distance * unit(vector())),
+        snap_to_grid(distance * unit(vector())),
         rotation(unit(vector()), rng.uniform(-np.pi, np.pi, n)),
     )
     i = Moving(u, q, vector(), vector())
@@ -231,7 +235,7 @@ def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool)
         j = Moving(i.u, tilted * rotation(h, angle), i.v, w + rate * axis)
     else:
         e = turn(e0) + slide * axis
-        j = Moving(gridded(i.u + e - e0), tilted, i.v + cross(i.w, e) + rate * axis, w)
+        j = Moving(snap_to_grid(i.u + e - e0), tilted, i.v + cross(i.w, e) + rate * axis, w)
     return States(conditions(f, cross(h, f), h, s_i, s_j), i, j, e0)
 
 
@@ -320,14 +324,14 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
     Raises:
         SolveError: a sweep does not reach all its samples.
     """
-    away = _moved(case.mechanism, FAR)
+    away = _shift_mechanism(case.mechanism, FAR)
     # exact: what was lost in going there stays lost
-    back = _moved(away, (-FAR[0], -FAR[1], -FAR[2]))
+    back = _shift_mechanism(away, (-FAR[0], -FAR[1], -FAR[2]))
     places = {AT_DESIGN: case.mechanism, AWAY: away, BACK: back}
     programs: list[ProgramSize] = []
     sweeps: list[SweepError] = []
     for style in Style:
-        found = {place: _swept(case, mechanism, style) for place, mechanism in places.items()}
+        found = {place: _solve_sweep(case, mechanism, style) for place, mechanism in places.items()}
         # where positions alone are asked for, rates are a program of their own: it is run where the
         # motion begins
         size = solve(
@@ -356,7 +360,7 @@ def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
     return programs, sweeps
 
 
-def _swept(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
+def _solve_sweep(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
     sweep = case.sweep
     values = sweep.change + mechanism.design_value(sweep.driver)
     found = solve(mechanism, sweep.driver, values, rate=sweep.rate, points=case.points, style=style)
@@ -374,18 +378,18 @@ def _outputs(case: Case, found: Trajectory) -> Array:
     return np.array([[getattr(each, name) for name in QUANTITIES] for each in series])
 
 
-def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
+def _shift_mechanism(mechanism: Mechanism, by: Vector) -> Mechanism:
     """Return the mechanism elsewhere: all points, origins and loads shifted."""
 
-    def shifted(point: Sequence[float]) -> Vector:
+    def shift(point: Sequence[float]) -> Vector:
         x, y, z = (a + b for a, b in zip(point, by, strict=True))
         return x, y, z
 
     return mechanism.with_joints(
-        lambda joint: replace(joint, **joint.mapped({Kind.POSITION: shifted})),
-        bodies=[body.in_frame(shifted) for body in mechanism.bodies],
-        points=[replace(point, position=shifted(point.position)) for point in mechanism.points],
-        forces=[force.in_frame(shifted) for force in mechanism.forces],
+        lambda joint: replace(joint, **joint.mapped({Kind.POSITION: shift})),
+        bodies=[body.in_frame(shift) for body in mechanism.bodies],
+        points=[replace(point, position=shift(point.position)) for point in mechanism.points],
+        forces=[force.in_frame(shift) for force in mechanism.forces],
     )
 
 

@@ -238,11 +238,11 @@ class Condition:
         """Whether the paper has other rows for it than the scalar products."""
         return self.dots != (self.primitive,)
 
-    def simplified(self, style: str) -> tuple[Primitive, ...]:
+    def simplified_rows(self, style: str) -> tuple[Primitive, ...]:
         """Return the condition in the row style "native" or "paper"."""
         return (self.primitive,) if style == "native" else self.primitive.paper_form()
 
-    def unsimplified(self, style: str) -> tuple[Primitive, ...]:
+    def unsimplified_rows(self, style: str) -> tuple[Primitive, ...]:
         """Return the scalar products in the row style "native", "paper" or "conventional"."""
         if style == "native":
             return self.dots
@@ -252,7 +252,7 @@ class Condition:
             for form in (dot.paper_form() if style == "paper" else dot.conventional_form())
         )
 
-    def printed(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
+    def printed_rows(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
         """Return the scalar products as printed, for poses with positions in place of displacements
         from the design.
         """
@@ -364,15 +364,15 @@ class Executed:
     def __init__(self, tally: list[int]) -> None:
         self.tally = tally
 
-    def _counted(self, other: Scalar) -> Executed:
+    def _count(self, other: Scalar) -> Executed:
         self.tally[0] += 1
         return self
 
-    __add__ = __radd__ = __sub__ = __rsub__ = _counted
+    __add__ = __radd__ = __sub__ = __rsub__ = _count
 
     def __mul__(self, other: Scalar) -> Executed:
         free = isinstance(other, float) and abs(other) == 1.0
-        return self if free else self._counted(other)
+        return self if free else self._count(other)
 
     __rmul__ = __mul__
 
@@ -412,14 +412,14 @@ def stages(equations: Sequence[Countable], pair: Pair) -> Iterator[list[Scalar]]
     yield _less(_times(rows, pair.ai, pair.aj), gamma)
 
 
-def executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Operations:
+def count_executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Operations:
     """Return the operations of executed rows; the pair's numbers add to the tally."""
     totals = [tally[0], *(tally[0] for _ in stages(equations, pair))]
     jacobian, velocity, gamma, acceleration = (b - a for a, b in pairwise(totals))
     return Operations(jacobian, jacobian + velocity, jacobian + gamma + acceleration, gamma)
 
 
-def traced(equations: Sequence[Countable]) -> Operations:
+def count_traced(equations: Sequence[Countable]) -> Operations:
     """Return the operations of the traced programs of rows."""
     tape, slots = Tape(), count()
     pair = Pair.of(lambda: tape.input(next(slots)))
@@ -466,19 +466,22 @@ def count_operations() -> list[Counted]:
     for name, rows, way, equations in _as_printed(
         lambda: Vec3(*(Executed(tally) for _ in range(3)))
     ):
-        found.append(Counted(name, rows, way, executed(equations, pair, tally)))
+        found.append(Counted(name, rows, way, count_executed(equations, pair, tally)))
     # general numbers: no two equal, none a sum or a product of others
     f, g, h, s_i, s_j = (Vec3(0.137 + k, -0.731 * k - 0.29, 0.457 - 1.193 * k) for k in range(5))
     for both in zip(conditions(f, g, h, s_i, s_j), conditions(X, Y, Z, s_i, s_j), strict=True):
         for style, way in TRACED.items():
             found.append(
                 Counted(
-                    both[0].name, DOTS, way, *(traced(each.unsimplified(style)) for each in both)
+                    both[0].name,
+                    DOTS,
+                    way,
+                    *(count_traced(each.unsimplified_rows(style)) for each in both),
                 )
             )
         if both[0].is_simplified:
             for style in ("paper", "native"):
-                counts = (traced(each.simplified(style)) for each in both)
+                counts = (count_traced(each.simplified_rows(style)) for each in both)
                 found.append(Counted(both[0].name, SIMPLIFIED, TRACED[style], *counts))
     # stable: keeps the order of counting within a condition
     return sorted(found, key=lambda each: each.condition)
@@ -492,7 +495,7 @@ def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Seq
         if formed:  # these have no product with two orders
             simplified |= {"d12": PrintedDot12(Mat3(*constant)), "d21": PrintedDot21(f, g)}
         for condition in conditions(f, g, h, s_i, s_j):
-            yield condition.name, DOTS, way, condition.printed(formed=formed)
+            yield condition.name, DOTS, way, condition.printed_rows(formed=formed)
             if condition.name in simplified:
                 yield condition.name, SIMPLIFIED, way, [simplified[condition.name]]
 

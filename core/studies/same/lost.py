@@ -19,7 +19,7 @@ from ...mechanism.body import Body, inertia_matrix
 from ...mechanism.mechanism import GROUND
 from ...trajectory import Array
 from .links import Match
-from .motion import SIDES, Placement, joints_of_both, measurable, times, turned, values
+from .motion import SIDES, Placement, joints_of_both, measurable, rotate_vectors, times, values
 
 # Numbers that files print in fewest digits are equal within this part [-].
 PRINTED = 1e-5
@@ -58,7 +58,7 @@ def lost_items(
             if abs(zero) > enough + PRINTED:
                 unit = "rad" if first.turns else "m"
                 changed.append(f"zero of {joint.name}: moved by {zero:.4g} {unit} in {b.name}")
-            second = _seen(second, sense, zero)
+            second = _in_terms_of(second, sense, zero)
         if not (a.is_model and b.is_model):
             continue
         for what, where, text in _of_joint(first, second):
@@ -89,7 +89,7 @@ def _relation(x: Array, y: Array, *, turns: bool) -> tuple[float, float]:
     return sense, math.remainder(zero, 2.0 * math.pi) if turns else zero
 
 
-def _seen(coordinate: Coordinate, sense: float, zero: float) -> Coordinate:
+def _in_terms_of(coordinate: Coordinate, sense: float, zero: float) -> Coordinate:
     """Return a coordinate y = sense x + zero with its limits as those of x."""
     given = coordinate.limit
     bounds = sorted((sense * (given.lower - zero), sense * (given.upper - zero)))
@@ -137,8 +137,8 @@ def _masses(
         if abs(body.mass - other.mass) > PRINTED * body.mass:
             yield f"mass of {x}: {body.mass:.6g} against {other.mass:.6g} kg"
         there = place.put(np.array([[*body.origin, *body.euler_parameters]]), body, other)[0]
-        center, inertia = _carried(other, there)
-        own = place.shift + turned(place.turn, np.array(body.center_of_mass or body.origin))
+        center, inertia = _mass_in_pose(other, there)
+        own = place.shift + rotate_vectors(place.turn, np.array(body.center_of_mass or body.origin))
         if (far := float(np.linalg.norm(center - own))) > enough + PRINTED * _arm(body):
             yield f"centre of mass of {x}: {far:.2g} m apart"
         axes = _matrix(place.turn)
@@ -177,15 +177,15 @@ def _inertia(body: Body) -> Array:
 
 
 def _matrix(turn: Array) -> Array:
-    return turned(turn, np.eye(3)).T
+    return rotate_vectors(turn, np.eye(3)).T
 
 
-def _carried(body: Body, pose: Array) -> tuple[Array, Array]:
+def _mass_in_pose(body: Body, pose: Array) -> tuple[Array, Array]:
     """Return centre of mass and inertia of a body, global in a pose."""
     q = times(pose[3:], SIDES * np.array(body.euler_parameters))
     arm = np.subtract(body.center_of_mass or body.origin, body.origin)
     axes = _matrix(q)
-    return pose[:3] + turned(q, arm), axes @ _inertia(body) @ axes.T
+    return pose[:3] + rotate_vectors(q, arm), axes @ _inertia(body) @ axes.T
 
 
 def _gravity(a: Undriven, b: Undriven, place: Placement) -> Iterator[str]:
@@ -196,6 +196,8 @@ def _gravity(a: Undriven, b: Undriven, place: Placement) -> Iterator[str]:
         and all(any(body.mass for body in each.mechanism.moving) for each in (a, b))
     ):
         first, second = (np.array(each.mechanism.gravity) for each in (a, b))
-        if np.linalg.norm(turned(place.turn, first) - second) > GRAVITY * np.linalg.norm(first):
+        if np.linalg.norm(rotate_vectors(place.turn, first) - second) > GRAVITY * np.linalg.norm(
+            first
+        ):
             texts = (" ".join(f"{x:.5g}" for x in each) for each in (first, second))
             yield f"gravity: {' against '.join(texts)} m/s^2"

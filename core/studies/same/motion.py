@@ -30,7 +30,7 @@ def times(p: Array, q: Array) -> Array:
     return np.concatenate([e0, a * v + b * u + np.cross(u, v)], axis=-1)
 
 
-def turned(p: Array, x: Array) -> Array:
+def rotate_vectors(p: Array, x: Array) -> Array:
     """Return vectors turned by unit quaternions, shape (..., 3)."""
     p, x = np.broadcast_arrays(p, np.concatenate([np.zeros_like(x[..., :1]), x], axis=-1))
     return times(times(p, x), SIDES * p)[..., 1:]
@@ -54,7 +54,7 @@ class Placement:
     def reversed(self) -> Placement:
         """The same seen from the second file."""
         back = SIDES * self.turn
-        return Placement(back, -turned(back, self.shift), self.by_frames)
+        return Placement(back, -rotate_vectors(back, self.shift), self.by_frames)
 
     @property
     def angle(self) -> float:
@@ -66,10 +66,10 @@ class Placement:
         r, p = poses[:, :3], poses[:, 3:]
         if not self.by_frames:  # moved as since design
             q = times(p, SIDES * np.array(a.euler_parameters))
-            origin = turned(self.reversed.turn, np.array(b.origin) - self.shift)
-            r = r + turned(q, origin - np.array(a.origin))
+            origin = rotate_vectors(self.reversed.turn, np.array(b.origin) - self.shift)
+            r = r + rotate_vectors(q, origin - np.array(a.origin))
             p = times(q, times(self.reversed.turn, np.array(b.euler_parameters)))
-        return np.hstack([self.shift + turned(self.turn, r), times(self.turn, p)])
+        return np.hstack([self.shift + rotate_vectors(self.turn, r), times(self.turn, p)])
 
     def all(self, poses: Poses, a: Undriven, b: Undriven, match: Match) -> Poses:
         """Return poses of all links with partners as poses of these, but for links that spin."""
@@ -87,7 +87,7 @@ def candidates(a: Undriven, b: Undriven, match: Match) -> Iterator[Placement]:
     for x, y in [*match.partner.items()][:FEW_LINKS]:
         body, other = a.mechanism.body(x), b.mechanism.body(y)
         turn = times(np.array(other.euler_parameters), SIDES * np.array(body.euler_parameters))
-        found.append((turn, np.array(other.origin) - turned(turn, np.array(body.origin))))
+        found.append((turn, np.array(other.origin) - rotate_vectors(turn, np.array(body.origin))))
     for turn, shift in found if a.is_model and b.is_model else found[:1]:
         yield Placement(turn, shift, by_frames=True)
     yield Placement(*still, by_frames=False)
@@ -97,7 +97,7 @@ def candidates(a: Undriven, b: Undriven, match: Match) -> Iterator[Placement]:
     points = [(p[0], q[0]) for p, q in pairs if len(p) == len(q) == 1]
     axes = [(_axis(j), _axis(k)) for j, k in joints]
     for signs in (None, 1.0, -1.0):
-        moved = _fitted(points, [] if signs is None else [(f, signs * g) for f, g in axes])
+        moved = _fit_pose(points, [] if signs is None else [(f, signs * g) for f, g in axes])
         for by_frames in (True, False) if a.is_model and b.is_model else (False,):
             yield Placement(*moved, by_frames=by_frames)
 
@@ -107,7 +107,7 @@ def _axis(joint: Joint) -> Array:
     return np.zeros(3) if axis is None else np.array([*unit(axis)], dtype=np.float64)
 
 
-def _fitted(
+def _fit_pose(
     points: Sequence[tuple[Sequence[float], Sequence[float]]], axes: Sequence[tuple[Array, Array]]
 ) -> tuple[Array, Array]:
     """Return the turn and shift that fit points, and directions, best (Kabsch, Horn)."""
@@ -128,7 +128,7 @@ def _fitted(
         ]
     )
     turn: Array = np.linalg.eigh(horn)[1][:, -1] if np.any(m) else np.eye(4)[0]
-    return turn, b - turned(turn, a)
+    return turn, b - rotate_vectors(turn, a)
 
 
 Links: TypeAlias = frozenset[str]
@@ -224,11 +224,11 @@ def values(file: Undriven, name: str, coordinate: Coordinate, poses: Poses) -> A
             continue
         body, each = file.mechanism.body(link), poses[link]
         q = times(each[:, 3:], SIDES * np.array(body.euler_parameters))
-        moved.append((each[:, :3] + turned(q, point - np.array(body.origin)), q))
+        moved.append((each[:, :3] + rotate_vectors(q, point - np.array(body.origin)), q))
     (r_i, q_i), (r_j, q_j) = moved
     axis = axis / np.linalg.norm(axis)
     if not coordinate.turns:
-        return coordinate.start + ((r_j - r_i) * turned(q_i, axis)).sum(axis=1)
+        return coordinate.start + ((r_j - r_i) * rotate_vectors(q_i, axis)).sum(axis=1)
     between = times(SIDES * q_i, q_j)
     angle = 2.0 * np.arctan2(between[:, 1:] @ axis, between[:, 0])
     return coordinate.start + angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))

@@ -155,7 +155,7 @@ class _Pair:
         found = Comparison(
             files=(a.name, b.name),
             verdict="not judged",
-            reason=self._unjudged(walked),
+            reason=self._reason_unjudged(walked),
             largest=None,
             allowed=self.allowed,
             freedoms=(walked[0].freedom, walked[1].freedom),
@@ -191,7 +191,7 @@ class _Pair:
             placement=place,
         )
 
-    def _unjudged(self, walked: Sequence[Walked]) -> str:
+    def _reason_unjudged(self, walked: Sequence[Walked]) -> str:
         """Return why nothing can be judged; empty if something can."""
         alone = [
             [link for link in links if not file.is_between(link)]

@@ -26,7 +26,7 @@ from ...mechanism.body import Body
 from ...mechanism.mechanism import GROUND, Mechanism
 from .families import Specimen
 from .run import Example, Finding
-from .verdicts import Judgement, Verdict, judged, solve_all
+from .verdicts import Judgement, Verdict, judge_answer, solve_all
 
 
 def judge(case: Case, engine: Engine, tol: float) -> Judgement:
@@ -45,7 +45,7 @@ def judge(case: Case, engine: Engine, tol: float) -> Judgement:
 def _judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
     """Judge a case in place of a specimen's case, by the specimen's reference and excuses."""
     (answer,) = solve_all([Pair(case, engine, specimen.tol)])
-    return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
+    return judge_answer(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
 
 
 def save(example: Example, folder: Path, problems: list[str]) -> Finding:
@@ -72,7 +72,7 @@ def save(example: Example, folder: Path, problems: list[str]) -> Finding:
         except KincheckError:
             known = False
         if known:
-            case, more = reduced(case, bad_by_itself)
+            case, more = reduce_case(case, bad_by_itself)
             words += more
         else:
             words.append(
@@ -136,7 +136,7 @@ def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
     return case
 
 
-def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
+def reduce_case(case: Case, bad: Bad) -> tuple[Case, list[str]]:
     """Return the smallest case found with the outcome, and the reductions as text."""
     still, words = _Budget(bad), list[str]()
     before = len(case.mechanism.bodies), len(case.mechanism.joints)
@@ -145,7 +145,7 @@ def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
     if (after := (len(case.mechanism.bodies), len(case.mechanism.joints))) != before:
         words.append(f"bodies {before[0]} to {after[0]}, joints {before[1]} to {after[1]}")
     for digits in range(1, 12):
-        rounder = rounded(case, digits)
+        rounder = round_geometry(case, digits)
         if rounder is not None and still(rounder):
             return rounder, [*words, f"numbers to {digits} digits"]
     return case, words
@@ -168,16 +168,16 @@ def _smaller(case: Case) -> Iterator[Case]:
     for gone, body in (*product([None], moving), *((j, b) for b, j in product(moving, joints))):
         bodies = [each for each in mechanism.bodies if each is not body]
         free = [j for j in joints if body.name not in j.bodies and j is not gone]
-        yield from _driven(case, bodies, free)
+        yield from _with_parts(case, bodies, free)
     for body in moving:
         bodies = [replace(each, fixed=each.fixed or each is body) for each in mechanism.bodies]
         ground = {each.name for each in bodies if each.fixed} | {GROUND}
         held = [joint for joint in joints if not ground.issuperset(joint.bodies)]
         for gone in (None, *held):
-            yield from _driven(case, bodies, [joint for joint in held if joint is not gone])
+            yield from _with_parts(case, bodies, [joint for joint in held if joint is not gone])
 
 
-def _driven(case: Case, bodies: Sequence[Body], joints: Sequence[Joint]) -> Iterator[Case]:
+def _with_parts(case: Case, bodies: Sequence[Body], joints: Sequence[Joint]) -> Iterator[Case]:
     """Yield the case of these bodies and joints, if it has a point, all drivers, and as many
     freedoms as drivers.
     """
@@ -217,7 +217,7 @@ def _with(case: Case, mechanism: Mechanism, hidden: str = "") -> Case:
     return replace(case, mechanism=replace(mechanism, points=shown), outputs=outputs)
 
 
-def rounded(case: Case, digits: int) -> Case | None:
+def round_geometry(case: Case, digits: int) -> Case | None:
     """Return the case with its geometry rounded to some digits; None if the result is invalid."""
 
     def short(value: Any) -> Any:

@@ -25,7 +25,15 @@ from ..truth.motion import Reach, Truth
 from ..truth.proofs import distance_from_proof
 from ..truth.rows import require_extended
 from .families import Family, Specimen
-from .verdicts import BAD, Judgement, Verdict, judged, refused_description, solve_all, suited
+from .verdicts import (
+    BAD,
+    Judgement,
+    Verdict,
+    judge_answer,
+    refused_description,
+    solve_all,
+    suitable_engine,
+)
 
 # Fewest specimens of a small share, and fewest samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
@@ -205,7 +213,7 @@ def stress(
     examples: list[Example] = []
 
     @contextmanager
-    def timed(part: str) -> Generator[None]:
+    def measure_time(part: str) -> Generator[None]:
         begun = perf_counter()
         yield
         found.seconds[part] += perf_counter() - begun
@@ -215,15 +223,15 @@ def stress(
         name, done = family.name, number / len(families)
         try:
             progress(f"{name}: making {share} samples", done)
-            with timed("truth"):
+            with measure_time("truth"):
                 draws = specimens(family, seed, share)
             if prove:
-                with timed("proofs"):
+                with measure_time("proofs"):
                     found.proofs.extend(_proofs(name, seed, draws))
             count = f"{sum(draw.samples for draw in draws)} samples of {len(draws)} specimens"
             for k, engine in enumerate(engines, 1):
                 progress(f"{name}: {count} by {engine.name}", done + k / parts / len(families))
-                with timed("engines"):
+                with measure_time("engines"):
                     examples += _solve(found, name, engine, draws)
         except KincheckError as error:  # the other families keep their results
             found.unfinished[name] = str(error)
@@ -259,7 +267,12 @@ def _solve(found: Stress, family: str, engine: Engine, draws: Sequence[Draw]) ->
     begun = perf_counter()
     cases = [(draw, draw.case) for draw in draws if draw.case is not None]
     answers = iter(
-        solve_all([Pair(case, suited(engine, case, d.number), d.specimen.tol) for d, case in cases])
+        solve_all(
+            [
+                Pair(case, suitable_engine(engine, case, d.number), d.specimen.tol)
+                for d, case in cases
+            ]
+        )
     )
     judgements: list[tuple[Draw, Judgement]] = []
     for draw in draws:
@@ -268,7 +281,7 @@ def _solve(found: Stress, family: str, engine: Engine, draws: Sequence[Draw]) ->
             judgements.append((draw, refused_description(one, draw.samples)))
             continue
         answer = next(answers)
-        judgement = judged(one, draw.case, truth, answer)
+        judgement = judge_answer(one, draw.case, truth, answer)
         judgements.append((draw, judgement))
         unsupported = judgement.counts[Verdict.UNSUPPORTED]
         if one.tilt is None or truth is None or truth.violated is None or unsupported:
@@ -320,7 +333,7 @@ def _solve(found: Stress, family: str, engine: Engine, draws: Sequence[Draw]) ->
             tol=draw.specimen.tol,
             worst=list(judgement.worst),
         )
-        solver = suited(engine, case, draw.number)
+        solver = suitable_engine(engine, case, draw.number)
         yield Example(solver, draw.specimen, case, verdict, finding)
 
 

@@ -97,7 +97,7 @@ def refused_description(specimen: Specimen, samples: int) -> Judgement:
     return _all(samples, verdict, str(error))
 
 
-def judged(
+def judge_answer(
     specimen: Specimen, case: Case, truth: Truth | None, result: Answer | Failure
 ) -> Judgement:
     """Compare an answer or a refusal with the reference; a None reference means that no sample is
@@ -110,12 +110,12 @@ def judged(
         if result.outcome is not Outcome.ERROR:  # a crash or a hang is not a valid refusal
             return _all(n, Verdict.REFUSED_WRONGLY, result.message)
         kinds = [] if result.kind is None else [result.kind]
-        return Judgement(_refused(specimen, truth, n, kinds), message=result.message)
+        return Judgement(_refusal_verdicts(specimen, truth, n, kinds), message=result.message)
     shown = [output.name for output in case.outputs if not output.forces]
     points = list(dict.fromkeys(name.rpartition(".")[0] for name in shown))
-    positions = {name: _moved(result, name, "position") for name in points}
+    positions = {name: _point_quantity(result, name, "position") for name in points}
     solved = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in positions.values()])
-    verdicts = _refused(specimen, truth, n, result.failures)
+    verdicts = _refusal_verdicts(specimen, truth, n, result.failures)
     if truth is None:
         verdicts[solved] = Verdict.SILENTLY_WRONG
         return Judgement(verdicts, message=result.message, elsewhere=int(solved.sum()))
@@ -126,7 +126,7 @@ def judged(
     for name in points:
         moved = truth.points[name]
         for k, quantity in enumerate(QUANTITIES):
-            found = _moved(result, name, quantity)
+            found = _point_quantity(result, name, quantity)
             if not np.isfinite(found[known]).any():
                 continue
             compared[k] = True
@@ -138,7 +138,7 @@ def judged(
             if k == 0:
                 errors[known] = np.maximum(errors[known], off)
     wrong = (ratios > 1.0).any(axis=0)
-    forces = _judged_forces(case, truth, result, known & ~wrong, ratios[3])
+    forces = _judge_forces(case, truth, result, known & ~wrong, ratios[3])
     compared[3] = bool(np.isfinite(ratios[3]).any() and (ratios[3] > 0.0).any())
     told = max(result.residual, float(result.details.get("redundant_residual") or 0.0))
     if specimen.tilt is not None and truth.violated is not None:
@@ -160,7 +160,7 @@ def judged(
     )
 
 
-def _judged_forces(
+def _judge_forces(
     case: Case, truth: Truth, result: Answer, known: NDArray[np.bool_], ratios: Array
 ) -> dict[Verdict, NDArray[np.bool_]]:
     """Return masks of the samples with wrong forces, by verdict, the worst first.
@@ -190,7 +190,7 @@ def _judged_forces(
     return {**found, Verdict.UNSUPPORTED: lacking}
 
 
-def _refused(
+def _refusal_verdicts(
     specimen: Specimen, truth: Truth | None, n: int, kinds: Collection[FailureKind]
 ) -> NDArray[np.object_]:
     """Return the verdicts on a refusal of all samples, by its reasons."""
@@ -208,7 +208,7 @@ def _all(n: int, verdict: Verdict, message: str) -> Judgement:
     return Judgement(np.full(n, verdict, dtype=object), message=message)
 
 
-def _moved(result: Answer, point: str, quantity: str) -> Array:
+def _point_quantity(result: Answer, point: str, quantity: str) -> Array:
     """Return a quantity of a point's motion, shape (n, 3); NaN if there is none."""
     series = [getattr(result.outputs[f"{point}.{axis}"], quantity) for axis in "xyz"]
     n = len(result.outputs[f"{point}.x"].position)
@@ -227,7 +227,7 @@ MOST_INTERPRETED = 2000
 """Largest number of samples solved without compilation."""
 
 
-def suited(engine: Engine, case: Case, number: int) -> Engine:
+def suitable_engine(engine: Engine, case: Case, number: int) -> Engine:
     """Return the native engine, interpreted for some of the small mechanisms, which tests both
     executors. Return simulators unchanged.
     """
@@ -236,11 +236,11 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
         and len(case.sweep.values) <= MOST_INTERPRETED
     )
     if isinstance(engine, NativeEngine) and number % INTERPRETED == INTERPRETED - 1 and small:
-        return interpreted(engine)
+        return with_numpy_executor(engine)
     return engine
 
 
-def interpreted(engine: NativeEngine) -> NativeEngine:
+def with_numpy_executor(engine: NativeEngine) -> NativeEngine:
     """Return the native engine with numpy as executor: compilation does not pay for a single
     solution.
     """

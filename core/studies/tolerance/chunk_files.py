@@ -82,8 +82,8 @@ class Part:
                     kept = file.tell()
                     yield chunk
         else:
-            self._try(lambda: self.path.write_bytes(head))
-        self._try(lambda: self._append_at(kept))
+            self._try_write(lambda: self.path.write_bytes(head))
+        self._try_write(lambda: self._append_at(kept))
 
     def add(self, chunk: Chunk) -> None:
         """Append a chunk."""
@@ -93,7 +93,7 @@ class Part:
             frame = (
                 len(packed).to_bytes(LENGTH, "little") + hashlib.sha256(packed).digest() + packed
             )
-            self._try(lambda: file.write(frame))
+            self._try_write(lambda: file.write(frame))
 
     def remove(self) -> None:
         """Remove the file after the study's end."""
@@ -103,7 +103,7 @@ class Part:
         os.truncate(self.path, end)
         self._file = self.path.open("ab", buffering=0)
 
-    def _try(self, write: Any) -> None:
+    def _try_write(self, write: Any) -> None:
         try:
             if not self.problems:
                 write()
@@ -198,11 +198,11 @@ class ParquetStore:
             self._writer.add_key_value_metadata(
                 {"kincheck.partial": f"{self._first} of {self._samples} variants"}
             )
-        with self._tried():
+        with self._note_errors():
             self._writer.close()
         if error is None and self.problems:
             error = KincheckError(self.problems[0])  # leaves an earlier file as it is
-        with self._tried():
+        with self._note_errors():
             self._whole.__exit__(None if error is None else type(error), error, trace)
 
     def write(self, chunk: Chunk) -> None:
@@ -217,12 +217,12 @@ class ParquetStore:
         for each in values:
             flat = arrow.array(np.ascontiguousarray(each.T).ravel())
             columns.append(arrow.FixedSizeListArray.from_arrays(flat, each.shape[0]))
-        with self._tried():
+        with self._note_errors():
             self._writer.write_table(arrow.table(columns, schema=self._schema))
         self._first += chunk.count
 
     @contextmanager
-    def _tried(self) -> Generator[None]:
+    def _note_errors(self) -> Generator[None]:
         try:
             yield
         except OSError as error:

@@ -52,7 +52,7 @@ class Check:
     progress: Callable[[int, int], None] = lambda done, total: None
 
 
-def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
+def choose_variants(samples: int, share: float, seed: int) -> frozenset[int]:
     """Return the variants to check: a random share, at least one."""
     count = min(samples, max(1, round(share * samples)))
     random = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=())))
@@ -111,12 +111,12 @@ def cross_check(study: Study, check: Check, picked: Mapping[int, Array]) -> list
     with closing(check.solver(pairs)) as attempts:
         for index, attempt in attempts:
             variant = pairs.variants[index]
-            found[variant] = judged(study, variant, attempt, picked[variant], tol)
+            found[variant] = judge_variant(study, variant, attempt, picked[variant], tol)
             check.progress(len(found), len(pairs))
     return [found[variant] for variant in sorted(found)]
 
 
-def judged(
+def judge_variant(
     study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf
 ) -> Checked:
     """Compare an engine's answer with the sweep's values.
@@ -138,7 +138,11 @@ def judged(
         variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both"
     )
     residual = result.residual if result.solved else 0.0
-    faults = [_contradicted(study, case, result, ours), excess(case, residual, tol), *result.faults]
+    faults = [
+        _contradiction(study, case, result, ours),
+        excess(case, residual, tol),
+        *result.faults,
+    ]
     if any(faults):
         message = "; ".join(filter(None, faults))
         return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=message)
@@ -189,7 +193,7 @@ def judged(
     return worst
 
 
-def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
+def _contradiction(study: Study, case: Case, answer: Answer, ours: Array) -> str:
     """Return a message if an engine has values at samples native cannot reach; else an empty text.
 
     The message gives native's reason. Near singular poses, native refuses a batch of variants

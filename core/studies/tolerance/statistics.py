@@ -42,7 +42,7 @@ class Summary:
             return np.where(self.count > 1, np.sqrt(self.squares / (self.count - 1)), np.nan)
 
 
-def nothing(quantities: int, n: int) -> Summary:
+def empty_summary(quantities: int, n: int) -> Summary:
     """Return the summary of no variants."""
     none, unknown = np.zeros((quantities, n)), np.full((quantities, n), np.nan)
     extremes = np.full((quantities, 2), -1, dtype=np.int64)
@@ -76,7 +76,7 @@ def summary_of(values: Array, first: int) -> Summary:
     return Summary(count, least, most, mean, np.einsum("qnv,qnv->qn", away, away), extremes)
 
 
-def merged(a: Summary, b: Summary) -> Summary:
+def merge(a: Summary, b: Summary) -> Summary:
     """Return the summary of the variants of both; b's variants come after a's.
 
     Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm

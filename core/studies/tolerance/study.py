@@ -27,7 +27,7 @@ from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..variation.study_choices import Mode
 from ..variation.variation import Stream, Variation, generator
-from .statistics import Summary, merged, nothing, summary_of
+from .statistics import Summary, empty_summary, merge, summary_of
 
 COUNTS = 7
 """Counts of a limit, seven numbers of variants: all; incomplete; with a sample below, and with a
@@ -137,7 +137,7 @@ class Chunk:
         return Chunk(
             later.index,
             self.count + later.count,
-            merged(self.summary, later.summary),
+            merge(self.summary, later.summary),
             self.kept + later.kept,
             {**self.picked, **later.picked},
             (self.unsolved + later.unsolved)[:MOST_MESSAGES],
@@ -234,13 +234,13 @@ class Study:
         )
 
     @property
-    def nothing(self) -> Chunk:
+    def empty_chunk(self) -> Chunk:
         """The results of no variants, before the first chunk."""
         rows, n = len(self.rows), len(self.case.sweep.values)
         limited = np.zeros((len(self.limits) + 1, COUNTS), dtype=np.int64)
         kept = (np.empty((rows, n, 0)),)
         effects = (np.empty((rows, 0)),)
-        return Chunk(-1, 0, nothing(rows, n), kept, {}, (), 0, 0, limited, effects)
+        return Chunk(-1, 0, empty_summary(rows, n), kept, {}, (), 0, 0, limited, effects)
 
     def of_variant(self, index: int) -> Case:
         """The case with the geometry of one variant."""
@@ -350,7 +350,7 @@ class Ready:
         count = min(study.of_a_chunk, study.samples - first)
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
-        found = study.nothing
+        found = study.empty_chunk
         for start in range(0, count, self.lanes):
             part = slice(start, start + self.lanes)
             found += self._part(index, first + start, offsets[:, part], chosen[part])

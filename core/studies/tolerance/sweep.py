@@ -40,7 +40,7 @@ from ..variation.variation import Variation
 from . import results
 from .chunk_files import Part
 from .conformance import capabilities, histogram, worst_sample
-from .cross_check import Check, Checked, chosen, cross_check, require_able
+from .cross_check import Check, Checked, choose_variants, cross_check, require_able
 from .statistics import quantiles
 from .study import Chunk, Ready, Study, gradients
 
@@ -99,13 +99,13 @@ def on_cluster(address: str, silent: float = SILENT) -> Source:
                     for late in islice(waiting, max(0, more)):
                         tasks.submit(late, (solve_there, packed, late, VERSION))
                     number, found = tasks.next()
-                    ready[number] = _answered(found, address)
+                    ready[number] = _chunk_or_error(found, address)
                 yield ready.pop(index)
 
     return solve
 
 
-def _answered(found: Chunk | Exception, address: str) -> Chunk:
+def _chunk_or_error(found: Chunk | Exception, address: str) -> Chunk:
     """Return a chunk; raise an exception in its place with an explanation."""
     if isinstance(found, Chunk):
         return found
@@ -225,10 +225,10 @@ def sweep_designs(
     study = Study(case, variation, count, seed, order, tol, whole=store is not None)
     if check is not None:
         require_able(study, check)
-        study = replace(study, picked=chosen(study.samples, check.share, seed))
-    study = replace(study, subset=min(1.0, _kept(study) / study.samples))
+        study = replace(study, picked=choose_variants(study.samples, check.share, seed))
+    study = replace(study, subset=min(1.0, _subset_size(study) / study.samples))
     ready = Ready.of(study)
-    found = study.nothing
+    found = study.empty_chunk
     for chunk in part.finished(study) if part is not None else ():
         found += _without_store(chunk, store)
     begin, cpu, earlier = perf_counter(), process_time(), found.count
@@ -267,7 +267,7 @@ def sweep_designs(
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
     run["cases"][case.name]["notes"] += ready.designs.start_notes(tol)
-    measured = _measured(
+    measured = _speed_figures(
         study, found.count - earlier, jobs if source is None else None, seconds, processor
     )
     return results.SweepResults(
@@ -337,11 +337,11 @@ def how_many(variation: Variation, samples: int | None) -> int:
     return listed
 
 
-def _kept(study: Study) -> int:
+def _subset_size(study: Study) -> int:
     return max(1, min(KEPT, KEPT_BYTES // (8 * len(study.rows) * len(study.case.sweep.values))))
 
 
-def _measured(
+def _speed_figures(
     study: Study, solved: int, jobs: int | None, seconds: float, cpu: float
 ) -> dict[str, Any]:
     """Return the rates of solving and reducing variants; a cluster has no rates by core."""

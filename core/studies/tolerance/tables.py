@@ -269,12 +269,12 @@ def envelope_csv(results: SweepResults) -> str:
     for name, each in results.outputs.items():
         unit, scale = results.shown_unit(each.unit)
         numbers = [
-            getattr(each, key) if key == "count" else scaled(scale, getattr(each, key))
+            getattr(each, key) if key == "count" else scale_values(scale, getattr(each, key))
             for key in _STATISTICS
         ]
         quantiles = [*each.quantiles.values(), *(each.standard_errors or {}).values()]
-        numbers += [scaled(scale, column) for column in quantiles]
-        for k, value in enumerate(scaled(driver_scale, results.driver[swept])):
+        numbers += [scale_values(scale, column) for column in quantiles]
+        for k, value in enumerate(scale_values(driver_scale, results.driver[swept])):
             found = (column[k] for column in numbers)
             rows.append([name, unit, k, value, driver_unit, *found, *partial])
     return csv_text(columns, rows)
@@ -289,7 +289,7 @@ def gradient_csv(results: SweepResults) -> str:
     for each in results.gradients:
         unit, scale = results.shown_unit(results.outputs[each.output].unit)
         its, factor = results.shown_unit(results.unit_of(each.coordinate))
-        at, largest, error = scaled(scale / factor, [getattr(each, key) for key in numbers])
+        at, largest, error = scale_values(scale / factor, [getattr(each, key) for key in numbers])
         rows.append(
             [
                 *(each.output, each.coordinate, f"({unit})/({its})"),
@@ -311,13 +311,13 @@ def limits_csv(results: SweepResults) -> str:
         counts = (each.known, each.below, each.above, each.outside, each.incomplete)
         interval = each.interval or (None, None)
         indices = (each.cp, each.cpk, each.by_quantiles, each.sample)
-        limits = scaled(scale, [each.low, each.high])
+        limits = scale_values(scale, [each.low, each.high])
         name = each.output or "all"
         shares = (each.share_of_all, each.share_of_complete)
         rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
     return csv_text(columns, rows)
 
 
-def scaled(scale: float, values: Iterable[float | None]) -> list[float | None]:
+def scale_values(scale: float, values: Iterable[float | None]) -> list[float | None]:
     """Return numbers times a factor; None stays None."""
     return [None if value is None else scale * value for value in values]

@@ -24,7 +24,7 @@ from ...case.case import Case
 from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...trajectory import Array
-from .motion import ROUND_OFF, Solved, System, Truth, carried
+from .motion import ROUND_OFF, Solved, System, Truth, point_motion
 from .rows import Real, cross, extended, inner, triad
 
 # Fractions of a unit multiplier: values below the first are round-off, values above the second are
@@ -138,10 +138,10 @@ class _Loaded:
         """Return the arm of a body's point, its place from the origin, velocity and acceleration
         [SI], each of shape (3, n).
         """
-        arm, (moved, v, a) = carried(self.rows, self.solved, body, point)
+        arm, (moved, v, a) = point_motion(self.rows, self.solved, body, point)
         return arm, (extended(point) - self.rows.origin)[:, None] + moved, v, a
 
-    def _turned(self, body: int, a: Any) -> Real:
+    def _current_vector(self, body: int, a: Any) -> Real:
         """Return a vector of a body in its current direction, shape (3, n)."""
         return extended(a)[:, None] + self.solved.poses.swing(body, extended(a))
 
@@ -180,7 +180,7 @@ class _Loaded:
         if isinstance(each, TorsionSpringDamper):
             return self._torsion(each)
         k = self.rows.index(each.body)
-        vector = self._turned(k if each.frame == "body" else 0, each.vector)
+        vector = self._current_vector(k if each.frame == "body" else 0, each.vector)
         if isinstance(each, Torque):
             self.demand[k, 1] -= vector
             self._grow(vector / self.size)
@@ -208,11 +208,15 @@ class _Loaded:
         joint: Any = self.mechanism.joint(each.joint)
         i, j = map(self.rows.index, joint.bodies)
         f, g, h = triad(joint.axis)
-        axis, w = self._turned(i, h), self.solved.v[:, 3:]
+        axis, w = self._current_vector(i, h), self.solved.v[:, 3:]
         if joint.name in self.system.driving:
             angle = self.drives[self.system.driving[joint.name]]
         else:  # known within a turn
-            f_i, g_i, f_j = self._turned(i, f), self._turned(i, g), self._turned(j, f)
+            f_i, g_i, f_j = (
+                self._current_vector(i, f),
+                self._current_vector(i, g),
+                self._current_vector(j, f),
+            )
             angle = np.arctan2(inner(g_i, f_j), inner(f_i, f_j))
             angle = np.where(np.abs(angle) < SAME_TURN, angle, np.nan)
         rate = inner(axis, w[j] - w[i])

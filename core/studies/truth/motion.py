@@ -98,7 +98,7 @@ class Solved:
         return Solved(poses=self.poses.at(lanes), **parts)
 
     @staticmethod
-    def joined(parts: Sequence[Solved]) -> Solved:
+    def join(parts: Sequence[Solved]) -> Solved:
         """Return the samples of all parts."""
         u, q = zip(*((part.poses.u, part.poses.q) for part in parts), strict=True)
         poses = Poses(np.concatenate(u, -1), np.concatenate(q, -1))
@@ -120,7 +120,7 @@ def condition(inverse: Array) -> Array:
     return np.maximum(1.0, np.abs(inverse).sum(axis=2).max(axis=1))
 
 
-def inverted(jacobian: Array) -> Array:
+def inverses(jacobian: Array) -> Array:
     """Return the inverses, or the pseudo-inverses for redundant rows; NaN if there is none."""
     finite = np.isfinite(jacobian).all(axis=(1, 2), keepdims=True)
     sound = np.where(finite, jacobian, 0.0)
@@ -188,7 +188,7 @@ class System:
         for k, joint in enumerate(rows.turning):
             if joint in self.driving:
                 near[k] = drives[0, self.driving[joint]]
-        inverse = inverted(rows.jacobian(poses, near))
+        inverse = inverses(rows.jacobian(poses, near))
         last, largest = np.full(poses.samples, np.inf), np.inf
         for _ in range(MOST_STEPS):
             residual = rows.residual(poses, drives[0], near)
@@ -204,9 +204,9 @@ class System:
             before, largest = largest, float(size[good].max())
             # else the old J still gains at least three digits per step
             if largest > 1e-5 or largest > 1e-3 * before:
-                inverse = inverted(rows.jacobian(poses, near))
+                inverse = inverses(rows.jacobian(poses, near))
         jacobian = rows.jacobian(poses, near)
-        inverse = inverted(jacobian)
+        inverse = inverses(jacobian)
         forced = np.zeros((2, len(rows.owners), poses.samples), dtype=np.longdouble)
         for k, (row, size) in enumerate(rows.driven):
             forced[:, row] = size * drives[1:, k]
@@ -248,9 +248,9 @@ class System:
                 break
             else:
                 h = 0.5 * dt
-        return Solved.joined(found), fold
+        return Solved.join(found), fold
 
-    def between(self, knots: Solved, samples: Indices) -> Solved:
+    def interpolate(self, knots: Solved, samples: Indices) -> Solved:
         """Return samples of the sweep on the path through the knots; the step is infinite if J
         changes too much from the nearer knot.
         """
@@ -400,7 +400,7 @@ def chunks(samples: Indices) -> Iterator[Indices]:
         yield samples[first : first + LANES]
 
 
-def followed(case: Case) -> Truth:
+def follow_motion(case: Case) -> Truth:
     """Return the reference followed from the design in both directions."""
     found = Truth.unknown(case, Reach.UNKNOWN)
     system, times = found.system, found.system.path.times
@@ -412,7 +412,7 @@ def followed(case: Case) -> Truth:
         at, worst = np.abs(knots.times), np.maximum.accumulate(knots.condition)
         for chunk in chunks(side[away <= at[-1]]):
             # if nothing moves, only the design is known, and all samples are there
-            solved = system.between(knots, chunk) if len(at) > 1 else knots.at(0 * chunk)
+            solved = system.interpolate(knots, chunk) if len(at) > 1 else knots.at(0 * chunk)
             found.reach[chunk] = np.where(solved.step <= POLISHED, Reach.REACHED, Reach.UNKNOWN)
             passed = worst[np.searchsorted(at, np.abs(times[chunk]))]
             found.singular[chunk] = np.maximum(passed, solved.condition) >= SINGULAR
@@ -467,7 +467,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
     found.singular[:] |= bool(system.design().condition[0] >= SINGULAR)
     for time in np.divide(nearest, case.sweep.rate):
         poses = closed_poses(system.rows, motion, system.drives(np.array([time]))[0])
-        if not condition(inverted(system.rows.jacobian(poses)))[0] < UNPOLISHED:
+        if not condition(inverses(system.rows.jacobian(poses)))[0] < UNPOLISHED:
             found.singular[:] |= times * time > time * time
     for side in outwards(times, 0.0):
         # beyond a gap a formula may have values, but no motion leads there
@@ -491,7 +491,9 @@ def closed_poses(rows: Rows, motion: Motion, values: Real) -> Poses:
     return found
 
 
-def carried(rows: Rows, found: Solved, body: int, position: Sequence[float]) -> tuple[Real, Real]:
+def point_motion(
+    rows: Rows, found: Solved, body: int, position: Sequence[float]
+) -> tuple[Real, Real]:
     """Return the arm of a body's point, (3, n), and its displacement, velocity and acceleration,
     (3, 3, n) [SI].
 
@@ -513,7 +515,7 @@ def _motion(system: System, found: Solved, name: str) -> tuple[Real, Array]:
     """
     rows, point = system.rows, system.mechanism.point(name)
     body, size = rows.index(point.body), rows.unit
-    arm, motion = carried(rows, found, body, point.position)
+    arm, motion = point_motion(rows, found, body, point.position)
     motion[0] += extended(point.position)[:, None]
     x = np.abs(motion[0]).max(axis=0).astype(np.float64)
     if not body:

@@ -338,8 +338,8 @@ class Rows:
     def angles(self, poses: Poses) -> Real:
         """Return the angle of every turn, within half a turn of zero [rad], shape (turns, n)."""
         f, g, _ = self._axes
-        f_i, g_i = (self._carried(poses, self._i, a) for a in (f, g))
-        f_j = self._carried(poses, self._j, f)
+        f_i, g_i = (self._arms(poses, self._i, a) for a in (f, g))
+        f_j = self._arms(poses, self._j, f)
         return np.arctan2(inner(g_i, f_j), inner(f_i, f_j))
 
     def residual(self, poses: Poses, driven: Real, near: Real) -> Real:
@@ -360,7 +360,7 @@ class Rows:
         """Return the terms of all rows, and the coordinates that others follow."""
         (x, _), (y, _) = self._vectors(poses)
         angles = self.angles(poses)
-        found = self._summed(inner(x, y), angles if near is None else nearest_turn(angles, near))
+        found = self._sum_terms(inner(x, y), angles if near is None else nearest_turn(angles, near))
         return found - extended(self._constants)[:, None]
 
     def jacobian(self, poses: Poses, near: Real | None = None) -> NDArray[np.float64]:
@@ -380,7 +380,7 @@ class Rows:
         slopes = self._weight[..., None, None] * SIGNS * slopes
         np.add.at(found, (self._row[:, None], self._bodies), slopes.astype(np.float64))
         h = self._axes[2]
-        turns = (self._turn_weight[..., None] * self._carried(poses, self._i, h)).astype(np.float64)
+        turns = (self._turn_weight[..., None] * self._arms(poses, self._i, h)).astype(np.float64)
         np.add.at(found[:, :, 3:], (self.turn_rows, self._i), -turns)
         np.add.at(found[:, :, 3:], (self.turn_rows, self._j), turns)
         for row, behind, unit, function in self._curves:
@@ -400,15 +400,15 @@ class Rows:
         (x, x_arms), (y, y_arms) = self._vectors(poses)
         both = v[self._bodies], w[self._bodies]
         (x_t, x_tt), (y_t, y_tt) = self._x.rates(*both, x_arms), self._y.rates(*both, y_arms)
-        h_t = cross(w[self._i], self._carried(poses, self._i, self._axes[2]))
+        h_t = cross(w[self._i], self._arms(poses, self._i, self._axes[2]))
         spin = w[self._j] - w[self._i]
-        found = self._summed(
+        found = self._sum_terms(
             inner(x_tt, y) + 2.0 * inner(x_t, y_t) + inner(x, y_tt), inner(h_t, spin)
         )
         if not self._curves:
             return found
-        h, values = self._carried(poses, self._i, self._axes[2]), self._values(poses, near)
-        once = self._summed(inner(x_t, y) + inner(x, y_t), inner(h, spin))
+        h, values = self._arms(poses, self._i, self._axes[2]), self._values(poses, near)
+        once = self._sum_terms(inner(x_t, y) + inner(x, y_t), inner(h, spin))
         for row, behind, unit, function in self._curves:
             _, slope, bend = function.at(values[behind])
             found[row] -= (slope * found[behind] + bend * once[behind] ** 2) / unit
@@ -417,10 +417,10 @@ class Rows:
     def _vectors(self, poses: Poses) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
         return self._x.at(poses, self._bodies), self._y.at(poses, self._bodies)
 
-    def _carried(self, poses: Poses, bodies: Indices, a: Real) -> Real:
+    def _arms(self, poses: Poses, bodies: Indices, a: Real) -> Real:
         return a[..., None] + poses.swing(bodies, a)
 
-    def _summed(self, products: Real, turns: Real) -> Real:
+    def _sum_terms(self, products: Real, turns: Real) -> Real:
         found = np.zeros((len(self._constants), products.shape[-1]), dtype=np.longdouble)
         np.add.at(found, self._row, self._weight * products / self._length)
         np.add.at(found, self.turn_rows, self._turn_weight * turns)

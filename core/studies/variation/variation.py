@@ -413,7 +413,7 @@ class Variation:
         """Return offsets of variants from the nominal design [units], (coordinates, count)."""
         if self.mode is Mode.MONTE_CARLO:
             return self._drawn(seed, first, count)
-        return self._listed(first + np.arange(count))
+        return self._listed_offsets(first + np.arange(count))
 
     def of_variant(self, seed: int, index: int) -> Array:
         """Return offsets of one variant [units], shape (coordinates,)."""
@@ -464,7 +464,7 @@ class Variation:
             )
         return np.concatenate(rows)
 
-    def _listed(self, indices: NDArray[np.int64]) -> Array:
+    def _listed_offsets(self, indices: NDArray[np.int64]) -> Array:
         found = np.zeros((len(self.coordinates), len(indices)))
         if self.mode is Mode.GRID:  # the last coordinate varies fastest
             for row in reversed(range(len(self.coordinates))):

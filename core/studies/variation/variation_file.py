@@ -215,7 +215,9 @@ class CoordinateReader:
             return [
                 each
                 for row, offsets in enumerate(lists)
-                for each in self._listed(row, axes[row], [self.scale * x for x in offsets])
+                for each in self._listed_coordinate(
+                    row, axes[row], [self.scale * x for x in offsets]
+                )
             ]
         sigma, half_width = self._sizes(keys.sigma, count), self._sizes(keys.half_width, count)
         law = Law.UNIFORM if keys.sigma is None else Law.NORMAL
@@ -232,7 +234,7 @@ class CoordinateReader:
                 found.append((row, each))
             else:
                 steps = sizes[0] * np.linspace(-1.0, 1.0, keys.steps or 2)
-                found += self._listed(row, axis, steps.tolist())
+                found += self._listed_coordinate(row, axis, steps.tolist())
         return found
 
     def require_physical(self, value: float, each: Coordinate, dimension: Dimension) -> None:
@@ -290,7 +292,9 @@ class CoordinateReader:
             )
         return given
 
-    def _listed(self, row: int, axis: str, values: Sequence[float]) -> list[tuple[int, Coordinate]]:
+    def _listed_coordinate(
+        self, row: int, axis: str, values: Sequence[float]
+    ) -> list[tuple[int, Coordinate]]:
         """Return the coordinate with its values.
 
         One at a time, the values omit zero: it is the nominal design.

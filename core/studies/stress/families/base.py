@@ -20,7 +20,7 @@ from ....mechanism.motions import Driver, JointAngle, JointDisplacement, JointDr
 from ....trajectory import Array
 from ...truth.motion import Motion as ClosedForm
 from ...truth.motion import Truth as Known
-from ...truth.motion import closed, followed
+from ...truth.motion import closed, follow_motion
 
 TOL = 1e-12
 """Largest accepted residual, as in `kincheck run`."""
@@ -65,7 +65,7 @@ class Specimen:
 
     name: str
     case: Case | KincheckError
-    truth: Callable[[Case], Known] | None = followed
+    truth: Callable[[Case], Known] | None = follow_motion
     tol: float = TOL
     reasons: frozenset[FailureKind] = frozenset()
     excused: bool = False
@@ -133,7 +133,7 @@ def swept(
     """
     values = np.linspace(first, last, samples)
     case = as_case(mechanism, mechanism.drivers[0].name, values, rate=rate, motions=motions)
-    truth = partial(closed, motion=motion, nearest=nearest or ()) if motion else followed
+    truth = partial(closed, motion=motion, nearest=nearest or ()) if motion else follow_motion
     return Specimen(name, case, truth)
 
 

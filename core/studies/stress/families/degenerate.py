@@ -24,7 +24,7 @@ from ....joints import (
 )
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import JointAngle, PointCoordinate
-from ...truth.motion import followed
+from ...truth.motion import follow_motion
 from .base import MOTION_ENDS, Rng, Specimen, as_case, direction, family
 from .linkages import any_plane, crank_rocker, four_bar, slider_crank
 
@@ -55,7 +55,7 @@ def degenerate(rng: Rng, samples: int) -> Specimen:
         case = as_case(mechanism, mechanism.drivers[0].name, values)
     except KincheckError as error:
         case = error
-    return Specimen(name, case, None if wrong else followed, reasons=reasons)
+    return Specimen(name, case, None if wrong else follow_motion, reasons=reasons)
 
 
 def _pair(joint: Callable[..., Joint], **given: Any) -> Mechanism:

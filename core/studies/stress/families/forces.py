@@ -66,9 +66,9 @@ def forces(rng: Rng, samples: int) -> Specimen:
         mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
         reach *= NEAR
         name, along = f"loop of {len(mechanism.bodies)} bodies", (direction(rng),)
-        if rng.random() < 0.5 and (doubled := _doubled(rng, mechanism)) is not None:
+        if rng.random() < 0.5 and (doubled := _with_second_hinge(rng, mechanism)) is not None:
             mechanism, name = doubled, f"{name}, a hinge twice"
-    mechanism = _loaded(rng, mechanism)
+    mechanism = _with_loads(rng, mechanism)
     motions = motions or {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
     rate, outputs = power(rng, -1.0, 1.0), _outputs(rng, mechanism, along)
     values = np.linspace(-reach, reach, samples)
@@ -77,7 +77,7 @@ def forces(rng: Rng, samples: int) -> Specimen:
     return Specimen(name, replace(case, mechanism=watched, outputs=(*case.outputs, *outputs)))
 
 
-def _doubled(rng: Rng, mechanism: Mechanism) -> Mechanism | None:
+def _with_second_hinge(rng: Rng, mechanism: Mechanism) -> Mechanism | None:
     """Return the mechanism with a second hinge on the axis of a hinge: five redundant rows."""
     hinges = [joint for joint in mechanism.joints if isinstance(joint, Revolute)]
     if not hinges:
@@ -88,7 +88,7 @@ def _doubled(rng: Rng, mechanism: Mechanism) -> Mechanism | None:
     return replace(mechanism, joints=[*mechanism.joints, twin])
 
 
-def _loaded(rng: Rng, mechanism: Mechanism) -> Mechanism:
+def _with_loads(rng: Rng, mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with masses, gravity and force elements. Some bodies have no mass, some
     masses no inertia.
     """

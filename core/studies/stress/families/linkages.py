@@ -114,7 +114,7 @@ JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
 """Ways to connect the coupler of a loop to its neighbours, with or without redundant rows."""
 
 
-def coupled(
+def coupler(
     way: str, plane: Plane, names: Sequence[str], start: complex, end: complex, label: str = ""
 ) -> tuple[list[Body], list[Joint]]:
     """Return bodies and joints of the coupler between two bodies at their points, or of a rod that
@@ -169,11 +169,11 @@ def four_bar(
         still = np.zeros((3, drives.shape[1]), dtype=np.longdouble)
         return {"crank": (plane.turned(drives[0]), extended(pivot), still)}
 
-    found, closed = beside((crank, motion), plane, b, d, c, way, "", parallel=parallel)
+    found, closed = add_loop((crank, motion), plane, b, d, c, way, "", parallel=parallel)
     return replace(found, name="four_bar"), closed
 
 
-def beside(
+def add_loop(
     first: Linkage,
     plane: Plane,
     b: complex,
@@ -192,7 +192,7 @@ def beside(
     """
     single, others = first
     rocker = f"{label}rocker"
-    bodies, joints = coupled(way, plane, ("crank", rocker, f"{label}coupler"), b, c, label)
+    bodies, joints = coupler(way, plane, ("crank", rocker, f"{label}coupler"), b, c, label)
     rest = Revolute(f"{label}rest", GROUND, rocker, plane.point(d), plane.normal)
     mechanism = Mechanism(
         "two_loops",
@@ -258,7 +258,7 @@ def slider_crank(plane: Plane, b: complex, c: complex, way: str, drive: str) -> 
     In the closed form, a quadratic equation gives the slider, or two circles give the crank.
     """
     pivot, pin, slider = (plane.point(each) for each in (0j, b, c))
-    bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), b, c)
+    bodies, joints = coupler(way, plane, ("crank", "slider", "coupler"), b, c)
     mechanism = Mechanism(
         "slider_crank",
         [Body("crank"), Body("slider", slider), *bodies],
@@ -345,7 +345,9 @@ def crank_rocker(
         turn, high = rng.uniform(0.0, 2.0 * np.pi), sign(rng)
         crank, d = rng.uniform(0.15, 0.4), complex(rng.uniform(0.8, 1.2))
         x, y = rng.uniform(0.2, 1.0), high * rng.uniform(0.5, 1.0)
-        b, d, c = (scale * each for each in gridded(grid, polar(crank, turn), d, complex(x, y)))
+        b, d, c = (
+            scale * each for each in snap_to_grid(grid, polar(crank, turn), d, complex(x, y))
+        )
         first, *bars = abs(b), abs(d), abs(c - b), abs(d - c)
         if first < min(bars) and first + max(bars) < 0.95 * (sum(bars) - max(bars)):
             return b, d, c
@@ -357,10 +359,10 @@ def turning_crank(rng: Rng, grid: float = 0.0) -> tuple[complex, ...]:
     """
     turn, crank = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.15, 0.4)
     offset = rng.uniform(-0.2, 0.2)
-    return gridded(grid, polar(crank, turn), complex(rng.uniform(1.0, 1.3), offset))
+    return snap_to_grid(grid, polar(crank, turn), complex(rng.uniform(1.0, 1.3), offset))
 
 
-def gridded(grid: float, *points: complex) -> tuple[complex, ...]:
+def snap_to_grid(grid: float, *points: complex) -> tuple[complex, ...]:
     """Return points on a grid, unless it is zero."""
     if not grid:
         return points

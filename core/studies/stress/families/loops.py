@@ -118,14 +118,14 @@ def starts(rng: Rng, samples: int) -> Specimen:
     numbers must not decide the result.
     """
     digits = str(rng.choice(DIGITS))
-    mechanism, motions = (_arm if rng.random() < 0.5 else _closed)(rng, digits)
+    mechanism, motions = (_arm if rng.random() < 0.5 else _closed_mechanism)(rng, digits)
     first, last = ((-1.0, 1.0), (0.2, 1.0), (-1.0, -0.2))[int(rng.integers(3))]
     name = f"{digits} start, {mechanism.name}, {len(mechanism.drivers)} drivers"
     times = np.linspace(first, last, samples)
     return Specimen(name, as_case(mechanism, TIME, times, motions=motions))
 
 
-def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
+def _closed_mechanism(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     """Return a random closed mechanism; its drivers swing by a part of its reach."""
     found, reach = random_mechanism(rng, lambda: int(rng.integers(1, MOST_STARTED + 1)), DRIVERS)
     mechanism = replace(found, drivers=[replace(each, relative=False) for each in found.drivers])

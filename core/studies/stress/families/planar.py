@@ -21,9 +21,9 @@ from .base import TOL, Rng, Specimen, direction, family, power, sign, swept
 from .linkages import (
     JOINTS_OF_A_LOOP,
     Plane,
+    add_loop,
     any_plane,
     area,
-    beside,
     crank_rocker,
     flat_plane,
     flats,
@@ -202,7 +202,7 @@ def near_change_points(rng: Rng, samples: int, kind: str = "") -> Specimen:
     parallel = kind == "parallelogram" and off == 0.0
     found, name = four_bar(plane, b, d, c, way, parallel=parallel), f"{kind} with {way}"
     for twin in twins:
-        found = beside(found, plane, b, d, c, twin, "twin ", parallel=parallel)
+        found = add_loop(found, plane, b, d, c, twin, "twin ", parallel=parallel)
         name = f"{kind}s with {way} and {twin}"
     name, last = f"{name}, off by {off:.2g}", NEARLY_A_TURN
     return swept(name, *found, -last, last, samples, nearest=flats(b, d))
@@ -256,7 +256,7 @@ def corners(rng: Rng, samples: int) -> Specimen:
     # loop
     if rng.random() < 0.5:
         ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
-        found = beside(found, plane, *crank_rocker(rng, ratio), hung, "small ")
+        found = add_loop(found, plane, *crank_rocker(rng, ratio), hung, "small ")
         name = f"{name}, beside a loop of {ratio:.2g} with {hung}"
     return swept(name, *found, 0.0, last, samples, nearest=flats(b, d))
 
@@ -305,14 +305,14 @@ def redundant(rng: Rng, samples: int) -> Specimen:
     found = swept(f"four_bar, one hinge off by {tilt:.2g} rad", tilted, None, -2.0, 2.0, samples)
     return replace(
         found,
-        truth=partial(_tilted, sound=sound, motion=motion, tilt=tilt),
+        truth=partial(_truth_with_tilt, sound=sound, motion=motion, tilt=tilt),
         reasons=CONTRADICTIONS,
         excused=tilt > ROUNDED,
         tilt=tilt,
     )
 
 
-def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
+def _truth_with_tilt(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
     """Return the truth of the untilted mechanism, with bounds that allow for another choice of
     rows. Rows with an error of the tilt move the pose by K times the tilt. The inverse of another
     choice of rows is at most K times larger.
