@@ -57,12 +57,12 @@ def writer(name: str) -> Any:
 
 
 CONVERTERS = {"mujoco": "mujoco.saved"}
-"""Simulators with converters: name on the command line -> module with `saved`."""
+"""Simulators with converters: name on the command line -> module with `convert`."""
 
 
 def converter(name: str) -> Any:
     """Return the function from a model's file to the text saved by a simulator."""
-    return importlib.import_module(f".{CONVERTERS[name]}", __name__).saved
+    return importlib.import_module(f".{CONVERTERS[name]}", __name__).convert
 
 
 _MUJOCO = "shared/stepper_mjcf.py"

@@ -39,7 +39,7 @@ def cache_last(
     """
 
     def keep(function: Any) -> Any:
-        recent: Any = _OfThread(count, function) if per_thread else _kept(count, function)
+        recent: Any = _OfThread(count, function) if per_thread else _cache_results(count, function)
         if (is_kept := when) is None:
             return recent
 
@@ -63,7 +63,7 @@ def clear_caches() -> None:
         each.cache_clear()
 
 
-def _kept(count: int, function: Callable[..., Any]) -> Any:
+def _cache_results(count: int, function: Callable[..., Any]) -> Any:
     kept = lru_cache(maxsize=count)(function)
     with _lock:
         _results.add(kept)
@@ -99,7 +99,7 @@ class _OfThread(local):
     """A function with results of each thread, which end with the thread."""
 
     def __init__(self, count: int, function: Callable[..., Any]) -> None:
-        self._call = _kept(count, function)
+        self._call = _cache_results(count, function)
 
     def __call__(self, *args: Hashable) -> Any:
         return self._call(*args)

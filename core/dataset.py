@@ -69,10 +69,10 @@ class Dataset:
         found = dict[str, Variable]()
         for name, each in (*self.coords.items(), *self.variables.items()):
             if not set(each.dims) <= set(self.coords) - set(self.rows):  # not the labels themselves
-                found.update(self._unfolded(name, each))
+                found.update(self._unfold(name, each))
         return found
 
-    def _unfolded(self, name: str, each: Variable) -> Iterator[tuple[str, Variable]]:
+    def _unfold(self, name: str, each: Variable) -> Iterator[tuple[str, Variable]]:
         further = [dim for dim in each.dims if dim not in self.rows]
         dims = [dim for dim in self.rows if dim in each.dims]
         values = np.transpose(each.values, [each.dims.index(dim) for dim in (*further, *dims)])
@@ -112,6 +112,6 @@ class Dataset:
             if along in each.dims and each.values.dtype.kind == "f":
                 found[name] = {
                     column: np.moveaxis(one.values, one.dims.index(along), 0)
-                    for column, one in self._unfolded(name, each)
+                    for column, one in self._unfold(name, each)
                 }
         return found

@@ -37,7 +37,7 @@ def refuse(problems: Iterable[str]) -> None:
 
 
 @contextmanager
-def collected(problems: list[str]) -> Generator[None]:
+def collect_errors(problems: list[str]) -> Generator[None]:
     """Add the lines of a KincheckError to the problems, and go on behind the block."""
     try:
         yield

@@ -165,7 +165,7 @@ def view(
     seen = MARGIN + scale * (seen - low)
     at, of_rods = seen[: len(spots)], seen[len(spots) :].reshape(-1, 2, *seen.shape[1:])
     names = [*dict.fromkeys(name for name, _ in spots)]
-    parts = [_moving(rod, "#777", " stroke-dasharray='7 4'") for rod in of_rods]
+    parts = [_moving_line(rod, "#777", " stroke-dasharray='7 4'") for rod in of_rods]
     moving = [name for name in names if name not in fixed]
     for name in names:
         own = at[[k for k, (body, _) in enumerate(spots) if body == name]]
@@ -179,7 +179,7 @@ def view(
             continue
         colour = COLOURS[moving.index(name) % len(COLOURS)]
         hub = mine.mean(axis=0)
-        parts += [_moving(np.array([hub, end]), colour, " stroke-width='2.5'") for end in mine]
+        parts += [_moving_line(np.array([hub, end]), colour, " stroke-width='2.5'") for end in mine]
         x, y = hub[0]
         parts.append(f"<text x='{x + 6:.1f}' y='{y - 6:.1f}' fill='{colour}'>{escape(name)}</text>")
     width, height = (2 * MARGIN + scale * (high - low)).round().astype(int).tolist()
@@ -190,7 +190,7 @@ def view(
     )
 
 
-def _moving(ends: NDArray[np.float64], colour: str, look: str) -> str:
+def _moving_line(ends: NDArray[np.float64], colour: str, look: str) -> str:
     """Return a line between two ends, shape (2, frames, 2) [px]."""
     drawn = [f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in ends.swapaxes(0, 1)]
     there_and_back = ";".join([*drawn, *drawn[::-1]])

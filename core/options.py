@@ -188,9 +188,10 @@ def with_values(found: T, **values: Any) -> T:
     return other
 
 
-def declared(cls: Any) -> Iterator[tuple[Field[Any], Option | None, Any]]:
+def option_fields(cls: Any) -> Iterator[tuple[Field[Any], Option | None, Any]]:
     """Yield the fields of a class, each with its option, or with the class of its group."""
-    for each in fields(cls):
+    last: Sequence[str] = getattr(cls, "LAST", ())
+    for each in sorted(fields(cls), key=lambda each: each.name in last):
         meaning, below = each.metadata.get("option"), each.metadata.get("group")
         if meaning is not None or below is not None:
             yield each, meaning, below
@@ -208,7 +209,7 @@ def read_values(found: T) -> T:
         KincheckError: a value cannot be read.
     """
     values: dict[str, Any] = {}
-    for each, meaning, below in declared(type(found)):
+    for each, meaning, below in option_fields(type(found)):
         value: Any = getattr(found, each.name)
         default: Any = cast("Any", each).default
         if not each.init:
@@ -261,7 +262,7 @@ def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable
     import inspect  # slow
     from textwrap import fill
 
-    first = next(iter(declared(command)))[1]
+    first = next(iter(option_fields(command)))[1]
 
     def found(*args: Any, **kwargs: Any) -> Any:
         if len(args) > 1 and first is not None and first.nargs == "+":
@@ -274,7 +275,7 @@ def function_of(name: str, command: Any, call: Callable[[Any], Any]) -> Callable
         return call(read_values(command(*args, **kwargs)))
 
     signature, answer = inspect.signature(command), inspect.signature(command.answer)
-    helps = {each.name: each for each, meaning, _ in declared(command) if meaning is not None}
+    helps = {each.name: each for each, meaning, _ in option_fields(command) if meaning is not None}
     lines = [
         fill(
             f"{each}: {option.metadata['option'].help % {'default': option.default}}.",
@@ -333,7 +334,7 @@ def positive(text: str) -> float:
     return found
 
 
-def measured(text: str) -> str:
+def number_with_unit(text: str) -> str:
     """Return the text of an option that is a number, with or without a unit."""
     if not re.fullmatch(r"\s*[-+]?[\d.]*\d\.?(?:[eE][-+]?\d+)?\s*[A-Za-z]*\s*", text):
         raise KincheckError(f"{text!r} is not a number. Give one such as 0.02, 20mm or -3deg.")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from .support.case_texts import rows
 from .support.sources import SOURCES, folder_of, imported, module_of, tree
 
 LAYERS = (
@@ -165,7 +166,7 @@ def imports_against_the_table(path, syntax):
             yield f"imports {'.'.join(target)}: engines share adapters/shared only"
 
 
-def test_sources_import_by_the_table():
+def test_sources_import_by_table():
     found = {
         str(path): offences
         for path in SOURCES
@@ -174,60 +175,44 @@ def test_sources_import_by_the_table():
     assert found == {}
 
 
-OFFENDERS = [
-    ("core/algebra.py", "from .mechanism.motions import JointAngle"),
-    ("core/primitives/new.py", "from ..joints.base import Joint"),
-    ("core/kinematics/new.py", "from ..harness import record"),
-    ("core/kinematics/new.py", "def f():\n    from .. import harness"),
-    (
-        "core/kinematics/formulation/new.py",
-        "from ..structure.components import Section",
-    ),
-    ("core/kinematics/continuation/new.py", "from .. import blocks"),
-    ("core/harness/run.py", "from ... import adapters"),
-    ("core/kincheck/new.py", "from kincheck.adapters import engine"),
-    ("core/kincheck/new.py", "from kincheck.core.program import Tape"),
-    ("core/harness/run.py", "from ...cases import load"),
-    ("core/history/new.py", "from ..report import table"),
-    ("core/extra/new.py", "from ..algebra import Vec3"),
-    ("core/mechanism/new.py", "from kincheck.core.joints import Joint"),
-    (
-        "adapters/mujoco/new.py",
-        "from ..pinocchio.dynamics import Dynamics",
-    ),
-    ("adapters/shared/new.py", "from ..mujoco.mujoco import MuJoCo"),
-    ("adapters/mujoco/new.py", "from ...cases import load"),
-    ("cases/rssr.py", "from ..adapters import engine"),
-]
+OUTSIDE = """
+core/algebra.py | from .mechanism.motions import JointAngle
+core/primitives/new.py | from ..joints.base import Joint
+core/kinematics/new.py | from ..harness import record
+core/kinematics/new.py | def f():\\n    from .. import harness
+core/kinematics/formulation/new.py | from ..structure.components import Section
+core/kinematics/continuation/new.py | from .. import blocks
+core/harness/run.py | from ... import adapters
+core/kincheck/new.py | from kincheck.adapters import engine
+core/kincheck/new.py | from kincheck.core.program import Tape
+core/harness/run.py | from ...cases import load
+core/history/new.py | from ..report import table
+core/extra/new.py | from ..algebra import Vec3
+core/mechanism/new.py | from kincheck.core.joints import Joint
+adapters/mujoco/new.py | from ..pinocchio.dynamics import Dynamics
+adapters/shared/new.py | from ..mujoco.mujoco import MuJoCo
+adapters/mujoco/new.py | from ...cases import load
+cases/rssr.py | from ..adapters import engine
+"""
+INSIDE = """
+core/kinematics/compiled/new.py | from ...program import Tape\\nfrom . import request
+core/cli/main.py | def f():\\n    from ... import adapters, cases
+adapters/mujoco/new.py
+    | from ...core.mechanism.mechanism import Body\\nfrom ..shared.projection import project
+"""
 
 
-@pytest.mark.parametrize(("path", "text"), OFFENDERS)
-def test_offenders_are_found(path, text):
+@pytest.mark.parametrize(("path", "text"), rows(OUTSIDE, named=False))
+def test_import_outside_table_is_found(path, text):
     assert list(imports_against_the_table(Path(path), ast.parse(text)))
 
 
-ALLOWED = [
-    (
-        "core/kinematics/compiled/new.py",
-        "from ...program import Tape\nfrom . import request",
-    ),
-    (
-        "core/cli/main.py",
-        "def f():\n    from ... import adapters, cases",
-    ),
-    (
-        "adapters/mujoco/new.py",
-        "from ...core.mechanism.mechanism import Body\nfrom ..shared.projection import project",
-    ),
-]
-
-
-@pytest.mark.parametrize(("path", "text"), ALLOWED)
-def test_allowed_code_passes(path, text):
+@pytest.mark.parametrize(("path", "text"), rows(INSIDE, named=False))
+def test_import_inside_table_passes(path, text):
     assert list(imports_against_the_table(Path(path), ast.parse(text))) == []
 
 
-def test_the_table_is_exact():
+def test_import_table_is_exact():
     """Every folder has a row, and every arrow of the table is used."""
     arrows: dict[str, set[str]] = {
         folder_of(path): set() for path in SOURCES if path.parts[0] == "core"
@@ -246,7 +231,7 @@ def test_the_table_is_exact():
     assert set(MAY_IMPORT) == set(arrows)
 
 
-def test_imports_run_down_the_layers_and_never_in_a_circle():
+def test_import_table_follows_layers():
     level = {folder: k for k, layer in enumerate(LAYERS) for folder in layer}
     up = [
         (folder, other)
@@ -262,7 +247,7 @@ def test_imports_run_down_the_layers_and_never_in_a_circle():
     TopologicalSorter(MAY_IMPORT).prepare()
 
 
-def test_no_files_import_each_other_in_a_circle():
+def test_files_have_no_circular_imports():
     """Imports in functions and for type checkers count too."""
     arrows = {}
     for path in SOURCES:

@@ -54,7 +54,7 @@ DRAWN = {"Trajectory", "Designs", "Curve", "Record"}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_result_tells_itself(results, kind):
+def test_result_has_repr_and_html(results, kind):
     found = results[kind]
     assert re.fullmatch(f"<{kind}: .{{5,150}}>", repr(found))
     html = found._repr_html_()
@@ -64,7 +64,7 @@ def test_every_result_tells_itself(results, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_pandas_and_xarray_hold_the_same_numbers(results, kind):
+def test_result_pandas_and_xarray_equal_dataset(results, kind):
     pytest.importorskip("pandas")
     pytest.importorskip("xarray")
     data, frame, arrays = (
@@ -81,7 +81,7 @@ def test_pandas_and_xarray_hold_the_same_numbers(results, kind):
         assert arrays[name].attrs.get("units", "") == each.unit
 
 
-def test_plots_of_a_suspension_have_six_useful_axes(tmp_path):
+def test_suspension_plot_has_six_curves(tmp_path):
     pytest.importorskip("matplotlib")
     (tmp_path / "car.csv").write_text(sample_table(TEMPLATES["mcpherson"]))
     supplied = kincheck.Supplied(travel="0.05:3")
@@ -95,7 +95,7 @@ def test_plots_of_a_suspension_have_six_useful_axes(tmp_path):
     assert re.search(r"\d\d further curves", html)
 
 
-def test_mechanisms_are_seen_in_three_dimensions(results):
+def test_mechanism_html_view(results):
     html = rssr()._repr_html_()
     assert html.count("<path") == 1 + 4  # the rod, and each body from its middle to its joints
     assert html.count("<rect") == 2  # on the ground
@@ -108,7 +108,7 @@ def test_mechanisms_are_seen_in_three_dimensions(results):
     assert kincheck.Mechanism("a<b", [kincheck.Body("x")], [])._repr_html_().count("a&lt;b") == 1
 
 
-def test_views_move_as_the_bodies_do():
+def test_scene_view_moves_as_bodies():
     """A crank from its pin at the origin, half a turn about z: its end passes to the other side."""
     half_turns = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
     crank = SceneBody(
@@ -130,7 +130,7 @@ def test_views_move_as_the_bodies_do():
     assert first != last
 
 
-def test_a_trajectory_knows_drivers_time_and_units(results):
+def test_trajectory_has_drive_time_and_units(results):
     motion = results["Trajectory"]
     assert np.array_equal(motion.drive.values["turn"], VALUES)
     assert motion.drive.units == {"turn": "rad"}
@@ -147,14 +147,14 @@ def test_a_trajectory_knows_drivers_time_and_units(results):
     assert np.array_equal(again.drive.values["turn"], VALUES)
 
 
-def test_values_changed_after_a_solve_change_no_result():
+def test_trajectory_copies_driver_values():
     values = VALUES.copy()
     motion = kincheck.solve(rssr(), "turn", values)
     values[:] = 0.0
     assert np.array_equal(motion.drive.values["turn"], VALUES)
 
 
-def test_a_motion_driven_by_several_knows_all_of_them():
+def test_trajectory_has_all_drivers():
     mechanism = kincheck.Mechanism(
         "arm",
         [kincheck.Body("upper"), kincheck.Body("lower")],
@@ -172,7 +172,7 @@ def test_a_motion_driven_by_several_knows_all_of_them():
     assert np.allclose(motion.drive.values["reach"], 0.1 * np.sin(np.pi * VALUES), atol=1e-15)
 
 
-def test_designs_are_rows_by_design_and_sample(results):
+def test_designs_table_rows(results):
     designs = results["Designs"]
     table = designs.dataset().table()
     assert list(table)[:2] == ["design", "sample"]
@@ -181,7 +181,7 @@ def test_designs_are_rows_by_design_and_sample(results):
     assert np.array_equal(table["position.end.z"], designs.points["end"].position[..., 2].ravel())
 
 
-def test_records_are_rows_of_a_run(results):
+def test_results_table_rows(results):
     run = results["Results"]
     assert run.record("rssr", "native") is results["Record"]
     with pytest.raises(KeyError):
@@ -192,7 +192,7 @@ def test_records_are_rows_of_a_run(results):
     assert run.to_dict()["schema"] == "kincheck-results/1"
 
 
-def test_figures_have_a_diagram_for_each_variable(results):
+def test_plot_has_axes_per_variable(results):
     pytest.importorskip("matplotlib")
     figure = results["Trajectory"].plot()
     assert [each.get_ylabel() for each in figure.axes] == [
@@ -214,7 +214,7 @@ def test_figures_have_a_diagram_for_each_variable(results):
     ("method", "module"),
     [("to_dataframe", "pandas"), ("to_xarray", "xarray"), ("plot", "matplotlib.figure")],
 )
-def test_a_missing_library_is_one_message(results, monkeypatch, method, module):
+def test_missing_plot_library_is_reported(results, monkeypatch, method, module):
     name = module.split(".")[0]
     monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setitem(sys.modules, name, None)
@@ -234,7 +234,7 @@ class Made(Tabular):
         return self.data
 
 
-def test_gaps_are_gaps_and_names_are_escaped():
+def test_html_curve_has_gaps_and_escapes():
     html = Made(**{"a<b": Variable("k", [1.0, np.nan, 3.0])})._repr_html_()
     assert html.count("<polyline") == 2
     assert "a&lt;b" in html
@@ -243,7 +243,7 @@ def test_gaps_are_gaps_and_names_are_escaped():
     assert "–" in html
 
 
-def test_nothing_solved_is_shown_too():
+def test_unsolved_curve_is_shown():
     found = Made(y=Variable("k", [np.nan] * 3))
     assert "<polyline" not in found._repr_html_()
     assert found.to_dict()["data_vars"]["y"]["data"] == [None] * 3
@@ -251,12 +251,12 @@ def test_nothing_solved_is_shown_too():
     assert found.plot().axes
 
 
-def test_a_motion_without_samples_tells_itself():
+def test_trajectory_without_samples_has_repr():
     motion = kincheck.solve(rssr(), "turn", [])
     assert "0 samples" in repr(motion)
     assert "<table>" in motion._repr_html_()
 
 
-def test_one_is_counted_in_the_singular(results):
+def test_repr_counts_one_in_singular(results):
     assert repr(results["Results"]) == "<Results: 1 case, 1 engine, 1 pass>"
     assert ", 1 sample, " in repr(kincheck.solve(rssr(), "turn", [0.0]))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from .support.case_texts import rows
 from .support.sources import DOOR, SOURCES, TESTS, imported, module_of, tree
 
 SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
@@ -60,12 +61,16 @@ def bare_packages(path, syntax):
             yield f"imports {'.'.join(target)}: say kincheck.{target[0]}"
 
 
-RULES = [past_the_door, simulators_at_import, undocumented]
+RULES = {
+    rule.__name__: rule
+    for rule in (past_the_door, simulators_at_import, undocumented, bare_packages)
+}
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
-def test_sources(rule):
-    found = {str(path): offences for path in SOURCES if (offences := list(rule(path, tree(path))))}
+@pytest.mark.parametrize("rule", RULES)
+def test_sources_follow_rules(rule):
+    paths = TESTS if rule == "bare_packages" else SOURCES
+    found = {str(path): each for path in paths if (each := list(RULES[rule](path, tree(path))))}
     assert found == {}
 
 
@@ -73,7 +78,7 @@ INSIDE = {"kinematics", "program", "test_joint_probe.py"}
 """Below tests: those of the inside of kinematics, and of its programs."""
 
 
-def test_tests_of_anything_else_enter_kinematics_by_its_door():
+def test_tests_import_public_names_of_kinematics():
     found = {
         str(path): offences
         for path in TESTS
@@ -82,59 +87,40 @@ def test_tests_of_anything_else_enter_kinematics_by_its_door():
     assert found == {}
 
 
-def test_tests_use_the_installed_package():
-    found = {str(path): each for path in TESTS if (each := list(bare_packages(path, tree(path))))}
-    assert found == {}
+OFFENDERS = """
+past_the_door | core/case/new.py | from ..kinematics.one_design import prepare
+past_the_door | core/case/io/new.py | from ...kinematics import compiled
+past_the_door | core/cli/new.py | def f():\\n    from ..kinematics.one_design import solve
+past_the_door | core/kincheck/new.py | import kincheck.core.kinematics.blocks.sweep
+past_the_door | adapters/new.py | from ..core.kinematics.compiled.request import Request
+simulators_at_import | adapters/new.py | import mujoco
+simulators_at_import | adapters/new.py | class A:\\n    from mujoco.viewer import launch
+simulators_at_import | adapters/new.py
+    | try:\\n    import exudyn as exu\\nexcept ImportError:\\n    exu = None
+simulators_at_import | adapters/new.py | mj = importlib.import_module('mujoco')
+undocumented | core/new.py | x = 1
+undocumented | core/new.py | "Doc."\\ndef f(): ...
+undocumented | core/new.py | "Doc."\\nclass A: ...
+bare_packages | tests/test_new.py | from core.mechanism import Body
+bare_packages | tests/test_new.py | import adapters.native
+"""
+ALLOWED = """
+past_the_door | adapters/shared/new.py
+    | from ...core.kinematics import NativeSolver, solve\\nfrom ...core import kinematics
+past_the_door | core/kinematics/new.py | from .compiled.request import Request
+simulators_at_import | adapters/new.py
+    | def f():\\n    import mujoco\\n    return importlib.import_module('exudyn')
+undocumented | core/new.py | "Doc."\\ndef _f(): ...
+bare_packages | tests/test_new.py
+    | from kincheck.core.algebra import Vec3\\nfrom .oracles.naive import A
+"""
 
 
-OFFENDERS = [
-    (past_the_door, "core/case/new.py", "from ..kinematics.one_design import prepare"),
-    (past_the_door, "core/case/io/new.py", "from ...kinematics import compiled"),
-    (past_the_door, "core/cli/new.py", "def f():\n    from ..kinematics.one_design import solve"),
-    (past_the_door, "core/kincheck/new.py", "import kincheck.core.kinematics.blocks.sweep"),
-    (past_the_door, "adapters/new.py", "from ..core.kinematics.compiled.request import Request"),
-    (simulators_at_import, "adapters/new.py", "import mujoco"),
-    (simulators_at_import, "adapters/new.py", "class A:\n    from mujoco.viewer import launch"),
-    (
-        simulators_at_import,
-        "adapters/new.py",
-        "try:\n    import exudyn as exu\nexcept ImportError:\n    exu = None",
-    ),
-    (simulators_at_import, "adapters/new.py", "mj = importlib.import_module('mujoco')"),
-    (undocumented, "core/new.py", "x = 1"),
-    (undocumented, "core/new.py", '"""Doc."""\ndef f(): ...'),
-    (undocumented, "core/new.py", '"""Doc."""\nclass A: ...'),
-    (bare_packages, "tests/test_new.py", "from core.mechanism import Body"),
-    (bare_packages, "tests/test_new.py", "import adapters.native"),
-]
+@pytest.mark.parametrize(("rule", "path", "text"), rows(OFFENDERS, named=False))
+def test_source_rule_finds_offender(rule, path, text):
+    assert list(RULES[rule](Path(path), ast.parse(text)))
 
 
-@pytest.mark.parametrize(("rule", "path", "text"), OFFENDERS)
-def test_offenders_are_found(rule, path, text):
-    assert list(rule(Path(path), ast.parse(text)))
-
-
-ALLOWED = [
-    (
-        past_the_door,
-        "adapters/shared/new.py",
-        "from ...core.kinematics import NativeSolver, solve\nfrom ...core import kinematics",
-    ),
-    (past_the_door, "core/kinematics/new.py", "from .compiled.request import Request"),
-    (
-        simulators_at_import,
-        "adapters/new.py",
-        "def f():\n    import mujoco\n    return importlib.import_module('exudyn')",
-    ),
-    (undocumented, "core/new.py", '"""Doc."""\ndef _f(): ...'),
-    (
-        bare_packages,
-        "tests/test_new.py",
-        "from kincheck.core.algebra import Vec3\nfrom .oracles.naive import A",
-    ),
-]
-
-
-@pytest.mark.parametrize(("rule", "path", "text"), ALLOWED)
-def test_allowed_code_passes(rule, path, text):
-    assert list(rule(Path(path), ast.parse(text))) == []
+@pytest.mark.parametrize(("rule", "path", "text"), rows(ALLOWED, named=False))
+def test_source_rule_passes_allowed_code(rule, path, text):
+    assert list(RULES[rule](Path(path), ast.parse(text))) == []

@@ -111,7 +111,7 @@ class DartModel(TreeModel):
                 found[first : first + BALL] = START
         return found
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         self.skeleton.setPositions(self.q)
         self.skeleton.setVelocities(dx)
         self.skeleton.integratePositions(1.0)

@@ -139,7 +139,7 @@ class DrakeModel(TreeModel):
         found[self.turning] = v
         return found
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         self.plant.SetPositions(self.context, self.q)
         q = self.q + self.plant.MapVelocityToQDot(self.context, self.full(dx))
         for ball in self.balls:

@@ -21,7 +21,6 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.harness.engine import Floor
 from ...core.joints import Joint
 from ...core.joints.base import unit
 from ...core.mechanism.loads import (
@@ -36,10 +35,10 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
 from ..shared.exudyn_joints import JOINTS
-from ..shared.force_solution import Element, elastic_force, left_out_of, places, reacting
-from ..shared.projection_engine import ProjectionEngine, floor_of
+from ..shared.force_solution import Element, elastic_force, left_out_of, places, reacting_joints
+from ..shared.projection_engine import Call, CountedCalls, ProjectionEngine
 from ..shared.projection_model import Dynamics
-from .rows import NO_ROTATION, Rows, System, turned
+from .rows import NO_ROTATION, Rows, System, rotation_about_z
 
 COMPUTED_BY = {
     "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
@@ -161,7 +160,7 @@ class Loads:
         every = np.vstack(rows)
         reactions = {
             name: (np.zeros(6), self._on_second(self.mechanism.joint(name), every, owners))
-            for name in reacting(self.case)
+            for name in reacting_joints(self.case)
         }
         return Dynamics(demand, reactions, amounts, every[len(J) :])
 
@@ -281,35 +280,35 @@ class Exudyn(ProjectionEngine):
         """Return Exudyn's system of the case."""
         return ExudynModel(case)
 
-    def floor(self, case: Case) -> Floor:
-        """Return the floor from the static solver's residual and Jacobian.
+    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
+        """Return the static solver's residual and Jacobian.
 
         Accelerations need two rates of the rows for a difference.
         """
-        model = self.model_of(self.own(case))
-        solved = self.solve(model, case, 1e-12)
         # the smallest model has one free coordinate
         least = System()
         node = least.mbs.AddNode(least.items.Node1D())
         least.mbs.AddObject(least.items.ObjectMass1D(nodeNumber=node, mass=1.0))
         least.mbs.Assemble()
-        mbs, settings, solver = least.mbs, least.settings(), least.exu.MainSolverStatic()
-        solver.InitializeSolver(mbs, settings)
-        residual = (
-            lambda: model.solver.ComputeAlgebraicEquations(model.mbs),
-            lambda: solver.ComputeAlgebraicEquations(mbs),
-            1,
+        settings, solver = least.settings(), least.exu.MainSolverStatic()
+        solver.InitializeSolver(least.mbs, settings)
+
+        def calls(solver: Any, mbs: Any, settings: Any) -> Mapping[str, Call]:
+            residual = partial(solver.ComputeAlgebraicEquations, mbs)
+            jacobian = partial(solver.ComputeNewtonJacobian, mbs, settings)
+            return {
+                "ComputeAlgebraicEquations": residual,
+                "ComputeNewtonJacobian": jacobian,
+                "ComputeNewtonJacobian (rates)": jacobian,
+                "ComputeAlgebraicEquations (rates)": residual,
+            }
+
+        return CountedCalls(
+            calls(model.solver, model.mbs, model.settings),
+            calls(solver, least.mbs, settings),
+            {"ComputeAlgebraicEquations": 1, "ComputeNewtonJacobian": 1},
+            {"ComputeNewtonJacobian (rates)": 1, "ComputeAlgebraicEquations (rates)": 2},
         )
-        own, empty = (
-            partial(s.ComputeNewtonJacobian, m, t)
-            for s, m, t in ((model.solver, model.mbs, model.settings), (solver, mbs, settings))
-        )
-        pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
-        once = {
-            "ComputeNewtonJacobian (rates)": (own, empty, 1),
-            "ComputeAlgebraicEquations (rates)": (*residual[:2], 2),
-        }
-        return floor_of(self.name, solved, model.unknowns, pose, once)
 
 
 def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:
@@ -413,7 +412,7 @@ class ExudynModel:
         for row, place, curve in self.bent:
             values[row] = -curve.at(float(self.x[self.coordinates + place]))[0]
         for row, (first, second), frame in self.turning:
-            self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
+            self.mbs.SetMarkerParameter(first, "localHT", frame @ rotation_about_z(values[row]))
             # The frame has turned by the value: the row is the sine of the remaining angle. From
             # beyond a quarter turn, Newton would converge to the other zero of the sine; a
             # non-finite residual makes the walk take a shorter step.

@@ -259,7 +259,7 @@ class Rows:
                 self.follow(number, value, weight)
 
 
-def turned(angle: float) -> Array:
+def rotation_about_z(angle: float) -> Array:
     """Return the rotation about z by an angle [rad] as a homogeneous matrix, shape (4, 4)."""
     frame = np.eye(4)
     c, s = math.cos(angle), math.sin(angle)

@@ -27,7 +27,7 @@ from ..shared.simulation import (
     Simulation,
     SimulationEndedError,
     start_of,
-    uneven,
+    uneven_samples,
 )
 from ..shared.tree_plan import ends_of
 from .exudyn import Exudyn, ExudynModel
@@ -147,10 +147,13 @@ def limitation_of(case: Case) -> str | None:
             return f"{coupler}: Exudyn's own solvers have no object that keeps a curve"
         if len(coupler.joints) > 2:
             return f"{coupler}: this adapter gives Exudyn's own solvers relations of two joints"
-    if case.balance is None and (reason := uneven(case, "Exudyn")) is not None:
+    if case.balance is None and (reason := uneven_samples(case, "Exudyn")) is not None:
         return reason
     if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).starts_at_design:
-        return "turns of coupled joints count from the design, where this motion does not begin"
+        return (
+            "turns of coupled joints count from the design, where this motion does not begin; use"
+            " projection"
+        )
     return None
 
 
@@ -203,7 +206,7 @@ class Solver(Simulation):
 
     def unsupported(self, case: Case) -> str | None:
         """Return a message on an unsupported joint, driver or sample grid, or None."""
-        return Exudyn().unsupported(case) or limitation_of(Exudyn().known(case))
+        return Exudyn().unsupported(case) or limitation_of(Exudyn().with_known_joints(case))
 
     def efforts(self) -> Mapping[str, Solver]:
         """Return the efforts by the tolerance of Newton, or by the number of steps."""
@@ -216,7 +219,7 @@ class Solver(Simulation):
 
     def build(self, case: Case) -> _Solved:
         """Return Exudyn's system and its start."""
-        return _Solved(Exudyn().known(case), self)
+        return _Solved(Exudyn().with_known_joints(case), self)
 
 
 def trapezoidal() -> Solver:
@@ -360,8 +363,10 @@ class _Solved:
         drift.
         """
         steps = self.how.steps
-        stored = [[self.stored(sensor)[::steps] for sensor in sensors] for sensors in self.sensors]
-        state = np.hstack([self.stored(sensor) for sensor in self.nodes])[::steps]
+        stored = [
+            [self.sensor_values(sensor)[::steps] for sensor in sensors] for sensors in self.sensors
+        ]
+        state = np.hstack([self.sensor_values(sensor) for sensor in self.nodes])[::steps]
         last = len(state) - 1
         self.of.restore(
             np.concatenate([state[last], np.zeros(self.of.unknowns - self.of.coordinates)])
@@ -377,6 +382,6 @@ class _Solved:
         for k in range(last + 1):
             yield SimulatedPose(points[:, k], residual, steps if k else 0)
 
-    def stored(self, sensor: int) -> Array:
+    def sensor_values(self, sensor: int) -> Array:
         """Return the stored values of a sensor without the times, shape (steps + 1, values)."""
         return np.array(self.mbs.GetSensorStoredData(sensor))[:, 1:]

@@ -158,20 +158,20 @@ class Statics:
         """Return samples in equilibrium, their forces, and why others are missing."""
         n, m = self.values.shape
         found, message, efforts = dict[int, Rest](), "", np.full((m, n), np.nan)
-        near = [(np.zeros(m), 0.0, self._saved())]
+        near = [(np.zeros(m), 0.0, self._configuration())]
         for k in sorted(group, key=lambda k: float(np.linalg.norm(self.values[k]))):
             to = self.values[k]
             # without loads only if there is no sample yet
             start = min(near, key=lambda x: (x[1] < 1.0, float(np.linalg.norm(x[0] - to))))
             if message := self._advance(to, *start):
                 continue
-            near.append((to, 1.0, self._saved()))
-            found[k] = self._here(to)
+            near.append((to, 1.0, self._configuration()))
+            found[k] = self._rest(to)
             efforts[:, k] = self._efforts()
         unknown, efforts = np.full(n, np.nan), dict(zip(self.names, efforts, strict=True))
         return found, Forces({}, efforts, {}, unknown, unknown), message
 
-    def _saved(self) -> tuple[Array, Array]:
+    def _configuration(self) -> tuple[Array, Array]:
         return np.array(self.state.GetODE2Coordinates()), np.array(self.state.GetDataCoordinates())
 
     def _advance(self, to: Array, start: Array, share: float, saved: tuple[Array, Array]) -> str:
@@ -183,7 +183,7 @@ class Statics:
         while done < 1.0:
             target = min(1.0, done + step)
             try:
-                found = self._solved(start + target * (to - start), max(share, target), saved)
+                found = self._solve_static(start + target * (to - start), max(share, target), saved)
             except RuntimeError as error:  # Exudyn's SolverError
                 why = f"Exudyn: {str(error).strip().splitlines()[0]}"
             else:
@@ -195,7 +195,7 @@ class Statics:
                 return why
         return ""
 
-    def _solved(
+    def _solve_static(
         self, values: Array, share: float, saved: tuple[Array, Array]
     ) -> tuple[Array, Array]:
         """Return the state that Exudyn's solver finds from another one."""
@@ -206,9 +206,9 @@ class Statics:
         self.state.SetODE2Coordinates(saved[0], self.exu.ConfigurationType.Initial)
         self.state.SetDataCoordinates(saved[1], self.exu.ConfigurationType.Initial)
         self.mbs.SolveStatic(self.settings, showHints=False)
-        return self._saved()
+        return self._configuration()
 
-    def _here(self, c: Array) -> Rest:
+    def _rest(self, c: Array) -> Rest:
         still = np.zeros(0)
         points = list[Array]()
         for point in map(self.case.mechanism.point, self.case.points):
@@ -217,7 +217,7 @@ class Statics:
             at_rest = number == self.rows.ground
             at = arm if at_rest else self.mbs.GetObjectOutputBody(number, self.kinds.Position, arm)
             points.append(np.array(at))
-        return Rest(self._saved(), c, still, still, 0, 0.0, np.array(points))
+        return Rest(self._configuration(), c, still, still, 0, 0.0, np.array(points))
 
     def _efforts(self) -> Array:
         drivers = self.rows.rows[len(self.rows.rows) - len(self.names) :]
@@ -230,7 +230,9 @@ class StaticSolver(Solver):
 
     def equilibria(self, case: Case) -> Trajectory:
         """Return the equilibria of a case; see `harness.engine.Balancing`."""
-        return equilibria(case, lambda each, group: Statics(Exudyn().known(each)).solve(group))
+        return equilibria(
+            case, lambda each, group: Statics(Exudyn().with_known_joints(each)).solve(group)
+        )
 
 
 def static() -> StaticSolver:

@@ -30,12 +30,11 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ...core.case.case import Case
-from ...core.harness.engine import Floor
 from ...core.joints import Distance, Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.force_solution import RowWrench
-from ..shared.projection_engine import floor_of
+from ..shared.projection_engine import Call, CountedCalls
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import CHAINS, Chain, Closure, Link, Relation
@@ -72,24 +71,18 @@ class MuJoCo(TreeEngine):
         model.m.eq_solref[:] = 0.0
         return model
 
-    def floor(self, case: Case) -> Floor:
-        """Return the floor from `mj_kinematics` and the other calls of a pose."""
-        mj = mujoco()
-        model = self.model_of(self.own(case))
-        trajectory = self.solve(model, case, 1e-12)
-        nothing = mj.MjSpec().compile()
-        given, empty = (model.m, model.d), (nothing, mj.MjData(nothing))
+    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
+        """Return `mj_kinematics` and the other calls of a pose."""
+        mj, nothing = mujoco(), mujoco().MjSpec().compile()
+        poses = ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeConstraint")
+        rates = ("mj_comVel", "mj_referenceConstraint")
 
-        def calls(*names: str) -> Mapping[str, tuple[Any, Any, int]]:
-            return {
-                name: (partial(getattr(mj, name), *given), partial(getattr(mj, name), *empty), 1)
-                for name in names
-            }
+        def calls(m: Any, d: Any) -> Mapping[str, Call]:
+            return {name: partial(getattr(mj, name), m, d) for name in (*poses, *rates)}
 
-        pose = calls("mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeConstraint")
-        return floor_of(
-            self.name, trajectory, model.m.nv, pose, calls("mj_comVel", "mj_referenceConstraint")
-        )
+        least = calls(nothing, mj.MjData(nothing))
+        own = calls(model.m, model.d)
+        return CountedCalls(own, least, dict.fromkeys(poses, 1), dict.fromkeys(rates, 1))
 
 
 def mujoco() -> Any:
@@ -303,7 +296,7 @@ class MuJoCoModel(TreeModel):
     def design(self) -> Array:
         return np.array(self.m.qpos0)
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         q = self.q.copy()
         self.mj.mj_integratePos(self.m, q, dx, 1.0)
         return q
@@ -360,8 +353,8 @@ class MuJoCoModel(TreeModel):
         center = np.array(self.d.subtree_com[self.m.body_rootid[node]])
         return np.concatenate([force, moment + np.cross(center - point, force)])
 
-    def exerted(self) -> list[RowWrench]:
-        found = super().exerted()
+    def row_wrenches(self) -> list[RowWrench]:
+        found = super().row_wrenches()
         for each, (rows, _) in zip(self.equalities, self.own_rows, strict=True):
             if each.kind == "joint":
                 continue

@@ -10,7 +10,7 @@ from typing import Any
 from ...core.errors import KincheckError
 
 
-def saved(file: Path) -> str:
+def convert(file: Path) -> str:
     """Return the MJCF saved by MuJoCo of a model of URDF or MJCF.
 
     Raises:

@@ -63,7 +63,7 @@ def rod_forces(case: Case, rod: str) -> RodForces:
     if (reason := MuJoCo().unsupported(case)) is not None:
         raise CaseError(f"case {case.name!r}: {reason}")
     engine = MuJoCo()
-    model, unit = engine.model_of(engine.own(case)), own_frame(case).unit
+    model, unit = engine.model_of(engine.scaled_case(case)), own_frame(case).unit
     m, d, mj = model.m, model.d, model.mj
     tendons = {
         str(each.keeps): rows.start
@@ -85,7 +85,7 @@ def rod_forces(case: Case, rod: str) -> RodForces:
     origin, message = walk.start(path, start_of(case.mechanism, path))
     if origin is None:
         raise CaseError(f"case {case.name!r}: {message}")
-    samples = [at for _, at in walk.reached(origin)]
+    samples = [at for _, at in walk.follow_samples(origin)]
     mj.mj_setConst(m, d)
     for at in samples:
         model.restore(at.saved)

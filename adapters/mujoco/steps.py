@@ -19,7 +19,7 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.mechanism.motions import Ramp
 from ...core.trajectory import Array, Trajectory
-from ..shared.equivalents import jointed
+from ..shared.equivalents import with_joints_alone
 from ..shared.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
 from .mujoco import MuJoCo, MuJoCoModel, mujoco
 
@@ -103,7 +103,7 @@ class Stepping(Simulation):
 
     def build(self, case: Case) -> _Steps:
         """Return the compiled model with its settings and start."""
-        return _Steps(mujoco(), MuJoCo().known(case), self)
+        return _Steps(mujoco(), MuJoCo().with_known_joints(case), self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
         with model.warnings():
@@ -132,7 +132,7 @@ class _Massless(MuJoCoModel):
 
 class _Steps:
     def __init__(self, mj: Any, case: Case, how: Stepping) -> None:
-        case = replace(case, mechanism=jointed(case.mechanism))
+        case = replace(case, mechanism=with_joints_alone(case.mechanism))
         self.mj, self.how, self.of = mj, how, _Massless(mj, case)
         self.start, self.details = start_of(self.of, case), self.of.details
         m = self.m = self.of.m

@@ -97,7 +97,7 @@ class PinocchioModel(TreeModel):
     def design(self) -> Array:
         return self.pin.neutral(self.model)
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         return self.pin.integrate(self.model, self.q, dx)
 
     def place(self) -> None:
@@ -208,13 +208,13 @@ class PinocchioSteps(SteppedTree, PinocchioModel):
         parts = [*super().plan()]
         chains = [part for part in parts if isinstance(part, Chain)]
 
-        def carried(bodies: Collection[str]) -> Iterator[Chain]:
+        def chains_on(bodies: Collection[str]) -> Iterator[Chain]:
             on = [chain for chain in chains if chain.parent in bodies]
             for chain in sorted(on, key=lambda chain: not chain.cut):
                 yield chain
-                yield from carried([chain.child])
+                yield from chains_on([chain.child])
 
-        yield from carried([*self.carrier])  # before any chain, those are the ground
+        yield from chains_on([*self.carrier])  # before any chain, those are the ground
         yield from (part for part in parts if not isinstance(part, Chain))
 
     def stabilise(self, h: float) -> None:
@@ -301,7 +301,7 @@ class Dynamics(Stepping):
         """Return a message on the joint or driver that is not supported here, or None."""
         if (self.version() or "").startswith("3."):
             return "constraintDynamics of Pinocchio 3 has another signature; install Pinocchio 4"
-        case = Pinocchio().known(case)
+        case = Pinocchio().with_known_joints(case)
         for joint in case.mechanism.joints:
             if relations(joint):
                 return f"{joint} relates coordinates, which Pinocchio's constraintDynamics refuses"

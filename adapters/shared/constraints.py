@@ -104,18 +104,18 @@ class Condition(Protocol):
 class Direction:
     """A unit vector of a body, a0 at design.
 
-    `placed` returns x and J_x, shapes (3,) and (3, unknowns); `moving` returns x, its rate and its
-    bias, each of shape (3,).
+    `value_and_jacobian` returns x and J_x, shapes (3,) and (3, unknowns); `value_and_rates` returns
+    x, its rate and its bias, each of shape (3,).
     """
 
     frame: BodyFrame
     a0: Array
 
-    def placed(self) -> tuple[Array, Array]:
+    def value_and_jacobian(self) -> tuple[Array, Array]:
         x = self.frame.rotation @ self.a0
         return x, -skew(x) @ self.frame.jacobian[3:]
 
-    def moving(self) -> tuple[Array, Array, Array]:
+    def value_and_rates(self) -> tuple[Array, Array, Array]:
         x, w, alpha = (
             self.frame.rotation @ self.a0,
             skew(self.frame.velocity[3:]),
@@ -133,10 +133,10 @@ class Difference:
     i: BodyFrame
     j: BodyFrame
 
-    def placed(self) -> tuple[Array, Array]:
+    def value_and_jacobian(self) -> tuple[Array, Array]:
         return self.j.position - self.i.position, (self.j.jacobian - self.i.jacobian)[:3]
 
-    def moving(self) -> tuple[Array, Array, Array]:
+    def value_and_rates(self) -> tuple[Array, Array, Array]:
         rate, bias = self.j.velocity - self.i.velocity, self.j.acceleration - self.i.acceleration
         return self.j.position - self.i.position, rate[:3], bias[:3]
 
@@ -152,10 +152,10 @@ class Coincident:
     n = 3
 
     def rows(self) -> tuple[Any, Array]:
-        return self.x.placed()
+        return self.x.value_and_jacobian()
 
     def bias(self) -> Any:
-        return self.x.moving()[2]
+        return self.x.value_and_rates()[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,11 +168,11 @@ class Dot:
     n = 1
 
     def rows(self) -> tuple[Any, Array]:
-        (x, J_x), (y, J_y) = self.x.placed(), self.y.placed()
+        (x, J_x), (y, J_y) = self.x.value_and_jacobian(), self.y.value_and_jacobian()
         return x @ y - self.c, y @ J_x + x @ J_y
 
     def bias(self) -> Any:
-        (x, x_dot, b_x), (y, y_dot, b_y) = self.x.moving(), self.y.moving()
+        (x, x_dot, b_x), (y, y_dot, b_y) = self.x.value_and_rates(), self.y.value_and_rates()
         return y @ b_x + x @ b_y + 2.0 * (x_dot @ y_dot)
 
 
@@ -185,12 +185,12 @@ class Length:
     n = 1
 
     def rows(self) -> tuple[Any, Array]:
-        x, J_x = self.x.placed()
+        x, J_x = self.x.value_and_jacobian()
         length = np.sqrt(x @ x)
         return length - self.L, (x / length) @ J_x
 
     def bias(self) -> Any:
-        x, x_dot, b_x = self.x.moving()
+        x, x_dot, b_x = self.x.value_and_rates()
         return (x @ b_x + x_dot @ x_dot) / np.sqrt(x @ x)
 
 
@@ -277,7 +277,7 @@ def _on_line(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     return [Dot(Direction(i, a), Difference(i, j)) for a in (f, g)]
 
 
-def _crossed(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
+def _crossing_axes(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     # a table may round the right angle; two hinges keep the design angle
     a, b = (_array(unit(axis)) for axis in joint.axes)
     return [Dot(Direction(i, a), Direction(j, b), float(a @ b))]
@@ -307,7 +307,7 @@ def _twistless(joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     return [EqualDots(*(Dot(Direction(i, _array(a)), Direction(j, b)) for a, b in (left, right)))]
 
 
-def _threaded(joint: Screw, i: BodyFrame, j: BodyFrame) -> list[Condition]:
+def _thread(joint: Screw, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     f, _, h = map(_array, triad(joint.axis))
     return [Thread(i, j, f, h, joint.lead / (2.0 * math.pi))]
 
@@ -322,7 +322,7 @@ ON_PLANE = Part(
 ROD = Part("points at constant distance", 1, _rod)
 PARALLEL = Part("axes parallel", 2, _parallel)
 ALIKE = Part("axes aligned", 3, _alike)
-CROSSED = Part("axes at right angle", 1, _crossed)
+CROSSED = Part("axes at right angle", 1, _crossing_axes)
 
 CLOSURES: Mapping[type[Joint], Sequence[Part]] = {
     Spherical: [COINCIDENT],
@@ -332,7 +332,7 @@ CLOSURES: Mapping[type[Joint], Sequence[Part]] = {
     Fixed: [COINCIDENT, ALIKE],
     Distance: [ROD],
     Cylindrical: [PARALLEL, ON_LINE],
-    Screw: [PARALLEL, ON_LINE, Part("displacement by turn", 1, _threaded)],
+    Screw: [PARALLEL, ON_LINE, Part("displacement by turn", 1, _thread)],
     Planar: [PARALLEL, ON_PLANE],
     ConstantVelocity: [COINCIDENT, Part("shafts turn alike", 1, _twistless)],
     OrientationLock: [ALIKE],
@@ -352,7 +352,7 @@ def closure_text(by: type[Joint]) -> str:
     return ", ".join(texts + [f"{each.text} ({each.n})" for each in others])
 
 
-def closing(by: type[Joint], joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
+def closure_conditions(by: type[Joint], joint: Any, i: BodyFrame, j: BodyFrame) -> list[Condition]:
     """Return the conditions of a joint type between frames on both bodies of a joint."""
     return [each for part in CLOSURES[by] for each in part.conditions(joint, i, j)]
 

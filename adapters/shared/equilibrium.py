@@ -49,7 +49,7 @@ class Rest(SolvedPose):
     points: Array
 
 
-def loaded(case: Case, sample: int) -> Case:
+def with_loads(case: Case, sample: int) -> Case:
     """Return the case with the loads of a sample as force elements of its mechanism."""
     assert case.balance is not None
     further = list[ForceElement]()
@@ -84,7 +84,7 @@ def equilibria(
     efforts, residual = {name: unknown.copy() for name in names}, 0.0
     messages = list[str]()
     for group in groups.values():
-        found, forces, message = solve(loaded(case, group[0]), group)
+        found, forces, message = solve(with_loads(case, group[0]), group)
         messages += [message] if message else []
         for k, each in found.items():
             points[k], count[k], residual = (
@@ -152,7 +152,7 @@ class Walk:
             if not self._advance(start, to, 1.0):
                 messages.append(f"no equilibrium on the way to sample {k}")
                 continue
-            found[k], self.iterations = self._here(to), 0
+            found[k], self.iterations = self._rest(to), 0
             near.append((to, found[k].saved))
         freedoms = self.unknowns - self.rank
         forces = Forces({}, {}, {}, np.zeros(0), np.zeros(0))
@@ -160,7 +160,7 @@ class Walk:
             forces = solved_forces(self.model, self.case, found, self.frame.unit, freedoms)
         return found, forces, "; ".join(filter(None, [*messages[:1], forces.message]))
 
-    def _here(self, c: Array) -> Rest:
+    def _rest(self, c: Array) -> Rest:
         still, unit = np.zeros(self.unknowns), self.frame.unit
         residual = float(np.abs(self.model.residual(c)).max(initial=0.0))
         points = [self.frame.back(x) for x, _, _ in self.model.points(still, still)]
@@ -236,7 +236,7 @@ class Walk:
         multipliers = self._multipliers(J, demand)
         saved = self.model.save()
 
-        def along(way: Array) -> Array:
+        def unbalance_rate(way: Array) -> Array:
             """Return the derivative of the forces that are out of balance."""
             ends = list[Array]()
             for h in (DIFFERENCE, -DIFFERENCE):
@@ -246,14 +246,19 @@ class Walk:
                 ends.append(demand - J.T @ multipliers)
             return (ends[0] - ends[1]) / (2.0 * DIFFERENCE)
 
-        stiffness = free.T @ np.array([along(way) for way in free.T]).reshape(-1, len(vh)).T
+        stiffness = (
+            free.T @ np.array([unbalance_rate(way) for way in free.T]).reshape(-1, len(vh)).T
+        )
         left = demand - J.T @ multipliers
         if length := float(np.linalg.norm(closing)):
-            left = left + length * along(closing / length)
+            left = left + length * unbalance_rate(closing / length)
         self.model.restore(saved)
         values = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))
         try:
             step = closing - free @ np.linalg.solve(stiffness, free.T @ left)
         except np.linalg.LinAlgError:
-            raise SolveError("the stiffness is singular: nothing holds a body") from None
+            raise SolveError(
+                "nothing holds a body: the stiffness is singular. Add a joint, a spring or a"
+                " bushing"
+            ) from None
         return step, int((values < 0.0).sum())

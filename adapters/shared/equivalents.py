@@ -37,7 +37,7 @@ SAME_LENGTH = 1e-12
 ALONG = 0.3
 
 
-def jointed(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
+def with_joints_alone(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
     """Return the mechanism with joint drivers only and without rods.
 
     Rods whose length differs from the design remain. Added bodies have no mass.

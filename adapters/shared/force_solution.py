@@ -32,7 +32,7 @@ from ...core.mechanism.loads import (
 )
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .constraints import BodyFrame, by_frame, closing
+from .constraints import BodyFrame, by_frame, closure_conditions
 from .projection_model import Dynamics, ProjectionModel, SolvedPose
 from .tree_plan import ends_of
 
@@ -204,7 +204,7 @@ class _Given:
     dynamics: Dynamics
 
 
-def reacting(case: Case) -> list[str]:
+def reacting_joints(case: Case) -> list[str]:
     """Return the names of the joints whose reactions are needed: of outputs, or of all where rows
     are left out within digits; see `in_wrenches`.
     """
@@ -230,13 +230,13 @@ def solved_forces(
     n, wanted = len(path.times), set(case.forces)
     force, torque = unit, unit**2  # kg unit/s^2 in N, kg unit^2/s^2 in N m
     names = [each.name for each in mechanism.drivers]
-    joints = reacting(case)
+    joints = reacting_joints(case)
     scales = np.array([torque if each.turns else force for each in mechanism.drivers])
     turning = {f.name for f in mechanism.forces if isinstance(f, TorsionSpringDamper | Torque)}
     efforts, power, largest = np.full((n, len(names)), np.nan), *np.full((2, n), np.nan)
     amounts = {each.name: np.full(n, np.nan) for each in mechanism.forces if each.name in wanted}
     solved = sorted(samples)
-    given = [_given(model, samples[k]) for k in solved]
+    given = [_evaluate(model, samples[k]) for k in solved]
     found = _multipliers(given, freedoms)
     wrenches = {name: np.full((n, 6), np.nan) for name in joints}
     free = {name: np.full((n, 6, found.free.shape[2]), np.nan) for name in joints}
@@ -279,7 +279,7 @@ def solved_forces(
     )
 
 
-def _given(model: ProjectionModel, at: SolvedPose) -> _Given:
+def _evaluate(model: ProjectionModel, at: SolvedPose) -> _Given:
     model.restore(at.saved)
     model.residual(at.c)
     J, columns = np.array(model.jacobian()), np.array(model.driver_columns())
@@ -337,7 +337,7 @@ class LeftOut:
             first: index of the first row.
         """
         found, exerted = list[Array](), list[RowWrench]()
-        for condition in closing(type(self.joint), self.joint, *self.frames):
+        for condition in closure_conditions(type(self.joint), self.joint, *self.frames):
             found.append(np.atleast_2d(condition.rows()[1]))
             rows = slice(first, first := first + len(found[-1]))
             exerted += [

@@ -151,10 +151,9 @@ class Walk:
         if self.rank < self.unknowns:
             raise SolveError(
                 f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
-                " coordinates of the simulator's model are left free by joints and drivers at the"
-                " design position; add a driver or a joint; if their number is"
-                " right a driver does not move it there (a lock-up): give the design in another"
-                " pose",
+                " coordinates of the simulator's model are left free at the design position. Add a"
+                " driver or a joint. If their number is right, a driver cannot move it there (a"
+                " lock-up): give the design in another pose",
                 FailureKind.FREE,
             )
 
@@ -241,7 +240,7 @@ class Walk:
         gamma = columns @ c_tt - self.model.bias(v)
         a = inverse @ gamma
         # least squares would hide rates that do not satisfy the rows (a driver at a dead centre)
-        if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
+        if not (_satisfies(jacobian, v, nu) and _satisfies(jacobian, a, gamma)):
             self.lost = PoseFailure(FailureKind.DEAD_CENTRE)
             return None
         position, velocity, acceleration = (
@@ -274,10 +273,14 @@ class Walk:
             to = t if abs(t - at.t) <= abs(h) else at.t + h
             dt = to - at.t
             self.model.restore(at.saved)
-            self.model.move(self.predicted(at, dt))
+            self.model.move(self.prediction(at, dt))
             new, whole = self.solve(path, to), step or abs(t - start.t)
             short = abs(dt) <= FOLD * whole
-            if new is not None and self.connected(at, new) and (short or self.regular(at, new)):
+            if (
+                new is not None
+                and self.is_connected(at, new)
+                and (short or self.is_regular(at, new))
+            ):
                 at, h = new, 2.0 * h
             else:
                 h = 0.5 * min(abs(h), abs(t - at.t)) * math.copysign(1.0, h)
@@ -286,11 +289,11 @@ class Walk:
         return at, True
 
     @staticmethod
-    def predicted(at: Sample, dt: float) -> Array:
+    def prediction(at: Sample, dt: float) -> Array:
         """Return the change of the unknowns over a time, to second order."""
         return dt * (at.v + (0.5 * dt) * at.a)
 
-    def connected(self, at: Sample, new: Sample) -> bool:
+    def is_connected(self, at: Sample, new: Sample) -> bool:
         """Return whether output points and coordinates moved between two poses by their rates.
 
         At rest they do not show full turns of a driver, so turns have a separate limit.
@@ -299,11 +302,11 @@ class Walk:
             return False
         dt = np.float64(new.t - at.t)
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
-        change = self.predicted(at, float(dt)) + new.corrected
+        change = self.prediction(at, float(dt)) + new.corrected
         everything = continuous(change, new.v, at.v, dt, self.size)
         return bool(watched & everything) and is_continuation(change, new.v, at.v, dt)
 
-    def regular(self, at: Sample, new: Sample) -> bool:
+    def is_regular(self, at: Sample, new: Sample) -> bool:
         """Return whether no singular value of the Jacobian can have been zero between two poses."""
         return regular_between(at.inverse @ new.jacobian)
 
@@ -350,7 +353,7 @@ class Walk:
         """Return the kind of a failure at the start."""
         return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
 
-    def reached(self, origin: Sample) -> Iterator[tuple[int, Sample]]:
+    def follow_samples(self, origin: Sample) -> Iterator[tuple[int, Sample]]:
         """Yield the samples reached from a pose, outwards; `ended` and `failures` have the ends."""
         path, times = self.path, self.path.times
         step = (
@@ -381,7 +384,7 @@ class Walk:
             self.ended.append(message)
             self.failures.append(self.kind_at_start)
         else:
-            for k, at in self.reached(origin):
+            for k, at in self.follow_samples(origin):
                 motion[:, k] = at.rows
                 iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
                 samples[k] = at
@@ -420,6 +423,6 @@ class Walk:
         )
 
 
-def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
+def _satisfies(jacobian: Array, v: Array, wanted: Array) -> bool:
     # a millionth: far above round-off, far below the error of an unsatisfied row
     return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))

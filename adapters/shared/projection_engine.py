@@ -40,44 +40,20 @@ CALLS = 200
 Call = Callable[[], Any]
 
 
-def floor_of(
-    engine: str,
-    solved: Trajectory,
-    unknowns: int,
-    pose: Mapping[str, tuple[Call, Call, int]],
-    rates: Mapping[str, tuple[Call, Call, int]],
-) -> Floor:
-    """Return the floor of Newton's method with the iterations of a solved trajectory.
+@dataclass(frozen=True)
+class CountedCalls:
+    """The calls of the projection mode into a simulator, by name.
 
-    Args:
-        engine: name of the engine.
-        pose: calls for the residual and Jacobian of a pose, by name: on the case's model, on the
-            smallest model, and their number.
-        rates: further calls once per sample, for velocities and accelerations.
+    Attributes:
+        own, least: on the case's model, and on the smallest possible one.
+        poses: how many there are for the residual and Jacobian of a pose.
+        rates: how many more once per sample, for velocities and accelerations.
     """
-    large, small = (np.eye(n) + 0.1 * np.ones((n, n)) for n in (unknowns, 1))
-    lapack: Any = importlib.import_module("scipy.linalg.lapack")
-    solve = {
-        f"LU of {unknowns} rows": (
-            lambda: lapack.dgesv(large, large[0]),
-            lambda: lapack.dgesv(small, small[0]),
-            1,
-        )
-    }
-    # the adapter's last step only confirms convergence; the pose before it counts as the pose for
-    # the Jacobian of the rates
-    poses = float(solved.iterations[solved.solved].mean())
-    counts = {**dict.fromkeys([*pose, *solve], poses), **dict.fromkeys(rates, 1.0)}
-    parts = {
-        name: counts[name] * each * max(0.0, _microseconds(call) - _microseconds(least))
-        for name, (call, least, each) in {**pose, **solve, **rates}.items()
-    }
-    counted = (
-        f"{engine}: {poses:.3g} poses ({', '.join([*pose, *solve])}) and once"
-        f" {', '.join(rates)}; the fastest of {ROUNDS} rounds, less the same calls on the smallest"
-        " model"
-    )
-    return Floor(sum(parts.values()), counted, parts)
+
+    own: Mapping[str, Call]
+    least: Mapping[str, Call]
+    poses: Mapping[str, int]
+    rates: Mapping[str, int]
 
 
 def _microseconds(call: Call) -> float:
@@ -138,20 +114,20 @@ class ProjectionEngine(ABC):
         """
         return str(simulator.__version__)
 
-    def known(self, case: Case) -> Case:
+    def with_known_joints(self, case: Case) -> Case:
         """Return the case with equivalents of unsupported joints."""
         found = with_equivalents(case.mechanism, self.joints)
         return case if found is case.mechanism else replace(case, mechanism=found)
 
-    def own(self, case: Case) -> Case:
+    def scaled_case(self, case: Case) -> Case:
         """Return the case for the simulator: known joints, in the scaled frame."""
-        return in_own_frame(self.known(case))
+        return in_own_frame(self.with_known_joints(case))
 
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the first joint or driver that has none of the known exact types, and
         no equivalent of them, or None. A subclass may have another meaning.
         """
-        mechanism = self.known(case).mechanism
+        mechanism = self.with_known_joints(case).mechanism
         for each in (*mechanism.joints, *mechanism.drivers):
             known = self.joints if isinstance(each, Joint) else DRIVERS
             if type(each) not in known:
@@ -168,7 +144,7 @@ class ProjectionEngine(ABC):
 
     def build(self, case: Case) -> ProjectionModel:
         """Return the simulator's model of the case in the scaled frame, at the design position."""
-        return self.model_of(self.own(case))
+        return self.model_of(self.scaled_case(case))
 
     def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
         """Solve all samples; see `Engine.solve`.
@@ -178,7 +154,7 @@ class ProjectionEngine(ABC):
                 length gives another unit of length.
         """
         replaced = replaced_joints(case.mechanism, self.joints)
-        case = self.known(case)
+        case = self.with_known_joints(case)
         own = in_own_frame(case)
         # The model has no names, so results of another mechanism could be mistaken for this one's.
         built = model.case
@@ -198,7 +174,7 @@ class ProjectionEngine(ABC):
             model = self.build(case)
             if not case.forces:
                 raise UnsupportedError(f"{self.title} gives no forces of case {case.name!r}")
-            return Walk(model, self.known(case)).solve(group)
+            return Walk(model, self.with_known_joints(case)).solve(group)
 
         return equilibria(case, solve)
 
@@ -207,5 +183,34 @@ class ProjectionEngine(ABC):
         return {label: type(self)(corrections) for label, corrections in EFFORTS.items()}
 
     @abstractmethod
+    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
+        """Return the calls into the simulator for a sample of the case."""
+
     def floor(self, case: Case) -> Floor:
-        """Return the time of the simulator's compiled code for a sample."""
+        """Return the time of the simulator's compiled code for a sample, by Newton's method with
+        the iterations of the solved case.
+        """
+        model = self.model_of(self.scaled_case(case))
+        solved = self.solve(model, case, 1e-12)
+        calls = self.simulator_calls(model, case)
+        large, small = (np.eye(n) + 0.1 * np.ones((n, n)) for n in (model.unknowns, 1))
+        lapack: Any = importlib.import_module("scipy.linalg.lapack")
+        linear = f"LU of {model.unknowns} rows"
+        own = {**calls.own, linear: lambda: lapack.dgesv(large, large[0])}
+        least = {**calls.least, linear: lambda: lapack.dgesv(small, small[0])}
+        # the adapter's last step only confirms convergence; the pose before it counts as the pose
+        # for the Jacobian of the rates
+        poses = float(solved.iterations[solved.solved].mean())
+        once = {**calls.poses, linear: 1}
+        counts: dict[str, float] = {name: poses * n for name, n in once.items()}
+        counts |= calls.rates
+        parts = {
+            name: count * max(0.0, _microseconds(own[name]) - _microseconds(least[name]))
+            for name, count in counts.items()
+        }
+        counted = (
+            f"{self.name}: {poses:.3g} poses ({', '.join(once)}) and once"
+            f" {', '.join(calls.rates)}; the fastest of {ROUNDS} rounds, less the same calls on the"
+            " smallest model"
+        )
+        return Floor(sum(parts.values()), counted, parts)

@@ -68,6 +68,9 @@ class ProjectionModel(Protocol):
     def case(self) -> Case: ...
 
     @property
+    def unknowns(self) -> int: ...
+
+    @property
     def details(self) -> Mapping[str, Any]: ...
 
     def reset(self) -> None:

@@ -32,8 +32,8 @@ from ...core.kinematics import start_of as where_from
 from ...core.mechanism.mechanism import Vector
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
-from .constraints import closing, closure_text
-from .equivalents import fits, jointed
+from .constraints import closure_conditions, closure_text
+from .equivalents import fits, with_joints_alone
 from .projection import Walk
 from .projection_engine import ProjectionEngine
 from .projection_model import ProjectionModel
@@ -172,7 +172,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
     )
 
 
-def uneven(case: Case, title: str) -> str | None:
+def uneven_samples(case: Case, title: str) -> str | None:
     """Return the reason why steps of equal length miss the samples, or None."""
     gaps = np.abs(np.diff(case.sweep.path.times))
     if len(gaps) and np.ptp(gaps) > EQUIDISTANT * gaps.max():
@@ -183,7 +183,7 @@ def uneven(case: Case, title: str) -> str | None:
     return None
 
 
-def simulated(
+def simulate_legs(
     case: Case, start: Start, simulator: Simulator, details: Mapping[str, Any]
 ) -> Trajectory:
     """Simulate both legs; see `Engine.solve`."""
@@ -274,7 +274,7 @@ class Simulation:
         """Simulate all reachable samples with the simulator's own tolerance (see `settings`),
         however far the constraints drift.
         """
-        return simulated(case, model.start, model.run, model.details)
+        return simulate_legs(case, model.start, model.run, model.details)
 
 
 @dataclass(frozen=True)
@@ -314,7 +314,7 @@ class Stepping(Simulation):
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint, coupler or driver without a constraint here, or None."""
         engine = self.projection()
-        case = engine.known(case)
+        case = engine.with_known_joints(case)
         if (reason := engine.unsupported(case)) is not None:
             return reason
         for joint in case.mechanism.joints:
@@ -329,7 +329,7 @@ class Stepping(Simulation):
                 return self._without(coupler, "that keeps a curve")
             if len(coupler.joints) > 2:
                 return self._without(coupler, "that couples more than two coordinates")
-        return uneven(case, engine.title) if self.equal else None
+        return uneven_samples(case, engine.title) if self.equal else None
 
     def _without(self, joint: Joint | Coupler, what: str) -> str:
         title = self.projection.title
@@ -341,7 +341,9 @@ class Stepping(Simulation):
 
     def build(self, case: Case) -> SteppedTree:
         """Return tree, constraints and start."""
-        mechanism = jointed(self.projection().known(case).mechanism, rods=self.rods)
+        mechanism = with_joints_alone(
+            self.projection().with_known_joints(case).mechanism, rods=self.rods
+        )
         return self.model(replace(case, mechanism=mechanism), self.steps)
 
 
@@ -386,7 +388,7 @@ class TiedTree(TreeModel):
         self.ties.append(tie)
         self.closures[name] = f"{self.has}, {closure_text(tie.by)}"
         i, j = map(self.add_frame, tie.bodies, tie.points)
-        self.conditions += closing(tie.by, joint, i, j)
+        self.conditions += closure_conditions(tie.by, joint, i, j)
 
 
 class SteppedTree(TiedTree):

@@ -82,7 +82,7 @@ def urdf(model: Plain) -> str:
             at[name] = move["point"]
             if last:
                 inertial = ET.SubElement(link, "inertial")
-                ET.SubElement(inertial, "origin", xyz=_between(at[name], body["center"]))
+                ET.SubElement(inertial, "origin", xyz=_offset(at[name], body["center"]))
                 ET.SubElement(inertial, "mass", value=repr(body["mass"]))
                 six = {
                     f"i{'xyz'[i]}{'xyz'[j]}": repr(body["inertia"][i][j])
@@ -91,7 +91,7 @@ def urdf(model: Plain) -> str:
                 }
                 ET.SubElement(inertial, "inertia", six)
             joint = ET.SubElement(root, "joint", name=f"{name} joint", type=kinds[move["kind"]])
-            ET.SubElement(joint, "origin", xyz=_between(at[parent], at[name]))
+            ET.SubElement(joint, "origin", xyz=_offset(at[parent], at[name]))
             ET.SubElement(joint, "parent", link=parent)
             ET.SubElement(joint, "child", link=name)
             ET.SubElement(joint, "axis", xyz=_numbers(move["axis"]))
@@ -102,7 +102,7 @@ def urdf(model: Plain) -> str:
     return _text(root)
 
 
-def _between(start: Iterable[float], end: Iterable[float]) -> str:
+def _offset(start: Iterable[float], end: Iterable[float]) -> str:
     return _numbers(b - a for a, b in zip(start, end, strict=True))
 
 

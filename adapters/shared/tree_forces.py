@@ -33,7 +33,7 @@ from .force_solution import (
     axis_of,
     left_out_of,
     places,
-    reacting,
+    reacting_joints,
 )
 from .projection_model import Dynamics
 from .tree_plan import Relation
@@ -87,7 +87,7 @@ class Site:
             by_multiplier[:, rows] += to_point @ exerted[self.second][:, rows]
         return alone, by_multiplier
 
-    def along(self, freedom: str) -> Array:
+    def coordinate_wrench(self, freedom: str) -> Array:
         """Return the wrench of a unit force or torque of a coordinate on the second body."""
         joint: Any = self.joint
         h, none = self.frame.rotation @ np.array([*unit(joint.axis)]), np.zeros(3)
@@ -153,7 +153,7 @@ class TreeForces:
         ]
         self.points = {
             joint.name: self._frame(joint.j, mechanism.reaction_point(joint))
-            for joint in map(mechanism.joint, reacting(model.case))
+            for joint in map(mechanism.joint, reacting_joints(model.case))
         }
         self.left_out = left_out_of(mechanism, self._frame)
 
@@ -215,7 +215,7 @@ class TreeForces:
             for frame, wrench in zip(element.frames, wrenches, strict=True):
                 demand = demand - frame.jacobian.T @ wrench
                 loads[frame.body] += about_origin(frame.position, wrench[None])[:, 0]
-        left_out, exerting = [np.zeros((0, len(v)))], [*model.exerted()]
+        left_out, exerting = [np.zeros((0, len(v)))], [*model.row_wrenches()]
         for each, place in self.slices:
             rows, wrenches = each.rows(place.start)
             left_out.append(rows)
@@ -231,7 +231,7 @@ class TreeForces:
             for row, freedom in self.shares[name]:
                 body, sign = model.coordinates[name, freedom]
                 weight = sign * float(model.J[row, model.coordinate(body)[1]])
-                by_multiplier[:, row] -= weight * site.along(freedom)
+                by_multiplier[:, row] -= weight * site.coordinate_wrench(freedom)
             reactions[name] = alone, by_multiplier
         return Dynamics(demand, reactions, amounts, total)
 

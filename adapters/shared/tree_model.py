@@ -7,8 +7,9 @@ its origin is the point of its link there.
 
 A constructor prepares the simulator's empty model and then calls the constructor of `TreeModel`,
 which calls `add_link` for every link, parents first, `make_frame` for every frame, and finally
-`finish`. Then the model is solved: `design` and `moved` return configurations q, `place` and `rate`
-update the simulator's data, which `placement`, `slope` and `motion` read frame by frame.
+`finish`. Then the model is solved: `design` and `configuration_after` return configurations q,
+`place` and `rate` update the simulator's data, which `placement`, `slope` and `motion` read frame
+by frame.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.harness.engine import Floor
 from ...core.joints import Fixed, Joint, Translational
 from ...core.joints.base import unit
 from ...core.mechanism.loads import TorsionSpringDamper
@@ -38,11 +38,11 @@ from .constraints import (
     DrivenPoint,
     Linear,
     by_frame,
-    closing,
+    closure_conditions,
     closure_text,
 )
 from .force_solution import RowWrench
-from .projection_engine import Call, ProjectionEngine, floor_of
+from .projection_engine import Call, CountedCalls, ProjectionEngine
 from .projection_model import Dynamics
 from .tree_forces import Mass, TreeForces
 from .tree_plan import Chain, Closure, Link, Relation, plan_tree
@@ -165,7 +165,7 @@ class TreeModel(ABC):
         """Return the configuration at design, zero for slides and hinges."""
 
     @abstractmethod
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         """Return the configuration q advanced by dx, shape (unknowns,)."""
 
     @abstractmethod
@@ -241,7 +241,7 @@ class TreeModel(ABC):
         copied = f"on a copy of {joint.j!r}: " if closure.links else ""
         self.closures[joint.name] = copied + closure_text(closure.by)
         i, j = map(self.add_frame, self.bodies_of(closure), closure.points)
-        conditions = closing(closure.by, joint, i, j)
+        conditions = closure_conditions(closure.by, joint, i, j)
         self.conditions += conditions
         self.tied += [(joint.name, each, (i, j)) for each in conditions]
 
@@ -273,7 +273,7 @@ class TreeModel(ABC):
         """Return the rows of a condition."""
         return self.slices[self.conditions.index(condition)]
 
-    def exerted(self) -> list[RowWrench]:
+    def row_wrenches(self) -> list[RowWrench]:
         """Return the wrenches of unit multipliers of rows between bodies."""
         found = [
             RowWrench(self.rows_of(condition), frame.body, frame.position, wrenches)
@@ -341,7 +341,7 @@ class TreeModel(ABC):
         self.q = saved
 
     def move(self, dx: Array) -> None:
-        self.q = self.moved(dx)
+        self.q = self.configuration_after(dx)
 
     def observe(self) -> None:
         """Read the poses and Jacobians of all frames in conditions from the simulator, at q."""
@@ -419,31 +419,24 @@ class TreeEngine(ProjectionEngine):
     def model_of(self, case: Case) -> TreeModel:
         """Return the simulator's model of the unscaled case, at the design position."""
 
-    def floor(self, case: Case) -> Floor:
-        """Return the floor from all simulator calls for a pose and its rates."""
-        model, least = (
-            self.model_of(self.own(case)),
-            self.model_of(replace(case, mechanism=LEAST, outputs=())),
-        )
-        solved = self.solve(model, case, 1e-12)
+    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
+        """Return all simulator calls for a pose and its rates."""
+        least = self.model_of(replace(case, mechanism=LEAST, outputs=()))
         n, wanted = len(model.moving), len(model.wanted)
         # the same Python on the smallest model
         least.moving, least.wanted = least.moving * n, least.moving * wanted
-        zeros = np.zeros(model.unknowns), np.zeros(least.unknowns)
-        pose: dict[str, tuple[Call, Call, int]] = {
-            f"placements and Jacobians of {n} frames": (model.observe, least.observe, 1),
-        }
-        own, empty = zeros
-        rates: dict[str, tuple[Call, Call, int]] = {
-            f"accelerations of {n} frames": (
-                partial(model.observe_rates, own),
-                partial(least.observe_rates, empty),
-                1,
-            ),
-            f"motions of {wanted} points": (
-                partial(model.points, own, own),
-                partial(least.points, empty, empty),
-                1,
-            ),
-        }
-        return floor_of(self.name, solved, model.unknowns, pose, rates)
+        pose, rates, points = (
+            f"placements and Jacobians of {n} frames",
+            f"accelerations of {n} frames",
+            f"motions of {wanted} points",
+        )
+
+        def calls(of: TreeModel) -> Mapping[str, Call]:
+            zeros = np.zeros(of.unknowns)
+            return {
+                pose: of.observe,
+                rates: partial(of.observe_rates, zeros),
+                points: partial(of.points, zeros, zeros),
+            }
+
+        return CountedCalls(calls(model), calls(least), {pose: 1}, {rates: 1, points: 1})

@@ -265,7 +265,7 @@ def plan_tree(
     tree = spanning_tree(mechanism, first)
     names = {body.name for body in mechanism.bodies}
 
-    def related(joint: Joint) -> Iterator[Relation]:
+    def own_relations(joint: Joint) -> Iterator[Relation]:
         for terms in relations(joint):
             yield Relation(joint.name, terms, (signs[joint.name],) * 2)
 
@@ -280,7 +280,7 @@ def plan_tree(
         P, sign = ends_of(mechanism, joint)[0], 1 if joint.j == body.name else -1
         links, signs[joint.name] = CHAINS[type(joint)](joint, P)[::sign], sign
         yield Chain(joint, joint.bodies[sign < 0], body.name, links, sign, P)
-        yield from related(joint)
+        yield from own_relations(joint)
     cut |= {joint.name for joint in tree.cut}
     for joint in mechanism.joints:
         if joint.name not in cut:
@@ -301,7 +301,7 @@ def plan_tree(
             while first in names:
                 first += "'"
             yield Chain(joint, joint.i, first, links, 1, point, cut=True)
-        yield from related(joint)
+        yield from own_relations(joint)
         yield Closure(joint, (first, joint.j), (point, point), tied, [each.move for each in links])
     for coupler in mechanism.couplers:
         named = tuple(signs[name] for name in coupler.joints)

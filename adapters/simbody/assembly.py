@@ -16,7 +16,7 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.errors import SolveError
 from ...core.trajectory import Array
-from ..shared.equivalents import jointed
+from ..shared.equivalents import with_joints_alone
 from ..shared.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
 from .simbody import Simbody, SimbodyModel, opensim
 
@@ -64,7 +64,7 @@ class Assembly(Simulation):
 
     def build(self, case: Case) -> _Assembled:
         """Return OpenSim's model and its start."""
-        case = replace(case, mechanism=jointed(case.mechanism))
+        case = replace(case, mechanism=with_joints_alone(case.mechanism))
         return _Assembled(opensim(), case, self.accuracy)
 
 
@@ -86,9 +86,9 @@ class _Assembled(SimbodyModel):
         self.restore(self.start.configuration)
         self.place()
         for values in leg.drive(leg.times)[0].T:
-            yield self.assembled(values)
+            yield self.assemble(values)
 
-    def assembled(self, values: Array) -> SimulatedPose:
+    def assemble(self, values: Array) -> SimulatedPose:
         """Return the pose at values of the drivers."""
         o, state = self.o, self.state
         references = o.SimTKArrayCoordinateReference()

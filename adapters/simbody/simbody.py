@@ -27,7 +27,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.harness.engine import Floor
 from ...core.joints import Distance, Inline, Spherical
 from ...core.joints.base import unit
 from ...core.mechanism.mechanism import Vector
@@ -35,7 +34,7 @@ from ...core.mechanism.motions import PointCoordinate
 from ...core.trajectory import Array
 from ..shared.force_solution import RowWrench
 from ..shared.poses import Parameters, euler_angles, orientation
-from ..shared.projection_engine import Call, floor_of
+from ..shared.projection_engine import Call, CountedCalls
 from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import LEAST, TreeEngine, TreeModel
 from ..shared.tree_plan import Closure, Link, Relation
@@ -43,7 +42,7 @@ from ..shared.tree_plan import Closure, Link, Relation
 UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
 
 
-def turned(p: Sequence[float], turn: Sequence[float]) -> Parameters:
+def turn_parameters(p: Sequence[float], turn: Sequence[float]) -> Parameters:
     """Return Euler parameters p after a further rotation by a rotation vector in the axes of the
     parent [rad].
     """
@@ -103,27 +102,20 @@ class Simbody(TreeEngine):
         """Return OpenSim's model of the case."""
         return SimbodyModel(opensim(), case)
 
-    def floor(self, case: Case) -> Floor:
-        """Return the floor from Simbody's stages and its calls for constraints and points."""
-        model = self.model_of(self.own(case))
-        solved = self.solve(model, case, 1e-12)
-        own = _calls(model)
-        least = _calls(self.model_of(replace(case, mechanism=LEAST, outputs=())))
+    def simulator_calls(self, model: Any, case: Case) -> CountedCalls:
+        """Return Simbody's stages and its calls for constraints and points."""
+        least = self.model_of(replace(case, mechanism=LEAST, outputs=()))
         driven = sum(isinstance(each, PointCoordinate) for each in case.mechanism.drivers)
         points = len(model.wanted)
-
-        def timed(**times: int) -> Mapping[str, tuple[Call, Call, int]]:
-            return {name: (own[name], least[name], n) for name, n in times.items()}
-
-        pose = timed(realizePosition=1, calcG=1, calcFrameJacobian=driven)
-        rates = timed(
-            realizeVelocity=2,
-            calcBiasForAccelerationConstraints=1,
-            calcBiasForFrameJacobian=driven,
-            calcStationJacobian=points,
-            calcBiasForStationJacobian=points,
-        )
-        return floor_of(self.name, solved, model.unknowns, pose, rates)
+        poses = {"realizePosition": 1, "calcG": 1, "calcFrameJacobian": driven}
+        rates = {
+            "realizeVelocity": 2,
+            "calcBiasForAccelerationConstraints": 1,
+            "calcBiasForFrameJacobian": driven,
+            "calcStationJacobian": points,
+            "calcBiasForStationJacobian": points,
+        }
+        return CountedCalls(_calls(model), _calls(least), poses, rates)
 
 
 def _calls(of: SimbodyModel) -> Mapping[str, Call]:
@@ -312,11 +304,11 @@ class SimbodyModel(TreeModel):
             q[at : at + 4] = UNTURNED
         return q
 
-    def moved(self, dx: Array) -> Array:
+    def configuration_after(self, dx: Array) -> Array:
         q, (at_q, at_v) = self.q.copy(), self.single.T
         q[at_q] += dx[at_v]
         for k, n in self.balls:
-            q[k : k + 4] = turned(q[k : k + 4].tolist(), dx[n : n + 3].tolist())
+            q[k : k + 4] = turn_parameters(q[k : k + 4].tolist(), dx[n : n + 3].tolist())
         return q
 
     def place(self) -> None:
@@ -418,8 +410,8 @@ class SimbodyModel(TreeModel):
         )
         return np.array(found.to_numpy())
 
-    def exerted(self) -> list[RowWrench]:
-        found = super().exerted()
+    def row_wrenches(self) -> list[RowWrench]:
+        found = super().row_wrenches()
         origins = [self.position_of(number) for number in range(len(self.bodies))]
         for rows, keeps in self.own_rows:
             if not isinstance(keeps, str):

@@ -51,7 +51,7 @@ def inertial(body: Body) -> tuple[float, list[float], list[float]]:
     return text.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
 
 
-def known(element: ForceElement) -> bool:
+def is_known(element: ForceElement) -> bool:
     """Return whether a script has the element: it has no curves."""
     return not getattr(element, "curve", None)
 
@@ -74,7 +74,7 @@ def load_options(element: ForceElement) -> dict[str, Any]:
     return {"stiffness": element.stiffness, "damping": element.damping, **own}
 
 
-def beginning(mechanism: Mechanism) -> str:
+def script_head(mechanism: Mechanism) -> str:
     """Return the functions that the lines call; with masses and force elements if it has loads."""
     masses, body = text.PLAIN, PLAIN_BODY
     if mechanism.has_loads:
@@ -270,7 +270,7 @@ def write(
             f"{strange[0]} has no counterpart in Exudyn; export MJCF or URDF instead"
         )
     note = text.zeros_of(zeros) + text.lost_limits(ranges)
-    script = _Script(*_spelled_out(mechanism, way)).text(start)
+    script = _Script(*_with_hinges(mechanism, way)).text(start)
     return {".py": f"#{note}\n{script}" if note else script}
 
 
@@ -303,17 +303,17 @@ class _Script:
                 self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
-        forces = [each.name for each in self.mechanism.forces if known(each)]
+        forces = [each.name for each in self.mechanism.forces if is_known(each)]
         if strange := text.left_out(self.mechanism, forces, True).strip():
             self.lines.append(f"# {strange}")
-        for force in filter(known, self.mechanism.forces):
+        for force in filter(is_known, self.mechanism.forces):
             self.load(force)
         for point in self.mechanism.points:
             self.lines.append(
                 f"points[{point.name!r}] = bodies[{point.body!r}],"
                 f" {self.arm(point.body, point.position)}"
             )
-        return beginning(self.mechanism) + "\n".join(self.lines) + "\n" + END
+        return script_head(self.mechanism) + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
         """Add a line with a call."""
@@ -406,7 +406,7 @@ def _text(value: Any) -> str:
     return repr(value) if isinstance(value, str | int) else repr(float(value) + 0.0)
 
 
-def _spelled_out(
+def _with_hinges(
     mechanism: Mechanism, way: Mapping[str, BodyMotion]
 ) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
     """Return the mechanism and its way, with joints unknown to Exudyn as hinges between further
@@ -415,7 +415,7 @@ def _spelled_out(
     placed, way = displacements(mechanism, way), dict(way)
     bodies, joints, couplers = [*mechanism.bodies], list[j.Joint](), [*mechanism.couplers]
     for joint in mechanism.joints:
-        if not _to_be_spelled_out(joint):
+        if not _needs_hinges(joint):
             joints.append(joint)
             continue
         P = ends_of(mechanism, joint)[0]
@@ -453,7 +453,7 @@ def _spelled_out(
     return replace(mechanism, bodies=bodies, joints=joints, couplers=couplers, drivers=()), way
 
 
-def _to_be_spelled_out(joint: j.Joint) -> bool:
+def _needs_hinges(joint: j.Joint) -> bool:
     if isinstance(joint, j.Universal | j.PerpendicularAxes):
         return abs(unit(joint.axes[0]) @ unit(joint.axes[1])) > RIGHT_ANGLE
     return isinstance(joint, j.ConstantVelocity)

@@ -26,7 +26,7 @@ from .text import link_between
 
 
 @dataclass(frozen=True)
-class Hung:
+class TreeJoint:
     """A joint of the tree: how a link moves on its parent.
 
     Attributes:
@@ -74,7 +74,7 @@ class Tree:
     """
 
     frames: dict[str, Body] = field(default_factory=dict[str, Body])
-    joints: list[Hung] = field(default_factory=list[Hung])
+    joints: list[TreeJoint] = field(default_factory=list[TreeJoint])
     ties: list[Tie] = field(default_factory=list[Tie])
     relations: list[Following] = field(default_factory=list[Following])
     curves: list[Following] = field(default_factory=list[Following])
@@ -179,13 +179,15 @@ def loops(ties: Sequence[Tie], kinds: tuple[str, str, str]) -> str:
     return f" Loops are closed at {', '.join(told)}{why}." if told else ""
 
 
-def hung(mechanism: Mechanism) -> Tree:
+def tree_of(mechanism: Mechanism) -> Tree:
     """Return the mechanism as tree, ties and relations, at its design position."""
     tree = Tree()
     for body in mechanism.bodies:
         if body.fixed:
             tree.frames[body.name] = body
-            tree.joints.append(Hung(f"{body.name}.fixed", "fixed", GROUND, body.name, body.origin))
+            tree.joints.append(
+                TreeJoint(f"{body.name}.fixed", "fixed", GROUND, body.name, body.origin)
+            )
     for part in plan(mechanism, auxiliary="{last}.link"):
         match part:
             case Chain():
@@ -211,13 +213,13 @@ def _hang(tree: Tree, chain: Chain, mechanism: Mechanism) -> None:
     if end is not None and (joint is None or not chain.links):
         tree.frames[end.name] = end
         name, move = (joint.name, "fixed") if joint else (f"{end.name}.free", "free")
-        tree.joints.append(Hung(name, move, chain.parent, end.name, chain.point))
+        tree.joints.append(TreeJoint(name, move, chain.parent, end.name, chain.point))
         return
     assert joint is not None
     for name, link, parent, child in chain.each():
         last = end or Body(child, link.point)
         between = child != chain.child
         tree.frames[child] = link_between(child, link.point, mechanism) if between else last
-        tree.joints.append(Hung(name, link.move, parent, child, link.point, link.axis))
+        tree.joints.append(TreeJoint(name, link.move, parent, child, link.point, link.axis))
         if link.name:
             tree.coordinates[joint.name, link.name] = name

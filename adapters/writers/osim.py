@@ -37,7 +37,7 @@ from ..shared.poses import (
     orientation,
 )
 from . import text
-from .hung_tree import Hung, Tie, hung, loops
+from .hung_tree import Tie, TreeJoint, loops, tree_of
 from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (
@@ -112,7 +112,7 @@ class _Model:
         values: Mapping[tuple[str, str], float],
         ranges: Ranges,
     ) -> None:
-        self.tree = hung(mechanism)
+        self.tree = tree_of(mechanism)
         names = self.tree.coordinates
         self.ranges = {names[key]: limits for key, limits in ranges.items() if key in names}
         # values of coordinates at the start, by name
@@ -185,7 +185,7 @@ class _Model:
         add_text(element, "mass_center", local(body, text.center_of(body)))
         add_text(element, "inertia", text.six(text.own_inertia(body)))
 
-    def add_joint(self, joints: ET.Element, joint: Hung) -> None:
+    def add_joint(self, joints: ET.Element, joint: TreeJoint) -> None:
         """Add a joint between a frame of the parent and a frame of the child, which coincide at
         zero.
         """
@@ -214,9 +214,9 @@ class _Model:
             back = turn * about(vec((0.0, 0.0, 1.0)), -value)
         ends = (("parent", joint.parent, zero, back), ("child", joint.child, joint.point, turn))
         for end, body, point, axes in ends:
-            _add_frame(frames, end, body, self.local(body, point), self.turned(body, axes))
+            _add_frame(frames, end, body, self.local(body, point), self.local_turn(body, axes))
 
-    def turned(self, body: str, turn: Quat) -> Quat:
+    def local_turn(self, body: str, turn: Quat) -> Quat:
         """Return a rotation, global at design, in the axes of a link."""
         return attitude(self.frame(body)).conjugate() * turn
 
@@ -227,7 +227,7 @@ class _Model:
             frames = ET.SubElement(element, "frames")
             for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
                 add_text(element, f"socket_frame{k}", f"end{k}")
-                turn = self.turned(link, IDENTITY)
+                turn = self.local_turn(link, IDENTITY)
                 _add_frame(frames, f"end{k}", link, self.local(link, at), turn)
             return
         kind = "PointConstraint" if tie.length is None else "ConstantDistanceConstraint"

@@ -27,7 +27,7 @@ from ...core.trajectory import BodyMotion
 from ..shared.equivalents import cross_of
 from ..shared.poses import at_start, attitude, bushing_ends, joint_coordinates, local
 from . import text
-from .hung_tree import Hung, Tie, extent, hung, loops
+from .hung_tree import Tie, TreeJoint, extent, loops, tree_of
 from .text import add_note, add_text, document, numbers, require_known
 
 NOTE = (
@@ -82,7 +82,7 @@ class _Model:
     def __init__(
         self, mechanism: Mechanism, limits: Mapping[tuple[str, str], Sequence[float]]
     ) -> None:
-        self.mechanism, self.tree = mechanism, hung(mechanism)
+        self.mechanism, self.tree = mechanism, tree_of(mechanism)
         names = self.tree.coordinates
         self.limits = {names[key]: each for key, each in limits.items() if key in names}
         self.root = ET.Element("sdf", {"version": "1.11", "xmlns:drake": text.DRAKE})
@@ -94,7 +94,9 @@ class _Model:
                 self.add_rod(tie)
         # Drake has no ball constraint with the world body
         self.tree.frames[GROUND] = Body(GROUND)
-        self.tree.joints.append(Hung(f"{GROUND}.fixed", "fixed", WORLD, GROUND, (0.0, 0.0, 0.0)))
+        self.tree.joints.append(
+            TreeJoint(f"{GROUND}.fixed", "fixed", WORLD, GROUND, (0.0, 0.0, 0.0))
+        )
         for frame in self.tree.frames.values():
             self.add_link(frame)
         for joint in self.tree.joints:
@@ -123,7 +125,7 @@ class _Model:
         links = [f"{names[0]}.link", f"{tie.name}.rod"]
         axes = cross_of(self.mechanism, i, along)
         for name, parent, child, axis in zip(names, (i, *links), links, axes, strict=False):
-            self.tree.joints.append(Hung(name, "hinge", parent, child, P, axis))
+            self.tree.joints.append(TreeJoint(name, "hinge", parent, child, P, axis))
             self.tree.frames[child] = Body(child, P)
         self.tree.ties.append(Tie(tie.name, (links[1], j), (end, Q)))
 
@@ -147,7 +149,7 @@ class _Model:
         options = {"relative_to": of, "rotation_format": "quat_xyzw"}
         add_text(element, "pose", (*at, e1, e2, e3, e0), options)
 
-    def add_joint(self, joint: Hung) -> None:
+    def add_joint(self, joint: TreeJoint) -> None:
         """Add a joint at its point, in global axes."""
         element = ET.SubElement(
             self.model, "joint", name=self.joint_name(joint.name), type=KINDS[joint.move]

@@ -37,7 +37,7 @@ from ..shared.constraints import (
     Direction,
     Dot,
     Length,
-    closing,
+    closure_conditions,
 )
 from ..shared.poses import displacements, link_coordinates
 from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
@@ -146,7 +146,7 @@ def _as_data(condition: Condition) -> Iterator[dict[str, Any]]:
     def end(frame: Any) -> dict[str, Any]:
         return {"link": frame.link, "point": frame.point}
 
-    def along(direction: Direction) -> dict[str, Any]:
+    def axis_data(direction: Direction) -> dict[str, Any]:
         return {"link": cast(Any, direction.frame).link, "direction": direction.a0.tolist()}
 
     match condition:
@@ -155,9 +155,9 @@ def _as_data(condition: Condition) -> Iterator[dict[str, Any]]:
         case Length(Difference(i, j), length):
             yield {"kind": "distance", "i": end(i), "j": end(j), "value": length}
         case Dot(Direction() as x, Direction() as y, value):
-            yield {"kind": "directions", "x": along(x), "y": along(y), "value": value}
+            yield {"kind": "directions", "x": axis_data(x), "y": axis_data(y), "value": value}
         case Dot(Direction() as x, Difference(i, j), value):
-            yield {"kind": "offset", "x": along(x), "i": end(i), "j": end(j), "value": value}
+            yield {"kind": "offset", "x": axis_data(x), "i": end(i), "j": end(j), "value": value}
         case _:
             raise NotImplementedError(f"{type(condition).__name__}: give its kind here")
 
@@ -291,7 +291,7 @@ class _Model:
             cast(BodyFrame, _End(link, self.arm(link, P)))
             for link, P in zip(closure.ends, closure.points, strict=True)
         ]
-        for condition in closing(closure.by, joint, *frames):
+        for condition in closure_conditions(closure.by, joint, *frames):
             self.constraints += (
                 {"joint": joint.name, **written} for written in _as_data(condition)
             )

@@ -100,7 +100,7 @@ class CheckEngine(Command):
         Raises:
             KincheckError: there is no such engine, or a member of the engine protocol is missing.
         """
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
         from ..recorded.engine import ProgramEngine
         from ..report.progress import progress
         from ..studies.checks.check_engine import check_engine
@@ -220,7 +220,7 @@ def _lines(found: Reference, named: int) -> list[str]:
     lines += [
         f"  {name}: no proof: {each.reason}" for name, each in found.outputs.items() if each.reason
     ]
-    lines += _missing(found, named)
+    lines += _unproved_samples(found, named)
     lines += [
         f"  signs: {words}"
         for words in dict.fromkeys(each.signs for each in found.outputs.values())
@@ -249,7 +249,7 @@ def _cell(largest: float | None, ulps: float | None) -> str:
     return f"{largest:.1e}" + (f" {ulps:6.1f} ulp" if ulps is not None else "")
 
 
-def _missing(found: Reference, named: int) -> list[str]:
+def _unproved_samples(found: Reference, named: int) -> list[str]:
     """Return the lines about samples without a proof."""
     name, values = next(iter(found.driver.items()))
     missing = [(k, sample.reason) for k, sample in enumerate(found.samples) if not sample.proved]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _NOT_THEIRS, MOST_PLACES = (str(Path(__file__).parents[1]), importlib.__file__, "<"), 3
 
 
-def _raised(error: Exception) -> str:
+def _import_error_text(error: Exception) -> str:
     """Return the text of an import error with its places, the last first, except places in the
     importer and in kincheck.
     """
@@ -50,7 +50,7 @@ def _raised(error: Exception) -> str:
     return f"{message} ({', called from '.join(reversed(places))})" if places else message
 
 
-def _members(module: ModuleType, offered: Callable[[object], bool]) -> list[str]:
+def _members(module: ModuleType, is_wanted: Callable[[object], bool]) -> list[str]:
     """Return the names of the wanted objects that a module or package defines or loads on first
     use; objects imported from elsewhere are left out.
     """
@@ -61,16 +61,17 @@ def _members(module: ModuleType, offered: Callable[[object], bool]) -> list[str]
     return [
         name
         for name, each in found.items()
-        if offered(each) and f"{getattr(each, '__module__', '')}.".startswith(f"{module.__name__}.")
+        if is_wanted(each)
+        and f"{getattr(each, '__module__', '')}.".startswith(f"{module.__name__}.")
     ]
 
 
-def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
+def load_named(where: str, kind: str, is_wanted: Callable[[object], bool]) -> Any:
     """Return the object at MODULE:NAME; modules of the current folder are found too.
 
     Args:
         kind: "joint" or "engine", for messages.
-        offered: tells whether an object is of the kind, for the list of candidates in a message.
+        is_wanted: tells whether an object is of the kind, for the list of candidates in a message.
 
     Raises:
         KincheckError: there is no such module or name, or the module cannot be imported.
@@ -86,7 +87,7 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
     try:
         module = importlib.import_module(module_name)
         found = getattr(module, name, None)
-        members = [] if found is not None else _members(module, offered)
+        members = [] if found is not None else _members(module, is_wanted)
     except SystemExit as end:  # a script; its exit would skip the check and set the exit status
         raise KincheckError(
             f"module {module_name!r} ends the process when it is imported (status {end.code})."
@@ -101,7 +102,7 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
                 " out the ending .py."
             ) from error
         raise KincheckError(
-            f"module {module_name!r} cannot be imported: {_raised(error)}. Correct it."
+            f"module {module_name!r} cannot be imported: {_import_error_text(error)}. Correct it."
         ) from error
     if found is None:
         close = similar(name, members)
@@ -128,10 +129,10 @@ def load_engine(where: str) -> Engine:
         KincheckError: there is no such module or class, the module cannot be imported, the call
             fails, or a member of the engine protocol is missing.
     """
-    return made(where, load_named(where, "engine", _is_engine))
+    return create_engine(where, load_named(where, "engine", _is_engine))
 
 
-def made(where: str, found: Any) -> Engine:
+def create_engine(where: str, found: Any) -> Engine:
     """Return the engine that a class or function creates, or the engine itself.
 
     Raises:
@@ -165,7 +166,7 @@ def entry_points() -> Mapping[str, EntryPoint]:
     return {each.name: each for each in metadata.entry_points(group=GROUP)}
 
 
-def offered(known: Sequence[str]) -> tuple[str, ...]:
+def names_of_entry_points(known: Sequence[str]) -> tuple[str, ...]:
     """Return the names of other packages' engines.
 
     Args:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, collected, refuse
+from ..errors import KincheckError, collect_errors, refuse
 from ..options import (
     argument,
     destination,
@@ -68,11 +68,11 @@ class Compare(Command):
             KincheckError: there are not two, one cannot be read, moves by another driver, or does
                 not reach all samples.
         """
-        designs, beyond, unsolved = self._compared(registry)
+        designs, beyond, unsolved = self._compare_designs(registry)
         refuse(unsolved)
         return replace(designs, exceeded=tuple(beyond))
 
-    def _compared(self, registry: Registry) -> tuple[Designs, list[str], list[str]]:
+    def _compare_designs(self, registry: Registry) -> tuple[Designs, list[str], list[str]]:
         """Return the designs, differences beyond their tolerances, and designs unsolved in part."""
         from ..harness import run as running
         from ..report import designs as views
@@ -95,7 +95,7 @@ class Compare(Command):
         if self.command:
             tell_left_out(cases)
             complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
-        accepted = _accepted(self.tolerance, Path(_name_of(self.cases[0])), designs)
+        accepted = _tolerances_of(self.tolerance, Path(_name_of(self.cases[0])), designs)
         return designs, views.exceeded(designs, accepted), unsolved
 
     def run(self, registry: Registry) -> int:
@@ -106,7 +106,7 @@ class Compare(Command):
         from .destinations import curves_of
 
         refuse(self.unwritable(*PAGE))
-        designs, beyond, unsolved = self._compared(registry)
+        designs, beyond, unsolved = self._compare_designs(registry)
         columns = views.side_by_side(designs)
         rows = [*zip(*columns.values(), strict=True)]
         kinds = dict.fromkeys(columns, Kind.NUMBER)
@@ -133,7 +133,7 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
     given: list[str | Case] = []
     for each in options.cases:
         texts = isinstance(each, str | Path)
-        given += registry.matching(str(each)) if texts else [registry.find_case(each)]
+        given += registry.matching_names(str(each)) if texts else [registry.find_case(each)]
     names = [*map(_name_of, given)]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise KincheckError(f"{twice}: found twice. Leave one out.")
@@ -143,7 +143,7 @@ def _cases(options: Compare, registry: Registry) -> list[Case]:
     cases: list[Case] = []
     problems: list[str] = []
     for each in given:
-        with collected(problems):
+        with collect_errors(problems):
             cases.append(registry.find_case(each, options.supplied))
     refuse(problems)
     several = len({case.name for case in cases}) < len(cases)
@@ -168,7 +168,7 @@ def _name_of(case: str | Path | Case) -> str:
     return str(case) if isinstance(case, str | Path) else case.name
 
 
-def _accepted(texts: Sequence[str], file: Path, designs: Designs) -> dict[str, float]:
+def _tolerances_of(texts: Sequence[str], file: Path, designs: Designs) -> dict[str, float]:
     """Return accepted differences by output, in the units of the first design."""
     from ..case.io.document import unknown_name
     from ..case.io.reference_curve import size_of

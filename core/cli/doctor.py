@@ -36,7 +36,7 @@ class Doctor(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
         from ..report.terminal import with_json
         from .installation import examine
 

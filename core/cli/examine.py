@@ -7,16 +7,11 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, number_of, refuse, unknown
 from ..options import (
-    ONE_CASE,
-    argument,
     destination,
-    group,
-    joint_types,
     json_file,
-    measured,
+    number_with_unit,
     option,
     options,
     positive,
@@ -24,14 +19,12 @@ from ..options import (
     whole,
 )
 from .files import formats, keep_texts
-from .parser import Command
-from .registry import Registry, Status, given
-from .shared_options import TOL, driver_value
+from .registry import Registry, Status, names_of_given
+from .shared_options import TOL, OfCase, driver_value
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..case.case import Case
     from ..kinematics import Curve, Event
     from ..studies.assemblies import Survey
     from ..studies.diagnosis import Diagnosis
@@ -39,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @options
-class Explain(Command):
+class Explain(OfCase):
     """Diagnose a case: degrees of freedom, redundant and contradictory rows by name, conditioning
     along the sweep, resulting tolerances, sensitivity of the outputs to hardpoints, and the
     programs of the native engine.
@@ -49,7 +42,6 @@ class Explain(Command):
     """
 
     about = "diagnose a case: freedom, conditioning, tolerances"
-    case: str | Path | Case = argument(ONE_CASE, "CASE")
     samples: int = option(
         "number of samples of the sweep to examine; default %(default)s", whole(1), "N", default=41
     )
@@ -62,8 +54,6 @@ class Explain(Command):
     json: str | None = json_file("the diagnosis")
     quiet: bool = verbosity("print only the verdict, the findings and the notes")
     verbose: bool = verbosity("print all samples and sensitivities, instead of a few of each", "-v")
-    joint_type: tuple[str, ...] = joint_types()
-    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
 
     def answer(self, registry: Registry) -> Diagnosis:
         """Diagnose a case: degrees of freedom, redundant rows, conditioning, and sensitivities of
@@ -96,7 +86,7 @@ WAYS = {1: "growing", -1: "falling"}
 
 
 @options
-class Trace(Command):
+class Trace(OfCase):
     """Follow a case's motion from its design position in both directions by arc length, and report
     its singular poses.
 
@@ -107,7 +97,6 @@ class Trace(Command):
     """
 
     about = "follow a motion past lock-ups; find limit and branch points"
-    case: str | Path | Case = argument(ONE_CASE, "CASE")
     driver: str | None = option(
         "driver whose value follows from the motion; default: the swept driver",
         metavar="NAME",
@@ -119,8 +108,6 @@ class Trace(Command):
         default=LENGTH,
     )
     json: str | None = json_file("the curve")
-    joint_type: tuple[str, ...] = joint_types()
-    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
@@ -201,18 +188,17 @@ MEETING = 1e-6
 
 
 @options
-class ListAssemblies(Command):
+class ListAssemblies(OfCase):
     """List the assemblies found from random starts at a driver value, the intended assembly first.
 
     Exit status: 0 assemblies are found, 1 none is found, 2 the tool could not do its work.
     """
 
     about = "list assemblies of a mechanism, found from random starts"
-    case: str | Path | Case = argument(ONE_CASE, "CASE")
     at: str | None = option(
         "value of the swept driver, such as 30mm or -20deg, in SI without a unit; default: the"
         " design position",
-        measured,
+        number_with_unit,
         "VALUE",
     )
     samples: int = option(
@@ -229,15 +215,13 @@ class ListAssemblies(Command):
     out: Path | None = destination(
         "stem of the exported files; default: CASE.K in this folder", Path
     )
-    joint_type: tuple[str, ...] = joint_types()
-    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ..report.terminal import with_json
         from ..studies.assemblies import survey, written
 
-        if self.export is None and (found := given(self, ("number", "out"))):
+        if self.export is None and (found := names_of_given(self, ("number", "out"))):
             raise KincheckError(
                 f"{found}: only an export uses it. Add --export FORMAT, or leave it out."
             )
@@ -314,7 +298,7 @@ def _sign(value: int) -> str:
 
 
 @options
-class MoveFreely(Command):
+class MoveFreely(OfCase):
     """Integrate the motion of a case without its drivers: its masses, loads and the rates of
     [free] alone move it from the design position.
 
@@ -323,7 +307,6 @@ class MoveFreely(Command):
     """
 
     about = "move a case without drivers, by its masses and loads, to round-off"
-    case: str | Path | Case = argument(ONE_CASE, "CASE")
     duration: float | None = option(
         "of the motion [s]; default: of [free]", positive, "T", default=None
     )
@@ -336,8 +319,6 @@ class MoveFreely(Command):
     rates: Mapping[str, float] | None = field(default=None)
     csv: Path | None = destination("write time and outputs as columns, SI units", Path)
     json: str | None = json_file("outputs and errors")
-    joint_type: tuple[str, ...] = joint_types()
-    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
 
     def answer(self, registry: Registry) -> FreeResult:
         """Integrate the motion of a case without its drivers.

@@ -12,23 +12,21 @@ from ..case.io.escape import file_name
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError, refuse, unknown
 from ..options import (
-    ONE_CASE,
     argument,
     destination,
     group,
     joint_types,
     json_file,
-    measured,
+    number_with_unit,
     option,
     options,
     switch,
 )
 from .parser import Command
 from .registry import Registry, Status, tell_left_out
-from .shared_options import driver_value, return_cases
+from .shared_options import OfCase, driver_value, return_cases
 
 if TYPE_CHECKING:
-    from ..case.case import Case
     from ..case.models.undriven import Undriven
 
 
@@ -49,14 +47,13 @@ def formats() -> str:
 
 
 @options
-class Export(Command):
+class Export(OfCase):
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
     A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
 
     about = "write a mechanism for a simulator"
-    case: str | Path | Case = argument(ONE_CASE, "CASE")
     to: str = destination(formats(), metavar="FORMAT", required=True)
     out: Path | None = destination(
         "stem of the written files; default: the case's name, in this folder", Path
@@ -64,11 +61,9 @@ class Export(Command):
     at: str | None = option(
         "value of the swept driver at the start, such as 30mm or -20deg, in SI without a unit;"
         " default: the design position",
-        measured,
+        number_with_unit,
         "VALUE",
     )
-    joint_type: tuple[str, ...] = joint_types()
-    supplied: Supplied = group(default_factory=Supplied)
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
@@ -238,7 +233,7 @@ class Same(Command):
             first, *others = (_read(name, registry, self.without) for name in names)
             used = {name for each in (first, *others) for name in each.without}
             require_used(Path(names[0]), self.without, used)
-            others += [_converted(name, Path(names[0]), registry) for name in self.converted_by]
+            others += [_convert(name, Path(names[0]), registry) for name in self.converted_by]
         except KincheckError as error:
             unread = {"files": [*names], "verdict": "not judged", "reason": str(error)}
             with with_json({**unread, **NO_MOTION}, self.json):
@@ -272,7 +267,7 @@ def _read(name: str, registry: Registry, without: Sequence[str]) -> Undriven:
     return undriven_case(registry.find_case(name, driven=False), name)
 
 
-def _converted(name: str, file: Path, registry: Registry) -> Undriven:
+def _convert(name: str, file: Path, registry: Registry) -> Undriven:
     """Return what a simulator saves of a model."""
     from ..case.models.undriven import undriven_file
 

@@ -209,7 +209,7 @@ def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
     browser = next((path for path in map(shutil.which, BROWSERS) if path), None)
     missing = ("", "") if browser else ("not installed", "apt install chromium")
     return [
-        *_imported(found, modules, pythons),
+        *_with_import_problems(found, modules, pythons),
         Part("chromium", browser, "tests of the report", False, *missing),
     ]
 
@@ -227,7 +227,7 @@ def _version(name: str, python: str = sys.executable) -> str | None:
         return None
 
 
-def _imported(
+def _with_import_problems(
     found: Sequence[Part], modules: Mapping[str, str], pythons: Mapping[str, str]
 ) -> list[Part]:
     """Return the parts with the problems of importing their modules. Each import runs in its own
@@ -251,7 +251,7 @@ def _imported(
     }
     result: list[Part] = []
     for part in found:
-        problem = _ended(running[part.name]) if part.name in running else part.problem
+        problem = _import_problem(running[part.name]) if part.name in running else part.problem
         remedy = part.remedy or (_repair(part.name, problem) if problem else "")
         result.append(msgspec.structs.replace(part, problem=problem, remedy=remedy))
     return result
@@ -264,7 +264,7 @@ def _repair(name: str, problem: str) -> str:
     return f"pip install --force-reinstall {name}"
 
 
-def _ended(importing: subprocess.Popen[str]) -> str:
+def _import_problem(importing: subprocess.Popen[str]) -> str:
     try:
         output = importing.communicate(timeout=PATIENCE)[1].strip().splitlines()
     except subprocess.TimeoutExpired:

@@ -95,8 +95,8 @@ class MeasureCompliance(Isolated):
         from ..case.io.atomic_files import write
         from ..case.models.files import is_table
         from ..case.units import LENGTHS
+        from ..harness.engine import STANDARD
         from ..harness.record import to_json
-        from ..harness.standard import STANDARD
         from ..report.progress import complain, lacking
         from ..report.table import print_table
         from ..report.terminal import with_json
@@ -127,7 +127,9 @@ class MeasureCompliance(Isolated):
         if self.csv is not None:
             write("--csv", self.csv, views.table(results).encode())
         if engines:
-            results = replace(results, checked=self._checked(engines, results.cases, problems))
+            results = replace(
+                results, checked=self._check_engines(engines, results.cases, problems)
+            )
         checked = results.checked
         if self.out is not None:
             if checked is not None:
@@ -152,7 +154,7 @@ class MeasureCompliance(Isolated):
         native = registry.baseline(found)
         return [native, *found] if native is not None else found
 
-    def _checked(
+    def _check_engines(
         self,
         engines: Sequence[Engine],
         cases: Sequence[Case],

@@ -28,7 +28,7 @@ from ..options import (
 )
 from ..report.progress import complain
 from .parser import Command
-from .registry import Registry, Status, given
+from .registry import Registry, Status, names_of_given
 from .shared_options import MODE, MODES, TOL
 
 if TYPE_CHECKING:
@@ -88,10 +88,10 @@ class BenchEngines(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        return _measured(self, registry, formulation=False)
+        return _measure_engines(self, registry, formulation=False)
 
 
-def _measured(options: BenchEngines, registry: Registry, *, formulation: bool) -> int:
+def _measure_engines(options: BenchEngines, registry: Registry, *, formulation: bool) -> int:
     from msgspec.structs import replace
 
     from ..extras import THREADS
@@ -225,7 +225,7 @@ class BenchAll(Command):
         """Do the work of the command line."""
         given = {name: getattr(self, name) for name in ("out", "json", "quiet", "command")}
         every = with_values(BenchEngines(), cases=CASES, **given)
-        return _measured(every, registry, formulation=True)
+        return _measure_engines(every, registry, formulation=True)
 
 
 SAMPLES = 2000
@@ -270,7 +270,7 @@ class StressEngines(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
         from ..report.sections import deliver
         from ..report.terminal import page, unheaded
         from ..studies.stress.families import FAMILIES
@@ -279,7 +279,7 @@ class StressEngines(Command):
         from .destinations import json_only
 
         if self.list:
-            if found := given(
+            if found := names_of_given(
                 self, [name for name in vars(self) if name not in ("list", "command")]
             ):
                 raise KincheckError(f"--list runs nothing. Leave out {found}.")
@@ -291,7 +291,7 @@ class StressEngines(Command):
         if self.replay:
             if self.out or self.json:
                 problems.append("--replay only prints its findings. Leave out --out and --json.")
-            if found := given(self, OF_FAMILIES):
+            if found := names_of_given(self, OF_FAMILIES):
                 problems.append(
                     f"--replay judges files, which belong to no family. Leave out {found}."
                 )

@@ -94,7 +94,7 @@ def _print_references(options: List, console: Console) -> None:
             whole: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
             lines = [
                 part
-                for line in _joined(lines)
+                for line in _join_broken_lines(lines)
                 # aligned below its text
                 for part in textwrap.wrap(
                     line, console.width, subsequent_indent=" " * _start(line), **whole
@@ -133,7 +133,7 @@ def _keys() -> Iterator[str]:
         yield from (what.splitlines()[0], "", *keys.splitlines(), "")
 
 
-def _joined(lines: Sequence[str]) -> list[str]:
+def _join_broken_lines(lines: Sequence[str]) -> list[str]:
     """Return the lines, joined where only the width of the source file broke them: the next line
     stands below the text, begins no key, and its first word did not fit.
     """

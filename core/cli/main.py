@@ -67,7 +67,7 @@ def _done(argv: list[str]) -> int:
 
             for where in options.joint_type:
                 load_joint(where)
-        return _printed(int(options.do(options, registry())))
+        return _flush_output(int(options.do(options, registry())))
     except KincheckError as error:
         complain(str(error).splitlines())
     except SystemExit as end:
@@ -109,7 +109,7 @@ def _be_able_to_print() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _printed(status: int) -> int:
+def _flush_output(status: int) -> int:
     """Flush the output of a finished command; return its status. A closed reader is no failure."""
     try:
         sys.stdout.flush()
@@ -130,12 +130,12 @@ def registry() -> Registry:
     from . import class_loading
     from .registry import Registry
 
-    others = class_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
+    others = class_loading.names_of_entry_points((*adapters.ENGINES, *adapters.SIMULATIONS))
     writers = adapters.WRITERS, adapters.writer
 
     def engine(name: str, mode: str = "projection") -> Any:
         if name in others:
-            return class_loading.made(name, class_loading.entry_points()[name].load())
+            return class_loading.create_engine(name, class_loading.entry_points()[name].load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 
     return Registry(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, TypeVar, cast
 
 from ..errors import KincheckError, brief, similar, unknown
-from ..options import Option, declared, flags_of, options, with_values
+from ..options import Option, flags_of, option_fields, options, with_values
 
 if TYPE_CHECKING:
     from .registry import Registry
@@ -127,6 +127,7 @@ class Command:
         epilog: end of the help.
         one_thread: whether its matrices are so small that threads of libraries wait for each other.
         below: commands below this one, by name, with the heading of their list.
+        LAST: options behind all others of the command.
         command: the command line.
     """
 
@@ -134,6 +135,7 @@ class Command:
     epilog: ClassVar[str | None] = None
     one_thread: ClassVar[bool] = False
     below: ClassVar[Mapping[str, type[Command]]] = {}
+    LAST: ClassVar[tuple[str, ...]] = ()
     command: str = field(default="", init=False)
 
     def run(self, registry: Registry) -> int:
@@ -176,7 +178,7 @@ def add_options(parser: argparse.ArgumentParser, cls: Any, given: Collection[str
         headings |= cast("Any", vars(base)).get("HEADINGS", {})
     known = set[str]()
     # headings of groups stand above those of the class's own options
-    own = sorted(declared(cls), key=lambda found: bool(found[1] and found[1].heading))
+    own = sorted(option_fields(cls), key=lambda found: bool(found[1] and found[1].heading))
     for each, meaning, below in own:
         if meaning is None:
             known |= add_options(parser, below, given)
@@ -243,7 +245,7 @@ def _reader(meaning: Option) -> Callable[[str], Any]:
 def values_of(cls: type[T], found: argparse.Namespace) -> T:
     """Return the options of a class in the namespace of a parser."""
     values: dict[str, Any] = {}
-    for each, meaning, below in declared(cls):
+    for each, meaning, below in option_fields(cls):
         if meaning is None:
             values[each.name] = values_of(below, found)
         else:

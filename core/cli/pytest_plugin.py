@@ -62,7 +62,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Check the engines before collection."""
-    names = _required(config)
+    names = _required_engines(config)
     if names and not config.getoption("--kincheck"):
         raise pytest.UsageError("--kincheck-engine: give --kincheck too")
     problems: list[str] = []
@@ -83,7 +83,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     return None
 
 
-def _required(config: pytest.Config) -> list[str]:
+def _required_engines(config: pytest.Config) -> list[str]:
     """Return the engines requested by name."""
     names: Any = config.getoption("--kincheck-engine")
     return [*names]
@@ -108,7 +108,7 @@ class CaseFile(pytest.File):
             case, recorded = recorded_engines([*map(Path, given["recorded"])], case, curve)
         except KincheckError as error:
             raise self.CollectError(str(error)) from None
-        required = _required(self.config)
+        required = _required_engines(self.config)
         for engine in [*registry.find_engines(required or registry.engines, []), *recorded]:
             yield EngineTest.from_parent(  # pyright: ignore[reportUnknownMemberType]
                 self, name=engine.name, case=case, engine=engine, required=bool(required)
@@ -130,7 +130,7 @@ class EngineTest(pytest.Item):
         """Solve and judge."""
         from ..harness.record import Outcome
 
-        record = _solved(self.case, self.engine)
+        record = _solve(self.case, self.engine)
         if record.outcome is Outcome.UNAVAILABLE and self.required:
             from ..extras import how_to_install
 
@@ -155,15 +155,14 @@ class CaseFailedError(Exception):
     """Failure of an engine on a case."""
 
 
-def _solved(case: Case, engine: Engine) -> Record:
+def _solve(case: Case, engine: Engine) -> Record:
     """Return the record of the pair. A simulator runs in a separate process, because a crash would
     end the tests.
     """
-    from ..harness.engine import may_run_here
+    from ..harness.engine import STANDARD, may_run_here
     from ..harness.execution import solve_in_process
     from ..harness.resource_limits import Limits
     from ..harness.run import run
-    from ..harness.standard import STANDARD
     from ..harness.workers.pool import in_workers
     from .shared_options import TOL
 

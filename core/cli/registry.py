@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.io.reader_options import LEFT_OUT, NOTHING, Supplied
 from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
 from ..report.progress import complain
-from .class_loading import WHERE, load_engine, made
+from .class_loading import WHERE, create_engine, load_engine
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -108,7 +108,7 @@ class Registry:
         if not isinstance(supplied, Supplied):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise KincheckError(f"supplied: found {supplied!r}, expected kincheck.Supplied(...)")
         name = str(name)
-        matching, known = self.matching(name), self.cases()
+        matching, known = self.matching_names(name), self.cases()
         if len(matching) > 1:
             raise KincheckError(
                 f"{name!r} matches {len(matching)} cases: {shortened(matching, MOST_NAMED)}. Name"
@@ -142,7 +142,7 @@ class Registry:
             ) from error
         return case
 
-    def matching(self, name: str) -> list[str]:
+    def matching_names(self, name: str) -> list[str]:
         """Return the built-in cases and files that match a shell-style pattern; return any other
         name unchanged.
 
@@ -177,7 +177,7 @@ class Registry:
         wanted: dict[str, None] = {}
         for name in names:
             try:
-                wanted |= dict.fromkeys(self.matching(name))
+                wanted |= dict.fromkeys(self.matching_names(name))
             except KincheckError as error:
                 unread[name] = str(error)
         for name in wanted:
@@ -207,7 +207,7 @@ class Registry:
         engines: list[Engine] = []
         for k, name in enumerate(names):
             if not isinstance(name, str):
-                engines.append(made(repr(name), name))
+                engines.append(create_engine(repr(name), name))
                 continue
             if name in names[:k]:
                 continue
@@ -231,16 +231,16 @@ class Registry:
                     " the engine."
                 )
             else:
-                engines.append(loaded or self._loaded(name, mode or modes[0]))
+                engines.append(loaded or self._load_engine(name, mode or modes[0]))
         return engines
 
     def baseline(self, engines: Sequence[Engine]) -> Engine | None:
         """Return the native engine as the standard; None if it is among the engines."""
-        from ..harness.standard import STANDARD
+        from ..harness.engine import STANDARD
 
         return None if STANDARD in (each.name for each in engines) else self.engine(STANDARD)
 
-    def _loaded(self, name: str, mode: str) -> Engine:
+    def _load_engine(self, name: str, mode: str) -> Engine:
         """Return the engine, or a substitute if it cannot be loaded: a broken adapter must not end
         a run of all engines.
         """
@@ -257,7 +257,7 @@ def tell_left_out(cases: Iterable[Case]) -> None:
     complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)
 
 
-def given(options: object, names: Iterable[str]) -> str:
+def names_of_given(options: object, names: Iterable[str]) -> str:
     """Return the names of the given options, for a message.
 
     Options with the default None, False or [] count.

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..case.io.reader_options import CurveOptions, Supplied
-from ..errors import MOST_NAMED, KincheckError, SolveError, collected, refuse, shortened
+from ..errors import MOST_NAMED, KincheckError, SolveError, collect_errors, refuse, shortened
 from ..harness.interrupts import hold, status_of, words_of
 from ..options import (
     CASES,
@@ -37,7 +37,7 @@ from ..report.progress import complain, lacking, progress, uncompared
 from . import shared_options
 from .class_loading import WHERE
 from .registry import Registry, Status, tell_left_out
-from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, WithRecordings, judged
+from .shared_options import HISTORY, MODE, MODES, TOL, Isolated, WithRecordings, with_references
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -175,7 +175,7 @@ class Run(Isolated, WithRecordings):
         from ..harness import run as running
         from ..harness.scene import with_scenes
 
-        plan = _planned(self, registry)
+        plan = _plan_run(self, registry)
         solver, _ = shared_options.solver(self, plan.engines)
         how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver}
         return with_scenes(running.run(plan.cases, plan.engines, tol=self.tol, **how), plan.cases)
@@ -185,14 +185,14 @@ class Run(Isolated, WithRecordings):
         from . import destinations as delivery
 
         self = _with_cases(self, registry)
-        plan = _planned(self, registry)
+        plan = _plan_run(self, registry)
         precision: Any = None
         if self.bench is not None:
             from ..studies.bench.engines import efforts_in
 
             precision = efforts_in(self.bench)
         with delivery.json_only() if self.json == "-" else nullcontext():
-            results, problems, keeping, stopped = _solved(self, plan)
+            results, problems, keeping, stopped = _solve(self, plan)
         if self.out or self.json or keeping:
             from ..harness.scene import with_scenes
 
@@ -205,11 +205,11 @@ class Run(Isolated, WithRecordings):
         if self.history is not None:
             history = partial(past, keeping, problems) if keeping else lambda: None
         delivery.deliver(
-            results, problems, self, show=_shown(self), precision=precision, history=history
+            results, problems, self, show=_printer(self), precision=precision, history=history
         )
         if self.explain:
             print(
-                *_explained(plan.cases),
+                *_explanations(plan.cases),
                 sep="\n",
                 file=sys.stderr if self.json == "-" else sys.stdout,
             )
@@ -222,7 +222,7 @@ class Run(Isolated, WithRecordings):
         return Status.of(results)
 
 
-def _shown(options: Run) -> Callable[[Results, TextIO], None]:
+def _printer(options: Run) -> Callable[[Results, TextIO], None]:
     """Return a function to print the results."""
     from ..report.table import print_matrix, print_outputs, print_summary, print_table
 
@@ -235,7 +235,7 @@ def _shown(options: Run) -> Callable[[Results, TextIO], None]:
     return print_matrix if options.joints else print_table
 
 
-def _planned(options: Run, registry: Registry) -> _Plan:
+def _plan_run(options: Run, registry: Registry) -> _Plan:
     """Return the plan of the run. Print messages on unreadable cases before any computation.
 
     Raises:
@@ -260,7 +260,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
             f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
         )
     elif options.recorded:
-        with collected(problems):
+        with collect_errors(problems):
             cases[0], recorded = shared_options.recorded_engines(
                 options.recorded,
                 cases[0],
@@ -271,10 +271,10 @@ def _planned(options: Run, registry: Registry) -> _Plan:
     if not (options.reference or options.recorded or options.fmu):
         problems += filter(None, [options.curve.without_curve])
     if options.reference and not problems:
-        with collected(problems):
+        with collect_errors(problems):
             # a reference may name an unreadable case, which does not stop the others
             files = [*map(Path, several(options.reference))]
-            cases, notes = judged(cases, files, options.curve, unused if unread else None)
+            cases, notes = with_references(cases, files, options.curve, unused if unread else None)
             tell(notes)
             if notes and not options.command:
                 cases = [replace(cases[0], assembly=(*cases[0].assembly, *notes))]
@@ -288,7 +288,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
             engines, baseline = [], None
     if options.fmu and options.jobs == 0:
         problems.append("--fmu runs foreign machine code in workers alone. Leave out --jobs 0.")
-    with collected(problems):
+    with collect_errors(problems):
         foreign = shared_options.foreign_engines(options, cases, options.curve.columns)
         engines += [*foreign, *recorded]
     keys = Counter((engine.name, engine.mode) for engine in engines)
@@ -313,7 +313,7 @@ def _planned(options: Run, registry: Registry) -> _Plan:
     )
 
 
-def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
+def _solve(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | None, int | None]:
     """Return the results, the problems, the run in the history, and the status if a signal stopped
     the run early.
     """
@@ -324,7 +324,7 @@ def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | No
     if plan.unread:
         settings["unread"] = plan.unread
     settings["selection"] = selection(options)
-    keeping, problems = _keeping(
+    keeping, problems = _open_history(
         options, plan.cases, plan.engines, [*plan.unread], settings, plan.mistyped
     )
     made = [*keeping.made] if keeping else []
@@ -367,7 +367,7 @@ def _solved(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | No
         )
 
 
-def _explained(cases: Sequence[Case]) -> Iterator[str]:
+def _explanations(cases: Sequence[Case]) -> Iterator[str]:
     """Yield for each case the account of the native engine's programs, or the reason why there is
     none, and notes on its geometry.
     """
@@ -473,7 +473,7 @@ def _words(given: Any) -> Any:
     return given if isinstance(given, bool | float) else readable(str(given))
 
 
-def _keeping(
+def _open_history(
     options: Any,
     cases: Sequence[Case],
     engines: Sequence[Engine],

@@ -14,7 +14,7 @@ from ..options import argument, group, joint_types, option, options, switch, who
 from ..report.progress import complain
 from .parser import Command
 from .registry import Registry, Status
-from .shared_options import TOL, judged
+from .shared_options import TOL, with_references
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -83,7 +83,7 @@ class Serve(Command):
             raise KincheckError(self.curve.without_curve)
         wanted, read = self.measure or 0, self._reader(registry)
         if wanted:
-            _measured(read(), wanted)
+            _measure_edits(read(), wanted)
             if self.no_browser:
                 return Status.WITHIN
         server = self._server(registry, read, port=self.port, once=self.once)
@@ -118,10 +118,10 @@ class Serve(Command):
 
         told = list[str]()
 
-        def referenced(case: Case) -> Case:
+        def with_reference(case: Case) -> Case:
             if self.reference is None:
                 return case
-            (case,), notes = judged([case], [Path(self.reference)], self.curve, None)
+            (case,), notes = with_references([case], [Path(self.reference)], self.curve, None)
             if self.command and told != notes:
                 told[:] = notes
                 complain(notes)
@@ -131,10 +131,10 @@ class Serve(Command):
             case, file, vary = self.case, self._file, self.variation
             typed = isinstance(case, str | Path) and str(case) not in registry.cases()
             if typed and file.is_file() and is_table(file, self.supplied):
-                return LiveTable(file, self.supplied, referenced, Path(vary) if vary else None)
+                return LiveTable(file, self.supplied, with_reference, Path(vary) if vary else None)
             if vary:
                 raise KincheckError(f"--vary: {file} is no table of hardpoints; give one")
-            return LiveModel(file, referenced(registry.find_case(case, self.supplied)))
+            return LiveModel(file, with_reference(registry.find_case(case, self.supplied)))
 
         return read
 
@@ -145,7 +145,7 @@ def _print_times(name: str, times: Sequence[float]) -> None:
     print(f"  {name:<9} median {median(times):8.2f} ms, most {max(times):8.2f} ms")
 
 
-def _measured(live: Live, count: int) -> None:
+def _measure_edits(live: Live, count: int) -> None:
     """Print the times of edits: of each step and of a whole answer as JSON, and the processor's
     share of it, free of other programs.
     """

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from ..case.io.reader_options import Supplied
 from ..errors import KincheckError
 from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
-from ..options import option, options, positive, whole
+from ..options import (
+    ONE_CASE,
+    argument,
+    group,
+    joint_types,
+    option,
+    options,
+    positive,
+    whole,
+)
 from .parser import Command
 
 if TYPE_CHECKING:
@@ -37,6 +46,16 @@ SCHEDULER = (
     "solve on the workers of this dask.distributed scheduler instead; it exchanges pickles: whoever"
     " runs or reaches it runs code as you, here and on the workers"
 )
+
+
+@options
+class OfCase(Command):
+    """A command on one case."""
+
+    LAST = ("joint_type", "supplied")
+    case: str | Path | Case = argument(ONE_CASE, "CASE")
+    joint_type: tuple[str, ...] = joint_types()
+    supplied: Supplied = group(default_factory=Supplied, kw_only=False)
 
 
 ISOLATION = "isolation"
@@ -169,7 +188,7 @@ def driver_value(text: str | None, case: Case) -> float | None:
         ) from None
 
 
-def judged(
+def with_references(
     cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
 ) -> tuple[list[Case], list[str]]:
     """Return the cases with the references in these files, and notes on how a curve was read.

@@ -167,7 +167,7 @@ class Sweep(Command):
         case = only(whole, self.output, problems)
         problems = problems or shared_options.unreachable(self)
         refuse(problems)
-        variation = limited(self, read_variation(Path(self.variation), whole), whole, case)
+        variation = with_limits(self, read_variation(Path(self.variation), whole), whole, case)
         if self.replay and self.samples is None:
             samples = variation.count or 0
         else:
@@ -301,20 +301,20 @@ def _solve(
     from ..studies.tolerance.chunk_files import ParquetStore
     from ..studies.tolerance.sweep import Check, on_cluster
 
-    def solved(progress: Progress) -> None:
+    def show_progress(progress: Progress) -> None:
         rate = f"{progress.solved / progress.seconds:.3g} variants/s"
         unsolved = f", {progress.unsolved} unsolved" if progress.unsolved else ""
         meter(
             f"[{progress.done}/{progress.total}] {rate}{unsolved}", progress.done / progress.total
         )
 
-    def checked(done: int, total: int) -> None:
+    def show_checks(done: int, total: int) -> None:
         meter(f"[{done}/{total}] checked", done / total)
 
     meter = Meter("sweep", quiet=options.quiet, every=EVERY)
     check = None
     if engine is not None:
-        check = Check(engine, share, checking_solver(options, engine), options.tol, checked)
+        check = Check(engine, share, checking_solver(options, engine), options.tol, show_checks)
     with ExitStack() as stack:
         stack.enter_context(meter)
         store = (
@@ -327,7 +327,7 @@ def _solve(
             source=None if options.scheduler is None else on_cluster(options.scheduler),
             check=check,
             store=store,
-            progress=solved,
+            progress=show_progress,
             part=part,
             stopped=stops.append,
         )
@@ -365,7 +365,7 @@ def only(case: Case, names: Sequence[str], problems: list[str]) -> Case:
     return replace(case, outputs=wanted)
 
 
-def limited(options: Sweep, variation: Variation, whole: Case, case: Case) -> Variation:
+def with_limits(options: Sweep, variation: Variation, whole: Case, case: Case) -> Variation:
     """Return the variation with limits for the outputs of the case; limits of the options replace
     those of the file.
     """
@@ -389,7 +389,7 @@ def limited(options: Sweep, variation: Variation, whole: Case, case: Case) -> Va
 def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | None) -> int:
     """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
-    from ..harness.standard import STANDARD
+    from ..harness.engine import STANDARD
     from .destinations import deliver
 
     for index in options.replay:

@@ -24,7 +24,8 @@ of its rate is this atol times the pace.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -145,6 +146,11 @@ def numbers(values: Array) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
+def as_array(numbers: Sequence[float | None] | None) -> Array | None:
+    """Return the values of plain numbers, without loss: NaN for null; None for no series."""
+    return None if numbers is None else np.array(numbers, dtype=np.float64)
+
+
 def deviations(
     case: Case,
     output: Quantity,
@@ -172,8 +178,8 @@ def deviations(
     unreached = np.zeros(len(found.position), dtype=np.bool_) if refused is None else refused
     for order, quantity in enumerate(QUANTITIES):
         values: Array | None = getattr(found, quantity)
-        known: list[tuple[str, Array, Array | None]] = [
-            (name, getattr(series, quantity), series.uncertainty.get(quantity))
+        known = [
+            (name, Curve(getattr(series, quantity), half=series.uncertainty.get(quantity)))
             for name, series in standards
             if getattr(series, quantity) is not None
         ]
@@ -192,15 +198,11 @@ def deviations(
                 else f"{word}: there is nothing to compare with"
             )
         else:
-            name, reference, uncertainty = known[0]
-            own = found.uncertainty.get(quantity)
-            if own is not None:
-                uncertainty = own if uncertainty is None else own + uncertainty
-            shown = labels.against(name)
-            compared[quantity] = off = deviation(
-                values, reference, output.atol * rate_scale**order, output.rtol, name, uncertainty
-            )
-            lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
+            (name, standard), own = known[0], found.uncertainty.get(quantity)
+            shown, has = labels.against(name), np.isfinite(standard.values)
+            mine = curve_of(output, order, rate_scale, values, own)
+            compared[quantity] = off = deviation(mine, standard, name)
+            lost = int((has & ~np.isfinite(values)).sum()) if complete else 0
             many = number_of(lost, "sample")
             if lost and (order or found.possible):
                 compared[quantity] = off and msgspec.structs.replace(off, within=False)
@@ -212,7 +214,7 @@ def deviations(
             elif off is None:
                 none = f"{word}: no sample is known to both the engine and {shown}"
                 reasons.append(found.reason or none)
-            alone = np.isfinite(values) & ~np.isfinite(reference) & ~unreached
+            alone = np.isfinite(values) & ~has & ~unreached
             if off is not None and (count := int(alone.sum())):
                 reasons.append(f"{word}: {shown} {NO_VALUE} {count} of {len(values)} samples")
     contradicted = int((unreached & np.isfinite(found.position)).sum())
@@ -229,26 +231,51 @@ def deviations(
     )
 
 
-def deviation(
-    values: Array,
-    reference: Array,
-    atol: float,
-    rtol: float,
-    against: str,
-    uncertainty: Array | None = None,
-) -> Deviation | None:
-    """Return the deviation of values from a reference over the samples known to both; None without
-    such samples.
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One quantity of an output over the samples, and how far it may be off a standard: by
+    atol + rtol * range of the standard over the compared samples, plus the half-width.
 
-    Args:
-        values, reference: shape (n,), NaN at unknown samples.
-        uncertainty: half-width of the interval around each reference value, added to the tolerance
-            at its sample, shape (n,); None for an exact reference. With it, the result is the
-            deviation at the sample with the largest ratio to its tolerance.
+    Attributes:
+        values: shape (n,), NaN at unknown samples.
+        unit: of the values.
+        half: half-width of the interval around each value, shape (n,); None for exact values.
+    """
+
+    values: Array
+    atol: float = 0.0
+    rtol: float = 0.0
+    unit: str = ""
+    half: Array | None = None
+
+    def changed(self, change: Callable[[Array], Array]) -> Curve:
+        """Return the curve after an affine change of its values and samples."""
+        if self.half is None:
+            return replace(self, values=change(self.values))
+        half = np.abs(change(self.half) - change(np.zeros_like(self.half)))
+        half = np.where(np.isfinite(half), half, 0.0)
+        return replace(self, values=change(self.values), half=half)
+
+
+def curve_of(
+    output: Quantity, order: int, rate_scale: float, values: Array, half: Array | None = None
+) -> Curve:
+    """Return a quantity of an output with its tolerance, from the pace of its case."""
+    unit = output.unit + PER_TIME[order]
+    return Curve(values, output.atol * rate_scale**order, output.rtol, unit, half)
+
+
+def deviation(found: Curve, standard: Curve, against: str = "") -> Deviation | None:
+    """Return the deviation of a curve from a standard over the samples known to both; None without
+    such samples. The tolerances and half-widths of both add up.
+
+    With a half-width, the result is the deviation at the sample with the largest ratio to its
+    tolerance.
 
     Raises:
         CaseError: the shapes differ.
     """
+    values, reference = found.values, standard.values
     if values.shape != reference.shape:
         raise CaseError(
             f"{labels.against(against)} has shape {reference.shape}, expected {values.shape}: one"
@@ -258,12 +285,13 @@ def deviation(
     if not both.any():
         return None
     error = np.where(both, np.abs(values - reference), -1.0)
-    largest, tolerance = float(error.max()), atol + rtol * float(np.ptp(reference[both]))
+    largest, extent = float(error.max()), float(np.ptp(reference[both]))
+    tolerance = found.atol + standard.atol + (found.rtol + standard.rtol) * extent
     # scaled by the largest value: no square overflows or underflows
     rms = largest * math.sqrt(float(np.mean((error[both] / largest) ** 2))) if largest else 0.0
     worst = int(np.argmax(error))
-    if uncertainty is not None:
-        allowed = tolerance + uncertainty
+    if halves := [each for each in (found.half, standard.half) if each is not None]:
+        allowed = tolerance + np.sum(halves, axis=0)
         exact = allowed <= 0.0
         ratio = np.where(exact, np.where(error > 0.0, np.inf, error), error)
         worst = int(np.argmax(ratio / np.where(exact, 1.0, allowed)))

@@ -16,6 +16,9 @@ from typing import Any, Protocol, runtime_checkable
 from ..case.case import Case
 from ..trajectory import Trajectory
 
+STANDARD = "native"
+"""Name of the standard engine, for cases without a complete reference."""
+
 RECORDED = "recorded"
 """Mode of engines that solve nothing: their results come from a file."""
 

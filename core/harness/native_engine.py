@@ -16,7 +16,7 @@ from ..kinematics import LAST_ITERATION, NativeSolver, ProgramSize, Solver, Styl
 from ..program.llvm.compiler import available
 from ..trajectory import PointMotion, Trajectory, shown
 from ..version import VERSION
-from .standard import STANDARD
+from .engine import STANDARD
 
 
 @dataclass(frozen=True)

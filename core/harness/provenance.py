@@ -20,8 +20,7 @@ from ..case.notes import notes
 from ..mechanism.motions import Absolute, Motion, Slowed
 from ..version import VERSION
 from .compare import as_numbers
-from .evidence import IDENTICAL
-from .record import OutputSeries, Record, Results
+from .record import IDENTICAL, OutputSeries, Record, Results
 from .suspects import suspect
 
 

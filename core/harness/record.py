@@ -19,7 +19,6 @@ from ..dataset import Dataset, Variable
 from ..errors import UnknownNameError, number_of
 from ..tabular import Tabular
 from ..trajectory import PER_TIME, QUANTITIES
-from .evidence import Evidence, Suspect
 from .scene_record import Scene
 
 Facts: TypeAlias = Mapping[str, Any]
@@ -143,6 +142,97 @@ def _share(record: Any, quantity: str) -> float:
     found = [getattr(each, quantity) for each in record.errors.values()]
     shares = [each.ratio for each in found if each is not None]
     return max(shares, default=np.nan)
+
+
+IDENTICAL = (
+    "the reference equals native's own result in every bit, as no independent data do: no pass is"
+    " called validated; give the data of the cited source"
+)
+"""Note on a case whose reference is `Evidence.own`."""
+
+
+class Evidence(msgspec.Struct, frozen=True, kw_only=True):
+    """The reference used to judge a record.
+
+    Attributes:
+        citation: source of the reference; empty if none is given.
+        sha256: digest of the content.
+        of: the digested content: a file name (the bytes of the file) or "values" (see `digest`).
+        own: whether the reference claims to be third-party data, but equals native's own result in
+            every bit.
+        units, signs: units of the columns by name, and convention of signs; empty in results of
+            older versions.
+        grid: samples with a value, in words; empty for all samples.
+        limits: by output, the known errors of the values, added to the tolerance; absent for exact
+            values.
+    """
+
+    citation: str
+    sha256: str
+    of: str
+    own: bool = False
+    units: dict[str, str] = {}
+    signs: str = ""
+    grid: str = ""
+    limits: dict[str, str] = {}
+
+    @property
+    def sound(self) -> bool:
+        """Return whether agreement with the reference can validate: its source is cited, and is
+        outside kincheck.
+        """
+        return bool(self.citation and self.sha256) and not self.own
+
+
+class Explanation(msgspec.Struct, frozen=True, kw_only=True):
+    """A change of the reference that brings quantities of outputs within tolerance.
+
+    Attributes:
+        change: words to follow "the reference"; "or" joins alternatives.
+        difference, tolerance: the largest remaining difference in the first of the quantities, and
+            its tolerance [unit].
+    """
+
+    outputs: list[str]
+    quantities: list[str]
+    change: str
+    difference: float
+    tolerance: float
+    unit: str
+
+
+REFERENCE = "reference"
+"""The subject of a suspicion, beside the native engine."""
+
+
+class Suspect(msgspec.Struct, frozen=True, kw_only=True):
+    """A case whose engines agree with each other, but not with the reference or not with native.
+
+    Attributes:
+        subject: "reference" or "native".
+        engines: those that agree.
+        agreement: largest difference between engines in `output` and `quantity` [unit].
+        outputs: quantities out of tolerance, by output; empty in results of older versions.
+        output, quantity, sample: place of the subject's largest deviation, in tolerances.
+        difference, tolerance: the deviation at this place, and its tolerance [unit].
+        explanations: simple changes that make the subject fit.
+        unexplained: outputs and quantities that no such change explains.
+        message: the whole suspicion in one sentence.
+    """
+
+    subject: str = REFERENCE
+    engines: list[str]
+    agreement: float
+    outputs: dict[str, list[str]] = {}
+    output: str
+    quantity: str
+    sample: int
+    difference: float
+    tolerance: float
+    unit: str
+    explanations: list[Explanation]
+    unexplained: list[str]
+    message: str
 
 
 class Outcome(StrEnum):

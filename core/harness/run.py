@@ -14,13 +14,11 @@ import msgspec
 from ..case.case import Case, Truth
 from ..errors import CaseError
 from .compare import as_numbers
-from .engine import Engine, untimed
-from .evidence import Evidence, evidence
+from .engine import STANDARD, Engine, untimed
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, solve_in_process
 from .provenance import results, truth_of
-from .record import Deviations, Outcome, Record, Results, Seconds
-from .standard import STANDARD, Standard, has_everything, standard_of
-from .verdict import Verdict, judged, promised
+from .record import Deviations, Evidence, Outcome, Record, Results, Seconds
+from .verdict import Standard, Verdict, evidence, has_everything, judged, promised, standard_of
 
 NULL_REASONS = {
     "residual_max": "no sample was solved, or the engine has none",

@@ -20,6 +20,7 @@ from ..mechanism.loads import SpringDamper
 from ..mechanism.mechanism import Vector
 from ..mechanism.motions import PointCoordinate
 from ..trajectory import Array, BodyMotion
+from .engine import STANDARD
 from .record import Results
 from .scene_record import (
     Scene,
@@ -30,7 +31,6 @@ from .scene_record import (
     SceneSpring,
     SceneWheel,
 )
-from .standard import STANDARD
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
 POSES = 3000  # frames times bodies, at most: a quarter of a megabyte of results

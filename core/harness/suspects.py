@@ -13,17 +13,15 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..case.case import TIME, Case, Series
+from ..case.case import TIME, Case, Series, pace
 from ..case.suspension import Camber, Toe, camber_of_front_view
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
-from ..trajectory import PER_TIME, QUANTITIES, Array
+from ..trajectory import QUANTITIES, Array
 from ..unit_text import motion_word, value_text
-from .compare import deviation, pace
-from .engine import RECORDED
-from .evidence import REFERENCE, Explanation, Suspect
-from .record import Deviation, Deviations, OutputSeries, Record
-from .standard import STANDARD
+from .compare import Curve, as_array, curve_of, deviation
+from .engine import RECORDED, STANDARD
+from .record import REFERENCE, Deviation, Deviations, Explanation, Record, Suspect
 
 # Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
@@ -43,8 +41,8 @@ class _Off:
 
     output: str
     order: int
-    held: Held
-    standard: Uncertain
+    held: Curve
+    standard: Curve
     deviation: Deviation
 
     @property
@@ -120,7 +118,7 @@ def _of_native(case: Case, mine: Sequence[Record], native: Mapping[str, Series])
             if 2 * len(_simulators(group)) > len(voters) + 1:
                 first = group[0]
                 values: Array | None = getattr(native.get(name), quantity, None)
-                standard = Uncertain(np.empty(0) if values is None else values)
+                standard = Curve(np.empty(0) if values is None else values)
                 worst = _Off(name, order, held[id(first)][name], standard, off[id(first)])
                 found.append((worst, group, len(voters), agreed))
     if not found:
@@ -140,14 +138,14 @@ def _of_native(case: Case, mine: Sequence[Record], native: Mapping[str, Series])
 
 
 def _largest_group(
-    astray: Sequence[tuple[Record, Held]],
+    astray: Sequence[tuple[Record, Curve]],
 ) -> tuple[Sequence[Record], float]:
     """Return the most records that agree pairwise within the sum of their tolerances, and their
     largest difference.
     """
     apart: dict[tuple[int, int], float] = {}
     for (one, (_, a)), (other, (_, b)) in combinations(enumerate(astray), 2):
-        off = deviation(b.values, a.values, a.atol + b.atol, a.rtol + b.rtol, "")
+        off = deviation(b, a)
         if off is not None and off.within:
             apart[one, other] = off.max_abs
     best: list[int] = []
@@ -246,22 +244,13 @@ def _against(errors: Deviations, case: Case) -> bool:
     return any(not each.within and each.against == case.truth for _, each in errors.items())
 
 
-def _series(output: OutputSeries, order: int) -> Array | None:
-    values: list[float | None] | None = getattr(output, QUANTITIES[order])
-    return None if values is None else np.array(values, dtype=np.float64)
-
-
-def _held(case: Case, rate_scale: float, record: Record, order: int) -> dict[str, Held]:
+def _held(case: Case, rate_scale: float, record: Record, order: int) -> dict[str, Curve]:
     """Return the values of a record by output, with their tolerances."""
-    found: dict[str, Held] = {}
+    found: dict[str, Curve] = {}
     for output in case.outputs:
-        if (
-            order < output.orders
-            and (values := _series(record.outputs[output.name], order)) is not None
-        ):
-            found[output.name] = Held(
-                values, output.atol * rate_scale**order, output.rtol, output.unit + PER_TIME[order]
-            )
+        values = as_array(getattr(record.outputs[output.name], QUANTITIES[order]))
+        if order < output.orders and values is not None:
+            found[output.name] = curve_of(output, order, rate_scale, values)
     return found
 
 
@@ -279,9 +268,7 @@ def _agreement(
             for name, other in _held(case, rate_scale, record, order).items():
                 if name not in held:
                     continue
-                off = deviation(
-                    other.values, held[name].values, other.atol, other.rtol, first.engine
-                )
+                off = deviation(other, Curve(held[name].values), first.engine)
                 if off is None:
                     continue
                 if not off.within:
@@ -297,8 +284,8 @@ def _off(case: Case, rate_scale: float, record: Record) -> Iterator[_Off]:
             reference: Array | None = getattr(case.reference.get(name), quantity, None)
             if reference is None:
                 continue
-            known = Uncertain(reference, case.reference[name].uncertainty.get(quantity))
-            found = known.off(held, str(case.truth))
+            known = Curve(reference, half=case.reference[name].uncertainty.get(quantity))
+            found = deviation(held, known, str(case.truth))
             if found is not None and found.max_abs > found.tolerance:
                 yield _Off(name, order, held, known, found)
 
@@ -311,25 +298,24 @@ def _explained(
     """
     every = {order: _held(case, rate_scale, record, order) for order in range(len(QUANTITIES))}
     units = {output.name: output.unit for output in case.outputs}
-    found: dict[tuple[str, tuple[str, ...]], list[tuple[str, str, Slip]]] = {}
+    found: dict[tuple[str, tuple[str, ...]], list[tuple[str, str, Deviation]]] = {}
     left: list[str] = []
     names = list(dict.fromkeys(each.output for each in off))
     for name in names[:MOST_EXPLAINED]:
-        fitting: dict[_Off, dict[str, Slip]] = {}
+        fitting: dict[_Off, dict[str, Deviation]] = {}
         for each in (each for each in off if each.output == name):
             others = {
                 other: held
                 for other, held in every[each.order].items()
                 if other != name and units[other] == units[name]
             }
-            all_slips = slips(
+            fitting[each] = slips(
                 each.held,
                 each.standard,
                 others,
                 offsets=each.order == 0,
                 definitions=_definitions(case, each, others),
             )
-            fitting[each] = {slip.change: slip for slip in all_slips}
         common = [
             words
             for words in next(iter(fitting.values()))
@@ -353,7 +339,7 @@ def _explained(
     return [_explanation(*key, members) for key, members in found.items()], left
 
 
-def _definitions(case: Case, off: _Off, others: Mapping[str, Held]) -> list[NamedChange]:
+def _definitions(case: Case, off: _Off, others: Mapping[str, Curve]) -> list[NamedChange]:
     """Return the changes from other definitions of an output: for camber, if toe is known."""
     camber = next(output for output in case.outputs if output.name == off.output)
     if not isinstance(camber, Camber) or off.order:
@@ -370,14 +356,14 @@ def _definitions(case: Case, off: _Off, others: Mapping[str, Held]) -> list[Name
 
 
 def _explanation(
-    change: str, quantities: Sequence[str], members: Sequence[tuple[str, str, Slip]]
+    change: str, quantities: Sequence[str], members: Sequence[tuple[str, str, Deviation]]
 ) -> Explanation:
     _, unit, worst = max(members, key=lambda each: each[2].ratio)
     return Explanation(
         outputs=[name for name, _, _ in members],
         quantities=list(quantities),
         change=change,
-        difference=worst.difference,
+        difference=worst.max_abs,
         tolerance=worst.tolerance,
         unit=unit,
     )
@@ -414,170 +400,107 @@ names in messages.
 """
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """The values of one output, and their tolerance: atol + rtol * range of the standard."""
-
-    values: Array
-    atol: float
-    rtol: float
-    unit: str
-
-
-@dataclass(frozen=True, eq=False)
-class Uncertain:
-    """A reference, and the half-width of the interval around each value; None for exact ones."""
-
-    values: Array
-    half: Array | None = None
-
-    def changed(self, change: Callable[[Array], Array]) -> Uncertain:
-        """Return the reference after an affine change of its values and samples."""
-        if self.half is None:
-            return Uncertain(change(self.values))
-        half = np.abs(change(self.half) - change(np.zeros_like(self.half)))
-        return Uncertain(change(self.values), np.where(np.isfinite(half), half, 0.0))
-
-    def off(self, held: Held, against: str = "") -> Deviation | None:
-        """Return the deviation of the held values from the reference."""
-        return deviation(held.values, self.values, held.atol, held.rtol, against, self.half)
-
-
-@dataclass(frozen=True)
-class Slip:
-    """A change that makes the reference fit.
-
-    Attributes:
-        change: in words, after "the reference".
-        difference: the largest remaining difference.
-        tolerance: its tolerance.
-    """
-
-    change: str
-    difference: float
-    tolerance: float
-
-    @property
-    def ratio(self) -> float:
-        """The remaining difference in tolerances."""
-        return self.difference / self.tolerance if self.tolerance else 0.0
-
-
 NamedChange: TypeAlias = tuple[str, Callable[[Array], Array]]
 """A change in words, and its function of the reference's values."""
 
 
 def slips(
-    held: Held,
-    reference: Array | Uncertain,
-    others: Mapping[str, Held],
+    held: Curve,
+    reference: Curve,
+    others: Mapping[str, Curve],
     *,
     offsets: bool = True,
     definitions: Sequence[NamedChange] = (),
-) -> list[Slip]:
-    """Return all single changes that make the reference fit; without any, all pairs of changes.
+) -> dict[str, Deviation]:
+    """Return all single changes that make the reference fit, with the remaining deviation, in
+    words after "the reference"; without any, all pairs of changes.
 
     Args:
         held: the agreed values of the engines.
-        reference: reference of the same output, out of tolerance, shape (n,).
+        reference: reference of the same output, out of tolerance.
         others: values of the other outputs, by name, which the reference may hold by mistake.
         offsets: whether a constant may be added; False for derivatives.
         definitions: changes from other definitions of the output to the engines' definition.
     """
-    if not isinstance(reference, Uncertain):
-        reference = Uncertain(reference)
-    given = held, reference, others, offsets, definitions
-    return list(_single(*given)) or list(_pairs(*given))
-
-
-def _single(
-    held: Held,
-    reference: Uncertain,
-    others: Mapping[str, Held],
-    offsets: bool,
-    definitions: Sequence[NamedChange],
-) -> Iterator[Slip]:
-    yield from _fitting(held, reference, definitions, "")
-    yield from _fitting(held, reference, _scales(), "", constant=True)
-    yield from _fitting(held, reference, _moves(held, reference, offsets), "")
-    yield from _exchanged(reference, others, "")
-
-
-def _pairs(
-    held: Held,
-    reference: Uncertain,
-    others: Mapping[str, Held],
-    offsets: bool,
-    definitions: Sequence[NamedChange],
-) -> Iterator[Slip]:
-    both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
-    yield from _fitting(held, reference, both, "", constant=True)
-    for words, change in _scales():
-        changed = reference.changed(change)
-        yield from _fitting(held, changed, definitions, f"{words} and ")
-        yield from _fitting(held, changed, _moves(held, changed, offsets), f"{words} and ")
-    yield from _exchanged(reference.changed(_times(-1.0)), others, f"{OTHER_SIGN} ")
-
-
-def _scales() -> list[NamedChange]:
-    return [
+    scales = [
         (OTHER_SIGN, _times(-1.0)),
         *((f"times {name}", _times(factor)) for name, factor in FACTORS.items()),
     ]
+    found = (
+        _fitting(held, reference, definitions)
+        | _fitting(held, reference, scales, constant=True)
+        | _fitting(held, reference, _moves(held, reference, offsets))
+        | _exchanged(reference, others, "")
+    )
+    if found:
+        return found
+    both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
+    found = _fitting(held, reference, both, constant=True)
+    for words, change in scales:
+        changed = reference.changed(change)
+        found |= _fitting(held, changed, definitions, f"{words} and ")
+        found |= _fitting(held, changed, _moves(held, changed, offsets), f"{words} and ")
+    return found | _exchanged(reference.changed(_times(-1.0)), others, f"{OTHER_SIGN} ")
 
 
 def _times(factor: float) -> Callable[[Array], Array]:
     return lambda x: factor * x
 
 
-def _moves(held: Held, reference: Uncertain, offsets: bool) -> Iterator[NamedChange]:
+def _moves(held: Curve, reference: Curve, offsets: bool) -> list[NamedChange]:
+    gap = np.full(1, np.nan)
+    found: list[NamedChange] = [
+        ("with its samples in reversed order", lambda x: x[::-1]),
+        (
+            "shifted by one sample, each taken from the next",
+            lambda x: np.concatenate([x[1:], gap]),
+        ),
+        (
+            "shifted by one sample, each taken from the one before",
+            lambda x: np.concatenate([gap, x[:-1]]),
+        ),
+    ]
     off = held.values - reference.values
     known = np.isfinite(off)
     if offsets and known.any():
         constant = 0.5 * float(off[known].max() + off[known].min())
         size = value_text(f"{abs(constant):.9g}", held.unit)
-        yield (
-            f"{'plus' if constant > 0 else 'minus'} {size}",
-            lambda x: x + constant,
-        )
-    yield "with its samples in reversed order", lambda x: x[::-1]
-    gap = np.full(1, np.nan)
-    yield "shifted by one sample, each taken from the next", lambda x: np.concatenate([x[1:], gap])
-    yield (
-        "shifted by one sample, each taken from the one before",
-        lambda x: np.concatenate([gap, x[:-1]]),
-    )
+        found.insert(0, (f"{'plus' if constant > 0 else 'minus'} {size}", lambda x: x + constant))
+    return found
 
 
 def _fitting(
-    held: Held,
-    reference: Uncertain,
-    changes: Iterator[NamedChange] | Sequence[NamedChange],
-    before: str,
+    held: Curve,
+    reference: Curve,
+    changes: Sequence[NamedChange],
+    before: str = "",
     *,
     constant: bool = False,
-) -> Iterator[Slip]:
-    """Yield the changes after which the reference fits.
+) -> dict[str, Deviation]:
+    """Return the changes after which the reference fits, with these words before.
 
     Args:
         constant: whether a constant series is significant, unless all its values are zero.
     """
+    found: dict[str, Deviation] = {}
     for words, change in changes:
         changed = reference.changed(change)
         both = np.isfinite(held.values) & np.isfinite(changed.values)
         if both.sum() < FEWEST:
             continue
-        off = changed.off(held)
+        off = deviation(held, changed)
         if off is None or not off.within:
             continue
         values = held.values[both]
         if (np.abs(values).max() if constant else np.ptp(values)) > MEANINGFUL * off.tolerance:
-            yield Slip(before + words, off.max_abs, off.tolerance)
+            found[before + words] = off
+    return found
 
 
-def _exchanged(reference: Uncertain, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
-    """Yield the other outputs that agree with the reference, if the reference varies."""
+def _exchanged(reference: Curve, others: Mapping[str, Curve], before: str) -> dict[str, Deviation]:
+    """Return the other outputs that agree with the reference, if the reference varies."""
+    found: dict[str, Deviation] = {}
     for name, other in others.items():
-        yield from _fitting(
-            other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], ""
-        )
+        same: list[NamedChange] = [(f"taken as that of output {name}", lambda x: x)]
+        found |= _fitting(other, reference, same, before)
+    return found

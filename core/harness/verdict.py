@@ -1,24 +1,100 @@
-"""Verdicts: the outcome of an answer and its reason, by the standards of its case."""
+"""Verdicts: the outcome of an answer and its reason, by the standards of its case: its reference,
+with evidence on it, completed by the native engine.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
-from ..case.case import Case, Quantity, size
+from ..case.case import Case, Origin, Quantity, Series, Truth, size
 from ..errors import shortened
+from ..trajectory import QUANTITIES, Array
 from ..unit_text import value_text
-from .compare import NO_VALUE, describe, deviations
-from .engine import Engine, bounds_error
+from .compare import NO_VALUE, as_array, describe, deviations
+from .engine import STANDARD, Engine, bounds_error
 from .execution import Answer
 from .labels import against
-from .record import Deviation, Deviations, Outcome
-from .standard import STANDARD, Standard, known
+from .record import Deviation, Deviations, Evidence, Outcome, Record
+
+UNCERTAIN = "uncertain_samples"
+"""Key of a record's details: samples that were reached, but refused as uncertain."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standard:
+    """The native engine's answer to a case.
+
+    Attributes:
+        outputs: outputs by name; empty without an answer.
+        absent: the reason for a missing answer, which ends a sentence on the missing reference.
+        refused: samples that the native engine cannot reach, shape (n,); None without such samples.
+            Samples near a singular pose that it refuses for an uncertain pose or rate are not
+            included: they contradict no other engine.
+        why: the native engine's own message.
+        dof: its number of degrees of freedom without drivers; None if it is not known.
+    """
+
+    outputs: Mapping[str, Series]
+    absent: str = ""
+    refused: NDArray[np.bool_] | None = None
+    why: str = ""
+    dof: int | None = None
+
+    def refuses(self, case: Case) -> NDArray[np.bool_] | None:
+        """Return the samples that neither native nor the reference reaches, shape (n,)."""
+        if self.refused is None:
+            return None
+        return self.refused & ~samples_with_values(case.reference.values(), len(self.refused))
+
+
+def standard_of(native: Record) -> Standard:
+    """Return the standard from a record of the native engine."""
+    if not native.outputs:
+        why = f", and the native engine has no answer ({native.outcome.shown}: {native.message})"
+        return Standard({}, why)
+    outputs = {
+        name: Series(
+            np.array(output.position, dtype=np.float64),
+            as_array(output.velocity),
+            as_array(output.acceleration),
+        )
+        for name, output in native.outputs.items()
+    }
+    if native.solved == native.samples:
+        return Standard(outputs, dof=native.dof)
+    refused = ~samples_with_values(outputs.values(), native.samples or 0)
+    refused[native.details.get(UNCERTAIN, [])] = False
+    return Standard(outputs, refused=refused, why=native.message, dof=native.dof)
+
+
+def has_everything(case: Case) -> bool:
+    """Return whether the reference has a value of every comparable quantity at every sample."""
+    return all(
+        (series := case.reference.get(output.name)) is not None
+        and all(
+            each is not None
+            for each in (series.position, series.velocity, series.acceleration)[: output.orders]
+        )
+        and np.isfinite(series.position).all()
+        for output in case.outputs
+    )
+
+
+def samples_with_values(outputs: Iterable[Series], samples: int) -> NDArray[np.bool_]:
+    """Return the samples where any output has a value, shape (samples,)."""
+    found = np.zeros(samples, dtype=np.bool_)
+    for each in outputs:
+        found |= np.isfinite(each.position)
+    return found
+
 
 ROUNDED = 2.0
 """Factor on the residual tolerance: engines measure in a unit near the mechanism's size, a power of
@@ -133,7 +209,7 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
     if refused is None:
         return ""
     samples = len(refused)
-    at = refused & known(answer.outputs.values(), samples)
+    at = refused & samples_with_values(answer.outputs.values(), samples)
     if not at.any():
         return ""
     first = int(np.argmax(at))
@@ -154,12 +230,12 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
     zero.
     """
     samples = len(case.sweep.values)
-    unsolved = ~known(answer.outputs.values(), samples)
+    unsolved = ~samples_with_values(answer.outputs.values(), samples)
     for name, series in (
         (str(case.truth), case.reference.values()),
         (STANDARD, native.outputs.values()),
     ):
-        if count := int((unsolved & known(series, samples)).sum()):
+        if count := int((unsolved & samples_with_values(series, samples)).sum()):
             return f"; {against(name)} has values at {count} of the others"
     return ""
 
@@ -204,3 +280,75 @@ def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
         reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}"
         for reason, names in reasons.items()
     ]
+
+
+VALUES = "values"
+"""Subject of a digest if no file holds the reference."""
+# Straight series prove nothing: their rounded values agree in every bit whatever the source. The
+# series of a driven coordinate is straight.
+FEWEST, STRAIGHT = 3, 1e-9
+
+
+def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
+    """Return the evidence on the reference of a case; None without a reference.
+
+    Args:
+        native: known outputs of the native engine.
+    """
+    if not case.reference:
+        return None
+    origin = case.origin or Origin(case.source)
+    return Evidence(
+        citation=origin.citation,
+        sha256=origin.sha256 or digest(case.reference),
+        of=origin.file or VALUES,
+        units=dict(origin.units),
+        signs=origin.signs,
+        grid=origin.grid,
+        limits=dict(origin.limits),
+        own=origin.own or (case.truth is Truth.THIRD_PARTY_DATA and _identical(case, native)),
+    )
+
+
+def _identical(case: Case, native: Mapping[str, Series]) -> bool:
+    """Return whether every reference value equals native's in every bit, with at least one curved
+    series.
+    """
+    telling = False
+    for name, series in case.reference.items():
+        for quantity in QUANTITIES:
+            reference: Array | None = getattr(series, quantity)
+            if reference is None:
+                continue
+            found: Array | None = getattr(native.get(name), quantity, None)
+            known = np.isfinite(reference)
+            if (
+                found is None
+                or found.shape != reference.shape
+                or not np.array_equal(reference[known], found[known])
+            ):
+                return False
+            telling = telling or not _straight(case.sweep.values[known], reference[known])
+    return telling
+
+
+def _straight(x: Array, y: Array) -> bool:
+    if len(y) < FEWEST:
+        return True
+    slope = float(y[x.argmax()] - y[x.argmin()]) / (float(np.ptp(x)) or 1.0)
+    off: Array = y - slope * x
+    return float(np.ptp(off)) <= STRAIGHT * float(np.abs(y).max())
+
+
+def digest(reference: Mapping[str, Series]) -> str:
+    """Return the SHA-256 of reference values.
+
+    Order: outputs by name, then quantities; after each name its values as little-endian SI doubles.
+    """
+    whole = hashlib.sha256()
+    for name, series in sorted(reference.items()):
+        for quantity in QUANTITIES:
+            if (values := getattr(series, quantity)) is not None:
+                whole.update(f"{name}.{quantity}\n".encode())
+                whole.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return whole.hexdigest()

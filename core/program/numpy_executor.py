@@ -234,7 +234,7 @@ class NumpyExecutor:
             self._worsen(worst)
             past[k % NODES] = block[remembered]
             if k + 1 < NODES:
-                for name in plan.rest:
+                for name in plan.remaining:
                     self.run(name)
                 self.carry()
             else:
@@ -354,7 +354,7 @@ class NumpyTrack:
                 break
             whole = accepted == lanes
             smooth = extrapolates and whole and at % lanes == 0 and at + accepted < stop
-            for name in () if smooth or not accepted else plan.rest:
+            for name in () if smooth or not accepted else plan.remaining:
                 executor.run(name)
             source, target = moved if smooth else carried
             block[target] = block[source, max(accepted - 1, 0), None]

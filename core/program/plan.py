@@ -86,7 +86,7 @@ class Plan:
     most: int = 0
 
     @property
-    def rest(self) -> list[str]:
+    def remaining(self) -> list[str]:
         """Names of the `onward` programs still to run after an attempt."""
         return [name for name in self.onward if name not in self.after]
 

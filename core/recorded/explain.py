@@ -14,8 +14,8 @@ import numpy as np
 from ..case.case import TIME, Case, Quantity, Series, Sweep
 from ..case.io.reference_samples import RATES
 from ..errors import shortened
-from ..harness.compare import deviation
-from ..harness.suspects import Held, Uncertain, slips
+from ..harness.compare import Curve, curve_of, deviation
+from ..harness.suspects import slips
 from ..trajectory import Array
 from ..unit_text import value_text
 from .meaning import MAP
@@ -65,12 +65,12 @@ class _Off:
     column: bool
 
     @property
-    def held(self) -> Held:
-        return Held(self.true, self.output.atol, self.output.rtol, self.output.unit)
+    def held(self) -> Curve:
+        return curve_of(self.output, 0, 1.0, self.true)
 
     def fits(self, left: Array) -> bool:
-        held = self.held
-        found = deviation(held.values + left, held.values, held.atol, held.rtol, "", self.half)
+        off = replace(self.held, values=self.true + left, half=self.half)
+        found = deviation(off, Curve(self.true))
         return found is None or found.within
 
     def left(self, curve: Array, sign: float) -> Array:
@@ -121,9 +121,10 @@ def explain_slips(
         name = each.output.name
         others = {key: other for key, other in held.items() if key != name}
         for values in (each.values, columns.get(name, each.values)):
-            if changes := slips(each.held, Uncertain(values, each.half), others):
-                words = " or ".join(slip.change for slip in changes[:_NAMED])
-                left = value_text(f"{changes[0].difference:.2g}", each.output.unit)
+            if changes := slips(each.held, Curve(values, half=each.half), others):
+                words = " or ".join([*changes][:_NAMED])
+                remaining = next(iter(changes.values())).max_abs
+                left = value_text(f"{remaining:.2g}", each.output.unit)
                 known.setdefault(words, []).append((name, left))
                 break
     # bodies or columns exchanged leave a sentence for each output

@@ -6,10 +6,9 @@ import re
 from xml.etree import ElementTree
 
 from ..harness.compare import describe
-from ..harness.evidence import REFERENCE
+from ..harness.engine import STANDARD
 from ..harness.labels import UNMADE, notes, suspects
-from ..harness.record import Deviations, Outcome, Record, Results
-from ..harness.standard import STANDARD
+from ..harness.record import REFERENCE, Deviations, Outcome, Record, Results
 from ..history.findings import Kind, Regressions
 from ..history.store import Pair
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..case.case import Truth
-from ..harness.evidence import Evidence
+from ..harness.engine import STANDARD
 from ..harness.labels import against, engine_name, motion_unit, number, output_label, product
-from ..harness.record import Deviation, Facts, OutputSeries, Record, Results
-from ..harness.standard import STANDARD
+from ..harness.record import Deviation, Evidence, Facts, OutputSeries, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import FORCES, motion_word, value_text
 from .axis import Axis, driver_axis

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from msgspec.structs import asdict
 
 from ..case.case import Truth
-from ..harness.evidence import REFERENCE
+from ..harness.engine import STANDARD
 from ..harness.labels import (
     TRUTHS,
     engine_name,
@@ -23,8 +23,7 @@ from ..harness.labels import (
     unread_count,
     validation,
 )
-from ..harness.record import Outcome, Record, Results
-from ..harness.standard import STANDARD
+from ..harness.record import REFERENCE, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from .axis import SAMPLES
 from .curves import downloads

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.constraints import CLOSURES
 from kincheck.core.joints import (
     ConstantVelocity,
     Cylindrical,
@@ -78,10 +77,6 @@ def test_joint_in_loop_moves_as_native(engine, kind, bodies, closing):
         # a screw is a slide and a turn tied by a row, a constant-velocity joint four by two
         spare = {"screw": 1, "constant_velocity": 2}.get(kind, 0)
         assert found.details["unknowns"] == 7 - mechanism.joint("tested").rows + spare
-
-
-def test_every_joint_type_has_closure():
-    assert {each.type for each in CLOSURES} == set(TYPES)
 
 
 def on_screw(theta, axis, point, lead, rate):

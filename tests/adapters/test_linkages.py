@@ -130,17 +130,6 @@ def test_point_coordinate_held_constant(engine):
 
 
 @ENGINES
-def test_unswept_driver_holds_joint(engine):
-    """The RSSR's rocker on a slide that is held."""
-    slide = Translational("slide", "carriage", "ground", ORIGIN, (1.0, 1.0, 0.0))
-    drivers = [JointAngle("crank", "a"), JointDisplacement("hold", "slide")]
-    joints = [RSSR[0], replace(RSSR[1], j="carriage"), RSSR[2], slide]
-    mechanism = mechanism_of(joints, {"C": ("rocker", C0)}, drivers)
-    found = solved(engine, mechanism, CRANK_TURN, CRANK_RATE).points["C"]
-    assert_motion(found, *periodic(rocker(CRANK_PIN, 0.76)), atol=PERIODIC)
-
-
-@ENGINES
 def test_point_coordinate_along_oblique_direction(engine):
     """A pendulum of radius r is pulled along a direction in its plane; a slider pushed along
     another direction k moves by c / (k . axis).

@@ -16,7 +16,7 @@ from ..support.mechanisms import ORIGIN, Y
 pytest.importorskip("opensim", reason="OpenSim is not installed: pip install 'kincheck[simbody]'")
 
 from kincheck.adapters.shared.poses import euler_angles
-from kincheck.adapters.simbody.simbody import turned
+from kincheck.adapters.simbody.simbody import turn_parameters
 
 ENGINE = adapters.engine("simbody")
 
@@ -53,9 +53,9 @@ def test_turn_by_parent_axes():
     p, turn = np.array([0.5, 0.5, -0.5, 0.5]), np.array([0.4, -0.2, 0.9])
     angle = np.linalg.norm(turn)
     step = [math.cos(angle / 2), *(math.sin(angle / 2) / angle * turn)]
-    found = turned(p.tolist(), turn.tolist())
+    found = turn_parameters(p.tolist(), turn.tolist())
     np.testing.assert_allclose(A(found), A(step) @ A(p), rtol=0, atol=1e-15)
-    assert turned(p.tolist(), [0.0, 0.0, 0.0]) == tuple(p)
+    assert turn_parameters(p.tolist(), [0.0, 0.0, 0.0]) == tuple(p)
 
 
 def test_simbody_settings_and_floor():

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from kincheck import adapters, cases
-from kincheck.adapters.shared.equivalents import jointed
+from kincheck.adapters.shared.equivalents import with_joints_alone
 from kincheck.core import (
     Distance,
     Gear,
@@ -226,10 +226,11 @@ def test_jointed_rod_turns_all_round(along):
     )
     turns = np.linspace(0.0, 2.0 * np.pi, 73)
     here, there = (
-        solve(each, "turn", turns).points["end"] for each in (mechanism, jointed(mechanism))
+        solve(each, "turn", turns).points["end"]
+        for each in (mechanism, with_joints_alone(mechanism))
     )
     assert np.abs(there.position - here.position).max() <= 1e-14
-    first, second = jointed(mechanism).joint("rod: cross").axes
+    first, second = with_joints_alone(mechanism).joint("rod: cross").axes
     assert abs(first[2]) == (along[2] != 1.0)
     np.testing.assert_allclose([np.dot(first, second), np.dot(second, rod)], 0.0, atol=1e-15)
 
@@ -295,7 +296,7 @@ def test_rod_of_given_length_stays_distance():
         for joint in plain.joints
     ]
     longer = replace(plain, joints=joints)
-    assert any(isinstance(joint, Distance) for joint in jointed(longer).joints)
+    assert any(isinstance(joint, Distance) for joint in with_joints_alone(longer).joints)
     refused = {
         name: adapters.engine(name, "simulate").unsupported(replace(strut(), mechanism=longer))
         for name in ("pinocchio", "dart", "drake")

@@ -18,13 +18,13 @@ FORCES = 5e-6
 RIGHT = [name for name in DECKS if name not in (*WITHOUT_RESULTS, *OTHER_SPRINGS)]
 
 
-def test_decks_are_all_of_chrono():
+def test_chrono_decks_are_complete():
     assert len(DECKS) == 19
     assert len(RIGHT) == 16
 
 
 @pytest.mark.parametrize("name", RIGHT)
-def test_deck_has_the_motion_of_adams(name):
+def test_chrono_deck_has_adams_motion(name):
     found = judged(name)
     for quantity, (_, ratio) in found.rows.items():
         assert ratio <= 1.0, quantity
@@ -33,7 +33,7 @@ def test_deck_has_the_motion_of_adams(name):
 
 
 @pytest.mark.parametrize("name", RIGHT)
-def test_deck_has_the_reactions_of_adams(name):
+def test_chrono_deck_has_adams_reactions(name):
     found = judged(name)
     # torques are about the joint: forces at arms of two metres
     arm = 2.0 * found.force[1]
@@ -43,12 +43,12 @@ def test_deck_has_the_reactions_of_adams(name):
 
 
 @pytest.mark.parametrize("name", OTHER_SPRINGS)
-def test_deck_of_another_spring_fails_by_its_free_force(name):
+def test_chrono_deck_wrong_spring_is_found(name):
     free, largest = judged(name).free
     assert free > 0.1 * largest
 
 
-def test_deck_with_the_spring_of_the_results_passes(tmp_path):
+def test_chrono_deck_corrected_spring_passes(tmp_path):
     """200 N m/rad and 10 N m s/rad, which the results are of."""
     text = DECKS["RotSpring_Case01"].read_text()
     changed = text.replace("- 1.0*RTOD*", "- 200.0*").replace("- 5.0E-002*RTOD*", "- 10.0*")
@@ -59,7 +59,7 @@ def test_deck_with_the_spring_of_the_results_passes(tmp_path):
     assert free <= FORCES * largest
 
 
-def test_rack_on_its_pinions_axis_says_what_is_missing():
+def test_rack_through_pinion_axis_is_refused():
     with pytest.raises(CaseError, match=r"line 111: JOINT/3: the line of the rack's marker"):
         load(DECKS["RackPinion_Case01"])
 
@@ -69,7 +69,7 @@ NUMBER = re.compile(r"\d[\d.]*(?:e[-+]\d+)?")
 
 
 @pytest.mark.parametrize("name", DECKS)
-def test_table_of_the_page_is_the_command_s(name):
+def test_deck_page_table_matches_command(name):
     """Above rounding, which differs from machine to machine."""
     (shown,) = (x for x in PAGE.read_text("utf-8").split("\n") if x.startswith(f"| {name} |"))
     pairs = zip(NUMBER.findall(shown), NUMBER.findall(line(name)), strict=True)

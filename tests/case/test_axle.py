@@ -1,9 +1,7 @@
 """Whole axles against two independent carriers on rods, and wheels of a car."""
 
-import json
-import tomllib
+import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
 
 from ..oracles.rods import Carrier
-from ..support.case_texts import complains
+from ..support.case_texts import complains, rows, supplied, write
 from ..support.rods_of_templates import RODS as ALL_RODS
 from ..support.rods_of_templates import solved
 from ..support.written_again import written_again
@@ -70,57 +68,79 @@ class Wheel:
         )
 
     @property
-    def cotangent(self):
-        """Of the steer angle to the left."""
+    def steer(self):
+        """Angle to the left."""
         heading = np.cross(self.s, (0.0, 0.0, 1.0)) * np.sign(self.s[1])
-        return heading[0] / heading[1]
+        return np.arctan(heading[1] / heading[0])
 
 
-def expected(name, motion, value):
-    rack = value if motion == "steer" else 0.0
+def wheels_of(name, motion, travel, rack):
+    """Both wheels of an axle, left first."""
     left, right = {"heave": (1, 1), "roll": (1, -1), "steer": (0, 0)}[motion]
-    a, b = Wheel(name, 1, left * value, rack), Wheel(name, -1, right * value, rack)
+    return Wheel(name, 1, left * travel, rack), Wheel(name, -1, right * travel, rack)
+
+
+def expected(a, b):
+    """Outputs by the pose of both wheels, then those by its slope."""
     road = a.contact - b.contact
     lines = np.array([a.velocity[1:], b.velocity[1:]])
     y, z = np.linalg.solve(lines, [a.velocity[1:] @ a.contact[1:], b.velocity[1:] @ b.contact[1:]])
     normal = np.array([-road[2], road[1]]) / np.hypot(*road[1:])
-    true = {
+    pose = {
         "left_toe": np.arctan2(a.s[0], a.s[1]),
         "right_toe": np.arctan2(b.s[0], -b.s[1]),
         "left_camber": -np.arcsin(a.s[2]),
         "right_camber": -np.arcsin(b.s[2]),
-        "right_roll_center_height": -b.contact[1] * -b.velocity[1] / b.velocity[2],
         "track": road[1],
         "roll_angle": np.arctan2(-road[2], road[1]),
+    }
+    slope = {
+        "right_roll_center_height": -b.contact[1] * -b.velocity[1] / b.velocity[2],
         "axle_roll_center_height": ((y, z) - a.contact[1:]) @ normal,
         "axle_roll_center_offset": y,
     }
-    if motion == "steer" and abs(value) > 0.005:
-        true["ackermann"] = WHEELBASE / road[1] * (b.cotangent - a.cotangent)
-        angles = sorted(np.arctan(1 / abs(each.cotangent)) for each in (a, b))
-        outer, inner = angles if true["ackermann"] > 0.0 else angles[::-1]
-        ideal = np.arctan(1.0 / (1.0 / np.tan(inner) + road[1] / WHEELBASE))
-        true["ackermann_angles"] = (inner - outer) / (inner - ideal)
-        true["turning_circle"] = 2.0 * WHEELBASE / np.sin(outer)
-        true["mean_steer_angle"] = 0.5 * np.sign(a.cotangent) * (inner + outer)
-    return true
+    return pose, slope
+
+
+def steering(a, b):
+    """Outputs by the steer angles of both wheels; none where they steer apart or hardly."""
+    if min(a.steer * b.steer, abs(a.steer) - 0.01, abs(b.steer) - 0.01) <= 0.0:
+        return {}
+    track = (a.contact - b.contact)[1]
+    ackermann = WHEELBASE / track * (1.0 / np.tan(b.steer) - 1.0 / np.tan(a.steer))
+    angles = sorted(map(abs, (a.steer, b.steer)))
+    outer, inner = angles if ackermann > 0.0 else angles[::-1]
+    ideal = np.arctan(1.0 / (1.0 / np.tan(inner) + track / WHEELBASE))
+    return {
+        "ackermann": ackermann,
+        "ackermann_angles": (inner - outer) / (inner - ideal),
+        "turning_circle": 2.0 * WHEELBASE / np.sin(outer),
+        "mean_steer_angle": 0.5 * np.sign(a.steer) * (inner + outer),
+    }
+
+
+def assert_close(found, sample, true, atol):
+    values = {name: found[name][sample] for name in true}
+    assert values == pytest.approx(true, abs=atol, rel=1e-11)
 
 
 @pytest.mark.parametrize("motion", ["heave", "roll", "steer"])
 @pytest.mark.parametrize("name", RODS)
-def test_axles(tmp_path, name, motion):
-    case = axle(tmp_path, name, motion, "0.03:5" if motion == "steer" else "0.04:5")
+def test_axle_outputs_in_closed_form(tmp_path, name, motion):
+    steered = motion == "steer"
+    case = axle(tmp_path, name, motion, "0.03:5" if steered else "0.04:5")
     found = answer(case)
     for k, value in enumerate(case.sweep.values):
-        true = expected(name, motion, value)
-        assert {each: found[each][k] for each in true} == pytest.approx(true, abs=CLOSE, rel=1e-11)
-    if motion == "steer":
+        wheels = wheels_of(name, motion, value, value if steered else 0.0)
+        pose, slope = expected(*wheels)
+        assert_close(found, k, {**pose, **slope, **(steering(*wheels) if steered else {})}, CLOSE)
+    if steered:
         assert np.isnan(found["ackermann"][2])
         assert np.isfinite(np.delete(found["ackermann"], 2)).all()
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_in_every_engine(tmp_path, name):
+def test_axle_outputs_in_other_engines(tmp_path, name):
     pytest.importorskip(name)
     case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
     found, native = answer(case, name), answer(case)
@@ -129,7 +149,7 @@ def test_in_every_engine(tmp_path, name):
         assert off < 1e-10, output.name
 
 
-def test_wheels_in_heave_are_one_wheel(tmp_path):
+def test_axle_in_heave_equals_one_wheel(tmp_path):
     """The roll centre of the axle is that of either wheel; half a track is of one wheel."""
     found = answer(axle(tmp_path, "double_wishbone", "heave"))
     height = found["axle_roll_center_height"]
@@ -140,7 +160,7 @@ def test_wheels_in_heave_are_one_wheel(tmp_path):
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_points_of_an_axle_are_on_bodies_of_their_side(tmp_path, name):
+def test_axle_points_mirror_one_wheel(tmp_path, name):
     """As those of one wheel, mirrored for the right; what is fixed stays so, steered or not."""
     file = table(tmp_path, name)
     wheel, both = (
@@ -156,18 +176,14 @@ def test_points_of_an_axle_are_on_bodies_of_their_side(tmp_path, name):
     assert not found
 
 
-def test_an_axle_without_steering(tmp_path):
+def test_axle_without_steering(tmp_path):
     case = axle(tmp_path, "three_link", "roll")
     assert [driver.name for driver in case.mechanism.drivers] == ["left_stroke", "right_stroke"]
     found = answer(case)
     assert np.abs(found["left_camber"] - found["right_camber"][::-1]).max() < CLOSE
-    with pytest.raises(
-        CaseError, match=r"--axle: found steer, but .* no tie rod, .* heave or roll"
-    ):
-        axle(tmp_path, "three_link", "steer")
 
 
-def test_parallel_lines_have_no_roll_centre(tmp_path):
+def test_trailing_arms_have_no_roll_centre(tmp_path):
     """Trailing arms on hinges across the car: the contacts move in planes along it."""
     file = tmp_path / "car.csv"
     rows = "arm_inner,0.5,0.3,0.3\narm_outer,0.5,0.6,0.3\nwheel_center,0,0.7,0.3\n"
@@ -177,90 +193,53 @@ def test_parallel_lines_have_no_roll_centre(tmp_path):
     assert np.abs(found["left_roll_center_height"]).max() < 1e-15
 
 
-def test_a_case_file_of_an_axle(tmp_path):
+def test_axle_case_file_round_trip(tmp_path):
     """[suspension.other] and the sides are in it."""
     written_again(axle(tmp_path, "five_link", "roll"), tmp_path)
 
 
-def changed(folder, edit):
-    """The file of an axle as data, changed."""
-    data = tomllib.loads(case_text(axle(folder, "double_wishbone", "roll", "0.02:3")))
-    edit(data)
-    file = Path(folder) / "case.json"
-    file.write_text(json.dumps(data))
-    return file
+def changed(folder, *edits):
+    """The case file of an axle with patterns replaced."""
+    text = case_text(axle(folder, "double_wishbone", "roll", "0.02:3"))
+    for old, new in edits:
+        text, count = re.subn(old, new, text, flags=re.DOTALL)
+        assert count
+    return write(folder, text)
 
 
-FAULTS = {
-    "other side": (
-        lambda data: data["outputs"]["left_toe"].update(side="middle"),
-        "outputs.left_toe ... 'middle' ... left, right",
-    ),
-    "no other": (
-        lambda data: data["suspension"].pop("other"),
-        ("outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]"),
-    ),
-    "no other for an axle": (
-        lambda data: (
-            data["suspension"].pop("other"),
-            data.update(outputs={"track": {"type": "track"}}),
-        ),
-        ("suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]"),
-    ),
-    "one wheel twice": (
-        lambda data: data["suspension"]["other"].update(wheel_center="left_wheel_center"),
-        "suspension.other.side ... 'right' ... on the other side",
-    ),
-    "no point": (
-        lambda data: data["suspension"]["other"].update(wheel_center="right_wheel_centre"),
-        "suspension.other.wheel_center ... 'right_wheel_center'",
-    ),
-    "upside down": (
-        lambda data: data["suspension"]["other"]["kingpin"].reverse(),
-        "suspension.other.kingpin ... the lower point, then the upper",
-    ),
-    "no driver": (
-        lambda data: data["suspension"]["other"].update(travel="right_strike"),
-        "suspension.other.travel ... 'right_stroke'",
-    ),
-    "side of an axle": (
-        lambda data: data["outputs"]["track"].update(side="left"),
-        "outputs.track ... side",
-    ),
-}
+FAULTS = """
+other side | (left_toe.*?side = )"left" | \\1"middle"
+    | outputs.left_toe ... 'middle' ... left, right
+no other | \\[suspension.other.*?(?=\\[outputs) |
+    | outputs.right_toe.side ... found 'right' ... expected left ... add [suspension.other]
+no other for an axle | \\[suspension.other.*(?=\\[outputs.track) |
+    | suspension.other: missing ... outputs.track of type 'track' ... add [suspension.other]
+one wheel twice | (other.*?center = )"right | \\1"left
+    | suspension.other.side ... 'right' ... on the other side
+no point | (other.*?)right_wheel_center | \\1right_wheel_centre
+    | suspension.other.wheel_center ... 'right_wheel_center'
+upside down | ("right_lca_outer"), ("right_uca_outer") | \\2, \\1
+    | suspension.other.kingpin ... the lower point, then the upper
+no driver | travel = "right_stroke" | travel = "right_strike"
+    | suspension.other.travel ... 'right_stroke'
+side of an axle | type = "track" | type = "track"\\nside = "left" | outputs.track ... side
+"""
 
 
-@pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, kind):
-    edit, fragments = FAULTS[kind]
-    complains(changed(tmp_path, edit), fragments)
+@pytest.mark.parametrize(("old", "new", "message"), rows(FAULTS))
+def test_axle_case_file_faults(tmp_path, old, new, message):
+    complains(changed(tmp_path, (old, new)), message)
 
 
-def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
-    def edit(data):
-        for side in ("left", "right"):
-            data["drivers"][f"{side}_stroke"]["point"] = f"{side}_tierod_outer"
-        data["suspension"].pop("travel")
-        data["suspension"]["other"].pop("travel")
-        data["outputs"] = {"rc": {"type": "axle_roll_center_height"}}
-
+def test_roll_centre_needs_both_travel_drivers(tmp_path):
+    points = r'point = "(left|right)_wheel_center"', r'point = "\1_tierod_outer"'
+    outputs = r"\[outputs.*", '[outputs.rc]\ntype = "axle_roll_center_height"\n'
+    file = changed(tmp_path, points, (r'travel = "\w+_stroke"\n', ""), outputs)
     with pytest.raises(CaseError, match=r"outputs\.rc: .* name them by suspension\.travel and"):
-        load_case(changed(tmp_path, edit))
+        load_case(file)
 
 
-@pytest.mark.parametrize(
-    ("supplied", "fragments"),
-    [
-        ({"axle": "pitch"}, "--axle ... 'pitch' ... heave"),
-        ({"axle": "steer", "wheelbase": "two"}, "--wheelbase ... 'two' ... a length"),
-        ({"axle": "steer", "wheelbase": "-2"}, "--wheelbase ... -2 m"),
-    ],
-)
-def test_faults_of_options(tmp_path, supplied, fragments):
-    complains(table(tmp_path, "mcpherson"), fragments, Supplied(**supplied))
-
-
-def test_signs_of_sae(tmp_path):
+def test_roll_centre_offset_in_sae_axes(tmp_path):
     """The offset is along y, which points to the other side."""
     case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
     there = {output.name: output for output in case.outputs}["axle_roll_center_offset"]
@@ -283,51 +262,29 @@ CAR = {
 }
 
 
-def expected_while_steering(motion, position, travel, rack):
-    a = Wheel("double_wishbone", 1, travel, rack)
-    b = Wheel("double_wishbone", -1, travel if motion == "heave" else -travel, rack)
-    steer_a, steer_b = (np.arctan(1.0 / wheel.cotangent) for wheel in (a, b))
-    lines = np.array([a.velocity[1:], b.velocity[1:]])
-    y, z = np.linalg.solve(lines, [a.velocity[1:] @ a.contact[1:], b.velocity[1:] @ b.contact[1:]])
-    road = a.contact - b.contact
-    normal = np.array([-road[2], road[1]]) / np.hypot(*road[1:])
-    pose = {
-        "left_toe": np.arctan2(a.s[0], a.s[1]),
-        "right_toe": np.arctan2(b.s[0], -b.s[1]),
-        "track": road[1],
-    }
-    if min(steer_a * steer_b, abs(steer_a) - 0.01, abs(steer_b) - 0.01) > 0.0:
-        pose["ackermann"] = float(WHEELBASE / road[1] * (b.cotangent - a.cotangent))
-    rate = {
-        "axle_roll_center_height": ((y, z) - a.contact[1:]) @ normal,
-        "axle_roll_center_offset": y,
-    }
-    for side, wheel in (("left", a), ("right", b)):
-        slope = SHARE * WHEELBASE / CG_HEIGHT * wheel.velocity[0] / wheel.velocity[2]
-        if position == "front":
-            rate[f"{side}_anti_dive"] = slope
-        else:
-            rate[f"{side}_anti_lift"] = -slope
-            squat = -WHEELBASE / CG_HEIGHT * wheel.of_center[0] / wheel.of_center[2]
-            rate[f"{side}_anti_squat"] = squat
-    return pose, rate
-
-
 @pytest.mark.parametrize(("motion", "position"), [("heave", "front"), ("roll", "rear")])
-def test_an_axle_that_steers_while_it_travels(tmp_path, motion, position):
+def test_axle_steered_during_travel(tmp_path, motion, position):
     said = Supplied(axle=motion, travel="0.03:3", rack="-0.02:0.03", position=position, **CAR)
     case = load(table(tmp_path), said)
     found = answer(case)
     for k, travel in enumerate(case.sweep.values):
-        pose, rate = expected_while_steering(
-            motion, position, travel, 0.005 + travel * 0.025 / 0.03
-        )
-        assert {each: found[each][k] for each in pose} == pytest.approx(pose, abs=CLOSE, rel=1e-11)
-        assert {each: found[each][k] for each in rate} == pytest.approx(rate, abs=1e-11, rel=1e-11)
+        wheels = wheels_of("double_wishbone", motion, travel, 0.005 + travel * 0.025 / 0.03)
+        pose, slope = expected(*wheels)
+        for side, wheel in zip(("left", "right"), wheels, strict=True):
+            anti = WHEELBASE / CG_HEIGHT * wheel.velocity[0] / wheel.velocity[2]
+            if position == "front":
+                slope[f"{side}_anti_dive"] = SHARE * anti
+            else:
+                slope[f"{side}_anti_lift"] = -SHARE * anti
+                squat = -WHEELBASE / CG_HEIGHT * wheel.of_center[0] / wheel.of_center[2]
+                slope[f"{side}_anti_squat"] = squat
+        pose |= {name: x for name, x in steering(*wheels).items() if name == "ackermann"}
+        assert_close(found, k, pose, CLOSE)
+        assert_close(found, k, slope, 1e-11)
     assert np.isfinite(found["ackermann"]).any()
 
 
-def test_without_data_of_the_vehicle_there_are_no_anti_values(tmp_path):
+def test_anti_outputs_need_vehicle_data(tmp_path):
     names = {each.name for each in load(table(tmp_path)).outputs}
     assert not [name for name in names if "anti" in name]
     said = Supplied(position="front", wheelbase="2.6", cg_height="0.5")
@@ -336,33 +293,35 @@ def test_without_data_of_the_vehicle_there_are_no_anti_values(tmp_path):
     assert not [name for name in names if "anti" in name]
 
 
-STEERING_FAULTS = {
-    "position": ({"position": "frnt"}, "--position ... 'frnt' ... 'front'"),
-    "height": ({"cg_height": "half"}, "--cg-height ... 'half' ... a length"),
-    "negative height": ({"cg_height": "-0.5"}, "--cg-height ... -0.5 m"),
-    "percent": ({"brake_share": "60"}, "--brake-share ... '60' ... 0 to 1"),
-    "no share": ({"drive_share": "all"}, "--drive-share ... 'all' ... 0 to 1"),
-    "rack": ({"rack": "40"}, "--rack ... '40' ... up to 1 m"),
-    "words": ({"rack": "left"}, "--rack ... 'left' ... START:STOP"),
-    "rack twice": ({"rack": "0.04", "axle": "steer"}, "--rack ... beside --axle steer"),
-    "travel in mm": ({"travel": "50"}, "--travel ... '50' ... up to 1 m"),
-    "nowhere": ({"travel": "0.1:0.1:5"}, "--travel ... '0.1:0.1:5'"),
-    "backwards": ({"travel": "-0.05"}, "--travel ... '-0.05'"),
-}
+OPTION_FAULTS = """
+axle | axle=pitch | --axle ... 'pitch' ... heave
+wheelbase | axle=steer wheelbase=two | --wheelbase ... 'two' ... a length
+negative wheelbase | axle=steer wheelbase=-2 | --wheelbase ... -2 m
+position | position=frnt | --position ... 'frnt' ... 'front'
+height | cg_height=half | --cg-height ... 'half' ... a length
+negative height | cg_height=-0.5 | --cg-height ... -0.5 m
+percent | brake_share=60 | --brake-share ... '60' ... 0 to 1
+no share | drive_share=all | --drive-share ... 'all' ... 0 to 1
+rack | rack=40 | --rack ... '40' ... up to 1 m
+words | rack=left | --rack ... 'left' ... START:STOP
+rack twice | rack=0.04 axle=steer | --rack ... beside --axle steer
+rack without tie rod | rack=0.02 template=three_link
+    | --rack: found a travel, but ... three_link has no tie rod
+steering without tie rod | axle=steer template=three_link
+    | --axle: found steer, but ... no tie rod, ... heave or roll
+travel in mm | travel=50 | --travel ... '50' ... up to 1 m
+nowhere | travel=0.1:0.1:5 | --travel ... '0.1:0.1:5'
+backwards | travel=-0.05 | --travel ... '-0.05'
+"""
 
 
-@pytest.mark.parametrize("kind", STEERING_FAULTS)
-def test_faults_of_steering(tmp_path, kind):
-    supplied, fragments = STEERING_FAULTS[kind]
-    complains(table(tmp_path), fragments, Supplied(**supplied))
+@pytest.mark.parametrize(("options", "message"), rows(OPTION_FAULTS))
+def test_axle_option_faults(tmp_path, options, message):
+    said = supplied(options)
+    complains(table(tmp_path, said.template or "double_wishbone"), message, said)
 
 
-def test_a_rack_needs_a_tie_rod(tmp_path):
-    with pytest.raises(CaseError, match=r"--rack: found a travel, but .*three_link has no tie rod"):
-        load(table(tmp_path, "three_link"), Supplied(rack="0.02"))
-
-
-def test_options_reach_the_case(tmp_path, capsys):
+def test_import_options_reach_case_file(tmp_path, capsys):
     options = ["--rack=0.02", "--position=front", "--wheelbase=2.6", "--cg-height=0.5"]
     options += ["--brake-share=0.6", "--drive-share=0.4", "--travel=-0.02:0.03:3"]
     out = tmp_path / "case.toml"
@@ -380,7 +339,7 @@ SAID = Supplied(units="mm", axes="forward,left,up", travel="0.04:5", rack="0.01"
 CORNERS = {"FL": (1, 0.0), "FR": (-1, 0.0), "RL": (1, -2600.0), "RR": (-1, -2600.0)}
 
 
-def rows(name, corner="FL"):
+def points_at(name, corner):
     """Rows of a template's sample at a corner; all corners differ by more than place and side."""
     side, along = CORNERS[corner]
     wider = 1.0 + 0.01 * (list(CORNERS).index(corner) // 2)
@@ -397,7 +356,7 @@ def written(folder, lines, name="car.csv"):
 
 
 def plain(folder, name, corner, *above):
-    lines = [*above, "name,x,y,z", *(",".join(row) for row in rows(name, corner))]
+    lines = [*above, "name,x,y,z", *(",".join(row) for row in points_at(name, corner))]
     return written(folder, lines, f"{corner}.csv")
 
 
@@ -407,7 +366,7 @@ def of(name, **own):
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_right_wheel_has_the_left_ones_outputs(tmp_path, name):
+def test_right_wheel_outputs_mirror_left(tmp_path, name):
     """The rack moves to the other side for the mirror image."""
     left = load(plain(tmp_path, name, "FL"), of(name))
     other_way = {"rack": "0.01:-0.01"} if TEMPLATES[name].steered else {}
@@ -421,7 +380,7 @@ def test_right_wheel_has_the_left_ones_outputs(tmp_path, name):
         np.testing.assert_allclose(values, expected, rtol=CLOSE, atol=CLOSE, err_msg=output)
 
 
-def test_side_is_stated_in_the_file(tmp_path):
+def test_side_comment_in_hardpoint_table(tmp_path):
     case = load(plain(tmp_path, "mcpherson", "FR", "# side: right"), of("mcpherson"))
     assert not case.assembly
     assert "right side" in case.source
@@ -429,56 +388,51 @@ def test_side_is_stated_in_the_file(tmp_path):
     np.testing.assert_allclose(again["toe"], ours["toe"], rtol=CLOSE, atol=CLOSE)
 
 
-@pytest.mark.parametrize(
-    ("corner", "above", "own", "fragments"),
-    [
-        ("FR", ["# side: left"], {}, "y = -750 mm ... side says left"),
-        ("FL", [], {"side": "right"}, "y = 750 mm ... --side says right"),
-        ("FL", ["# side: left"], {"side": "right"}, "--side: found right ... left side"),
-        ("FL", [], {"side": "lft"}, "--side: found 'lft' ... 'left'"),
-        ("FR", [], {"axes": "forward,right,down", "units": "mm"}, "above"),
-        ("FL", [], {"axes": "forward,right,up"}, "left-handed ... --side right"),
-        ("FL", [], {"corner": "FR"}, "--corner: found no point of FR"),
-        ("FL", [], {"corner": "front"}, "--corner: found no point of front"),
-        ("FL", [], {"corner": "nose"}, "--corner: found 'nose' ... FL, FR, RL, RR"),
-    ],
-)
-def test_contradicted_sides_are_refused(tmp_path, corner, above, own, fragments):
-    complains(plain(tmp_path, "mcpherson", corner, *above), fragments, of("mcpherson", **own))
+SIDE_FAULTS = """
+file says left | FR | # side: left | | y = -750 mm ... side says left
+option says right | FL | | side=right | y = 750 mm ... --side says right
+option and file | FL | # side: left | side=right | --side: found right ... left side
+no side | FL | | side=lft | --side: found 'lft' ... 'left'
+upside down | FR | | axes=forward,right,down | above
+left-handed | FL | | axes=forward,right,up | left-handed ... --side right
+no such corner | FL | | corner=FR | --corner: found no point of FR
+no such axle | FL | | corner=front | --corner: found no point of front
+no corner | FL | | corner=nose | --corner: found 'nose' ... FL, FR, RL, RR
+"""
 
 
-WORDS = {"FL": "Front,Left", "FR": "Front,Right", "RL": "Rear,Left", "RR": "Rear,Right"}
-TABLES = {
-    "column": lambda corner, row: ["corner,point,x,y,z", ",".join([corner, *row])],
-    "words": lambda corner, row: [
-        "wheel;name;x;y;z",
-        ";".join([WORDS[corner].replace(",", " "), *row]),
-    ],
-    "last column": lambda corner, row: ["name,x,y,z,corner", ",".join([*row, corner])],
-    "two columns": lambda corner, row: ["axle,side,point,x,y,z", ",".join([WORDS[corner], *row])],
-    "letters": lambda corner, row: ["axle,side,point,x,y,z", ",".join([*corner, *row])],
-    "merged cells": lambda corner, row: [
-        "corner,point,x,y,z",
-        ",".join([corner if row[0] == rows("double_wishbone")[0][0] else "", *row]),
-    ],
-    "suffix": lambda corner, row: ["name,x,y,z", ",".join([f"{row[0]}_{corner}", *row[1:]])],
-    "prefix": lambda corner, row: ["name,x,y,z", ",".join([f"{corner}_{row[0]}", *row[1:]])],
-    "script": lambda corner, row: [
-        "% the car",
-        f"{corner}.{row[0]} = [{' '.join(row[1:])}];",
-    ],
-}
+@pytest.mark.parametrize(("corner", "above", "options", "message"), rows(SIDE_FAULTS))
+def test_contradictory_sides_are_refused(tmp_path, corner, above, options, message):
+    own = {name: value for name, value in vars(supplied(options)).items() if f"{name}=" in options}
+    complains(plain(tmp_path, "mcpherson", corner, above), message, of("mcpherson", **own))
+
+
+TABLES = """
+column | corner,point,x,y,z | {corner},{name},{x},{y},{z}
+words | wheel;name;x;y;z | {axle} {side};{name};{x};{y};{z}
+last column | name,x,y,z,corner | {name},{x},{y},{z},{corner}
+two columns | axle,side,point,x,y,z | {axle},{side},{name},{x},{y},{z}
+letters | axle,side,point,x,y,z | {corner[0]},{corner[1]},{name},{x},{y},{z}
+merged cells | corner,point,x,y,z | {first},{name},{x},{y},{z}
+suffix | name,x,y,z | {name}_{corner},{x},{y},{z}
+prefix | name,x,y,z | {corner}_{name},{x},{y},{z}
+script | % the car | {corner}.{name} = [{x} {y} {z}];
+"""
+WORDS = {"F": "Front", "R": "Rear"}, {"L": "Left", "R": "Right"}
 
 
 @pytest.mark.parametrize("corner", CORNERS)
-@pytest.mark.parametrize("kind", TABLES)
-def test_corner_of_a_whole_car_is_read(tmp_path, kind, corner):
-    name = "double_wishbone"
-    said = of(name, corner=corner)
-    pairs = [TABLES[kind](each, row) for each in CORNERS for row in rows(name, each)]
-    lines = [pairs[0][0], *(line for _, line in pairs)]
-    case = load(written(tmp_path, lines, "car.m" if kind == "script" else "car.csv"), said)
-    alone = load(plain(tmp_path, name, corner), of(name))
+@pytest.mark.parametrize(("head", "form"), rows(TABLES))
+def test_corner_of_car_table_is_read(tmp_path, head, form, corner):
+    said = of("double_wishbone", corner=corner)
+    lines = [head]
+    for each in CORNERS:
+        axle, side = (words[letter] for words, letter in zip(WORDS, each, strict=True))
+        for k, (name, x, y, z) in enumerate(points_at("double_wishbone", each)):
+            place = {"name": name, "x": x, "y": y, "z": z, "first": "" if k else each}
+            lines.append(form.format(corner=each, axle=axle, side=side, **place))
+    case = load(written(tmp_path, lines, "car.m" if head[0] == "%" else "car.csv"), said)
+    alone = load(plain(tmp_path, "double_wishbone", corner), of("double_wishbone"))
     theirs, ours = solved(alone), solved(case)
     assert theirs.keys() == ours.keys()
     for output, values in ours.items():
@@ -486,9 +440,9 @@ def test_corner_of_a_whole_car_is_read(tmp_path, kind, corner):
     assert case.source.split(LEFT_OUT)[1] != "nothing"
 
 
-def test_several_corners_ask_for_one(tmp_path):
+def test_several_corners_need_corner_option(tmp_path):
     lines = ["corner,point,x,y,z"]
-    lines += [",".join([each, *row]) for each in CORNERS for row in rows("mcpherson", each)]
+    lines += [",".join([each, *row]) for each in CORNERS for row in points_at("mcpherson", each)]
     file = written(tmp_path, lines)
     with pytest.raises(
         CaseError, match=r"front left, front right, rear left, rear right.*--corner"
@@ -498,14 +452,14 @@ def test_several_corners_ask_for_one(tmp_path):
         load(file, of("mcpherson", corner="left"))
 
 
-def test_sheet_of_a_corner_is_read(tmp_path):
+def test_corner_sheet_of_workbook_is_read(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     book.remove(book.active)
     for corner in CORNERS:
         sheet = book.create_sheet(corner)
         sheet.append(["name", "x", "y", "z"])
-        for role, *place in rows("mcpherson", corner):
+        for role, *place in points_at("mcpherson", corner):
             sheet.append([role, *map(float, place)])
     file = tmp_path / "car.xlsx"
     book.save(file)

@@ -57,7 +57,7 @@ def bar_twist(at, travel):
     return turned(*BAR.values(), place)
 
 
-def test_anti_roll_bar_turns_with_its_link(tmp_path):
+def test_anti_roll_bar_in_closed_form(tmp_path):
     at = {**TEMPLATES["double_wishbone"].sample, **BAR}
     case = car(tmp_path, "double_wishbone", at, travel="0.04:5")
     found = solved(case)
@@ -68,7 +68,7 @@ def test_anti_roll_bar_turns_with_its_link(tmp_path):
     assert abs(found["bar_twist"][0]) > 0.1
 
 
-def test_anti_roll_bar_of_an_axle_is_mirrored(tmp_path):
+def test_anti_roll_bar_mirrored_on_axle(tmp_path):
     at = {**TEMPLATES["double_wishbone"].sample, **BAR}
     case = car(tmp_path, "double_wishbone", at, travel="0.04:3", axle="roll")
     found = solved(case)
@@ -77,7 +77,7 @@ def test_anti_roll_bar_of_an_axle_is_mirrored(tmp_path):
 
 
 @pytest.mark.parametrize("template", ["mcpherson", "double_wishbone"])
-def test_torsion_bar_turns_with_the_lower_arm(tmp_path, template):
+def test_torsion_bar_twists_with_lower_arm(tmp_path, template):
     at = TEMPLATES[template].sample
     case = car(tmp_path, template, {**at, "torsion_bar": (-0.5, 0.4, 0.2)}, travel="0.04:5")
     found = solved(case)["lower_arm_twist"]
@@ -139,7 +139,7 @@ def test_rocker_and_spring_ratios_across_axle(tmp_path):
     assert roll["heave_spring_ratio"][1] == pytest.approx(found["heave_spring_ratio"][1], abs=1e-9)
 
 
-def test_steering_ratio_is_of_rates(tmp_path):
+def test_steering_ratio_equals_rate_quotient(tmp_path):
     at = TEMPLATES["mcpherson"].sample
     said = {"axle": "steer", "travel": "0.03:7", "rack_per_turn": "50mm", "wheelbase": "2.6"}
     case = car(tmp_path, "mcpherson", at, **said)
@@ -152,7 +152,7 @@ def test_steering_ratio_is_of_rates(tmp_path):
         assert found["steering_ratio"][k] == pytest.approx(2 * np.pi / 0.05 / abs(slope), rel=1e-5)
 
 
-def test_steering_ratio_of_a_case_file(tmp_path):
+def test_steering_ratio_in_case_file(tmp_path):
     at = TEMPLATES["mcpherson"].sample
     said = {"axle": "steer", "travel": "0.03:3", "wheelbase": "2.6"}
     text = case_text(car(tmp_path, "mcpherson", at, **said, rack_per_turn="50mm"))
@@ -167,7 +167,7 @@ def test_steering_ratio_of_a_case_file(tmp_path):
         load(file)
 
 
-def test_lacking_data_is_said_with_its_remedy(tmp_path):
+def test_missing_outputs_state_lacking_points(tmp_path):
     at = TEMPLATES["double_wishbone"].sample
     one = car(tmp_path, "double_wishbone", at).source
     assert "damper_ratio (add damper_lower, damper_upper)" in one

@@ -1,6 +1,7 @@
 """Bushings of hardpoint tables by role, and of Project Chrono's files, by the command and files."""
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,7 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.mechanism.loads import SpringDamper
 from kincheck.core.studies.compliance.study import compliance
 
+from ..support.case_texts import rows, write
 from ..support.sources import ROOT
 
 AXLE = json.loads((ROOT / "tests/data/elastokinematics/8_hmmwv_axle.json").read_text())
@@ -52,7 +54,7 @@ def chrono_file(tmp_path, **spring):
 AXLE_OPTIONS = Supplied(axle="heave", wheel_radius="0.47")
 
 
-def test_file_of_chrono_has_wheel_load_and_rate_of_the_data(tmp_path):
+def test_chrono_bushings_wheel_load_and_rate(tmp_path):
     case = load(chrono_file(tmp_path), AXLE_OPTIONS)
     notes = "; ".join(case.assembly)
     assert "the inertia of 'Upper Control Arm' is left out: no body has it" in notes
@@ -64,7 +66,7 @@ def test_file_of_chrono_has_wheel_load_and_rate_of_the_data(tmp_path):
     assert rate == pytest.approx(rows["wheel_rate_parallel"], rel=1e-9)
 
 
-def test_spring_curve_of_chrono_is_tension_over_deflection(tmp_path):
+def test_chrono_spring_curve_equals_linear_spring(tmp_path):
     """A straight curve is the spring of the same rate."""
     straight = {"Spring Coefficient": 0.0, "Curve Data": [[-0.2, -36299.23], [0.2, 36299.23]]}
     loads = [
@@ -81,7 +83,7 @@ def sample(tmp_path, capsys, template, *options):
     return file
 
 
-def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
+def test_templates_bushings_option_prints_sample(tmp_path, capsys):
     table = sample(tmp_path, capsys, "mcpherson")
     rubber = sample(tmp_path, capsys, "mcpherson", "--bushings")
     assert list(tomllib.loads(rubber.read_text())["bushings"]) == [
@@ -97,14 +99,14 @@ def test_sample_of_bushings_serves_sample_table(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("template", TEMPLATES)
-def test_sample_bushings_have_roles_of_sample_table(tmp_path, capsys, template):
+def test_sample_bushings_match_template_roles(tmp_path, capsys, template):
     rubber = sample(tmp_path, capsys, template, "--bushings")
     case = load(sample(tmp_path, capsys, template), Supplied(bushings=rubber))
     roles = tomllib.loads(rubber.read_text())["bushings"]
     assert len(case.mechanism.bushings) == len(roles) > 0
 
 
-def test_rods_in_rubber_are_springs_in_series(tmp_path, capsys):
+def test_rods_in_rubber_equal_springs(tmp_path, capsys):
     """Bushings of both ends, along all axes alike, against springs in place of the rods."""
     table = sample(tmp_path, capsys, "five_link")
     rubber = tmp_path / "rubber.toml"
@@ -129,7 +131,7 @@ def test_rods_in_rubber_are_springs_in_series(tmp_path, capsys):
     assert found.compliance == pytest.approx(expected.compliance, abs=1e-13 * largest)
 
 
-def test_rod_held_by_rubber_at_one_end_carries_no_side_force(tmp_path, capsys):
+def test_rod_with_end_bushing_is_axial(tmp_path, capsys):
     """A ball at its other end: soft across and stiff along is a stiff rod, until it tilts."""
     table = sample(tmp_path, capsys, "five_link")
     rubber = tmp_path / "rubber.toml"
@@ -142,7 +144,7 @@ def test_rod_held_by_rubber_at_one_end_carries_no_side_force(tmp_path, capsys):
     assert C["along"] == pytest.approx(C["all"], abs=1e-12 * np.abs(C["all"]).max())
 
 
-def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
+def test_axle_bushings_are_mirrored(tmp_path, capsys):
     table = sample(tmp_path, capsys, "double_wishbone")
     rubber = tmp_path / "rubber.toml"
     keys = "stiffness = [1e6, 5e6, 2e5]\nturning_stiffness = [90, 30, 5]\npreload = [900, 0, 70]\n"
@@ -154,34 +156,30 @@ def test_sides_of_an_axle_mirror_each_other(tmp_path, capsys):
     assert C[:6, :6] == pytest.approx(mirror @ C[6:, 6:] @ mirror, abs=1e-13 * np.abs(C).max())
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("[bushings.lca_frnt]\nstiffness = 5e6\n", "did you mean 'lca_front'"),
-        ("[bushings.wheel_center]\nstiffness = 5e6\n", "a role of a joint of double_wishbone"),
-        (
-            "[joints.tie_rod.bushings.a]\nstiffness = 5e6\npoint = [0.07, 0.22, 0.16]\n",
-            r"at neither end of the rod; give the one on 'ground', \[0.07 m, 0.22 m, 0.15 m\]",
-        ),
-        (
-            '[joints.tie_rod.bushings.a]\nstiffness = 5e6\nbodies = ["ground", "lca"]\n',
-            "are not those of the rod, 'ground' and 'knuckle'; leave bodies out",
-        ),
-        ("[bushings.lca_front]\nstiffness = -3.0\n", "zero or more"),
-        ("[bushings.lca_front]\nstifness = 3.0\n", "did you mean 'stiffness'"),
-        ("[bushings.lca_front]\n", "has no stiffness"),
-        ("", "found no bushing"),
-    ],
-)
-def test_bushings_that_do_not_fit_a_table_are_refused(tmp_path, capsys, text, expected):
+FAULTS = """
+misspelt role | [bushings.lca_frnt]\\nstiffness = 5e6 | did you mean 'lca_front'
+role of no joint | [bushings.wheel_center]\\nstiffness = 5e6
+    | a role of a joint of double_wishbone
+beside the rod | [joints.tie_rod.bushings.a]\\nstiffness = 5e6\\npoint = [0.07, 0.22, 0.16]
+    | at neither end of the rod; give the one on 'ground', [0.07 m, 0.22 m, 0.15 m]
+other bodies | [joints.tie_rod.bushings.a]\\nstiffness = 5e6\\nbodies = ["ground", "lca"]
+    | are not those of the rod, 'ground' and 'knuckle'; leave bodies out
+negative stiffness | [bushings.lca_front]\\nstiffness = -3.0 | zero or more
+misspelt key | [bushings.lca_front]\\nstifness = 3.0 | did you mean 'stiffness'
+no stiffness | [bushings.lca_front] | has no stiffness
+empty | | found no bushing
+"""
+
+
+@pytest.mark.parametrize(("text", "message"), rows(FAULTS))
+def test_bushings_contradicting_table_are_refused(tmp_path, capsys, text, message):
     table = sample(tmp_path, capsys, "double_wishbone")
-    rubber = tmp_path / "rubber.toml"
-    rubber.write_text(text)
-    with pytest.raises(KincheckError, match=expected):
-        load(table, Supplied(bushings=rubber))
+    said = Supplied(bushings=write(tmp_path, text, "rubber.toml"))
+    with pytest.raises(KincheckError, match=re.escape(message)):
+        load(table, said)
 
 
-def test_slopes_that_kc_lacks_are_named(tmp_path, capsys):
+def test_kc_lists_slopes_without_value(tmp_path, capsys):
     table = sample(tmp_path, capsys, "double_wishbone")
     files = [f"--{kind}={tmp_path / kind}" for kind in ("json", "csv", "out")]
     assert main(["kc", str(table), "--travel=-10mm:10mm", *files]) == 0

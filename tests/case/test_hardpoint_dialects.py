@@ -13,7 +13,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
-from ..support.case_texts import complains, write
+from ..support.case_texts import complains, rows, write
 
 POINTS = {
     "uca_front": (-89.75, -259.75, 285.25),
@@ -47,34 +47,28 @@ def plain(tmp_path):
     return read(tmp_path, table().replace(";", ",")).mechanism
 
 
-OPTIMUM = {
-    "uca_front": "CHAS_UppFor",
-    "uca_rear": "CHAS_UppAft",
-    "uca_outer": "UPRI_UppPnt",
-    "lca_front": "CHAS_LowFor",
-    "lca_rear": "CHAS_LowAft",
-    "lca_outer": "UPRI_LowPnt",
-    "tierod_inner": "CHAS_TiePnt",
-    "tierod_outer": "UPRI_TiePnt",
-    "wheel_center": "Wheel_Centre",
-}
-LOTUS = dict(
+OPTIMUM = dict(
     zip(
         POINTS,
-        (
-            "Upper wishbone front pivot",
-            "Upper wishbone rear pivot",
-            "Upper wishbone outer ball joint",
-            "Lower wishbone front pivot",
-            "Lower wishbone rear pivot",
-            "Lower wishbone outer ball joint",
-            "Inner track rod ball joint",
-            "Outer track rod ball joint",
-            "Wheel centre point",
-        ),
+        "CHAS_UppFor CHAS_UppAft UPRI_UppPnt CHAS_LowFor CHAS_LowAft UPRI_LowPnt "
+        "CHAS_TiePnt UPRI_TiePnt Wheel_Centre".split(),
         strict=True,
     )
 )
+LOTUS = {
+    **{
+        f"{arm}_{end}": f"{place} wishbone {pivot}"
+        for arm, place in (("uca", "Upper"), ("lca", "Lower"))
+        for end, pivot in (
+            ("front", "front pivot"),
+            ("rear", "rear pivot"),
+            ("outer", "outer ball joint"),
+        )
+    },
+    "tierod_inner": "Inner track rod ball joint",
+    "tierod_outer": "Outer track rod ball joint",
+    "wheel_center": "Wheel centre point",
+}
 RIGHT = {f"{name}_right": (x, -y, z) for name, (x, y, z) in POINTS.items()}
 LEFT = {f"{name}_left": at for name, at in POINTS.items()}
 
@@ -89,76 +83,85 @@ def columns(head=("name", "x", "y", "z")):
     return "\n".join(";".join(each) for each in zip(*rows, strict=True)) + "\n"
 
 
+FORMS = """
+trailing separators | name;x;y;z; | {};{};{};{};
+trailing in rows | name;x;y;z | {};{};{};{};;;
+trailing in the head | name;x;y;z;; | {};{};{};{}
+trailing commas | name,x,y,z, | {},{},{},{},
+further columns | No;Name;X [mm];Y [mm];Z [mm];Remark | 1;{};{};{};{};is 1,5 off
+commas and further | name,x,y,z,mass,by | {},{},{},{},1.5,me
+other order | z;y;x;name | {3};{2};{1};{0}
+units below | name;x;y;z\\n;[mm];[mm];[mm] | {};{};{};{}
+points | Point;X_mm;Y_mm;Z_mm | {};{};{};{}
+Adams columns | hardpoint_name;x_value;y_value;z_value | {};{};{};{}
+three decimals | name;x;y;z | {};{:.3f};{:.3f};{:.3f}
+index of pandas | ,x,y,z | {},{},{},{}
+a name of its own for names | Bezeichnung;X;Y;Z | {};{};{};{}
+units in words | name;x in mm;y in mm;z in mm | {};{};{};{}
+long names of axes | name;X-coordinate [mm];Y-coordinate [mm];Z-coordinate [mm] | {};{};{};{}
+units with a slash | name;x/mm;y/mm;z/mm | {};{};{};{}
+blank columns | ;name;;x;y;z; | ;{};;{};{};{};
+spaces around | name ; x ; y ; z |  {} ;  {} ; {} ;{}
+quoted | "name";"x";"y";"z" | "{}";"{}";"{}";"{}"
+numbered | No.;Name;x;y;z | 7;{};{};{};{}
+comment of a spreadsheet | "# axes: rearward,right,up"\\n# units: mm;;;\\nname;x;y;z | {};{};{};{}
+comment in cells | # axes: rearward;right;up\\nname;x;y;z | {};{};{};{}
+title with a unit | units: mm\\nname;x;y;z | {};{};{};{}
+title | Front suspension, left\\n\\nDate;2026-11-26;;\\nname;x;y;z | {};{};{};{}
+"""
+
+
+@pytest.mark.parametrize(("head", "row"), rows(FORMS))
+def test_hardpoint_table_forms_read_alike(tmp_path, plain, head, row):
+    assert read(tmp_path, table(head, row)).mechanism == plain
+
+
 DIALECTS = {
     "decimal comma": comma(table()),
     "decimal comma, tabs": comma(table()).replace(";", "\t"),
     "quoted decimal comma": comma(table(row='{};"{}";"{}";"{}"')).replace(";", ","),
-    "trailing separators": table("name;x;y;z;", "{};{};{};{};"),
-    "trailing in rows": table(row="{};{};{};{};;;"),
-    "trailing in the head": table("name;x;y;z;;"),
-    "trailing commas": table("name,x,y,z,", "{},{},{},{},"),
     "sep line": "sep=;\n" + comma(table()),
     "sep bar": "\ufeffSEP=|\r\n" + table().replace(";", "|").replace("\n", "\r\n"),
-    "title": "Front suspension, left\n\nDate;2026-11-26;;\n" + table(),
-    "further columns": table("No;Name;X [mm];Y [mm];Z [mm];Remark", "1;{};{};{};{};is 1,5 off"),
-    "commas and further": table("name,x,y,z,mass,by", "{},{},{},{},1.5,me"),
-    "other order": table("z;y;x;name", "{3};{2};{1};{0}"),
-    "units below": table("name;x;y;z\n;[mm];[mm];[mm]"),
-    "points": table("Point;X_mm;Y_mm;Z_mm"),
-    "Adams columns": table("hardpoint_name;x_value;y_value;z_value"),
     "exponents": comma(table()).replace("228,25", "2,2825e2"),
     "grouped by nothing": comma(table()).replace("228,25", "228,250"),
-    "three decimals": table(row="{};{:.3f};{:.3f};{:.3f}"),
     "OptimumK": table("Point Name;X (mm);Y (mm);Z (mm)", points=renamed(OPTIMUM)),
     "Lotus": table(",x,y,z", "{},{},{},{}", renamed(LOTUS)),
     "corners": table(points={f"{name} FL": at for name, at in renamed(LOTUS).items()}),
     "corners before": table(points={f"FL_{name}": at for name, at in POINTS.items()}),
     "both sides": table(points=LEFT | RIGHT),
     "one side of a few": table(points=POINTS | {"spring_right": (1.5, 2.5, 3.5)}),
-    "index of pandas": table(",x,y,z", "{},{},{},{}"),
-    "a name of its own for names": table("Bezeichnung;X;Y;Z"),
-    "units in words": table("name;x in mm;y in mm;z in mm"),
-    "long names of axes": table("name;X-coordinate [mm];Y-coordinate [mm];Z-coordinate [mm]"),
-    "units with a slash": table("name;x/mm;y/mm;z/mm"),
     "columns of points": columns(),
     "columns, German": comma(columns()),
     "configuration below": table() + "Steering rack;XXXX;;\nWheelbase;1550;;\n",
     "notes below": table() + ";;;\nAll points from CAD, rev 3\n* not to scale;;;\n",
     "headings between": table().replace("lca_front", "Lower arm;;;\nlca_front"),
-    "comment of a spreadsheet": '"# axes: rearward,right,up"\n# units: mm;;;\n' + table(),
-    "comment in cells": "# axes: rearward;right;up\n" + table(),
-    "title with a unit": "units: mm\n" + table(),
-    "blank columns": table(";name;;x;y;z;", ";{};;{};{};{};"),
     "sign of typography": table().replace("-", "\u2212"),
-    "spaces around": table("name ; x ; y ; z", " {} ;  {} ; {} ;{} "),
     "plus signs": table().replace(";110.25", ";+110.25"),
     "lines of Windows": table().replace("\n", "\r\n"),
     "lines of an old Mac": table().replace("\n", "\r"),
     "Windows-1252": ("Radaufhängung, außen\n" + table()).encode("cp1252"),
-    "quoted": table('"name";"x";"y";"z"', '"{}";"{}";"{}";"{}"'),
-    "numbered": table("No.;Name;x;y;z", "7;{};{};{};{}"),
 }
 
 
 @pytest.mark.parametrize("kind", DIALECTS)
-def test_dialects(tmp_path, plain, kind):
+def test_hardpoint_table_dialects_read_alike(tmp_path, plain, kind):
     assert read(tmp_path, DIALECTS[kind]).mechanism == plain
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
-def test_encodings(tmp_path, plain, encoding):
+def test_hardpoint_table_encodings(tmp_path, plain, encoding):
     """Excel's Unicode text, with its mark."""
     mark = "\ufeff" if encoding in ("utf-16-le", "utf-16-be") else ""
     assert read(tmp_path, mark + comma(table()), encoding=encoding).mechanism == plain
 
 
-def test_left_out_is_listed(tmp_path):
+def test_omitted_rows_and_columns_are_listed(tmp_path):
     text = "Front suspension\n" + table("Name;X;Y;Z;Mass;", "{};{};{};{};3;")
     source = read(tmp_path, text).source
     assert source.endswith(f"{LEFT_OUT}line 1 (Front suspension), column Mass")
 
 
-def test_a_strut_by_the_names_of_optimumk(tmp_path):
+def test_strut_table_with_optimumk_names(tmp_path):
     names = {"lca_front": "CHAS_LowFor", "lca_rear": "CHAS_LowAft", "lca_outer": "UPRI_LowPnt"}
     rows = {names.get(name, name): at for name, at in TEMPLATES["mcpherson"].sample.items()}
     file = tmp_path / "car.csv"
@@ -169,129 +172,105 @@ def test_a_strut_by_the_names_of_optimumk(tmp_path):
     assert theirs == load(file, by_role).mechanism
 
 
-def test_what_is_no_point_is_listed(tmp_path):
+def test_omitted_points_and_settings_are_listed(tmp_path):
     listed = read(tmp_path, DIALECTS["configuration below"]).source.split(LEFT_OUT)[1]
     assert listed == "line 11 (Steering rack,XXXX), line 12 (Wheelbase,1550)"
     listed = read(tmp_path, DIALECTS["both sides"]).source.split(LEFT_OUT)[1]
     assert listed.split(", ") == [*RIGHT]
 
 
-def test_right_points_are_read_as_left_ones_by_axes(tmp_path, plain):
+def test_mirrored_axes_read_right_points(tmp_path, plain):
     text = table(points={name: (x, -y, z) for name, (x, y, z) in POINTS.items()})
     said = Supplied("double_wishbone", "mm", "rearward,left,up")
     assert read(tmp_path, text, said).mechanism == plain
 
 
-def integers(points=POINTS):
-    return {name: tuple(map(int, at)) for name, at in points.items()}
-
-
-def edited(old, new):
-    assert old in table()
-    return table().replace(old, new)
-
-
-THOUSANDS = table(points=integers()).replace("-611", "-1.611")
-
-
-def test_rows_may_end_with_their_coordinates(tmp_path):
+def test_row_without_remark_is_read(tmp_path):
     """A point that is added below a table with remarks: a split number has one field more."""
     whole = table("name,x,y,z,meaning", "{},{},{},{},a remark")
     found = read(tmp_path, whole.removesuffix(",a remark\n"))
     assert found.mechanism == read(tmp_path, whole).mechanism
 
 
+EDITS = """
+thousands and decimals | -611.75 | -1.611,75
+    | line 10: wheel_center: y ... '-1.611,75' ... thousands
+two commas | -611.75 | -1,611,750 | '-1,611,750' ... thousands
+thousands by a blank | -611.75 | -1 611.75 | line 10 ... separators of thous
+thousands of the Swiss | -611.75 | -1'611.75 | separators of thousands
+below no head | 228.25 | 228;25 | line 10 ... found 5 fields
+points above the head | name;x | lca_front;1;2;3\\nname;x
+    | line 1 ... expected the head ... above the points
+row of two units | y;z | y;z\\n;mm;mm;m | line 2 ... name the point
+unknown unit | x;y;z | x [furlong];y [furlong];z [furlong] | unit ... 'furlong'
+sign of one y | -219.75 | 219.75
+    | tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... correct its
+formula | -611.75 | =A1+1 | line 10: wheel_center: y ... '=A1+1' ... save the
+error of a formula | -611.75 | #REF! | line 10: wheel_center: y ... '#REF!'
+unit in a cell | -611.75 | -611.75 mm | '-611.75 mm' ... leave the unit out
+fraction | -611.75 | -611 3/4 | '-611 3/4' ... correct the number
+letter O | -611.75 | -61O.75 | '-61O.75' ... correct the number
+NaN | -611.75 | NaN | 'NaN'
+infinite | -611.75 | inf | 'inf'
+dash for nothing | -611.75 | - | line 10: wheel_center: y ... '-'
+date | -611.75 | 2026-05-01 | '2026-05-01' ... took the number for a date
+hexadecimal | -611.75 | 0x1F | '0x1F'
+point without numbers | 0.25;-611.75;228.25 | ;; | line 10 ... complete the
+missing point | wheel_center;0.25;-611.75;228.25\\n | | missing wheel_center, the wheel's centre
+twice, equal | 228.25 | 228.25\\nwheel_center;0.25;-611.75;228.25 | given before, in line 10
+twice, named otherwise | 228.25 | 228.25\\nWheel Centre;0;-600;228.25 | 'Wheel Centre' (line
+"""
+
+
+@pytest.mark.parametrize(("old", "new", "message"), rows(EDITS))
+def test_hardpoint_table_edit_faults(tmp_path, old, new, message):
+    assert table().count(old) == 1
+    complains(write(tmp_path, table().replace(old, new), "car.csv"), message, SAID)
+
+
+WHOLE_NUMBERS = table(points={name: tuple(map(int, at)) for name, at in POINTS.items()})
+WITH_MASS = table("name,x,y,z,mass", "{},{},{},{},3")
+THOUSANDS = WHOLE_NUMBERS.replace("-611", "-1.611")
+AXLES = {f"{name}_{side}": at for name, at in POINTS.items() for side in ("FL", "RL")}
+METRES = {name: [x / 1000 for x in at] for name, at in POINTS.items()}
 FAULTS = {
-    "both signs": (comma(table()).replace("-611,75", "-611.75"), "line 10 ... '-611.75' ... above"),
-    "thousands and decimals": (
-        table().replace("-611.75", "-1.611,75"),
-        "line 10: wheel_center: y ... '-1.611,75' ... thousands",
+    "line 10 ... '-611.75' ... above": comma(table()).replace("-611,75", "-611.75"),
+    "'-1.611' ... is -1.611 or -1611 ... write -1.6110 or -1611": THOUSANDS,
+    "'-1,611' ... is -1.611 or -1611": comma(THOUSANDS),
+    "found '-1,611' ... is -1.611 or -1611": (
+        WHOLE_NUMBERS.replace(";", ",").replace("-611", '"-1,611"')
     ),
-    "two commas": (table().replace("-611.75", "-1,611,750"), "'-1,611,750' ... thousands"),
-    "grouped or not": (THOUSANDS, "'-1.611' ... is -1.611 or -1611 ... write -1.6110 or -1611"),
-    "grouped by comma": (comma(THOUSANDS), "'-1,611' ... is -1.611 or -1611"),
-    "quoted and grouped": (
-        comma(table(points=integers())).replace(";", ",").replace("-611", '"-1,611"'),
-        "'-1,611' ... is -1.611 or -1611",
+    "line 2 ... found 7 fields, expected 4 ... decimal comma needs semicolons": (
+        comma(table()).replace(";", ",")
     ),
-    "decimal commas between commas": (
-        comma(table()).replace(";", ","),
-        "line 2 ... found 7 fields, expected 4 ... decimal comma needs semicolons",
+    "line 4 ... decimal comma needs semicolons": (
+        WITH_MASS.replace("15.25,-539.75,312.25,3", "15,25,-539,312,")
     ),
-    "shifted by a comma": (
-        table("name,x,y,z,mass", "{},{},{},{},3").replace(
-            "15.25,-539.75,312.25,3", "15,25,-539,312,"
-        ),
-        "line 4 ... decimal comma needs semicolons",
+    "line 4 ... complete the row": WITH_MASS.replace("15.25,-539.75,312.25,3", "15,-539,312"),
+    "line 1 ... 'x' twice": table("name;x [mm];y [mm];z [mm];x [m]", "{};{};{};{};1"),
+    "is not UTF-16": table().encode("utf-16")[:-1],
+    "line 10 ... separators of thousands": table().replace("-611.75", "-1\u202f611.75"),
+    "'\u2013611.75' ... as a hyphen": table().replace("-611.75", "\u2013611.75"),
+    "uca_front ... 'uca_front_FL' (line 2) and 'uca_front_RL' (line 3) ... expected one": (
+        table(points=AXLES)
     ),
-    "shorter by a comma": (
-        table("name,x,y,z,mass", "{},{},{},{},3").replace("15.25,-539.75,312.25,3", "15,-539,312"),
-        "line 4 ... complete the row",
-    ),
-    "below no head": (table().replace("228.25", "228;25"), "line 10 ... found 5 fields"),
-    "two x": (table("name;x [mm];y [mm];z [mm];x [m]", "{};{};{};{};1"), "line 1 ... 'x' twice"),
-    "points above the head": (
-        "lca_front;1;2;3\n" + table(),
-        "line 1 ... expected the head ... above the points",
-    ),
-    "row of two units": (table("name;x;y;z\n;mm;mm;m"), "line 2 ... name the point"),
-    "half of UTF-16": (table().encode("utf-16")[:-1], "is not UTF-16"),
-    "sign of one y": (
-        edited("-219.75", "219.75"),
-        ("tierod_inner ... y = 219.75 mm ... on the other side than wheel_center ... correct its"),
-    ),
-    "thousands by a blank": (edited("-611.75", "-1 611.75"), "line 10 ... separators of thous"),
-    "thousands of the French": (
-        edited("-611.75", "-1\u202f611.75"),
-        "line 10 ... separators of thousands",
-    ),
-    "thousands of the Swiss": (edited("-611.75", "-1'611.75"), "separators of thousands"),
-    "formula": (edited("-611.75", "=A1+1"), "line 10: wheel_center: y ... '=A1+1' ... save the"),
-    "error of a formula": (edited("-611.75", "#REF!"), "line 10: wheel_center: y ... '#REF!'"),
-    "dash": (edited("-611.75", "\u2013611.75"), "'–611.75' ... as a hyphen"),
-    "unit in a cell": (edited("-611.75", "-611.75 mm"), "'-611.75 mm' ... leave the unit out"),
-    "fraction": (edited("-611.75", "-611 3/4"), "'-611 3/4' ... correct the number"),
-    "letter O": (edited("-611.75", "-61O.75"), "'-61O.75' ... correct the number"),
-    "NaN": (edited("-611.75", "NaN"), "'NaN'"),
-    "infinite": (edited("-611.75", "inf"), "'inf'"),
-    "dash for nothing": (edited("-611.75", "-"), "line 10: wheel_center: y ... '-'"),
-    "date": (edited("-611.75", "2026-05-01"), "'2026-05-01' ... took the number for a date"),
-    "hexadecimal": (edited("-611.75", "0x1F"), "'0x1F'"),
-    "a point without numbers": (edited("0.25;-611.75;228.25", ";;"), "line 10 ... complete the"),
-    "missing point": (
-        edited("wheel_center;0.25;-611.75;228.25\n", ""),
-        "missing wheel_center, the wheel's centre",
-    ),
-    "front and rear corners": (
-        table(
-            points={f"{name}_{side}": at for name, at in POINTS.items() for side in ("FL", "RL")}
-        ),
-        ("uca_front ... 'uca_front_FL' (line 2) and 'uca_front_RL' (line 3) ... expected one"),
-    ),
-    "twice, equal": (table() + "wheel_center;0.25;-611.75;228.25\n", "given before, in line 10"),
-    "twice, named otherwise": (table() + "Wheel Centre;0;-600;228.25\n", "'Wheel Centre' (line"),
-    "metres said to be mm": (
-        table(points={name: tuple(x / 1000 for x in at) for name, at in POINTS.items()}),
-        "span ... metres declared as mm?",
-    ),
-    "no head at all": (table(row="{};1;{};{};{}").partition("\n")[2], "expected the head"),
-    "two tables": (table() + "\n" + table(), "a second head ... keep one"),
-    "two dimensions": ("name;x;y\nwheel;1;2\n", "expected the head name,x,y,z"),
-    "head of one letter": ("x\n1\n", "expected the head name,x,y,z"),
-    "unknown unit": (table("name;x [furlong];y [furlong];z [furlong]"), "unit ... 'furlong'"),
-    "JSON": ('{"wheel_center": [0, 1, 2]}', "expected the head"),
-    "control characters": (table().encode() + b"\x00\x01\xff", "a binary file, expected text"),
+    "span ... metres declared as mm?": table(points=METRES),
+    "line 1 ... expected the head": table(row="{};1;{};{};{}").partition("\n")[2],
+    "a second head ... keep one": table() + "\n" + table(),
+    "expected the head name,x,y,z": "name;x;y\nwheel;1;2\n",
+    "line 1 ... expected the head name,x,y,z": "x\n1\n",
+    "expected the head": '{"wheel_center": [0, 1, 2]}',
+    "a binary file, expected text": table().encode() + b"\x00\x01\xff",
 }
 
 
-@pytest.mark.parametrize("kind", FAULTS)
-def test_faults(tmp_path, kind):
-    text, fragments = FAULTS[kind]
-    complains(write(tmp_path, text, "car.csv"), fragments, SAID)
+@pytest.mark.parametrize(("message", "text"), FAULTS.items(), ids=FAULTS)
+def test_hardpoint_table_dialect_faults(tmp_path, message, text):
+    complains(write(tmp_path, text, "car.csv"), message, SAID)
 
 
 @pytest.mark.parametrize("unit", ["inch", "in", "inches"])
-def test_inches(tmp_path, unit):
+def test_hardpoint_table_in_inches(tmp_path, unit):
     """In the head, or said; a unit of one's own is not taken for another."""
     inches = {name: tuple(x / 25.4 for x in at) for name, at in POINTS.items()}
     said = Supplied("double_wishbone", unit, "adams")
@@ -313,13 +292,13 @@ def named(folder, text):
     return Supplied("double_wishbone", "mm", "adams", names=file)
 
 
-def test_own_names(tmp_path, plain):
+def test_hardpoint_names_file(tmp_path, plain):
     own = {OWN[name]: at for name, at in POINTS.items()}
     said = named(tmp_path, "\n".join(f'{role} = "{name}"' for role, name in OWN.items()))
     assert read(tmp_path, table(points=own), said).mechanism == plain
 
 
-def test_own_names_go_before_known_ones(tmp_path):
+def test_names_file_precedes_known_names(tmp_path):
     """One of two points that are called alike; roles without a line keep their names."""
     text = table(points=POINTS | {"wheel": (0.25, -600.0, 228.25)})
     case = read(tmp_path, text, named(tmp_path, 'wheel_center = "wheel"'))
@@ -328,18 +307,21 @@ def test_own_names_go_before_known_ones(tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "fragments"),
-    [
-        ('lca_inner = "lca_front"', "names.toml: lca_inner ... expected a role ... lca_outer"),
-        ('lca_front = "lca_fornt"', "names.toml: lca_front ... 'lca_fornt' ... 'lca_front'"),
-        ("lca_front = 3", "names.toml: lca_front ... found 3 ... quotes"),
-        ("lca_front", "names.toml ... not valid TOML"),
-    ],
+    rows(
+        """
+lca_inner = "lca_front" | names.toml: lca_inner ... expected a role ... lca_outer
+lca_front = "lca_fornt" | names.toml: lca_front ... 'lca_fornt' ... 'lca_front'
+lca_front = 3 | names.toml: lca_front ... found 3 ... quotes
+lca_front | names.toml ... not valid TOML
+""",
+        named=False,
+    ),
 )
-def test_faults_in_own_names(tmp_path, line, fragments):
+def test_names_file_faults(tmp_path, line, fragments):
     complains(write(tmp_path, table(), "car.csv"), fragments, named(tmp_path, line))
 
 
-def test_missing_points_advise_own_names(tmp_path, capsys):
+def test_missing_points_advise_names_option(tmp_path, capsys):
     file = tmp_path / "car.csv"
     file.write_text(table(points={OWN[name]: at for name, at in POINTS.items()}))
     options = ["--template", "double_wishbone", "--units", "mm", "--axes", "adams"]
@@ -366,7 +348,7 @@ ADAMS = """[UNITS]
 """
 
 
-def test_variants_of_adams(tmp_path, plain):
+def test_adams_hardpoint_variants_are_omitted(tmp_path, plain):
     file = tmp_path / "car.sub"
     rows = [f"'{name}' 'left/right' {x} {y} {z}" for name, (x, y, z) in POINTS.items()]
     file.write_text(ADAMS.format("\n".join(rows)))
@@ -388,7 +370,7 @@ def read_public(tmp_path, text, name, supplied=DRIVE):
     return load(file, supplied)
 
 
-def test_a_declaration_may_stand_after_white_space(tmp_path):
+def test_xml_declaration_after_white_space(tmp_path):
     text = f"""
  <?xml version="1.0" encoding="UTF-8"?>
 <mujoco><worldbody>{ARM}</worldbody><x/></mujoco>"""
@@ -397,7 +379,7 @@ def test_a_declaration_may_stand_after_white_space(tmp_path):
     assert read_public(tmp_path, text.replace("<x/>", ""), "arm.xml").mechanism.joints
 
 
-def test_a_body_that_stands_still_may_be_called_ground(tmp_path):
+def test_mjcf_fixed_body_named_ground(tmp_path):
     text = f"""<mujoco><worldbody><body name="ground" pos="1 0 0">{ARM}</body>{{}}</worldbody>
 <equality><connect body1="ground" body2="arm" anchor="0 0 0"/></equality></mujoco>"""
     case = read_public(tmp_path, text.format(""), "arm.xml")
@@ -408,7 +390,7 @@ def test_a_body_that_stands_still_may_be_called_ground(tmp_path):
         read_public(tmp_path, moving.replace('"ground" pos', '"base" pos'), "arm.xml")
 
 
-def test_what_stands_still_may_be_joined(tmp_path):
+def test_constraints_between_fixed_bodies_are_omitted(tmp_path):
     text = f"""<mujoco><worldbody>{ARM}<body name="a"/><body name="b" mocap="true"/></worldbody>
 <equality><weld body1="a" body2="b"/><connect body1="a" anchor="0 0 0"/></equality></mujoco>"""
     case = read_public(tmp_path, text, "arm.xml")
@@ -420,7 +402,7 @@ def test_what_stands_still_may_be_joined(tmp_path):
     assert "joints of what stands still (1)" in case.source.split(LEFT_OUT)[1]
 
 
-def test_the_world_of_a_urdf_needs_no_link(tmp_path):
+def test_urdf_world_without_link(tmp_path):
     text = """<robot name="r"><link name="base"/><link name="arm"/><joint name="foot" type="fixed">
 <parent link="world"/><child link="base"/><origin xyz="0 0 2"/></joint>
 <joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"""
@@ -428,7 +410,7 @@ def test_the_world_of_a_urdf_needs_no_link(tmp_path):
     assert case.mechanism.body("arm").origin == (0.0, 0.0, 2.0)
 
 
-def test_joints_in_one_place_have_no_size(tmp_path):
+def test_mjcf_joints_at_one_place(tmp_path):
     """Rounding of a composed place is no gap of a tenth of the model."""
     text = """<mujoco><worldbody><body name="arm" pos="0.1 0.2 0.3" euler="1 2 3">
 <joint name="hinge"/><body name="tip" pos="-0.1 -0.2 -0.3">
@@ -437,7 +419,7 @@ def test_joints_in_one_place_have_no_size(tmp_path):
     assert read_public(tmp_path, text, "arm.xml").mechanism.joints
 
 
-def test_messages_name_the_element_of_the_file(tmp_path):
+def test_sdf_message_states_element(tmp_path):
     text = '<sdf version="1.9"><model name="m"><link name="a"/><static>1</static></model></sdf>'
     with pytest.raises(CaseError, match="line 1: <sdf>: has no body with a joint"):
         read_public(tmp_path, text, "still.sdf")
@@ -476,13 +458,13 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_other_files(tmp_path, name):
+def test_foreign_file_formats_are_refused(tmp_path, name):
     data, fragment = OTHERS[name]
     file = write(tmp_path, data, name)
     complains(file, f"{file}: ... {fragment}", SAID)
 
 
-def test_a_folder(tmp_path, capsys):
+def test_folder_as_case_is_refused(tmp_path, capsys):
     (tmp_path / "car.csv").mkdir()
     assert main(["explain", str(tmp_path / "car.csv")]) == 2
     assert "car.csv: a folder, not a regular file; give the path" in capsys.readouterr().err
@@ -491,7 +473,7 @@ def test_a_folder(tmp_path, capsys):
 MISSPELT = {"uca_front": "UCA_Frnt", "lca_outer": "LCA outr", "wheel_center": "WheelCentr"}
 
 
-def test_likely_names_are_taken_with_a_note(tmp_path, plain):
+def test_misspelt_names_are_taken_with_note(tmp_path, plain):
     text = table(points={MISSPELT.get(name, name): at for name, at in POINTS.items()})
     case = read(tmp_path, text)
     assert case.mechanism == plain
@@ -503,15 +485,18 @@ def test_likely_names_are_taken_with_a_note(tmp_path, plain):
 
 @pytest.mark.parametrize(
     ("role", "name"),
-    [
-        ("uca_front", "lca_front2"),
-        ("uca_rear", "uca_front_2"),
-        ("tierod_outer", "tierod_inner_2"),
-        ("wheel_center", "wheel_cont"),
-        ("wheel_center", "hub"),
-    ],
+    rows(
+        """
+uca_front | lca_front2
+uca_rear | uca_front_2
+tierod_outer | tierod_inner_2
+wheel_center | wheel_cont
+wheel_center | hub
+""",
+        named=False,
+    ),
 )
-def test_names_of_another_point_are_not_taken(tmp_path, role, name):
+def test_names_of_other_points_are_refused(tmp_path, role, name):
     with pytest.raises(CaseError, match=f"missing {role}"):
         read(
             tmp_path,
@@ -519,13 +504,13 @@ def test_names_of_another_point_are_not_taken(tmp_path, role, name):
         )
 
 
-def test_one_name_is_not_taken_twice(tmp_path):
+def test_misspelt_name_serves_one_role(tmp_path):
     points = {each: at for each, at in POINTS.items() if each not in ("uca_front", "lca_front")}
     with pytest.raises(CaseError, match="missing uca_front"):
         read(tmp_path, table(points={**points, "xca_front": POINTS["uca_front"]}))
 
 
-def test_a_new_file_of_names_is_written(tmp_path, plain):
+def test_names_file_is_written_when_missing(tmp_path, plain):
     text = table(points={MISSPELT.get(name, name): at for name, at in POINTS.items()})
     names = tmp_path / "names.toml"
     said = Supplied(*("double_wishbone", "mm", "adams"), names=names)

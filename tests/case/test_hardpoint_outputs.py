@@ -10,7 +10,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_tab
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
-from ..support.case_texts import complains
+from ..support.case_texts import complains, rows, supplied, write
 from ..support.rods_of_templates import CLOSE, DATA, RODS, expected, solved
 from ..support.written_again import written_again
 
@@ -22,7 +22,7 @@ def sample(folder, name, travel="0.05:11", extra=""):
 
 
 @pytest.mark.parametrize("name", RODS)
-def test_outputs_of_each_template(tmp_path, name):
+def test_template_outputs_in_closed_form(tmp_path, name):
     case = sample(tmp_path, name)
     found, at = solved(case), TEMPLATES[name].sample
     for k, travel in enumerate(case.sweep.values):
@@ -33,17 +33,17 @@ def test_outputs_of_each_template(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", RODS)
-def test_a_case_file_of_the_table(tmp_path, name):
+def test_hardpoint_case_file_round_trip(tmp_path, name):
     written_again(sample(tmp_path, name), tmp_path)
 
 
-def test_a_slope_beside_each_output(tmp_path):
+def test_camber_slope_equals_difference_quotient(tmp_path):
     found = solved(sample(tmp_path, "double_wishbone", "1e-4:3"))
     difference = (found["camber"][2] - found["camber"][0]) / 2e-4
     assert found["camber.per_travel"][1] == pytest.approx(difference, abs=1e-6)
 
 
-def test_a_wheel_that_is_turned_at_design(tmp_path):
+def test_wheel_axis_point_gives_static_angles(tmp_path):
     """The wheel's axis by a point; toe and camber move as the carrier does."""
     toe, camber = np.radians(0.3), np.radians(-1.5)
     spin = np.array([np.cos(camber) * np.sin(toe), np.cos(camber) * np.cos(toe), -np.sin(camber)])
@@ -56,7 +56,7 @@ def test_a_wheel_that_is_turned_at_design(tmp_path):
         assert found[name][10] == pytest.approx(true[name], abs=CLOSE)
 
 
-def test_without_a_radius_nothing_is_at_the_road():
+def test_road_outputs_need_wheel_radius():
     case = load(DATA / "chrono_double_wishbone.json")
     names = {output.name for output in case.outputs}
     assert {"toe", "camber", "caster", "spring_ratio", "damper_ratio"} <= names
@@ -66,36 +66,34 @@ def test_without_a_radius_nothing_is_at_the_road():
     assert track.at == "wheel_center"
 
 
-@pytest.mark.parametrize(
-    ("supplied", "extra", "fragments"),
-    [
-        ({"wheel_radius": "30 deg"}, "", "--wheel-radius ... '30 deg' ... a length"),
-        (
-            {"wheel_radius": "300"},
-            "",
-            "--wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm",
-        ),
-        ({"wheel_radius": "-0.3"}, "", "found -0.3 m ... correct it"),
-        ({"wheelbase": "2600"}, "", "--wheelbase ... 0.1 to 20 m ... 2600mm"),
-        ({"cg_height": "500"}, "", "--cg-height ... 0.005 to 6 m ... 500mm"),
-        ({"rack_per_turn": "50"}, "", "--rack-per-turn ... 0.001 to 1 m ... 50mm"),
-        ({"wheel_radius": "0.3"}, "wheel_contact,0,612,0\n", "--wheel-radius ... wheel_contact"),
-        ({}, "wheel_contact,0,612,220\n", "wheel_contact ... 0.008 m"),
-        ({}, "wheel_axis,0,412,228\n", "wheel_axis ... inboard ... mirror"),
-    ],
-)
-def test_faults(tmp_path, supplied, extra, fragments):
-    file = tmp_path / "car.csv"
-    rows = [
-        f"{role},{','.join(repr(1000.0 * x) for x in place)}\n"
-        for role, place in TEMPLATES["double_wishbone"].sample.items()
+FAULTS = """
+angle | wheel_radius=30deg | | --wheel-radius ... '30deg' ... a length
+radius in mm | wheel_radius=300 |
+    | --wheel-radius ... 300 m ... 0.02 to 3 m ... say its unit: 300mm
+negative radius | wheel_radius=-0.3 | | found -0.3 m ... correct it
+wheelbase in mm | wheelbase=2600 | | --wheelbase ... 0.1 to 20 m ... 2600mm
+height in mm | cg_height=500 | | --cg-height ... 0.005 to 6 m ... 500mm
+rack in mm | rack_per_turn=50 | | --rack-per-turn ... 0.001 to 1 m ... 50mm
+radius and contact | wheel_radius=0.3 | wheel_contact,0,612,0 | --wheel-radius ... wheel_contact
+contact at centre | | wheel_contact,0,612,220 | wheel_contact ... 0.008 m
+axis inboard | | wheel_axis,0,412,228 | wheel_axis ... inboard ... mirror
+"""
+
+
+@pytest.mark.parametrize(("options", "extra", "message"), rows(FAULTS))
+def test_suspension_option_and_wheel_faults(tmp_path, options, extra, message):
+    places = TEMPLATES["double_wishbone"].sample.items()
+    lines = [
+        f"{role},{1e3 * x!r},{1e3 * y!r},{1e3 * z!r}"
+        for role, (x, y, z) in places
         if role != "wheel_contact"
     ]
-    file.write_text("name,x,y,z\n" + "".join(rows) + extra)
-    complains(file, fragments, Supplied("double_wishbone", "mm", "iso", **supplied))
+    file = write(tmp_path, "\n".join(["name,x,y,z", *lines, extra]), "car.csv")
+    said = supplied(f"template=double_wishbone units=mm axes=iso {options}")
+    complains(file, message, said)
 
 
-def test_templates_prints_tables_that_run(tmp_path, capsys):
+def test_templates_command_prints_runnable_tables(tmp_path, capsys):
     assert main(["templates"]) == 0
     printed = capsys.readouterr().out
     assert [name for name in TEMPLATES if f"# template: {name}\n" not in printed] == []
@@ -108,14 +106,14 @@ def test_templates_prints_tables_that_run(tmp_path, capsys):
     assert "'five_link'" in capsys.readouterr().err
 
 
-def test_samples_have_all_that_is_required():
+def test_template_samples_have_all_roles():
     for template in TEMPLATES.values():
         names = {role.name for role in template.roles}
         assert names <= template.sample.keys()
         assert template.sample.keys() <= names | {role.name for role in template.optional}
 
 
-def test_the_template_of_a_table(tmp_path):
+def test_template_comment_of_table(tmp_path):
     file = tmp_path / "car.csv"
     file.write_text(sample_table(TEMPLATES["mcpherson"]))
     with pytest.raises(CaseError, match="expected mcpherson"):
@@ -134,6 +132,6 @@ def test_the_template_of_a_table(tmp_path):
         "2inch": (-0.0508, 0.0508),
     }.items(),
 )
-def test_travel_takes_a_unit(tmp_path, travel, ends):
+def test_travel_option_units(tmp_path, travel, ends):
     case = sample(tmp_path, "double_wishbone", travel)
     assert (case.sweep.values[0], case.sweep.values[-1]) == pytest.approx(ends, rel=1e-15)

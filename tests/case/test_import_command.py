@@ -14,6 +14,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_tab
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
+from ..support.case_texts import complains, refused, write
 from ..support.model_poses import solution
 from ..support.written_again import written_again
 
@@ -65,11 +66,17 @@ REFERRED = """<mujoco><compiler angle="radian"/><worldbody><body name="arm" eule
 <joint name="hinge" axis="1 2 2" ref="0.4"/></body></worldbody></mujoco>"""
 
 
-def test_imported_joint_values_start_at_zero(tmp_path):
+DRIVEN = Supplied(drive=("hinge:0:1:5",))
+
+
+@pytest.fixture
+def model(tmp_path):
+    return write(tmp_path, REFERRED, "model.xml")
+
+
+def test_imported_joint_values_start_at_zero(model, tmp_path):
     """A joint of a case file is zero at design, where the model's has its own reference."""
-    file = tmp_path / "model.xml"
-    file.write_text(REFERRED)
-    case = load(file, Supplied(drive=("hinge:0:1:5",)))
+    case = load(model, DRIVEN)
     assert case.sweep.design == 0.4
     again = written_again(case, tmp_path)
     assert (again.sweep.values[0], again.sweep.values[-1]) == (-0.4, 0.6)
@@ -78,10 +85,8 @@ def test_imported_joint_values_start_at_zero(tmp_path):
 
 
 def crank(tmp_path, *more):
-    """Return a case file with a line more at its end."""
-    file = tmp_path / "crank.toml"
-    file.write_text("\n".join([CRANK, *more]))
-    return load_case(file)
+    """Return the case of a file with more lines at its end."""
+    return load_case(write(tmp_path, "\n".join([CRANK, *more])))
 
 
 CRANK = """schema = "kincheck-case/1"
@@ -114,8 +119,7 @@ def test_import_keeps_sweep_at_reference(tmp_path):
     assert np.array_equal(again.reference["x"].position, case.reference["x"].position)
     assert 'at = "reference"' in case_text(case)
     bare = replace(case, reference={}, origin=None)
-    with pytest.raises(CaseError, match=r"no even grid.*; give an even one"):
-        case_text(bare)
+    refused(lambda: case_text(bare), "no even grid ... ; give an even one")
 
 
 def test_import_omits_reference_with_uncertainties(tmp_path):
@@ -134,24 +138,19 @@ def test_import_keeps_closure_notes(tmp_path):
 
 
 def test_import_refuses_too_long_texts(tmp_path):
-    file = tmp_path / "model.xml"
-    file.write_text(REFERRED.replace('"arm"', f'"{201 * "a"}"'))
-    case = load(file, Supplied(drive=("hinge:0:1:5",)))
-    with pytest.raises(CaseError, match=r"found 201 characters, expected 1 to 200.*; rename it"):
-        case_text(case)
-    out = tmp_path / "out.toml"
-    for length in (10_000, 10_001, 20_000):
-        out.write_text(case_text(replace(crank(tmp_path, EVEN), source=length * "s")))
-        cut = length * "s" if length == 10_000 else f"{9_994 * 's'} [...]"
-        assert load_case(out).source == cut
-    out.write_text(out.read_text().replace("ss [...]", "sss [...]"))
-    with pytest.raises(CaseError, match="found a text of 10001 characters, expected 10000 at most"):
-        load_case(out)
+    file = write(tmp_path, REFERRED.replace('"arm"', f'"{201 * "a"}"'), "model.xml")
+    case = load(file, DRIVEN)
+    refused(lambda: case_text(case), "found 201 characters, expected 1 to 200 ... ; rename it")
+    case, cut = crank(tmp_path, EVEN), f"{9_994 * 's'} [...]"
+    for source, kept in ((10_000 * "s",) * 2, (10_001 * "s", cut), (20_000 * "s", cut)):
+        text = case_text(replace(case, source=source))
+        assert load_case(write(tmp_path, text)).source == kept
+    file = write(tmp_path, text.replace("ss [...]", "sss [...]"))
+    complains(file, "found a text of 10001 characters, expected 10000 at most")
 
 
-def test_import_command_writes_case(tmp_path, capsys):
-    model, out = tmp_path / "model.xml", tmp_path / "case.toml"
-    model.write_text(REFERRED)
+def test_import_command_writes_case(model, tmp_path, capsys):
+    out = tmp_path / "case.toml"
     drive = ["--drive", "hinge:0:1:5"]
     assert main(["import", str(model), *drive]) == 0
     printed = capsys.readouterr()
@@ -165,9 +164,7 @@ def test_import_command_writes_case(tmp_path, capsys):
     assert solution(load_case(out)).solved.all()
 
 
-def test_import_command_takes_one_file(tmp_path, capsys):
-    model = tmp_path / "model.xml"
-    model.write_text(REFERRED)
+def test_import_command_takes_one_file(model, tmp_path, capsys):
     assert main(["import"]) == 2
     assert "found 0 files, expected one" in capsys.readouterr().err
     assert main(["import", str(model), "--out", str(tmp_path)]) == 2

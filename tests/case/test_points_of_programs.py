@@ -70,7 +70,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_points_of_a_program_are_read(tmp_path, name):
+def test_program_points_equal_table(tmp_path, name):
     table = tmp_path / "car.csv"
     table.write_text("name,x,y,z\n" + lines_of("{},{},{},{}"))
     file = tmp_path / f"car.{name}"
@@ -82,7 +82,7 @@ def test_points_of_a_program_are_read(tmp_path, name):
 
 
 @pytest.mark.parametrize("options", [{"sheet": "front"}, {"corner": "FL"}, {"corner": "FR"}, {}])
-def test_assetto_corsa_suspension_is_read(tmp_path, options):
+def test_assetto_corsa_points_equal_table(tmp_path, options):
     """Heights and lengths are from the wheel's centre: outputs of directions are the same."""
     table = tmp_path / "car.csv"
     table.write_text("name,x,y,z\n" + lines_of("{},{},{},{}"))
@@ -95,7 +95,7 @@ def test_assetto_corsa_suspension_is_read(tmp_path, options):
     assert "BASEY=-0.12" in case.source
 
 
-def test_expressions_of_a_script_are_listed(tmp_path):
+def test_python_expressions_are_omitted(tmp_path):
     file = tmp_path / "car.py"
     file.write_text(
         FORMS["dict.py"].replace("\n}", ",\n 'wheel_contact': np.array([0, 1, 2]) / 3,\n}", 1)
@@ -122,6 +122,6 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_other_files_are_refused_by_what_they_are(tmp_path, kind):
+def test_program_point_faults(tmp_path, kind):
     name, text, fragments = REFUSED[kind]
     complains(write(tmp_path, text, name), fragments, Supplied())

@@ -51,7 +51,7 @@ def test_matlab_form_is_read(tmp_path, form):
 
 
 @pytest.mark.parametrize("value", ["[a 2 3]", "[1+1 2 3]", "[1 - 2 3 4]", "2 * [1 2 3]"])
-def test_matlab_expression_is_left_out_and_listed(tmp_path, value):
+def test_matlab_expression_is_omitted(tmp_path, value):
     file = tmp_path / "front.m"
     file.write_text(f"{FORMS['fields']}\nhp.other = {value};\nclear all\n")
     found = read_hardpoints(file, Supplied("double_wishbone", "mm", "iso"))

@@ -14,6 +14,7 @@ from kincheck.core.harness.execution import Answer, Pair, attempt
 from scipy.optimize import brentq, least_squares
 
 from ..oracles.rods import rotation
+from ..support.case_texts import rows
 from ..support.rods_of_templates import CLOSE, DATA, expected, solved
 
 # A tyre 270/55 on a 13 inch rim: 0.5 * 13 * 25.4 + 0.55 * 270 mm.
@@ -45,35 +46,41 @@ DEGREE, MM = np.pi / 180.0, 1e-3
 # and wheel_travel). The slopes of all these curves by either are below 0.4 degrees/mm and 1 mm/mm,
 # those of the slopes below 0.01 degrees/mm^2; five such errors are allowed.
 ANGLE, LENGTH, SLOPE = 5 * 0.4 * 3e-6 * DEGREE, 5 * 3e-6 * MM, 5 * 0.01 * 3e-6 * DEGREE / MM
-SAME = {
-    "toe_angle": ("toe", DEGREE, ANGLE),
-    "caster": ("caster", DEGREE, ANGLE),
-    "kpi": ("kingpin_inclination", DEGREE, ANGLE),
-    "steering_axis_offset_ground": ("scrub_radius", MM, LENGTH),
-    "mechanical_trail": ("mechanical_trail", MM, LENGTH),
-    "wheel_center_x": ("wheel_center.x", MM, LENGTH),
-    "wheel_center_y": ("wheel_center.y", MM, LENGTH),
-    "deriv_toe_angle_wrt_hub_z": ("toe.per_travel", DEGREE / MM, SLOPE),
-    "deriv_caster_wrt_hub_z": ("caster.per_travel", DEGREE / MM, SLOPE),
-    "deriv_kpi_wrt_hub_z": ("kingpin_inclination.per_travel", DEGREE / MM, SLOPE),
-    "deriv_half_track_wrt_hub_z": ("half_track_change.per_travel", 1.0, SLOPE),
+SAME = """
+toe_angle | toe | angle
+caster | caster | angle
+kpi | kingpin_inclination | angle
+steering_axis_offset_ground | scrub_radius | length
+mechanical_trail | mechanical_trail | length
+wheel_center_x | wheel_center.x | length
+wheel_center_y | wheel_center.y | length
+deriv_toe_angle_wrt_hub_z | toe.per_travel | slope
+deriv_caster_wrt_hub_z | caster.per_travel | slope
+deriv_kpi_wrt_hub_z | kingpin_inclination.per_travel | slope
+deriv_half_track_wrt_hub_z | half_track_change.per_travel | ratio
+"""
+UNITS = {
+    "angle": (DEGREE, ANGLE),
+    "length": (MM, LENGTH),
+    "slope": (DEGREE / MM, SLOPE),
+    "ratio": (1.0, SLOPE),
 }
 
 
-@pytest.mark.parametrize("theirs", SAME)
-def test_the_published_sweep(explorer, published, theirs):
+@pytest.mark.parametrize(("theirs", "ours", "kind"), rows(SAME, named=False))
+def test_wishbone_explorer_sweep(explorer, published, theirs, ours, kind):
     """Rack and wheel move together; derivatives hold the rack."""
-    ours, unit, allowed = SAME[theirs]
+    unit, allowed = UNITS[kind]
     assert np.abs(explorer[ours] - unit * published[theirs]).max() < allowed
 
 
-def test_the_published_half_track(explorer, published):
+def test_wishbone_explorer_half_track(explorer, published):
     half_track = MM * published["half_track"]
     change = explorer["half_track_change"] + 0.95 + RADIUS * 5.0 / np.hypot(150.0, 5.0)
     assert np.abs(change - half_track).max() < LENGTH
 
 
-def test_the_published_camber(explorer, published):
+def test_wishbone_explorer_camber(explorer, published):
     """Seen from the front, where ISO 8855 has the angle of the wheel plane itself."""
     toe, camber = explorer["toe"], explorer["camber"]
     seen = np.arctan2(np.tan(camber), np.cos(toe))
@@ -92,13 +99,12 @@ def corner(at, travel, start):
     Returns:
         unknowns: shift and rotation vector of the upright, place of two points of the rocker.
     """
-    rods = [
-        ("lower_wishbone_inboard_front", "lower_wishbone_outboard"),
-        ("lower_wishbone_inboard_rear", "lower_wishbone_outboard"),
-        ("upper_wishbone_inboard_front", "upper_wishbone_outboard"),
-        ("upper_wishbone_inboard_rear", "upper_wishbone_outboard"),
-        ("trackrod_inboard", "trackrod_outboard"),
+    wishbones = [
+        (f"{arm}_wishbone_inboard_{end}", f"{arm}_wishbone_outboard")
+        for arm in ("lower", "upper")
+        for end in ("front", "rear")
     ]
+    rods = [*wishbones, ("trackrod_inboard", "trackrod_outboard")]
     wheel, outer = at["wheel_center"], at["pushrod_outboard"]
     inner, spring = at["pushrod_inboard"], at["strut_bottom"]
     ends = at["rocker_axis_a"], at["rocker_axis_b"]
@@ -111,22 +117,19 @@ def corner(at, travel, start):
         pairs = [(at[p], moved(at[q]), at[p], at[q]) for p, q in rods]
         pairs += [(moved(outer), a, outer, inner), (a, b, inner, spring)]
         pairs += [(end, now, end, then) for end in ends for now, then in ((a, inner), (b, spring))]
-        distances = [
-            np.dot(p - q, p - q) - np.dot(then - there, then - there) for p, q, then, there in pairs
-        ]
-        return [*distances, u[2] - travel]
+        return [*((p - q) @ (p - q) - (r - s) @ (r - s) for p, q, r, s in pairs), u[2] - travel]
 
     found = least_squares(gaps, start, xtol=3e-16, ftol=3e-16, gtol=3e-16, x_scale="jac")
     assert np.abs(found.fun).max() < 1e-13
     return found.x
 
 
-def test_a_formula_student_corner_with_pushrod_and_rocker():
+def test_formula_student_pushrod_corner():
     file = DATA / "formula_student_pushrod.csv"
     case = load(file, Supplied(travel="0.03:7"))
     found = curves(case)
-    rows = [line.split(",") for line in file.read_text().splitlines() if line[0] != "#"][1:]
-    at = {name: np.array([*map(float, xyz)]) / 1000.0 for name, *xyz in rows}
+    lines = [line.split(",") for line in file.read_text().splitlines() if line[0] != "#"][1:]
+    at = {name: np.array([*map(float, xyz)]) / 1000.0 for name, *xyz in lines}
     rest = np.concatenate([np.zeros(6), at["pushrod_inboard"], at["strut_bottom"]])
     step = 1e-4
     for k, travel in enumerate(case.sweep.values):
@@ -165,7 +168,7 @@ wheel_center,0.975,0.715,0.101
 ROAD = ("scrub_radius", "mechanical_trail", "roll_center_height", "half_track_change")
 
 
-def test_the_strut_of_the_paper(tmp_path):
+def test_mcpherson_strut_to_50_digits(tmp_path):
     """Against 50 digits of an independent solution; see the head of the built-in table."""
     file = tmp_path / "strut.csv"
     file.write_text(STRUT)
@@ -177,7 +180,7 @@ def test_the_strut_of_the_paper(tmp_path):
         assert np.abs(found[name] - true).max() < 1e-13, name
 
 
-def test_by_the_command_line(tmp_path, explorer):
+def test_wishbone_explorer_csv_by_command(tmp_path, explorer):
     """The curves leave as a table; there is nothing to compare a single engine with."""
     options = ["--travel=-0.04:0.12:3", "--rack", "0.04", "--wheel-radius", str(RADIUS)]
     file, out = str(DATA / "wishbone_explorer.csv"), tmp_path / "curves.csv"
@@ -187,7 +190,7 @@ def test_by_the_command_line(tmp_path, explorer):
     assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)
 
 
-def test_the_published_camber_by_the_command_line(tmp_path, published, capsys):
+def test_measured_camber_definition_is_named(tmp_path, published, capsys):
     """Compared as it stands, the camber is off, and the message states its other definition."""
     sweep = tmp_path / "sweep.csv"
     rows = zip(*(published[name] for name in ("wheel_travel", "toe_angle", "camber")), strict=True)
@@ -205,7 +208,7 @@ def test_the_published_camber_by_the_command_line(tmp_path, published, capsys):
 # Suspension outputs of Project Chrono's models, against an independent solution of
 
 
-def test_static_angles_of_chrono(tmp_path):
+def test_chrono_static_toe_and_camber(tmp_path):
     """Chrono turns the spindle of a left wheel by minus toe about z after minus camber about x."""
     file = tmp_path / "strut.json"
     text = (DATA / "chrono_macpherson_strut.json").read_text()
@@ -219,53 +222,47 @@ def test_static_angles_of_chrono(tmp_path):
     assert found["camber"][1] == pytest.approx(np.arcsin(-z), abs=1e-15)
 
 
-def test_chrono_strut_with_a_radius():
+def test_chrono_strut_with_wheel_radius():
     """Toe, camber and half track from 40-digit centres and spin axes; see test_hardpoints."""
-    case = load(
-        DATA / "chrono_macpherson_strut.json", Supplied(travel="0.07:15", wheel_radius="0.4")
-    )
-    rows = [
-        line.split(",")
-        for line in (DATA / "chrono_sweeps.csv").read_text().splitlines()
-        if line.startswith("chrono_macpherson_strut,")
-    ]
-    truth = np.array([row[1:] for row in rows], dtype=float)
-    center, s = truth[:, 1:4], truth[:, 4:]
-    level = np.hypot(s[:, 0], s[:, 1])
-    found = solved(case)
-    track = center[:, 1] + 0.4 * s[:, 1] * s[:, 2] / level
-    assert np.abs(found["toe"] - np.arctan2(s[:, 0], s[:, 1])).max() < 1e-14
-    assert np.abs(found["camber"] - np.arctan2(-s[:, 2], level)).max() < 1e-14
-    assert np.abs(found["half_track_change"] - (track - track[7])).max() < 1e-14
+    said = Supplied(travel="0.07:15", wheel_radius="0.4")
+    found = solved(load(DATA / "chrono_macpherson_strut.json", said))
+    lines = (DATA / "chrono_sweeps.csv").read_text().splitlines()
+    truth = [line.split(",")[1:] for line in lines if line.startswith("chrono_macpherson_strut,")]
+    _, _, y, _, *s = np.array(truth, dtype=float).T
+    level = np.hypot(s[0], s[1])
+    track = y + 0.4 * s[1] * s[2] / level
+    true = {
+        "toe": np.arctan2(s[0], s[1]),
+        "camber": np.arctan2(-s[2], level),
+        "half_track_change": track - track[7],
+    }
+    for name, values in true.items():
+        assert found[name] == pytest.approx(values, abs=1e-14)
 
 
-def test_chrono_semi_trailing_arm():
+def test_chrono_semi_trailing_arm_outputs():
     """A turn about one line: the angle of each travel by scipy's root, all else by rotation."""
-    case = load(
-        DATA / "chrono_semi_trailing_arm.json", Supplied(travel="0.1:9", wheel_radius="0.45")
-    )
+    said = Supplied(travel="0.1:9", wheel_radius="0.45")
+    case = load(DATA / "chrono_semi_trailing_arm.json", said)
     found = solved(case)
-    pivot, outer, wheel = (
-        np.array(each) for each in ([0.42, 0.6, -0.05], [0.5, 0.9, 0.0], [0.0, 1.1, 0.0])
-    )
+    pivot, outer, wheel = np.array([[0.42, 0.6, -0.05], [0.5, 0.9, 0.0], [0.0, 1.1, 0.0]])
     low, high = np.array([0.3, 0.8, 0.0]), np.array([0.3, 0.8, 0.4])
     axis = (outer - pivot) / np.linalg.norm(outer - pivot)
+
+    def moved(point, angle):
+        return pivot + rotation(angle * axis) @ (point - pivot)
+
     for k, travel in enumerate(case.sweep.values):
-
-        def height(angle, travel=travel):
-            return (pivot + rotation(angle * axis) @ (wheel - pivot))[2] - travel
-
-        angle = brentq(height, -0.5, 0.5, xtol=1e-15, rtol=1e-15)
-        turn = rotation(angle * axis)
-        center, s, spring = (
-            pivot + turn @ (wheel - pivot),
-            turn @ (0.0, 1.0, 0.0),
-            pivot + turn @ (low - pivot),
+        angle = brentq(
+            lambda angle, z=travel: moved(wheel, angle)[2] - z, -0.5, 0.5, xtol=1e-15, rtol=1e-15
         )
+        center, spring = moved(wheel, angle), moved(low, angle)
+        s = rotation(angle * axis) @ (0.0, 1.0, 0.0)
         rise = np.array([0.0, 0.0, 1.0]) - s[2] * s
         contact = center - 0.45 * rise / np.linalg.norm(rise)
         per_turn = [np.cross(axis, each - pivot) for each in (center, contact, spring)]
-        _, vy, vz = per_turn[1]
+        vy, vz = per_turn[1][1:]
+        shortening = (high - spring) @ per_turn[2] / np.linalg.norm(high - spring)
         true = {
             "wheel_center.x": center[0],
             "wheel_center.y": center[1],
@@ -273,15 +270,12 @@ def test_chrono_semi_trailing_arm():
             "camber": -np.arcsin(s[2]),
             "half_track_change": contact[1] - 1.1,
             "roll_center_height": contact[1] * vy / vz,
-            "spring_ratio": (high - spring)
-            @ per_turn[2]
-            / np.linalg.norm(high - spring)
-            / per_turn[0][2],
+            "spring_ratio": shortening / per_turn[0][2],
         }
         assert {name: found[name][k] for name in true} == pytest.approx(true, abs=1e-13)
 
 
-def test_chrono_three_link():
+def test_chrono_three_link_outputs():
     case = load(DATA / "chrono_three_link.json", Supplied(travel="0.08:9", wheel_radius="0.45"))
     at = {
         "arm_pivot": (0.7, 0.9, 0.0),

@@ -22,10 +22,10 @@ from kincheck.core.case.io import reference_samples
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
 from kincheck.core.errors import CaseError
-from kincheck.core.harness.compare import deviation
+from kincheck.core.harness.compare import Curve, deviation
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.harness.suspects import Held, Uncertain, slips
+from kincheck.core.harness.suspects import slips
 from scipy.interpolate import CubicSpline
 
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
@@ -541,19 +541,19 @@ def test_slopes_ignore_noise():
 
 
 def test_deviation_counts_in_tolerances():
-    none, half = np.zeros(2), np.array([0.0, 2.0])
+    known = Curve(np.zeros(2), half=np.array([0.0, 2.0]))
     for values, atol, worst in (
         ([1.0, 2.0], 0.5, (0, 1.0, 0.5, False)),
         ([0.0, 2.0], 0.0, (1, 2.0, 2.0, True)),
     ):
-        off = deviation(np.array(values), none, atol, 0.0, "data", half)
+        off = deviation(Curve(np.array(values), atol), known)
         assert (off.worst_step, off.max_abs, off.tolerance, off.within) == worst
 
 
 def test_slip_scales_accuracy():
     values = np.linspace(1.0, 2.0, 9)
-    reference = Uncertain(values / 1000.0 + 4e-7, np.full(9, 5e-7))
-    held = Held(values, 1e-9, 0.0, "m")
-    (slip,) = slips(held, reference, {}, offsets=False)
-    assert (slip.change, slip.tolerance) == ("times 1000", pytest.approx(5e-4, rel=1e-5))
-    assert slips(held, replace(reference, half=None), {}, offsets=False) == []
+    held = Curve(values, 1e-9)
+    reference = Curve(values / 1000.0 + 4e-7, half=np.full(9, 5e-7))
+    ((change, off),) = slips(held, reference, {}, offsets=False).items()
+    assert (change, off.tolerance) == ("times 1000", pytest.approx(5e-4, rel=1e-5))
+    assert slips(held, replace(reference, half=None), {}, offsets=False) == {}

@@ -9,21 +9,12 @@ from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 
+from ..oracles.rods import rotation
 from ..support.rods_of_templates import RODS, solved
 
 STEP = 1e-5
 """Half a difference [m]: its square, and round-off over it, are below the tolerance."""
 BALLS = {"mcpherson": (), "three_link": ("arm_pivot",), "semi_trailing_arm": ("arm_inner",)}
-INNER = {"lca_front", "lca_rear", "uca_front", "uca_rear", "strut_upper"}
-
-
-def turn(r):
-    angle = np.linalg.norm(r)
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = r / angle
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
 
 
 def angles_of(name, role, shift, spin):
@@ -31,51 +22,43 @@ def angles_of(name, role, shift, spin):
     ones on the carrier.
     """
     at = {each: np.array(place) for each, place in TEMPLATES[name].sample.items()}
-    outer = {end for _, end in RODS.get(name, ())}
-    on_body = {
-        each: place + (shift if each == role and each not in outer else 0.0)
-        for each, place in at.items()
-    }
-    on_carrier = {
-        each: place + (shift if each == role and each in outer else 0.0)
-        for each, place in at.items()
-    }
-    center = at["wheel_center"]
+    rods, center = RODS.get(name, ()), at["wheel_center"]
+    on_body, on_carrier = dict(at), dict(at)
+    outer = {end for _, end in rods}
+    (on_carrier if role in outer else on_body)[role] = at[role] + shift
+
+    def moved(pose):
+        return {
+            each: center + pose[:3] + rotation(pose[3:]) @ (place - center)
+            for each, place in on_carrier.items()
+        }
 
     def misfit(pose):
-        moved = {
-            k: center + pose[:3] + turn(pose[3:]) @ (p - center) for k, p in on_carrier.items()
-        }
+        now = moved(pose)
         found = [pose[2]]
-        for a, b in RODS.get(name, ()):
-            found.append(np.linalg.norm(moved[b] - on_body[a]) - np.linalg.norm(at[b] - at[a]))
+        for a, b in rods:
+            found.append(np.linalg.norm(now[b] - on_body[a]) - np.linalg.norm(at[b] - at[a]))
         if name == "mcpherson":
-            lower = moved["strut_lower"]
-            axis = turn(pose[3:]) @ (at["strut_upper"] - at["strut_lower"])
-            found += np.cross(axis / np.linalg.norm(axis), on_body["strut_upper"] - lower).tolist()
+            axis = rotation(pose[3:]) @ (at["strut_upper"] - at["strut_lower"])
+            away = on_body["strut_upper"] - now["strut_lower"]
+            found += np.cross(axis / np.linalg.norm(axis), away).tolist()
         for ball in BALLS.get(name, ()):
-            found += (moved[ball] - on_body[ball]).tolist()
+            found += (now[ball] - on_body[ball]).tolist()
         if name == "semi_trailing_arm":
             axis = on_body["arm_outer"] - on_body["arm_inner"]
-            away = moved["arm_outer"] - on_body["arm_outer"]
+            away = now["arm_outer"] - on_body["arm_outer"]
             found += np.cross(axis / np.linalg.norm(axis), away).tolist()
         return np.array(found)
 
     pose = np.zeros(6)
     for _ in range(6):
-        jacobian = np.array(
-            [(misfit(pose + d) - misfit(pose - d)) / 2e-6 for d in 1e-6 * np.eye(6)]
-        )
-        pose = pose - np.linalg.lstsq(jacobian.T, misfit(pose), rcond=None)[0]
-    s = turn(pose[3:]) @ spin
+        jacobian = [(misfit(pose + d) - misfit(pose - d)) / 2e-6 for d in 1e-6 * np.eye(6)]
+        pose = pose - np.linalg.lstsq(np.transpose(jacobian), misfit(pose), rcond=None)[0]
+    s = rotation(pose[3:]) @ spin
     angles = [np.arctan2(s[0], s[1]), -np.arcsin(s[2])]
-    kingpin = TEMPLATES[name].kingpin or ((),)
-    if isinstance(kingpin[0], str):
-        moved = {
-            k: center + pose[:3] + turn(pose[3:]) @ (p - center) for k, p in on_carrier.items()
-        }
-        low, high = ((moved if end in outer else on_body)[end] for end in kingpin)
-        angles += [np.arctan2(low[0] - high[0], high[2] - low[2])]
+    if (ends := TEMPLATES[name].kingpin) and isinstance(ends[0], str):
+        low, high = ((moved(pose) if end in outer else on_body)[end] for end in ends)
+        angles.append(np.arctan2(low[0] - high[0], high[2] - low[2]))
     return np.array(angles)
 
 
@@ -96,7 +79,7 @@ def write_table(folder, name, toe, camber, moved):
 
 @pytest.mark.parametrize("name", [*RODS])
 @pytest.mark.parametrize("angles", [(0.0, 0.0), (0.3, -2.0)])
-def test_shims_of_every_template(tmp_path, name, angles):
+def test_template_shims_equal_differences(tmp_path, name, angles):
     toe, camber = map(math.radians, angles)
     spin = write_table(tmp_path, name, toe, camber, {})
     found = {each.roles[0]: each.shim for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
@@ -111,7 +94,7 @@ def test_shims_of_every_template(tmp_path, name, angles):
 
 
 @pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) > 2])
-def test_tie_rod_moves_leave_no_bump_steer(tmp_path, name):
+def test_tie_rod_moves_cancel_bump_steer(tmp_path, name):
     def bump_steer(moved):
         write_table(tmp_path, name, 0.01, -0.03, moved)
         return solved(load(tmp_path / "car.csv", Supplied(travel="0.01:3")))["toe.per_travel"][1]

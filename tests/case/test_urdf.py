@@ -10,13 +10,14 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.undriven import undriven_case, undriven_file
 from kincheck.core.joints import Polynomial, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism
 from kincheck.core.mechanism.motions import JointAngle
+from kincheck.core.studies.same import compare
 
 from ..fuzz import urdf as seeds
 from ..support.case_texts import write
-from ..support.exported_again import same_motion
 from ..support.model_files import driven, edited
 from ..support.model_poses import EXACT, coordinate, near, solution
 from ..support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
@@ -153,7 +154,9 @@ def test_exported_polynomial_coupling_is_read(tmp_path):
     file = robot(tmp_path, texts[".urdf"], constraints_json=texts[".constraints.json"])
     again = load(file, driven("A:0:1:3"))
     assert [each.type for each in again.mechanism.couplers] == ["polynomial"]
-    assert same_motion(case, again) < EXACT
+    same = compare(undriven_case(case, "case"), undriven_file(file), {})
+    assert same.verdict == "same", same.reason
+    assert same.largest < EXACT
 
 
 AXES = ["3 4 0", "0.33 0 0.9439809320108114", "0 -0.6 0.8", "1e100 0 0", "2 3 6"]

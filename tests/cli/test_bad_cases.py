@@ -16,7 +16,7 @@ from ..support.fakes import Fake, crank
 from .test_cli import RIGHT
 
 
-def test_bad_case_files_are_named_first(kincheck_main, capsys, tmp_path):
+def test_invalid_cases_are_reported_before_run(kincheck_main, capsys, tmp_path):
     first, second = tmp_path / "first.toml", tmp_path / "second.json"
     first.write_text('schema = "kincheck-case/9"\n')
     second.write_text("{")
@@ -32,7 +32,7 @@ def test_bad_case_files_are_named_first(kincheck_main, capsys, tmp_path):
     assert RIGHT.solves == 0
 
 
-def test_cases_beside_a_bad_one_run(kincheck_main, capsys, tmp_path, monkeypatch):
+def test_run_continues_beside_unreadable_case(kincheck_main, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bad = "bad.toml"
     Path(bad).write_text('schema = "kincheck-case/9"\n')
@@ -99,7 +99,7 @@ def test_run_without_readable_case_is_stored(kincheck_main, capsys, tmp_path, mo
     )
 
 
-def test_bad_option_and_cases_are_told(kincheck_main, capsys):
+def test_unknown_case_and_engine_are_reported(kincheck_main, capsys):
     RIGHT.solves = 0
     assert kincheck_main("run crank nosuch --engine nativ", engines=[RIGHT]) == 2
     assert [line[:29] for line in capsys.readouterr().err.splitlines()] == [
@@ -109,7 +109,7 @@ def test_bad_option_and_cases_are_told(kincheck_main, capsys):
     assert RIGHT.solves == 0
 
 
-def test_a_bad_built_in_case_is_a_message(kincheck_main, capsys, monkeypatch):
+def test_invalid_built_in_case_is_reported(kincheck_main, capsys, monkeypatch):
     def load(name):
         raise CaseError("crank.toml: sweep.steps = 0: expected at least 1")
 
@@ -121,6 +121,6 @@ def test_a_bad_built_in_case_is_a_message(kincheck_main, capsys, monkeypatch):
     assert capsys.readouterr().err == "kincheck: crank.toml: sweep.steps = 0: expected at least 1\n"
 
 
-def test_two_cases_of_one_name_are_refused(kincheck_main, capsys):
+def test_duplicate_case_names_are_refused(kincheck_main, capsys):
     assert kincheck_main("run", cases={"a": crank("same"), "b": crank("same")}) == 2
     assert "two cases named 'same'" in capsys.readouterr().err

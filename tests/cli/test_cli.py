@@ -10,6 +10,7 @@ import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.extras import how_to_install
 
+from ..support.case_texts import rows
 from ..support.fakes import Fake, crank, off, partial, raising
 
 RIGHT = Fake("native")
@@ -20,52 +21,54 @@ MISSING = Fake("missing", installed=None)
 UNABLE = Fake("unable", refusal="joint 'cv' (universal) has no counterpart")
 
 
-@pytest.mark.parametrize(
-    ("engine", "status"),
-    [(RIGHT, 0), (WRONG, 1), (PARTIAL, 1), (BROKEN, 1), (MISSING, 0), (UNABLE, 0)],
-    ids=lambda each: getattr(each, "name", each),
-)
-def test_exit_status_of_a_run(kincheck_main, engine, status):
-    assert kincheck_main("run", engines=[RIGHT, engine]) == status
+SOLVED = "kincheck: nothing was solved: every installed engine that supports a case ended"
+COMPARED = "kincheck: nothing was compared (2 unsupported, 2 unavailable); run other engines\n"
 
 
 @pytest.mark.parametrize(
-    ("engines", "status"),
+    ("engines", "status", "message"),
     [
-        ([BROKEN], 2),
-        ([BROKEN, MISSING, UNABLE], 2),
-        ([BROKEN, PARTIAL], 1),
-        ([BROKEN, WRONG], 1),
-        ([MISSING, UNABLE], 2),
+        ([RIGHT], 0, ""),
+        ([RIGHT, WRONG], 1, ""),
+        ([RIGHT, PARTIAL], 1, ""),
+        ([RIGHT, BROKEN], 1, ""),
+        ([RIGHT, MISSING, UNABLE], 0, ""),
+        ([BROKEN], 2, SOLVED),
+        ([BROKEN, MISSING, UNABLE], 2, SOLVED),
+        ([BROKEN, PARTIAL], 1, ""),
+        ([BROKEN, WRONG], 1, ""),
+        ([MISSING, UNABLE], 2, COMPARED),
     ],
-    ids=[
-        "errors",
-        "errors and missing",
-        "errors and a motion that ends",
-        "errors and deviations",
-        "missing",
-    ],
+    ids=lambda each: " and ".join(x.name for x in each) if isinstance(each, list) else "",
 )
-def test_run_with_only_errors_has_status_2(kincheck_main, capsys, engines, status):
+def test_run_exit_status_by_outcome(kincheck_main, capsys, engines, status, message):
     assert kincheck_main("run", engines=engines) == status
-    told = capsys.readouterr().err
-    solved, tried = status != 2, BROKEN in engines
-    assert (
-        "kincheck: nothing was solved: every installed engine that supports a case ended" in told
-    ) is (tried and not solved)
-    nothing = "kincheck: nothing was compared (2 unsupported, 2 unavailable); run other engines\n"
-    assert (nothing in told) is not tried
+    printed = capsys.readouterr().err
+    assert [each for each in (SOLVED, COMPARED) if each in printed] == [message] * bool(message)
 
 
-def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
-    assert kincheck_main("run --json -", engines=[RIGHT, MISSING]) == 0
-    records = json.loads(capsys.readouterr().out)["records"]
-    assert [(each["case"], each["engine"]) for each in records] == [
-        ("crank", "native"),
-        ("crank", "missing"),
-        ("crank_two", "native"),
-        ("crank_two", "missing"),
-    ]
+@pytest.mark.parametrize(
+    ("line", "records"),
+    [
+        ("", "crank native, crank wrong, crank_two native, crank_two wrong"),
+        ("crank_two crank_two --engine native", "crank_two native"),
+        ("crank --engine native --require wrong", "crank native, crank wrong"),
+        ("crank --engine wrong", "crank wrong"),
+    ],
+    ids=["all pairs", "chosen", "required", "other than native"],
+)
+def test_run_solves_chosen_pairs(kincheck_main, capsys, line, records):
+    status = kincheck_main(f"run {line} --json -", engines=[RIGHT, WRONG])
+    found = json.loads(capsys.readouterr().out)["records"]
+    assert ", ".join(f"{each['case']} {each['engine']}" for each in found) == records
+    assert status == ("wrong" in records)
+
+
+def test_unselected_native_is_standard(kincheck_main, capsys):
+    cases = {"crank": crank(reference=False)}
+    assert kincheck_main("run --engine wrong --json -", engines=[RIGHT, WRONG], cases=cases) == 1
+    (record,) = json.loads(capsys.readouterr().out)["records"]
+    assert "against native" in record["message"]
 
 
 @pytest.mark.parametrize(
@@ -89,7 +92,7 @@ def test_simulators_run_in_worker_processes(
     assert (RIGHT.solves > 0) is inside
 
 
-def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
+def test_unloadable_adapter_gives_error_record(kincheck_main, capsys, monkeypatch):
     def load(name):
         if name == "other":
             raise ImportError("libother.so: no such file")
@@ -108,64 +111,33 @@ def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
     )
 
 
-def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
-    assert (
-        kincheck_main(
-            "run crank_two crank_two --engine native --json -",
-            engines=[RIGHT, WRONG],
-        )
-        == 0
-    )
-    assert [each["case"] for each in json.loads(capsys.readouterr().out)["records"]] == [
-        "crank_two"
-    ]
+INVALID = """
+crnk | there is no case 'crnk'; did you mean 'crank'?
+crank --engine nativ | there is no engine 'nativ'; did you mean 'native'?
+crank --require zzz | there is no engine 'zzz'; known: native
+crank --tol nan | 'nan' is not a positive number
+crank --tol 0 | '0' is not a positive number
+crank --tol inf | 'inf' is not a positive number
+crank --tol=-1e-9 | '-1e-9' is not a positive number
+crank --tol tight | 'tight' is not a positive number
+crank --mode dream | 'dream' is none of projection, simulate
+crank --mode simulate | no engine has the mode 'simulate'
+crank --engine native --mode simulate | engine 'native' has the mode 'projection', not 'simulate'
+--unknown | kincheck run: error: there is no option '--unknown'
+--engin native --ttol=1 | there is no option '--ttol'; did you mean '--tol'?
+-x | there is no option '-x'
+cran[q] | no built-in case and no file matches 'cran[q]'
+--jobs -1 | '-1' is not a whole number of 0 or more. Give one
+--timeout 5
+    | cannot be limited. Leave out --timeout and --memory, or --jobs
+--scheduler tcp://there:8786
+    | --scheduler: the cluster decides how many pairs run at a time. Leave out --jobs
+--resume | --resume needs a history. Give --history FILE, or set KINCHECK_HISTORY
+"""
 
 
-def test_unselected_native_is_the_standard(kincheck_main, capsys):
-    cases = {"crank": crank(reference=False)}
-    assert kincheck_main("run --engine wrong --json -", engines=[RIGHT, WRONG], cases=cases) == 1
-    (record,) = json.loads(capsys.readouterr().out)["records"]
-    assert record["engine"] == "wrong"
-    assert "against native" in record["message"]
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("crnk", "there is no case 'crnk'; did you mean 'crank'?"),
-        ("crank --engine nativ", "there is no engine 'nativ'; did you mean 'native'?"),
-        ("crank --require zzz", "there is no engine 'zzz'; known: native"),
-        ("crank --tol nan", "'nan' is not a positive number"),
-        ("crank --tol 0", "'0' is not a positive number"),
-        ("crank --tol inf", "'inf' is not a positive number"),
-        ("crank --tol=-1e-9", "'-1e-9' is not a positive number"),
-        ("crank --tol tight", "'tight' is not a positive number"),
-        ("crank --mode dream", "'dream' is none of projection, simulate"),
-        ("crank --mode simulate", "no engine has the mode 'simulate'"),
-        (
-            "crank --engine native --mode simulate",
-            "engine 'native' has the mode 'projection', not 'simulate'",
-        ),
-        ("--unknown", "kincheck run: error: there is no option '--unknown'"),
-        ("--engin native --ttol=1", "there is no option '--ttol'; did you mean '--tol'?"),
-        ("-x", "there is no option '-x'"),
-        ("cran[q]", "no built-in case and no file matches 'cran[q]'"),
-        ("--jobs -1", "'-1' is not a whole number of 0 or more. Give one"),
-        (
-            "--timeout 5",
-            (
-                "--jobs 0 solves in this process, which cannot be limited. Leave out --timeout and"
-                " --memory, or --jobs"
-            ),
-        ),
-        (
-            "--scheduler tcp://there:8786",
-            "--scheduler: the cluster decides how many pairs run at a time. Leave out --jobs",
-        ),
-        ("--resume", "--resume needs a history. Give --history FILE, or set KINCHECK_HISTORY"),
-    ],
-)
-def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, said):
+@pytest.mark.parametrize(("line", "said"), rows(INVALID, named=False))
+def test_run_invalid_options_have_status_2(kincheck_main, capsys, line, said):
     RIGHT.solves = 0
     assert kincheck_main("run", *line.split()) == 2
     captured = capsys.readouterr()
@@ -175,7 +147,7 @@ def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, s
     assert RIGHT.solves == 0
 
 
-def test_status_of_help_and_no_command(capsys):
+def test_help_and_missing_command_exit_status(capsys):
     assert main([]) == 2
     assert main(["--help"]) == 0
     assert main(["run", "--help"]) == 0
@@ -184,42 +156,25 @@ def test_status_of_help_and_no_command(capsys):
 @pytest.mark.parametrize(
     ("engine", "said"),
     [
-        (MISSING, "required engine 'missing': missing is not installed"),
-        (
-            UNABLE,
-            (
-                "required engine 'unable': case 'crank' is unsupported: joint 'cv' (universal) has"
-                " no counterpart"
-            ),
-        ),
+        (MISSING, "missing is not installed"),
+        (UNABLE, "case 'crank' is unsupported: joint 'cv' (universal) has no counterpart"),
     ],
     ids=["missing", "unable"],
 )
 def test_unable_required_engine_has_status_2(kincheck_main, capsys, engine, said):
-    assert (
-        kincheck_main("run crank --require", engine.name, "--json", "-", engines=[RIGHT, engine])
-        == 2
-    )
+    line = f"run crank --require {engine.name} --json -"
+    assert kincheck_main(line, engines=[RIGHT, engine]) == 2
     captured = capsys.readouterr()
-    assert said in captured.err
+    assert f"required engine '{engine.name}': {said}" in captured.err
     assert json.loads(captured.out)["records"][0]["outcome"] == "pass"
 
 
-def test_required_engine_is_always_run(kincheck_main, capsys):
-    argv = "run crank --engine native --require wrong --json -".split()
-    assert kincheck_main(*argv, engines=[RIGHT, WRONG]) == 1
-    assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == [
-        "native",
-        "wrong",
-    ]
-
-
-def test_how_to_install_comes_from_the_metadata():
+def test_how_to_install_matches_package_metadata():
     assert how_to_install("pinocchio").startswith("pip install 'pin>=")
     assert how_to_install("mujoco").startswith("pip install 'mujoco>=")
 
 
-def test_list_shows_truth_and_source_and_what_to_install(kincheck_main, capsys, monkeypatch):
+def test_list_shows_truth_source_and_installation(kincheck_main, capsys, monkeypatch):
     monkeypatch.setattr("kincheck.core.cli.lists.installed_version", lambda name: None)
     pinocchio = Fake("pinocchio", installed=None)
     cases = {"crank": crank(), "free": crank("free", reference=False)}

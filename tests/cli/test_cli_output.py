@@ -15,11 +15,12 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import caveats
 
+from ..support.case_texts import rows
 from ..support.fakes import Fake, off
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
 
 
-def test_stdout_holds_only_json_whatever_engines_print(kincheck_main, capfd):
+def test_json_output_excludes_engine_prints(kincheck_main, capfd):
     def chatty(case):
         print("from Python")
         os.write(1, b"from the file descriptor\n")
@@ -84,27 +85,22 @@ steps = 3
 
 
 @pytest.mark.parametrize(
-    ("length", "told"), [("1.1", True), ("1.0", False), ("1.0000000001", False), ("1.00001", True)]
+    ("length", "noted"), [("1.1", True), ("1.0", False), ("1.0000000001", False), ("1.00001", True)]
 )
-def test_contradictory_length_is_noted_in_results(tmp_path, capsys, length, told):
-    file, out = tmp_path / "rod.toml", tmp_path / "out"
+def test_contradictory_length_is_noted_in_results(tmp_path, capsys, length, noted):
+    file, page, out = tmp_path / "rod.toml", tmp_path / "rod.md", tmp_path / "out"
     file.write_text(ROD.replace("LENGTH", length))
-    assert (
-        main(f"run {file} --engine native --out {out} --markdown {tmp_path / 'rod.md'}".split())
-        == 2
-    )
+    assert main(f"run {file} --engine native --out {out} --markdown {page}".split()) == 2
     note = (
         f"joint 'rod' (distance): length {length} m, points 1 m apart at design: "
         "assembled from there, so the design position is another than the given one"
     )
     results = read_results(out / "results.json")
-    assert results.run["cases"]["rod"]["notes"] == [note] * told
-    assert (f"note: rod: {note}\n" in capsys.readouterr().out) is told
-    assert ("Note: rod: joint 'rod'" in (tmp_path / "rod.md").read_text()) is told
-    assert ("Note on rod" in dict(caveats(results))) is told
-    suite = ET.fromstring(to_junit(results)).find("testsuite")
-    assert suite is not None
-    assert suite.findtext("system-out") == (f"note: {note}" if told else None)
+    assert results.run["cases"]["rod"]["notes"] == [note] * noted
+    assert (f"note: rod: {note}\n" in capsys.readouterr().out) is noted
+    assert ("Note: rod: joint 'rod'" in page.read_text()) is noted
+    assert ("Note on rod" in dict(caveats(results))) is noted
+    assert (f"note: {note}" in to_junit(results).decode()) is noted
 
 
 @pytest.mark.parametrize("length", ["1.1", "1.0"])
@@ -115,21 +111,19 @@ def test_contradictory_length_is_noted_by_explain(tmp_path, capsys, length):
         'schema = "kincheck-vary/1"\nmode = "one_at_a_time"\nunits = { length = "mm" }\n'
         '[hardpoints.tip]\nat = "tip"\nvalues = [1.0]\n'
     )
-    note, told = "joint 'rod' (distance): length 1.1 m, points 1 m apart at design", length == "1.1"
-    for command in (
-        ["explain", str(file)],
-        f"sweep {file} --vary {vary} --out {out}".split(),
+    note = "note: joint 'rod' (distance): length 1.1 m, points 1 m apart at design"
+    for status, command in (
+        (0, f"explain {file}"),
+        (0, f"sweep {file} --vary {vary} --out {out}"),
+        (2, f"run {file} --engine native --explain"),
     ):
-        assert main(command) == 0
-        assert (f"\nnote: {note}" in capsys.readouterr().out) is told
-    assert (
-        "Nominal design of rod: joint &#39;rod&#39;" in (out / "sweep.html").read_text()
-    ) is told
-    assert main(f"run {file} --engine native --explain".split()) == 2
-    assert (f"\n  note: {note}" in capsys.readouterr().out) is told
+        assert main(command.split()) == status
+        assert (note in capsys.readouterr().out) == (length == "1.1")
+    page = (out / "sweep.html").read_text()
+    assert ("Nominal design of rod: joint &#39;rod&#39;" in page) == (length == "1.1")
 
 
-def test_unsolvable_case_is_explained_beside_others(tmp_path, capsys):
+def test_explain_reports_unsolvable_case(tmp_path, capsys):
     (tmp_path / "far.toml").write_text(
         ROD.replace("LENGTH", "5.0").replace('name = "rod"', 'name = "far"')
     )
@@ -144,7 +138,7 @@ def test_unsolvable_case_is_explained_beside_others(tmp_path, capsys):
     assert "\nrod: 12 unknowns for crank, rocker\n" in printed
 
 
-def test_out_of_memory_names_the_limit(monkeypatch):
+def test_memory_error_states_limit(monkeypatch):
     assert error_text(MemoryError()) == "MemoryError"
     monkeypatch.setattr("kincheck.core.harness.execution.memory_limit", lambda: 4.0)
     assert (
@@ -167,44 +161,37 @@ def test_run_table_shows_every_outcome(kincheck_main, capsys):
     assert "fail: crank · wrong: x: acceleration is off by 2e-06 m/s²" in captured.out
     assert "error: crank · broken: ValueError: no [axis] there" in captured.out
     assert "1 pass, 2 fail, 1 error, 1 unsupported, 1 unavailable" in captured.out
+    outcomes = "pass fail fail error unavailable unsupported".split()
     assert captured.err.splitlines() == [
-        f"[{k + 1}/6] crank {engine.name}: {outcome}"
-        for k, (engine, outcome) in enumerate(
-            zip(
-                engines,
-                ("pass", "fail", "fail", "error", "unavailable", "unsupported"),
-                strict=True,
-            )
-        )
+        f"[{k}/6] crank {engine.name}: {outcome}"
+        for k, (engine, outcome) in enumerate(zip(engines, outcomes, strict=True), 1)
     ]
 
 
-def test_files_are_written_where_asked(kincheck_main, capsys, tmp_path):
-    out = tmp_path / "made" / "here"
-    assert (
-        kincheck_main(
-            "run crank --out",
-            out,
-            "--json",
-            tmp_path / "r.json",
-            "--junit",
-            tmp_path / "j.xml",
-        )
-        == 0
-    )
-    results = from_json((out / "results.json").read_bytes())
-    assert results == from_json((tmp_path / "r.json").read_bytes())
+def test_run_writes_files_of_options(kincheck_main, capsys, tmp_path):
+    out, file, suite = tmp_path / "made" / "here", tmp_path / "r.json", tmp_path / "j.xml"
+    assert kincheck_main("run crank --out", out, "--json", file, "--junit", suite) == 0
+    results = read_results(out / "results.json")
+    assert results == read_results(file)
     assert results.run["command"].startswith("kincheck run crank --out ")
     assert "crank" in (out / "report.html").read_text()
-    assert len(ET.parse(tmp_path / "j.xml").findall(".//testcase")) == 2
+    assert len(ET.parse(suite).findall(".//testcase")) == 2
     assert "[1/1]" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("option", "name"),
-    [("--out", "file/sub"), ("--out", "file"), ("--json", "no/r.json"), ("--junit", ".")],
+    rows(
+        """
+--out | file/sub
+--out | file
+--json | no/r.json
+--junit | .
+""",
+        named=False,
+    ),
 )
-def test_unwritable_destination_is_found_first(kincheck_main, capsys, tmp_path, option, name):
+def test_unwritable_destination_stops_before_solving(kincheck_main, capsys, tmp_path, option, name):
     (tmp_path / "file").write_text("here already")
     RIGHT.solves = 0
     assert kincheck_main("run crank", option, tmp_path / name) == 2
@@ -214,7 +201,7 @@ def test_unwritable_destination_is_found_first(kincheck_main, capsys, tmp_path, 
     assert RIGHT.solves == 0
 
 
-def test_failed_file_keeps_the_others(kincheck_main, capsys, tmp_path):
+def test_failed_file_leaves_other_files(kincheck_main, capsys, tmp_path):
     def hostile(case):
         (tmp_path / "j.xml").mkdir(exist_ok=True)  # in the way, since the destinations were checked
         return off("position", lambda p: p)(case)
@@ -222,7 +209,7 @@ def test_failed_file_keeps_the_others(kincheck_main, capsys, tmp_path):
     argv = ["run", "crank", "--junit", tmp_path / "j.xml", "--json", tmp_path / "r.json"]
     assert kincheck_main(*argv, engines=[Fake("native", answer=hostile)]) == 2
     assert "j.xml: cannot be written (Is a directory)" in capsys.readouterr().err
-    assert len(from_json((tmp_path / "r.json").read_bytes()).records) == 1
+    assert len(read_results(tmp_path / "r.json").records) == 1
 
 
 def test_internal_defect_has_status_2(kincheck_main, capsys, monkeypatch):

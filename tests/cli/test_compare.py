@@ -9,6 +9,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 
 from ..report.page import Page
+from ..support.case_texts import rows
 from ..support.rods_of_templates import CLOSE, expected
 
 TEMPLATE = TEMPLATES["double_wishbone"]
@@ -63,7 +64,7 @@ def test_compare_writes_differences_of_curves(tmp_path, old, new, capsys):
     assert ["tierod_inner", "new", "70, 220, 150", "70, 223, 150", "0, 3, 0"] in page.tables[1][1]
 
 
-def test_compare_of_another_unit_and_axes_is_equal(tmp_path, old, capsys):
+def test_compare_converts_units_and_axes(tmp_path, old, capsys):
     inch = table(
         tmp_path / "inch.csv", TEMPLATE.sample, "inch", 0.0254, "rearward,right,up", (-1, -1, 1)
     )
@@ -73,7 +74,7 @@ def test_compare_of_another_unit_and_axes_is_equal(tmp_path, old, capsys):
     assert "No point that both have differs between old and inch." in printed
 
 
-def test_compare_has_points_in_axes_of_the_first(tmp_path, new, capsys):
+def test_compare_prints_points_in_first_axes(tmp_path, new, capsys):
     first = table(
         tmp_path / "adams.csv", TEMPLATE.sample, axes="rearward,right,up", signs=(-1, -1, 1)
     )
@@ -81,7 +82,7 @@ def test_compare_has_points_in_axes_of_the_first(tmp_path, new, capsys):
     assert "tierod_inner  new     -70, -220, 150  -70, -223, 150" in capsys.readouterr().out
 
 
-def test_compare_of_equal_names_tells_files_apart(tmp_path, old, new, capsys):
+def test_compare_labels_equal_names_by_file(tmp_path, old, new, capsys):
     other = table(tmp_path / "b" / "old.csv", {**TEMPLATE.sample, **MOVED})
     assert main(["compare", old, other, new]) == 0
     printed = capsys.readouterr().out
@@ -93,12 +94,12 @@ def test_compare_of_equal_names_tells_files_apart(tmp_path, old, new, capsys):
     ("option", "status"),
     [("toe=1e-3", 1), ("toe=5 deg", 0), ("toe=1e-6rad", 1), ("scrub_radius=20mm", 0)],
 )
-def test_compare_with_a_tolerance_judges(old, new, capsys, option, status):
+def test_compare_tolerance_gives_exit_status(old, new, capsys, option, status):
     assert main(["compare", old, new, "--tolerance", option]) == status
     assert ("toe of new differs by" in capsys.readouterr().out) == (status == 1)
 
 
-def test_compare_leaves_out_what_is_otherwise_defined(tmp_path, old, capsys):
+def test_compare_omits_differently_defined_outputs(tmp_path, old, capsys):
     bare = {name: at for name, at in TEMPLATE.sample.items() if name != "wheel_contact"}
     assert main(["compare", old, table(tmp_path / "bare.csv", bare), "--travel", "20mm:3"]) == 0
     printed = capsys.readouterr().out
@@ -108,7 +109,7 @@ def test_compare_leaves_out_what_is_otherwise_defined(tmp_path, old, capsys):
     assert "Only in old: wheel_contact." in printed
 
 
-def test_compare_beyond_reach_writes_and_is_status_2(tmp_path, old, new, capsys):
+def test_compare_beyond_reach_has_status_2(tmp_path, old, new, capsys):
     file = tmp_path / "d.csv"
     assert main(["compare", old, new, "--travel", "300mm:5", "--csv", str(file)]) == 2
     found = capsys.readouterr()
@@ -119,24 +120,27 @@ def test_compare_beyond_reach_writes_and_is_status_2(tmp_path, old, new, capsys)
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [
-        ("OLD", "found one design, expected two or more"),
-        ("OLD NEW OLD", "found twice"),
-        ("OLD nosuch.csv", "nosuch.csv: no such file"),
-        ("OLD four_bar", "four_bar: found the driver crank, expected stroke"),
-        ("OLD NEW --tolerance tow=1", "did you mean 'toe'?"),
-        ("OLD NEW --tolerance toe=1mm", "expected an angle"),
-        ("OLD NEW --tolerance toe", "expected a positive number"),
-        ("OLD NEW --axle hheave", "did you mean 'heave'?"),
-    ],
+    rows(
+        """
+OLD | found one design, expected two or more
+OLD NEW OLD | found twice
+OLD nosuch.csv | nosuch.csv: no such file
+OLD four_bar | four_bar: found the driver crank, expected stroke
+OLD NEW --tolerance tow=1 | did you mean 'toe'?
+OLD NEW --tolerance toe=1mm | expected an angle
+OLD NEW --tolerance toe | expected a positive number
+OLD NEW --axle hheave | did you mean 'heave'?
+""",
+        named=False,
+    ),
 )
-def test_compare_refuses_with_one_message(old, new, capsys, given, said):
+def test_compare_invalid_arguments_are_refused(old, new, capsys, given, said):
     words = given.replace("OLD", old).replace("NEW", new).split()
     assert main(["compare", *words]) == 2
     assert said in capsys.readouterr().err
 
 
-def test_compare_in_python_is_the_command(tmp_path, old, new):
+def test_compare_in_python_equals_command(tmp_path, old, new):
     file, travel = tmp_path / "d.csv", kincheck.Supplied(travel="40mm:5")
     assert main(["compare", old, new, "--travel", "40mm:5", "--csv", str(file)]) == 0
     rows = [*csv.DictReader(file.read_text().splitlines())]
@@ -160,6 +164,6 @@ def test_compare_in_python_is_the_command(tmp_path, old, new):
         ({"supplied": kincheck.Supplied(travel="300mm:5")}, "not reached|cannot"),
     ],
 )
-def test_compare_in_python_refuses(old, new, given, said):
+def test_compare_in_python_refuses_invalid_arguments(old, new, given, said):
     with pytest.raises(kincheck.KincheckError, match=said):
         kincheck.compare(old, new, **given)

@@ -37,19 +37,23 @@ def listening():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def started(*command):
+    return subprocess.Popen(
+        [sys.executable, *map(str, command)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=listening,
+    )
+
+
 def ended(process):
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
 
 
 def stopped_at(kind, count, number, *arguments, text=""):
-    event = [kind, text, str(count), str(int(number))]
-    command = [sys.executable, "-c", AT, *event, *map(str, arguments)]
-    return ended(
-        subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
-        )
-    )
+    return ended(started("-c", AT, kind, text, count, int(number), *arguments))
 
 
 def lines(err):
@@ -64,17 +68,15 @@ TERM = signal.SIGTERM, 143, "terminated"
     ("count", "number", "status", "said"),
     [(1, *INTERRUPT), (10, *TERM), (100, *INTERRUPT), (300, *TERM)],
 )
-def test_during_imports(count, number, status, said):
+def test_interrupt_during_imports_is_one_line(count, number, status, said):
     assert stopped_at("import", count, number, "list") == (status, "", f"kincheck: {said}\n")
 
 
-@pytest.mark.parametrize(
-    "command", [["list"], "run rssr --engine native".split(), ["trace", "four_bar"], ["doctor"]]
-)
-def test_an_interrupt_of_any_command_is_one_line(command):
+@pytest.mark.parametrize("line", ["list", "run rssr --engine native", "trace four_bar", "doctor"])
+def test_interrupt_of_command_is_one_line(line):
     """Texts that imports compile, which make Python end by the signal if it is left to itself."""
     for count in (5, 40):
-        status, _, err = stopped_at("exec", count, signal.SIGINT, *command)
+        status, _, err = stopped_at("exec", count, signal.SIGINT, *line.split())
         assert (status, lines(err)) == (130, ["kincheck: interrupted"])
 
 
@@ -82,11 +84,8 @@ def test_interrupted_run_writes_records(tmp_path):
     """While records come, and once more while they are written."""
     out = tmp_path / "out"
     # the strut and MuJoCo take long enough to be interrupted in time
-    command = [sys.executable, "-m", "kincheck", "run", "rssr", "mcpherson_strut"]
-    command += f"--engine native mujoco --jobs 1 --out {out}".split()
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
-    )
+    line = "-m kincheck run rssr mcpherson_strut --engine native mujoco --jobs 1"
+    process = started(*line.split(), "--out", out)
     first = process.stderr.readline()
     process.send_signal(signal.SIGINT)
     status, _, err = ended(process)
@@ -117,7 +116,7 @@ def test_interrupt_while_writing_completes_files(tmp_path, number):
 
 
 @pytest.mark.parametrize("seconds", [0.3, 0.7, 1.4])
-def test_at_any_moment(tmp_path, seconds):
+def test_interrupt_of_run_at_any_time(tmp_path, seconds):
     """From when Python has begun to the end of the run, workers and history included."""
     command = "run rssr --engine native --jobs 1".split()
     command += ["--history", tmp_path / "h.sqlite", "--out", tmp_path]
@@ -126,13 +125,7 @@ def test_at_any_moment(tmp_path, seconds):
         f"open({str(begun)!r}, 'w').close(); from kincheck.__main__ import main; import sys;"
         " sys.exit(main())"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, *map(str, command)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=listening,
-    )
+    process = started("-c", code, *command)
     while not begun.exists():
         time.sleep(0.01)
     time.sleep(seconds)
@@ -142,7 +135,7 @@ def test_at_any_moment(tmp_path, seconds):
     assert len(lines(err)) == (status == 130), err
 
 
-def test_a_second_interrupt_is_noted_and_a_third_stops():
+def test_second_interrupt_waits_third_stops():
     heard = interrupts.Interrupts()
     with pytest.raises(KeyboardInterrupt):
         heard(signal.SIGINT, None)
@@ -165,7 +158,7 @@ def test_deferred_interrupt_waits_for_work():
     assert done == ["whole"]
 
 
-def test_a_signal_that_is_ignored_stays_ignored():
+def test_ignored_signal_stays_ignored():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with interrupts.listening():

@@ -67,14 +67,14 @@ def test_impossible_output_file_is_refused(here, capsys, command, option, name):
         (("assemblies", "five_bar"), "assemblies from"),
     ],
 )
-def test_a_full_disk_costs_no_answer(capsys, command, said):
+def test_full_disk_still_prints_answer(capsys, command, said):
     assert main([*command, "--json", "/dev/full"]) == 2
     captured = capsys.readouterr()
     assert said in captured.out
     assert captured.err.startswith("kincheck: --json /dev/full: cannot be written (No space left")
 
 
-def test_proofs_go_on_without_a_file(here, capsys):
+def test_reference_continues_after_failed_file(here, capsys):
     Path("out").mkdir()
     Path("out", "five_bar.reference.json").symlink_to("/dev/full")
     assert main("reference five_bar rssr --digits 17 --out out -q".split()) == 2
@@ -84,7 +84,7 @@ def test_proofs_go_on_without_a_file(here, capsys):
     assert Path("out", "rssr.reference.json").is_file()
 
 
-def test_a_reader_of_the_old_file_keeps_it_whole(here):
+def test_replaced_file_stays_whole_for_readers(here):
     Path("all.json").write_text("an earlier answer")
     with Path("all.json").open() as old:
         assert main("trace five_bar --json all.json".split()) == 0
@@ -101,7 +101,7 @@ sys.exit(main())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
-def test_a_full_disk_leaves_the_stored_values_as_they_were(here):
+def test_full_disk_keeps_previous_store(here):
     pytest.importorskip("pyarrow.parquet")
     Path("all.parquet").write_bytes(b"an earlier study")
     ran = subprocess.run(
@@ -140,7 +140,7 @@ sys.exit(main())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_a_killed_study_leaves_the_stored_values_as_they_were(here):
+def test_killed_sweep_keeps_previous_store(here):
     pytest.importorskip("pyarrow.parquet")
     Path("all.parquet").write_bytes(b"an earlier study")
     ran = subprocess.run(
@@ -152,7 +152,7 @@ def test_a_killed_study_leaves_the_stored_values_as_they_were(here):
     assert Path("all.parquet").read_bytes() == b"an earlier study"
 
 
-def test_overlong_names_are_unknown(here, capsys):
+def test_overlong_case_names_are_refused(here, capsys):
     name = "x" * 300
     Path("model.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')
     for command in (["run", name], ["explain", name], ["report", name], ["run", "model.xml"]):

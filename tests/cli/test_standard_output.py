@@ -10,12 +10,12 @@ from kincheck.core.harness.record import from_json
 
 ROOT = Path(__file__).parents[2]
 KINCHECK = "import sys; from tests.support.fake_command import main; sys.exit(main())"
-RUN = "run first --engine native --jobs 0".split()
+RUN = "run first --engine native --jobs 0"
 
 
-def kincheck(*arguments, out=subprocess.PIPE, **env):
+def kincheck(line, out=subprocess.PIPE, **env):
     """The command line in a process of its own, with a case and an engine that need no time."""
-    arguments = [sys.executable, "-c", KINCHECK, *arguments]
+    arguments = [sys.executable, "-c", KINCHECK, *line.split()]
     env = os.environ | env
     env.pop("PYTHONUNBUFFERED", None)  # or nothing would be left to be written in the end
     return subprocess.run(
@@ -24,20 +24,20 @@ def kincheck(*arguments, out=subprocess.PIPE, **env):
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
-def test_output_encoding_without_letters(encoding):
-    done = kincheck(*RUN, PYTHONIOENCODING=encoding)
+def test_run_output_in_limited_encodings(encoding):
+    done = kincheck(RUN, PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
     assert "1 pass" in done.stdout.decode(encoding)
-    done = kincheck(*RUN, "--json", "-", PYTHONIOENCODING=encoding)
+    done = kincheck(f"{RUN} --json -", PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
     assert len(from_json(done.stdout).records) == 1
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
-@pytest.mark.parametrize("asked", [["list"], RUN, [*RUN, "--json", "-"]])
-def test_a_full_standard_output_is_one_message(asked):
+@pytest.mark.parametrize("line", ["list", RUN, f"{RUN} --json -"])
+def test_full_standard_output_has_status_2(line):
     with open("/dev/full", "wb") as full:
-        done = kincheck(*asked, out=full)
+        done = kincheck(line, out=full)
     assert done.returncode == 2
     assert (
         done.stderr.decode()
@@ -55,30 +55,30 @@ def test_closed_standard_output_is_no_failure(tmp_path):
     )
     file = tmp_path / "r.json"
     done = subprocess.run(
-        [sys.executable, "-c", code, *RUN, "--json", str(file)], cwd=ROOT, check=False
+        [sys.executable, "-c", code, *RUN.split(), "--json", str(file)], cwd=ROOT, check=False
     )
     assert done.returncode == 0
     assert len(from_json(file.read_bytes()).records) == 1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="closes a pipe as a shell does")
-@pytest.mark.parametrize("command", [["list"], RUN, ["explain", "first"]])
-def test_broken_pipe_is_no_failure(command):
+@pytest.mark.parametrize("line", ["list", RUN, "explain first"])
+def test_broken_pipe_is_no_failure(line):
     """As for `kincheck list | head`, whose head has what it wanted."""
     read, write = os.pipe()
     os.close(read)
     with os.fdopen(write, "wb") as gone:
-        done = kincheck(*command, out=gone)
+        done = kincheck(line, out=gone)
     assert done.returncode == 0
     # progress, and no complaint
     assert all(line.startswith(b"[") for line in done.stderr.splitlines()), done.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="has /dev/stdout")
-def test_output_file_equals_standard_output_refused(tmp_path):
+def test_file_behind_standard_output_is_refused(tmp_path):
     for name in ("/dev/stdout", str(tmp_path / "printed")):
         with open(tmp_path / "printed", "w") as printed:
-            done = kincheck(*RUN, "--junit", name, out=printed)
+            done = kincheck(f"{RUN} --junit {name}", out=printed)
         assert done.returncode == 2
         expected = (
             f"kincheck: --junit {name}: found the file that standard output goes to, expected one"
@@ -86,6 +86,6 @@ def test_output_file_equals_standard_output_refused(tmp_path):
         )
         assert done.stderr.decode() == expected
     # a pipe takes both
-    done = kincheck(*RUN, "--junit", "/dev/stdout")
+    done = kincheck(f"{RUN} --junit /dev/stdout")
     assert b"</testsuites>" in done.stdout
     assert b"1 pass" in done.stdout

@@ -41,7 +41,7 @@ def job(tmp_path):
     return job
 
 
-def test_the_action_is_red_after_a_regression(job, tmp_path):
+def test_github_action_fails_after_regression(job, tmp_path):
     file = tmp_path / "slider.toml"
     file.write_text(BASE + INLINE)
     assert job(cases="slider.toml")[:2] == (0, "status=0")

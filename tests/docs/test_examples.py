@@ -90,7 +90,9 @@ class Reader:
     [README, *(pytest.param(page, marks=pytest.mark.nightly) for page in PAGES)],
     ids=lambda path: str(path.relative_to(ROOT)),
 )
-def test_examples_run_as_printed(path, tmp_path, commands_folder, monkeypatch, own_joint_types):
+def test_documentation_examples_run_as_printed(
+    path, tmp_path, commands_folder, monkeypatch, own_joint_types
+):
     reader = Reader(tmp_path, commands_folder)
     monkeypatch.chdir(reader.folder)
     monkeypatch.syspath_prepend(str(reader.folder))

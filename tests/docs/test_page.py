@@ -38,7 +38,7 @@ make fuzz
 """
 
 
-def test_blocks():
+def test_page_blocks_with_status_and_output():
     file, console, python, left_out = blocks(PAGE)
     assert (file.title, file.text, file.line) == ("a.toml", "x = 1\n", 2)
     assert (console.status, console.excuse) == (1, None)
@@ -61,11 +61,11 @@ PRINTED = "case  error\n\nrssr  1.5e-16  pass\nnote: long, and longer\n1 pass\n"
         ("...\n1 pass\ncase error", "case error"),
     ],
 )
-def test_numbers_may_differ_and_nothing_else(shown, lacks):
+def test_shown_output_may_differ_in_numbers(shown, lacks):
     assert differences(shown, PRINTED) == lacks
 
 
-def test_reference_pages_have_all_commands_and_types():
+def test_reference_pages_list_commands_and_types():
     source = ROOT / "docs" / "generated.py"
     if not source.exists():
         pytest.skip("the documentation is not here")

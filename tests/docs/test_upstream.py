@@ -22,14 +22,14 @@ def printed(name, package):
     return done.stdout.splitlines()
 
 
-def test_tendon_equality_has_no_acceleration_term():
+def test_mujoco_tendon_equality_lacks_acceleration_term():
     _, *lines = printed("mujoco_tendon_equality", "mujoco")
     for line in lines:
         assert "expected -8" in line
         assert "found 0 " in line
 
 
-def test_accelerations_err_by_the_inverse_of_mu():
+def test_pinocchio_acceleration_error_grows_with_mu():
     _, *lines = printed("pinocchio_proximal", "pinocchio")
     found = {float(mu): float(error) for mu, error in map(numbers, lines)}
     assert found[1e-1] < 1e-13
@@ -40,7 +40,7 @@ def numbers(line):
     return re.findall(r"\d\.?\d*e[-+]\d+", line)
 
 
-def test_ball_on_world_body_ends_the_process():
+def test_drake_ball_on_world_aborts():
     world, anchor = printed("drake_ball_on_world", "pydrake")
     assert world.startswith("world body: exit status -")
     assert anchor == "anchor body: exit status 0"
@@ -49,13 +49,13 @@ def test_ball_on_world_body_ends_the_process():
 @pytest.mark.skipif(
     sys.platform != "linux" or shutil.which("cc") is None, reason="builds a binary for Linux"
 )
-def test_outputs_of_fmpy_are_a_step_late():
+def test_fmpy_outputs_lag_one_step():
     _, first, second, *_ = printed("fmpy_late_inputs", "fmpy")
     assert first.split() == "t 0.0 u 0.0 y 0.0".split()
     assert second.split() == "t 0.2 u 0.2 y 0.0".split()
 
 
-def test_every_draft_has_its_reproducer_and_is_listed():
+def test_upstream_drafts_have_listed_reproducers():
     listed = (FOLDER / "README.md").read_text("utf-8")
     drafts = sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "README")
     assert drafts == sorted(path.stem for path in FOLDER.glob("*.py"))

@@ -17,9 +17,9 @@ from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine import Unloadable, versions
 from kincheck.core.harness.record import Outcome
 
-from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 from ..support.fakes import record_of, run_case
 from ..support.mechanisms import placed
+from ..support.version_engines import DEEDS, Foreign, Loading, Ours
 
 # Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in
 # geometry cannot hide.

@@ -13,6 +13,7 @@ from kincheck.core.case.case import NO_SIZE, Output, Series, size
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import (
+    Curve,
     as_numbers,
     describe,
     deviation,
@@ -178,6 +179,11 @@ def test_report_refuses_file_without_results(tmp_path, capsys, text, said):
 REFERENCE = np.array([0.0, 1.0, 3.0, 2.0])
 
 
+def reference_off(error, atol, rtol=0.0):
+    """The deviation of the reference with these errors."""
+    return deviation(Curve(REFERENCE + error, atol, rtol), Curve(REFERENCE), "closed_form")
+
+
 def test_output_is_projection_minus_design():
     case = crank()
     position, velocity, acceleration = exact(case)
@@ -220,7 +226,7 @@ def test_missing_derivative_is_null_with_reason():
 
 
 def test_deviation_has_worst_sample():
-    found = deviation(REFERENCE + [0.0, 3e-3, -4e-3, 0.0], REFERENCE, 1e-3, 1e-3, "closed_form")
+    found = reference_off([0.0, 3e-3, -4e-3, 0.0], 1e-3, 1e-3)
     assert found is not None
     assert found.max_abs == pytest.approx(4e-3, rel=1e-12)
     assert found.rms == pytest.approx(2.5e-3, rel=1e-12)  # sqrt((9 + 16) / 4) e-3
@@ -231,23 +237,25 @@ def test_deviation_has_worst_sample():
 
 @pytest.mark.parametrize(("error", "within"), [(0.9e-3, True), (1.1e-3, False), (-1.1e-3, False)])
 def test_deviation_within_tolerance(error, within):
-    assert deviation(REFERENCE + [0, 0, 0, error], REFERENCE, 1e-3, 0.0, "x").within is within
+    assert reference_off([0, 0, 0, error], 1e-3).within is within
 
 
 def test_deviation_compares_common_samples():
     nan = np.nan
-    found = deviation(np.array([nan, 1.5, 3.0, 9.0]), np.array([0.0, 1.0, 3.0, nan]), 0.0, 0.1, "x")
+    one, other = (Curve(np.array(each)) for each in ([nan, 1.0], [0.0, nan]))
+    known = Curve(np.array([0.0, 1.0, 3.0, nan]))
+    found = deviation(Curve(np.array([nan, 1.5, 3.0, 9.0]), rtol=0.1), known)
     assert (found.max_abs, found.worst_step) == (0.5, 1)
     assert found.tolerance == pytest.approx(0.2)  # the range over the compared samples is 2, not 3
     assert found.rms == pytest.approx(0.5 / np.sqrt(2))
-    assert deviation(np.array([nan, 1.0]), np.array([0.0, nan]), 1.0, 0.0, "x") is None
+    assert deviation(one, other) is None
     # without any error the worst sample is still one that was compared
-    assert deviation(np.array([nan, 1.0]), np.array([nan, 1.0]), 0.0, 0.0, "x").worst_step == 1
+    assert deviation(one, one).worst_step == 1
 
 
 def test_reference_of_wrong_length_is_refused():
     with pytest.raises(CaseError, match=r"closed form has shape \(1,\), expected \(4,\)"):
-        deviation(REFERENCE, np.zeros(1), 1e-9, 0.0, "closed_form")
+        deviation(Curve(REFERENCE), Curve(np.zeros(1)), "closed_form")
 
 
 def test_derivative_tolerance_scales_with_rate():
@@ -314,7 +322,7 @@ def test_missing_value_of_solved_sample_fails(complete):
 
 
 def test_deviation_text_names_sample_and_tolerance():
-    found = deviation(REFERENCE + [0.0, 0.0, 4e-3, 0.0], REFERENCE, 1e-3, 0.0, "closed_form")
+    found = reference_off([0.0, 0.0, 4e-3, 0.0], 1e-3)
     said = describe("half_track_change", "velocity", found, "stroke", [-0.1, 0.0, 0.1, 0.2])
     assert (
         said

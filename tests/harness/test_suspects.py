@@ -14,10 +14,11 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
 from kincheck.core.case.suspension import camber_of_front_view
 from kincheck.core.cli import main
-from kincheck.core.harness.evidence import digest
+from kincheck.core.harness.compare import Curve
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
-from kincheck.core.harness.suspects import FACTORS, Held, slips
+from kincheck.core.harness.suspects import FACTORS, slips
+from kincheck.core.harness.verdict import digest
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import headline, write_report
@@ -175,14 +176,11 @@ def test_lone_engine_suspects_explained_slips():
 
 
 def held(values, atol=1e-9):
-    return Held(np.asarray(values, dtype=float), atol, 0.0, "m")
+    return Curve(np.asarray(values, dtype=float), atol, unit="m")
 
 
 def words(values, reference, others=None):
-    return [
-        each.change
-        for each in slips(held(values), np.asarray(reference, dtype=float), others or {})
-    ]
+    return [*slips(held(values), held(reference, 0.0), others or {})]
 
 
 OTHER = np.cos(3.0 * S)
@@ -213,7 +211,7 @@ def test_slip_by_definition_and_sign():
     definitions = [("taken as another", lambda x: camber_of_front_view(x, toe))]
 
     def named(reference):
-        return [each.change for each in slips(held(WAVY), reference, {}, definitions=definitions)]
+        return [*slips(held(WAVY), held(reference, 0.0), {}, definitions=definitions)]
 
     assert named(seen) == ["taken as another"]
     assert "with the other sign and taken as another" in named(-seen)

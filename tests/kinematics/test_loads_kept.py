@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.equivalents import in_own_frame, jointed, own_frame
+from kincheck.adapters.shared.equivalents import in_own_frame, own_frame, with_joints_alone
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.kinematics.formulation.constraints import frames, structure
@@ -36,7 +36,7 @@ def same_loads(a: Mechanism, b: Mechanism) -> None:
     [
         lambda m: replace(m, points=m.points),
         lambda m: placed(m, places(m)),
-        jointed,
+        with_joints_alone,
         lambda m: round_geometry(case_of(m), 9).mechanism,
     ],
     ids=["replace", "placed", "jointed", "rounded"],
@@ -47,7 +47,7 @@ def test_derived_mechanism_keeps_loads(other):
 
 
 def test_equivalent_joint_bodies_are_massless():
-    added = {each.name: each.mass for each in jointed(pushed()).bodies}
+    added = {each.name: each.mass for each in with_joints_alone(pushed()).bodies}
     assert len(added) == 3 + 4  # of a rod, and three slides
     assert sum(added.values()) == 5.5
 

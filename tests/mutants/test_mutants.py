@@ -49,7 +49,7 @@ EXPECTED = [
 ]
 
 
-def test_mutants_change_one_token_of_what_runs():
+def test_mutants_change_one_token():
     found = mutants("case.py", SOURCE)
     assert [[each.mutant for each in place] for place in found] == EXPECTED
     for each in (each for place in found for each in place):
@@ -66,7 +66,7 @@ def test_mutants_change_one_token_of_what_runs():
 
 
 @pytest.mark.nightly
-def test_sample_has_its_share_of_every_room_and_stays():
+def test_mutant_sample_covers_rooms_and_stays():
     sources = {str(path): (ROOT / path).read_text("utf-8") for path in files("core", "adapters")}
     sites = {path: mutants(path, text) for path, text in sources.items()}
     few, many = (sample(sites, count, 7) for count in (100, 300))
@@ -77,7 +77,7 @@ def test_sample_has_its_share_of_every_room_and_stays():
         assert ast.dump(ast.parse(each.applied(sources[each.path])))
 
 
-def test_table_counts_ends_by_room():
+def test_mutant_table_counts_ends_by_room():
     ends = {"core/a": ["killed", "timeout", "survived", "harmless"], "adapters": ["killed"]}
     rows = table([{"room": room, "end": end} for room, each in ends.items() for end in each])
     assert [line.split() for line in rows.splitlines()[1:]] == [

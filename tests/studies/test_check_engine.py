@@ -175,7 +175,7 @@ def test_entry_point_group_is_kincheck_engines(monkeypatch):
 
     class_loading.entry_points.cache_clear()
     monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
-    assert class_loading.offered(["native"]) == ("own",)
+    assert class_loading.names_of_entry_points(["native"]) == ("own",)
     assert asked == ["kincheck.engines"]
     class_loading.entry_points.cache_clear()
 

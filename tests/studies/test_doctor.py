@@ -19,7 +19,7 @@ from kincheck.core.program import disk_cache
 @pytest.fixture
 def without_imports(monkeypatch):
     """Nothing is imported in processes of their own: that takes seconds."""
-    monkeypatch.setattr(installation, "_imported", lambda found, *others: found)
+    monkeypatch.setattr(installation, "_with_import_problems", lambda found, *others: found)
 
 
 def missing(monkeypatch, *names):
@@ -117,7 +117,7 @@ def test_doctor_fails_without_essential_library(without_imports, monkeypatch, ca
 def imported(name, code):
     """What doctor finds of a library that is imported by code."""
     part = installation.Part(name, "1.0", "kincheck", True, "", "")
-    (found,) = installation._imported([part], {name: code} if code else {}, {})
+    (found,) = installation._with_import_problems([part], {name: code} if code else {}, {})
     return found
 
 

@@ -37,6 +37,12 @@ class Deck:
         )
         return self
 
+    def joint(self, number, kind, part, other=1, at=AT, axes=AXES):
+        """Add a joint of two parts with both markers at one place, I of the first part."""
+        i, j = 10 * number + 1, 10 * number + 2
+        self.marker(i, part, at, axes).marker(j, other, at, axes)
+        return self.add(f"JOINT/{number}, {kind}, I = {i}, J = {j}")
+
     def add(self, *lines):
         """Add statements."""
         self.lines += lines

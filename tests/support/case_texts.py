@@ -1,9 +1,11 @@
 """A small case file, ways to change it, and what a wrong one has to give: exactly one CaseError."""
 
+import re
 from functools import partial
 
 import pytest
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import CaseError
 
@@ -79,3 +81,20 @@ def complains(file, message, supplied=None):
     """As `refused`, of a case file, or of any file with options; it begins with the folder."""
     read = load_case if supplied is None else partial(load, supplied=supplied)
     assert refused(lambda: read(file), message).startswith(str(file.parent))
+
+
+def rows(text, named=True):
+    """Parameters of a test from a table in a text, cells between bars; the first names the row.
+    A line that begins with a bar goes on with the row above.
+    """
+    table = []
+    for line in re.sub(r"\n *\|", "|", text.strip()).splitlines():
+        cells = [cell.strip().replace(r"\n", "\n") for cell in line.split("|")]
+        table.append(pytest.param(*cells[named:], id=cells[0]))
+    return table
+
+
+def supplied(text):
+    """Options of a reader from words NAME=VALUE, of which the last counts; without a value none."""
+    pairs = (word.split("=", 1) for word in text.split())
+    return Supplied(**{name: value or None for name, value in pairs})

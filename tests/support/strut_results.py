@@ -8,10 +8,10 @@ import math
 from typing import Any
 
 import msgspec
-from kincheck.core.harness.evidence import Evidence
 from kincheck.core.harness.record import (
     Deviation,
     Deviations,
+    Evidence,
     Outcome,
     OutputSeries,
     Record,

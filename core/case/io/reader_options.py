@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
-from ...options import declared, flags_of, option, positive, switch
+from ...options import flags_of, option, option_fields, positive, switch
 
 HARDPOINTS, MODELS, CURVES = "hardpoints", "models", "measured curves"
 _hardpoints, _models, _curves = (
@@ -219,7 +219,7 @@ class CurveOptions:
         """The message if there is no curve that they are for; empty without any of them."""
         given = [
             flags_of(each, meaning)[0]
-            for each, meaning, _ in declared(CurveOptions)
+            for each, meaning, _ in option_fields(CurveOptions)
             if meaning is not None and getattr(self, each.name) not in (None, False, (), [])
         ]
         if not given:

@@ -162,7 +162,7 @@ class _WhileSteering(AxleOutput):
         return 1
 
     @abstractmethod
-    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+    def of_cotangents(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
         """Return the value for cotangents of the steer angles towards the inner wheel.
 
         Args:
@@ -180,7 +180,7 @@ class _WhileSteering(AxleOutput):
         ratio = (left.contact.y + right.contact.y) / self.vehicle.wheelbase
         x, y = doubles(a.x), doubles(b.x)
         steered = -np.sign(x * y) * np.minimum(np.abs(x), np.abs(y))
-        return where(steered > STRAIGHT, self.steered(inner, outer, ratio))
+        return where(steered > STRAIGHT, self.of_cotangents(inner, outer, ratio))
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class Ackermann(_WhileSteering):
     measure = "1"
     positive = "the inner wheel steered further, fully at 1"
 
-    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+    def of_cotangents(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
         """Return the part of the difference [-]."""
         return (outer - inner) / ratio
 
@@ -211,7 +211,7 @@ class AckermannAngles(_WhileSteering):
     measure = "1"
     positive = "the inner wheel steered further, fully at 1"
 
-    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+    def of_cotangents(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
         """Return the part of the difference [-]."""
         one = ratio / ratio
         a, b, ideal = (arctan2(one, each) for each in (inner, outer, inner + ratio))
@@ -228,7 +228,7 @@ class TurningCircle(_WhileSteering):
     type = "turning_circle"
     positive = "always"
 
-    def steered(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
+    def of_cotangents(self, inner: Jet, outer: Jet, ratio: Jet) -> Jet:
         """Return the diameter [m]."""
         assert self.vehicle.wheelbase is not None
         return 2.0 * self.vehicle.wheelbase * sqrt(1.0 + outer * outer)

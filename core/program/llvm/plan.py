@@ -23,7 +23,7 @@ and "state" the number of remembered slots. "behind" is zero without extrapolati
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Addresses of calls: each holds the address of a function of lanes and a table, and of the table.
 """
-CALLS = ("after", "alone", "joined", "onward", "remaining")
+CALLS = ("after", "alone", "joined", "onward", "rest")
 PAIRS = ("carried", "returned", "moves", "continued", "remembered", "shifted")
 TABLES: Mapping[str, int] = {
     **dict.fromkeys(CALLS, 1),
@@ -246,7 +246,7 @@ class PlanInMemory:
             "tolerance": _bits(plan.tolerance),
             "most": plan.most,
             "behind": plan.behind if extrapolates else 0,
-            "quick": extrapolates or not plan.rest,
+            "quick": extrapolates or not plan.remaining,
             "past": plan.past,
             "state": len(plan.remembered),
             **{name: self.entry(name) if name in self.calls else 0 for name in PROGRAMS},

@@ -11,8 +11,8 @@ from typing import Any
 from msgspec.structs import astuple
 
 from ...errors import number_of
+from ...harness.engine import STANDARD
 from ...harness.labels import against, known, motion_unit, number
-from ...harness.standard import STANDARD
 from ...report.figures import Figure, Style, precision_figure, ticked_axis
 from ...report.page_model import Plot
 from ...report.sections import Diagram, Report, Section

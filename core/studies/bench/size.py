@@ -19,10 +19,9 @@ import numpy as np
 
 from ...case.case import Case, Output, Series, Sweep, Truth
 from ...errors import SolveError
-from ...harness.engine import Engine
+from ...harness.engine import STANDARD, Engine
 from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
-from ...harness.standard import STANDARD
 from ...joints import Inline, Joint, Revolute, Spherical, Universal
 from ...kinematics import Method, NativeSolver
 from ...mechanism.mechanism import Body, Mechanism, Point, Vector

@@ -18,7 +18,7 @@ import numpy as np
 from ...case.case import TIME, Case
 from ...case.joint_probe import probe, probes
 from ...errors import shortened
-from ...harness.engine import Engine, may_run_here, versions
+from ...harness.engine import STANDARD, Engine, may_run_here, versions
 from ...harness.execution import (
     Answer,
     Attempt,
@@ -31,7 +31,6 @@ from ...harness.execution import (
 from ...harness.record import Outcome, Record
 from ...harness.resource_limits import Limits
 from ...harness.run import Progress, run
-from ...harness.standard import STANDARD
 from ...harness.verdict import NAMED
 from ...harness.workers.pool import in_workers
 from ...joints import Revolute

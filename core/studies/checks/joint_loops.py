@@ -22,11 +22,11 @@ from ...case.quantity import AXES, with_markers
 from ...errors import MechanismError, SolveError
 from ...forces import Reaction
 from ...harness.compare import output_series
-from ...harness.engine import Engine
+from ...harness.engine import STANDARD, Engine
 from ...harness.execution import Answer, Failure, Pair, attempt, error_text
 from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
-from ...harness.standard import STANDARD, Standard
+from ...harness.verdict import Standard
 from ...harness.verdict import judged as verdict_of
 from ...joints import AxialJoint, Joint
 from ...kinematics import NativeSolver

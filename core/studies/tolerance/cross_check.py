@@ -13,12 +13,11 @@ import numpy as np
 
 from ...case.case import Case, Series
 from ...errors import KincheckError, SolveError, shortened
-from ...harness.compare import describe, deviation, pace
-from ...harness.engine import Engine
+from ...harness.compare import Curve, curve_of, describe, deviation, pace
+from ...harness.engine import STANDARD, Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Deviation, Outcome
-from ...harness.standard import STANDARD, UNCERTAIN
-from ...harness.verdict import NAMED, excess, promised
+from ...harness.verdict import NAMED, UNCERTAIN, excess, promised
 from ...kinematics import NativeSolver
 from ...trajectory import QUANTITIES, Array
 from .study import ReducedQuantity, Study
@@ -157,9 +156,8 @@ def judge_variant(
                 f"{row.name}: {count} samples without a value where the sweep has one:"
                 f" {result.message or 'no reason given'}"
             )
-        off = deviation(
-            theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, STANDARD
-        )
+        mine = curve_of(row.output, row.derivative, beat, theirs)
+        off = deviation(mine, Curve(values), STANDARD)
         if off is not None and (worst is None or off.ratio > worst[0].ratio):
             worst = off, row
     outcome, message = Outcome.UNJUDGED, "no row has values from both"

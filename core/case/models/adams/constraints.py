@@ -132,7 +132,7 @@ def size_of(model: Model) -> float:
     return extent if extent > 1e-9 else 1.0
 
 
-def assembled(model: Model, links: Sequence[Link], size: float, tolerance: float) -> Model:
+def assemble_links(model: Model, links: Sequence[Link], size: float, tolerance: float) -> Model:
     """Return the dataset with both markers of each link together, with a note on how far they were
     apart unless they agreed.
 
@@ -151,26 +151,26 @@ def assembled(model: Model, links: Sequence[Link], size: float, tolerance: float
         shift, turn = gaps[link.statement.name]
         if shift > FAR * size or turn > FAR:
             raise link.statement.fault(
-                f"its markers {link.i} and {link.j} are {_apart(shift, turn)} apart at the start,"
+                f"its markers {link.i} and {link.j} are {_text(shift, turn)} apart at the start,"
                 f" expected {FAR * size:.3g} m and {math.degrees(FAR):.2g} degrees at most; Adams"
                 " assembles them first: save the dataset after its assembly, or correct a marker"
             )
-    found = _closed(model, links, size, max(WEAK, ADDED_UP * tolerance / size))
+    found = _close_links(model, links, size, max(WEAK, ADDED_UP * tolerance / size))
     for link in links:
         shift, turn = _gap(link, found)
         if max(shift, size * turn) > max(ADDED_UP * tolerance, CLOSED * ADDED_UP * size):
             raise link.statement.fault(
                 f"its markers {link.i} and {link.j} cannot be brought together: they are"
-                f" {_apart(*gaps[link.statement.name])} apart as the dataset places them, and"
-                f" {_apart(shift, turn)} in the nearest assembly; correct a marker or a part"
+                f" {_text(*gaps[link.statement.name])} apart as the dataset places them, and"
+                f" {_text(shift, turn)} in the nearest assembly; correct a marker or a part"
             )
     told = sorted(opened.items(), key=lambda each: -max(each[1][0], size * each[1][1]))
-    moves = shortened([f"{name} by {_apart(*gap)}" for name, gap in told], MOST_TOLD)
+    moves = shortened([f"{name} by {_text(*gap)}" for name, gap in told], MOST_TOLD)
     model.note(f"markers that were apart at the start are assembled: {moves}")
     return replace(model, places=found)
 
 
-def _apart(shift: float, turn: float) -> str:
+def _text(shift: float, turn: float) -> str:
     parts = [f"{shift:.3g} m"] if shift or not turn else []
     return " and ".join([*parts, *([f"{math.degrees(turn):.3g} degrees"] if turn else [])])
 
@@ -245,7 +245,7 @@ def _rows(
             yield _residual(row, i, j, link.length) / unit, slope
 
 
-def _closed(model: Model, links: Sequence[Link], size: float, weak: float) -> dict[int, Frame]:
+def _close_links(model: Model, links: Sequence[Link], size: float, weak: float) -> dict[int, Frame]:
     """Return the frames of the nearest assembly found.
 
     Args:
@@ -375,7 +375,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
     """
     found = list[Coupler]()
     for each in model.dataset.of("COUPLER"):
-        pair = _coupled(each, driven)
+        pair = _coupled_coordinates(each, driven)
         scales = each.numbers("SCALES") if "SCALES" in each.values else []
         if len(scales) not in (len(pair) - 1, len(pair)) or not all(scales):
             raise each.fault(
@@ -395,7 +395,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
                 " and stays so: joints are coupled from the start"
             )
     for each in model.dataset.of("GEAR"):
-        pair = _coupled(each, driven)
+        pair = _coupled_coordinates(each, driven)
         found.append(_coupler(each, pair, _gear_weights(each, model, pair)))
     for each in model.dataset.of("JOINT"):
         if "RACKPIN" in each.flags:
@@ -403,7 +403,7 @@ def read_couplers(model: Model, driven: Sequence[Coordinate]) -> list[Coupler]:
     return found
 
 
-def _coupled(statement: Statement, driven: Sequence[Coordinate]) -> list[Coordinate]:
+def _coupled_coordinates(statement: Statement, driven: Sequence[Coordinate]) -> list[Coordinate]:
     """Return the two coordinates of a gear, two or three of a coupler, named by its joints."""
     names = statement.ids("JOINTS")
     types = statement.values.get("TYPE", "").upper().replace(",", ":").split(":")
@@ -467,8 +467,8 @@ def _rack(statement: Statement, model: Model, driven: Sequence[Coordinate]) -> C
     """
     pinion, rack = model.ends(statement)
     radius = 0.5 * model.units.length * abs(statement.one("PD"))
-    one = _supported(statement, model.body(pinion), driven, "rotation")
-    other = _supported(statement, model.body(rack), driven, "translation")
+    one = _coordinate_of_body(statement, model.body(pinion), driven, "rotation")
+    other = _coordinate_of_body(statement, model.body(rack), driven, "translation")
     arm = model.frame(rack).origin - np.array(one.joint.point)
     for axis in (one.axis, other.axis):
         arm = arm - axis * (axis @ arm)
@@ -489,7 +489,7 @@ def _rack(statement: Statement, model: Model, driven: Sequence[Coordinate]) -> C
     return _coupler(statement, (one, other), (-speed, 1.0))
 
 
-def _supported(
+def _coordinate_of_body(
     statement: Statement, body: str, driven: Sequence[Coordinate], freedom: str
 ) -> Coordinate:
     """Return the only coordinate of a freedom of a body."""

@@ -253,12 +253,12 @@ def read_dataset(file: Path, text: str, without: Collection[str]) -> Dataset:
     used = set[str]()
     found = dict[str, dict[int, Statement]]()
     left_out = Counter[str]()
-    for count, (line, statement) in enumerate(_joined(file, lines)):
+    for count, (line, statement) in enumerate(_statements(file, lines)):
         if count > MOST_STATEMENTS:
             raise fault(file, "", f"found more than {MOST_STATEMENTS} statements; split the model")
         if statement.strip().upper() == "END":
             break
-        kind, identifier, rest = _headed(file, line, statement, wanted)
+        kind, identifier, rest = _head_of(file, line, statement, wanted)
         bare = Statement(file, kind, identifier, line)
         named = wanted & {kind, f"{kind}/{identifier}"}
         if named:
@@ -312,7 +312,7 @@ def _bare(line: str) -> str:
     return line.split("!", 1)[0].strip()
 
 
-def _joined(file: Path, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+def _statements(file: Path, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     """Yield whole statements with the number of their first line."""
     begun, parts = 0, list[str]()
     open_end = False
@@ -328,7 +328,7 @@ def _joined(file: Path, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int,
                 f"found {shown(line)}, which continues no statement; begin one by KIND/id",
             )
         if not continues and parts:
-            yield from _separated(begun, "".join(parts))
+            yield from _split_at_semicolons(begun, "".join(parts))
             parts = []
         if not parts:
             begun = line_number
@@ -337,14 +337,14 @@ def _joined(file: Path, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int,
         open_end = body.endswith("&")
         parts.append(f" {body.removesuffix('&')}" if continues else body.removesuffix("&"))
     if parts:
-        yield from _separated(begun, "".join(parts))
+        yield from _split_at_semicolons(begun, "".join(parts))
 
 
-def _separated(line: int, text: str) -> Iterator[tuple[int, str]]:
+def _split_at_semicolons(line: int, text: str) -> Iterator[tuple[int, str]]:
     yield from ((line, each) for each in text.split(";") if each.strip(f" \t{_CONTINUED},"))
 
 
-def _headed(file: Path, line: int, text: str, without: Collection[str]) -> tuple[str, int, str]:
+def _head_of(file: Path, line: int, text: str, without: Collection[str]) -> tuple[str, int, str]:
     """Return kind, identifier and the rest of a statement."""
     head = _HEAD.match(text.strip())
     if head is None:

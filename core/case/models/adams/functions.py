@@ -64,12 +64,12 @@ def linear(
 
         return of
 
-    def tried(values: tuple[float, float]) -> float:
+    def value_of(values: tuple[float, float]) -> float:
         own = {name: measure(x) for name, x in zip((length, rate), values, strict=True)}
         return float(evaluate(statement.function, {"SQRT": CURVES["SQRT"], **own}))
 
     try:
-        c, of_length, of_rate, *others = map(tried, _TRIED)
+        c, of_length, of_rate, *others = map(value_of, _TRIED)
         a, b = of_length - c, of_rate - c
         for (x, y), value in zip(_TRIED[3:], others, strict=True):
             parts = c, a * x, b * y
@@ -125,7 +125,7 @@ def read_forces(model: Model, driven: Sequence[Coordinate]) -> list[ForceElement
         numbers = stiffness * unit, damping * unit * units.time
         try:
             if turns:
-                joint, angle = _turning(model, each, driven, free)
+                joint, angle = _turning_joint(model, each, driven, free)
                 angle = angle if stiffness else 0.0
                 found.append(TorsionSpringDamper(each.name, joint, *numbers, angle))
             else:
@@ -140,7 +140,7 @@ def read_forces(model: Model, driven: Sequence[Coordinate]) -> list[ForceElement
     return found
 
 
-def _turning(
+def _turning_joint(
     model: Model, statement: Statement, driven: Sequence[Coordinate], free: float
 ) -> tuple[str, float]:
     """Return the joint between the parts of two markers that turns about their z axis, and its free
@@ -351,7 +351,7 @@ def read_drives(
     rest = [every[k].driver.name for k in taken if k >= len(moved) + len(named)]
     moving = bool(ranges) or any(each.motion for each in moved)
     if not supplied.recorded and (left or not moving or (rest and not supplied.hold_rest)):
-        raise _undriven(model, mechanism, rest, left, moving=moving)
+        raise _undriven_error(model, mechanism, rest, left, moving=moving)
     drives = [every[k] for k in taken]
     if supplied.recorded and (rest or not all(each.motion for each in moved)):
         if any(each.motion for each in moved):
@@ -432,7 +432,7 @@ def _bodies(mechanism: Mechanism) -> str:
     return shortened([body.name for body in mechanism.moving], _MOST_NAMED)
 
 
-def _undriven(
+def _undriven_error(
     model: Model, mechanism: Mechanism, rest: Sequence[str], left: int, *, moving: bool
 ) -> Exception:
     """Return the error of a dataset with undriven freedoms."""

@@ -336,11 +336,11 @@ def read_bodies(model: Model) -> list[Body]:
         x, y, z, w = rotations().from_matrix(place.axes).as_quat(canonical=True).tolist()
         body = Body(part.name, coordinates(place.origin), (w, x, y, z))
         with explained(part.file, part.label):
-            found.append(_weighed(body, part, model))
+            found.append(_with_mass(body, part, model))
     return found
 
 
-def _weighed(body: Body, part: Statement, model: Model) -> Body:
+def _with_mass(body: Body, part: Statement, model: Model) -> Body:
     units, place = model.units, model.places[part.id]
     mass = units.mass * part.one("MASS", 0.0)
     own = dict[str, Marker]()

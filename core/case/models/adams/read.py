@@ -17,7 +17,7 @@ from .constraints import (
     ADDED_UP,
     CLOSED,
     WEAK,
-    assembled,
+    assemble_links,
     coordinates_of,
     joint_of,
     read_couplers,
@@ -50,7 +50,7 @@ def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
     tolerance, why = tolerance_of(dataset, size)
     if supplied.closure is not None:
         tolerance, why = supplied.closure, "--closure"
-    model = assembled(model, links, size, tolerance)
+    model = assemble_links(model, links, size, tolerance)
     bodies = read_bodies(model)
     joints = {link.statement.name: joint_of(model, link) for link in links}
     driven = coordinates_of(model, links, joints)

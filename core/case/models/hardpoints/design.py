@@ -360,7 +360,7 @@ def with_suspension_outputs(
         vehicles = {f"{side}_": _on_side(vehicle, side) for side in Side}
     place = Place.WHEEL_CENTER if vehicle.wheel_radius is None else Place.CONTACT
     for prefix, wheel in vehicles.items():
-        for kind in _defined(vehicle):
+        for kind in _wheel_outputs(vehicle):
             add(prefix + kind, kind, wheel)
         add(f"{prefix}half_track_change", "half_track_change", wheel, at=place)
         for name, ends in template.springs.items():
@@ -380,7 +380,7 @@ def with_suspension_outputs(
                 # heave does not move an unlike pair of ends: one wheel travels, the other is held
                 alone = left if len({*ends}) == 1 else replace(left, travel=left.travel[:1])
                 add(name, "motion_ratio", alone, between=between)
-        for kind in _defined_of_axle(vehicle, motion, steered=steered):
+        for kind in _axle_outputs(vehicle, motion, steered=steered):
             own = {"rack": RACK} if kind == "steering_ratio" else {}
             add(kind, kind, left, other=right, **own)
     outputs += with_all_coordinates(case, watched).outputs
@@ -409,7 +409,7 @@ def _on_side(vehicle: Vehicle, side: Side) -> Vehicle:
     )
 
 
-def _defined(vehicle: Vehicle) -> Iterator[str]:
+def _wheel_outputs(vehicle: Vehicle) -> Iterator[str]:
     """Yield the types of the outputs of a wheel that the data of its vehicle define."""
     yield from ("toe", "camber")
     if vehicle.kingpin:
@@ -430,7 +430,7 @@ def _defined(vehicle: Vehicle) -> Iterator[str]:
         yield "anti_squat"
 
 
-def _defined_of_axle(vehicle: Vehicle, motion: str, *, steered: bool) -> Iterator[str]:
+def _axle_outputs(vehicle: Vehicle, motion: str, *, steered: bool) -> Iterator[str]:
     """Yield the types of the outputs of an axle that the data of its vehicle define."""
     steering = motion == AxleMotion.STEER
     if vehicle.wheel_radius is not None:

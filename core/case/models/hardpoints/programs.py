@@ -41,7 +41,7 @@ def plain_lines(text: str) -> Lines:
         start = next((k for k, each in enumerate(tokens) if each[0] == "="), 0) + 1
         try:
             value, end = _value(tokens, start)
-            lines = [*_assigned(head.strip(), value)]
+            lines = [*_assignments(head.strip(), value)]
         except (ValueError, IndexError):
             lines, end, value = [statement], len(tokens), None
         rows = cast("list[list[Any]]", value) if isinstance(value, list) else []
@@ -127,19 +127,19 @@ def _rows(tokens: Sequence[tuple[str, str]], k: int) -> tuple[list[list[Any]], i
     return [row for row in rows if row], k
 
 
-def _assigned(name: str, value: Any) -> Iterator[str]:
+def _assignments(name: str, value: Any) -> Iterator[str]:
     """Yield the assignments of a literal."""
     if isinstance(value, dict):
         for key, each in cast("dict[str, Any]", value).items():
-            yield from _assigned(f"{name}.{key}", each)
+            yield from _assignments(f"{name}.{key}", each)
         return
     rows = cast("list[list[Any]]", value) if isinstance(value, list) else []
     flat = [each for row in rows for each in row]
     if rows and all(len(row) in (2, 4) and _is_text(row[0]) for row in rows):
         for first, *rest in rows:
-            yield from _assigned(f"{name}.{_bare(first)}", rest[0] if len(rest) == 1 else [rest])
+            yield from _assignments(f"{name}.{_bare(first)}", rest[0] if len(rest) == 1 else [rest])
     elif len(flat) == 1 and isinstance(flat[0], list | dict):  # a cell around a value
-        yield from _assigned(name, flat[0])
+        yield from _assignments(name, flat[0])
     elif rows:
         yield f"{name} = [{' '.join(map(str, flat))}]"
     else:

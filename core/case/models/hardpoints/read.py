@@ -38,7 +38,7 @@ from .design import (
 )
 from .rubber import of_chrono, with_file, with_rubber
 from .shims import shims
-from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, placed, unit_of, wanted_corner
+from .table import AXES_IN_USE, Axes, HardpointTable, axes_of, positions_of, unit_of, wanted_corner
 from .templates import (
     NAMES,
     TEMPLATE_NAMES,
@@ -94,9 +94,9 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
     table = _of_corner(table, supplied.corner)
     template, of_names = _template(table, supplied)
-    named, told = _filled(table, template, supplied)
+    named, told = _fill_roles(table, template, supplied)
     told = [*of_names, *told]
-    points = placed(table, unit, axes)
+    points = positions_of(table, unit, axes)
     at = {role: points[name] for role, name in named.items()}
     size = max(math.dist(a, b) for a in at.values() for b in at.values())
     if improbable := SUSPENSIONS.improbable(size, unit):
@@ -129,9 +129,9 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     )
     if vehicle.wheel_radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
-    if lacking := _lacking(template, at, supplied):
+    if lacking := _missing_outputs(template, at, supplied):
         source += f"; not computed: {', '.join(lacking)}"
-    source += f"{LEFT_OUT}{_listed(others)}"
+    source += f"{LEFT_OUT}{_names(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit.name, angle_unit="deg", assembly=(*told, *of_side))
     case = with_suspension_outputs(
@@ -151,7 +151,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     return case
 
 
-def _lacking(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
+def _missing_outputs(template: Template, at: Mapping[str, Vector], supplied: Supplied) -> list[str]:
     """Return the outputs of optional data that are not there, each with what to add."""
     axle = supplied.axle is not None
     across = template.across.items() if axle else ()
@@ -267,7 +267,7 @@ def _template(table: HardpointTable, supplied: Supplied) -> tuple[Template, list
     return written, []
 
 
-def _filled(
+def _fill_roles(
     table: HardpointTable, template: Template, supplied: Supplied
 ) -> tuple[dict[str, str], list[str]]:
     """Return the name of the point for each role of the template, and notes on the names. A file of
@@ -326,7 +326,7 @@ def _filled(
     raise fault(
         table.file,
         "",
-        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or {advice}",
+        f"{problem}; found beside: {_names([*unused.values()])}; rename or add them, or {advice}",
     )
 
 
@@ -386,7 +386,7 @@ def _write_names(file: Path, template: Template, filled: Mapping[str, str]) -> N
         raise fault(file, "--names", f"cannot be written ({error}); choose another file") from None
 
 
-def _listed(names: Sequence[str]) -> str:
+def _names(names: Sequence[str]) -> str:
     """Return names as text, abridged if there are more than a suspension has."""
     return shortened([brief(visible(name)) for name in names], MOST_NAMED) or "nothing"
 

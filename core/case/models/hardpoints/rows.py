@@ -193,7 +193,7 @@ def _delimiter(table: Table) -> str:
     return max(DELIMITERS, key=first.count)
 
 
-def _joined(words: Sequence[Cell]) -> Sequence[Cell]:
+def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
     """Return the cells of a line with blanks between them: words beside numbers are one name, which
     stands before all of these or behind them.
     """
@@ -221,19 +221,19 @@ def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied
     """
     file, delimiter, rows = table.file, table.delimiter.strip(" "), [*table.rows()]
     if table.delimiter == " ":
-        rows = [(where, _joined([*filter(None, cells)])) for where, cells in rows]
+        rows = [(where, _join_words([*filter(None, cells)])) for where, cells in rows]
     if (parts := _parts(file, rows)) is None:
         where, cells = rows[0]
         raise fault(
             file,
             where,
-            f"found {shown(_written(cells))}, expected the head {','.join(HEAD)}; write it above"
+            f"found {shown(_row_text(cells))}, expected the head {','.join(HEAD)}; write it above"
             " the points, or a name and x, y, z alone in each row",
         )
     head, above, body = parts
     left_out = list[str]()
     for where, cells in above:
-        if fact := fact_of(_written([cell for cell in cells if cell != ""])):
+        if fact := fact_of(_row_text([cell for cell in cells if cell != ""])):
             facts.setdefault(*fact)
         else:
             left_out.append(_note(where, cells))
@@ -268,7 +268,7 @@ def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied
             left_out.append(_note(where, cells))
         else:
             _require_complete(file, where, cells, head, delimiter)
-            found.append((where, _written(own[:1]), own[1:]))
+            found.append((where, _row_text(own[:1]), own[1:]))
     points = _points(file, found, "," if delimiter == "," else ".,")
     if not points:
         raise fault(
@@ -340,13 +340,13 @@ def _points(
     }
 
 
-def _written(cells: Sequence[Cell]) -> str:
+def _row_text(cells: Sequence[Cell]) -> str:
     """Return cells as a text, separated by commas."""
     return ",".join(cell if isinstance(cell, str) else f"{cell:.15g}" for cell in cells)
 
 
 def _note(where: str, cells: Sequence[Cell]) -> str:
-    return f"{where} ({brief(_written(cells).strip(','))})"
+    return f"{where} ({brief(_row_text(cells).strip(','))})"
 
 
 def _require_complete(

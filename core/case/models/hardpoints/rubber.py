@@ -83,7 +83,7 @@ def with_rubber(
     """
     mechanism = case.mechanism
 
-    def placed(point: Sequence[float], side: int) -> Vector:
+    def place_on_side(point: Sequence[float], side: int) -> Vector:
         return point[0], side * point[1], point[2]
 
     def bushings() -> Iterator[Bushing]:
@@ -92,8 +92,8 @@ def with_rubber(
                 joint: Any = mechanism.joint(f"{prefix}{joint_at(template, role)}")
                 base: list[Any] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
                 if (axis := getattr(joint, "axis", None)) is not None:
-                    base = [[*x] for x in triad(placed([*axis], side))[:2]]
-                axes, numbers = [placed(x, side) for x in base], dict(keys)
+                    base = [[*x] for x in triad(place_on_side([*axis], side))[:2]]
+                axes, numbers = [place_on_side(x, side) for x in base], dict(keys)
                 if side < 0 and (given := keys.get("preload")):
                     # the mirror image of a right-handed third axis
                     x, y, z = (given,) * 3 if isinstance(given, float) else given
@@ -102,7 +102,7 @@ def with_rubber(
                     name=f"{joint.name}.{role}",
                     i=joint.i,
                     j=joint.j,
-                    point=placed(at[role], side),
+                    point=place_on_side(at[role], side),
                     axes=(axes[0], axes[1]),
                     joint=joint.name,
                     **numbers,
@@ -113,7 +113,7 @@ def with_rubber(
             for roles, keys in of.springs.items():
                 own = [template.bodies.get(role, GROUND) for role in roles]
                 i, j = (body if body == GROUND else prefix + body for body in own)
-                points = placed(at[roles[0]], side), placed(at[roles[1]], side)
+                points = place_on_side(at[roles[0]], side), place_on_side(at[roles[1]], side)
                 name = f"{prefix}{roles[1].removesuffix('_lower')}"
                 yield SpringDamper(name, i, j, points, **keys)
 
@@ -121,17 +121,17 @@ def with_rubber(
         f"{prefix}{name}": (name, side) for prefix, side in sides.items() for name in of.bodies
     }
 
-    def loaded(body: Body) -> Body:
+    def with_mass(body: Body) -> Body:
         if body.name not in bodies:
             return body
         name, side = bodies[body.name]
         facts = dict(of.bodies[name])
-        facts["center_of_mass"] = placed(facts["center_of_mass"], side)
+        facts["center_of_mass"] = place_on_side(facts["center_of_mass"], side)
         return replace(body, **facts)
 
     changed = replace(
         mechanism,
-        bodies=[loaded(body) for body in mechanism.bodies],
+        bodies=[with_mass(body) for body in mechanism.bodies],
         forces=(*mechanism.forces, *springs()),
         bushings=(*mechanism.bushings, *bushings()),
         gravity=STANDARD_GRAVITY if of.bodies else mechanism.gravity,

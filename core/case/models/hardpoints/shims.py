@@ -60,7 +60,7 @@ def shims(
         dx, dy, dz = np.cross(turns.T, spin).T
         angles = [(y * dx - x * dy) / (x * x + y * y), -dz / np.hypot(x, y)]
         if ends := [end for end in template.kingpin or () if isinstance(end, str)]:
-            low, high = (_moved(end, role, held, places, v, turns) for end in ends)
+            low, high = (_end_velocity(end, role, held, places, v, turns) for end in ends)
             x_of, _, z_of = places[ends[1]] - places[ends[0]]
             turned = x_of * (high - low)[2] - z_of * (high - low)[0]
             angles += [turned / (x_of * x_of + z_of * z_of)]
@@ -80,7 +80,7 @@ def shims(
         return found, {TIEROD_INNER: wanted / end, outer: -wanted / (end + np.cross(along, w))}
 
 
-def _moved(
+def _end_velocity(
     end: str,
     shimmed: str,
     held: Sequence[Held],

@@ -170,7 +170,7 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     return found
 
 
-def placed(table: HardpointTable, unit: Unit, axes: Axes) -> dict[str, Vector]:
+def positions_of(table: HardpointTable, unit: Unit, axes: Axes) -> dict[str, Vector]:
     """Return the points in metres, x forward, y left, z up."""
     points = dict[str, Vector]()
     for name, point in table.points.items():

@@ -236,10 +236,10 @@ def fact_of(text: str) -> tuple[str, str] | None:
 
 def _facts_of_comments(text: str) -> list[Leaf]:
     comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
-    return _stated(fact for comment in comments if (fact := fact_of(comment)))
+    return _fact_leaves(fact for comment in comments if (fact := fact_of(comment)))
 
 
-def _stated(facts: Iterable[tuple[str, str]]) -> list[Leaf]:
+def _fact_leaves(facts: Iterable[tuple[str, str]]) -> list[Leaf]:
     return [Leaf((key,), value, key) for key, value in facts]
 
 
@@ -297,7 +297,7 @@ def read_assignments(
             problem = f"found {unit}, and {facts['unit']} in a comment, expected one unit"
             raise fault(file, units[unit], f"{problem}; correct either")
         facts.setdefault("unit", unit)
-    return _table(file, "Assigned", [*found, *_stated(facts.items())], supplied, left_out)
+    return _table(file, "Assigned", [*found, *_fact_leaves(facts.items())], supplied, left_out)
 
 
 def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
@@ -311,13 +311,13 @@ def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
         not items or any(isinstance(each, dict | list) for each in items)
     ):
         for k, each in enumerate(items):
-            name, unnamed = _named(each)
+            name, unnamed = _split_name(each)
             yield from _leaves(unnamed, (*keys, name or f"[{k}]"))
     else:
         yield Leaf(keys, value, ".".join(keys))
 
 
-def _named(item: Any) -> tuple[str, Any]:
+def _split_name(item: Any) -> tuple[str, Any]:
     """Return the name of a point in a list of points, empty if it has none, and the rest of it."""
     if isinstance(item, dict):
         table = cast("dict[str, Any]", item)
@@ -532,11 +532,11 @@ def _wheel_points(
     if length == 0.0 or not is_number(offset):
         return {}
     axis = [(b - a) / length for a, b in zip(inner, outer, strict=True)]
-    center = _moved(outer, axis, -float(str(offset)))
+    center = _shift(outer, axis, -float(str(offset)))
     where = f"axle_outboard, wheel offset {offset}"
     found = {
         "wheel_center": Hardpoint(center, where),
-        "wheel_axis": Hardpoint(_moved(center, axis, length), where),
+        "wheel_axis": Hardpoint(_shift(center, axis, length), where),
     }
     tire = [given.get(("tire", key)) for key in ("rim_diameter", "aspect_ratio", "section_width")]
     down = [axis[2] * axis[0], axis[2] * axis[1], axis[2] * axis[2] - 1.0]
@@ -544,11 +544,11 @@ def _wheel_points(
     if millimetres and size > 0.0 and all(map(is_number, tire)):
         rim, ratio, width = (float(str(each)) for each in tire)
         radius = 0.5 * rim * 25.4 + ratio * width
-        contact = _moved(center, [each / size for each in down], radius)
+        contact = _shift(center, [each / size for each in down], radius)
         found["wheel_contact"] = Hardpoint(contact, f"{where}, tire")
     return found
 
 
-def _moved(place: Vector, along: Sequence[float], far: float) -> Vector:
+def _shift(place: Vector, along: Sequence[float], far: float) -> Vector:
     x, y, z = (a + far * b for a, b in zip(place, along, strict=True))
     return x, y, z

@@ -1,4 +1,4 @@
-"""Engines that are asked for their versions, in processes that import nothing else."""
+"""Engines whose versions are read, in processes that import nothing else."""
 
 import os
 import sys

@@ -1,10 +1,9 @@
-"""What makes the command line quick to use: completion, patterns, -q and -v, numbers, progress."""
+"""The command line at the terminal: completion, patterns, -q and -v, numbers, progress, widths."""
 
 import io
 import re
 import shutil
 import subprocess
-import sys
 
 import pytest
 from kincheck import cases
@@ -21,37 +20,37 @@ RIGHT = Fake("native")
 
 
 @pytest.mark.parametrize(("text", "value"), [("1000000", 10**6), ("1e6", 10**6), ("2.0", 2)])
-def test_whole_numbers_in_any_notation(text, value):
+def test_whole_number_option_notations(text, value):
     assert whole(1)(text) == value
 
 
 @pytest.mark.parametrize("text", ["1.5", "1e-3", "nan", "inf", "0", "ten", "1e3000"])
-def test_whole_numbers_refuse_other_values(text):
+def test_whole_number_option_refuses_other_values(text):
     with pytest.raises(Exception, match="is not a whole number of 1 or more"):
         whole(1)(text)
 
 
-def test_a_pattern_names_all_cases_that_match(kincheck_main, capsys):
+def test_case_pattern_selects_built_in_cases(kincheck_main, capsys):
     assert kincheck_main("run crank*", engines=[RIGHT]) == 0
     assert "2 pass" in capsys.readouterr().out
     assert kincheck_main("run crank_?wo", engines=[RIGHT]) == 0
     assert "1 pass" in capsys.readouterr().out
 
 
-def test_a_command_for_one_case_refuses_a_pattern_of_several(kincheck_main, capsys):
+def test_explain_refuses_pattern_of_several_cases(kincheck_main, capsys):
     assert kincheck_main("explain cran*", engines=[RIGHT]) == 2
     said = capsys.readouterr().err
     assert "'cran*' matches 2 cases: crank, crank_two. Name one of them" in said
 
 
-def test_a_pattern_names_files_too(kincheck_main, tmp_path, capsys):
+def test_case_pattern_selects_files(kincheck_main, tmp_path, capsys):
     shutil.copy(cases.FOLDER / "rssr.toml", tmp_path / "mine.toml")
     (tmp_path / "other.csv").touch()
     kincheck_main("run", f"{tmp_path}/*.toml", engines=[RIGHT], cases={})
     assert "[1/1] rssr native" in capsys.readouterr().err
 
 
-def test_quiet_and_verbose(kincheck_main, capsys):
+def test_quiet_and_verbose_output(kincheck_main, capsys):
     assert kincheck_main("run crank -q", engines=[RIGHT]) == 0
     assert capsys.readouterr() == ("1 pass\n", "")
     assert kincheck_main("run crank -v", engines=[RIGHT]) == 0
@@ -76,7 +75,7 @@ def test_quiet_and_verbose(kincheck_main, capsys):
         ("export rssr --at nan", "'nan' is not a number"),
     ],
 )
-def test_mistakes_name_the_command_and_the_remedy(line, said, capsys):
+def test_usage_errors_state_command_and_remedy(line, said, capsys):
     assert main(line.split()) == 2
     found = capsys.readouterr().err
     assert said in found
@@ -84,7 +83,7 @@ def test_mistakes_name_the_command_and_the_remedy(line, said, capsys):
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 100])
-def test_no_table_breaks_a_name_or_overflows(width, monkeypatch):
+def test_table_keeps_names_within_console_width(width, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
     table = columns("case", "engine", ">error", "what it says of itself")
     names = ["chrono_sedan_double_wishbone_arm", "exudyn-static-modified"]
@@ -99,9 +98,7 @@ def test_no_table_breaks_a_name_or_overflows(width, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [60, 80, 200])
-def test_records_stand_below_their_case_on_a_narrow_console(
-    kincheck_main, capsys, monkeypatch, width
-):
+def test_narrow_run_table_groups_by_case(kincheck_main, capsys, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     assert kincheck_main("run crank", engines=[RIGHT, Fake("twin")]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -109,7 +106,7 @@ def test_records_stand_below_their_case_on_a_narrow_console(
     assert sum("crank" in line for line in lines) == (2 if width == 200 else 1)
 
 
-def test_progress_says_how_much_time_is_left(capsys, monkeypatch):
+def test_progress_states_remaining_time(capsys, monkeypatch):
     now = iter([0.0, 0.0, 90.0, 100.0])
     monkeypatch.setattr("kincheck.core.report.terminal.perf_counter", lambda: next(now))
     with Meter("stress", every=5.0) as meter:
@@ -126,18 +123,10 @@ def test_quiet_progress_is_silent(capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_the_summary_of_a_case_is_that_of_the_case():
+def test_case_summary_matches_loaded_case():
     for name in ("rssr", "mcpherson_strut", "modelica_four_bar_distance"):
         case = cases.load(name)
         assert cases.summary(name) == (truth_of(case), case.source)
-
-
-def test_list_imports_no_simulator(capsys):
-    code = (
-        "import sys; from kincheck.core.cli.main import main; main(['list']);"
-        " sys.exit(bool({'mujoco', 'pinocchio', 'exudyn', 'pydrake'} & {*sys.modules}))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
 
 
 TRY = """
@@ -148,7 +137,7 @@ echo "${{COMPREPLY[@]}}"
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
-def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
+def test_bash_completion_of_commands_and_values(tmp_path, capsys):
     pytest.importorskip("shtab")
     assert main(["completion", "bash"]) == 0
     (script := tmp_path / "script").write_text(capsys.readouterr().out)
@@ -170,7 +159,7 @@ def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
     [["list", "--schema"], ["list", "--joints"], ["list", "--outputs"], ["stress", "--list"]],
     ids=" ".join,
 )
-def test_lists_fit_the_console_and_keep_every_word(argv, capsys, monkeypatch):
+def test_lists_keep_words_within_console_width(argv, capsys, monkeypatch):
     def words(width):
         monkeypatch.setenv("COLUMNS", str(width))
         assert main(argv) == 0
@@ -182,7 +171,7 @@ def test_lists_fit_the_console_and_keep_every_word(argv, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [60, 80, 100])
-def test_the_tables_of_every_output_and_of_its_history_fit(
+def test_verbose_and_history_tables_fit_console(
     kincheck_main, tmp_path, capsys, monkeypatch, width
 ):
     monkeypatch.setenv("COLUMNS", str(width))
@@ -243,7 +232,7 @@ half_width = 0.1
 """
 
 
-def test_run_and_study_say_why_a_force_has_no_value(tmp_path, capsys):
+def test_undetermined_force_is_explained(tmp_path, capsys):
     (case := tmp_path / "two_hinges.toml").write_text(UNDETERMINED)
     main(f"run {case} --engine native -v".split())
     assert "hinge: samples without a value are null; rigid bodies do not" in capsys.readouterr().out
@@ -269,10 +258,10 @@ def test_repr_of_case_is_one_line():
         ("gear", "'gear' couples two other joints"),
     ],
 )
-def test_check_joint_knows_the_names_of_built_in_joints(name, said, capsys):
+def test_check_joint_unknown_type_is_refused(name, said, capsys):
     assert main(["check-joint", name]) == 2
     assert said in capsys.readouterr().err
 
 
-def test_a_built_in_joint_is_named_by_its_type():
+def test_check_joint_finds_built_in_type():
     assert named_joint("revolute") is Revolute
