@@ -113,16 +113,17 @@ def as_numbers(series: Series, output: Quantity) -> OutputSeries:
         absent = (name for name in QUANTITIES[1:] if getattr(series, name) is None)
         reasons += [f"there is no {name}" for name in absent]
     return OutputSeries(
-        position=_numbers(series.position),
-        velocity=None if series.velocity is None else _numbers(series.velocity),
-        acceleration=None if series.acceleration is None else _numbers(series.acceleration),
+        position=numbers(series.position),
+        velocity=None if series.velocity is None else numbers(series.velocity),
+        acceleration=None if series.acceleration is None else numbers(series.acceleration),
         unit=output.unit,
         sense=output.sense or None,
         reason="; ".join(reasons) or None,
     )
 
 
-def _numbers(values: Array) -> list[float | None]:
+def numbers(values: Array) -> list[float | None]:
+    """Return plain numbers, None for NaN."""
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 

@@ -63,12 +63,6 @@ class Finding:
     message: str = ""
 
     @property
-    def badness(self) -> tuple[int, float]:
-        """Sort key: the worst of several findings of one check has the largest."""
-        order = {Verdict.SKIP: 0, Verdict.PASS: 1, Verdict.FAIL: 2}
-        return order[self.verdict], self.figure if self.figure is not None else 0.0
-
-    @property
     def place(self) -> str:
         """Where the worst figure is, in words."""
         parts = [f"specimen {self.specimen}" if self.specimen is not None else ""]
@@ -78,7 +72,8 @@ class Finding:
 
 def worst(*findings: Finding) -> Finding:
     """Return the worst of several findings of one check."""
-    return max(findings, key=lambda each: each.badness)
+    order = (Verdict.SKIP, Verdict.PASS, Verdict.FAIL)
+    return max(findings, key=lambda each: (order.index(each.verdict), each.figure or 0.0))
 
 
 def skip(check: str, why: str) -> Finding:

@@ -348,7 +348,7 @@ def work(probe: Probe) -> Array:
     return (force * (j.v - v)).sum(axis=1) + (moment * (j.w - i.w)).sum(axis=1)
 
 
-def speed(probe: Probe) -> float:
+def largest_speed(probe: Probe) -> float:
     """Return the largest velocity of any body's frame or turn, in one number [m/s, rad/s]."""
     motions = [each.v for each in probe.motion.bodies.values() if each.v is not None]
     return max(float(np.abs(each).max()) for each in motions)
@@ -427,7 +427,7 @@ def reactions(probe: Probe, what: str = "reaction") -> Iterator[Finding]:
     assert forces is not None
     missing = np.abs(forces.power)[None] / float(np.nanmax(forces.largest_power))
     yield judge_figures(f"{what}: power", missing, LIMIT, ["power"])
-    done = np.abs(work(probe))[None] / (probe.size * speed(probe))
+    done = np.abs(work(probe))[None] / (probe.size * largest_speed(probe))
     yield judge_figures(f"{what}: no work", done, LIMIT, ["work"])
     off = np.array([missing_wrench(probe, body) for body in probe.joint.bodies])
     names = [f"body {body}" for body in probe.joint.bodies]

@@ -41,6 +41,11 @@ SHOWN: Mapping[str, tuple[str, float]] = {
 """Unit and factor of tables and pages, by SI unit; files in JSON are in SI."""
 
 
+def _shown(unit: str) -> tuple[str, float]:
+    """Return unit and factor of tables and pages."""
+    return SHOWN.get(unit, (unit, 1.0))
+
+
 def as_data(results: ComplianceResults) -> dict[str, Any]:
     """Return the results as plain data in SI; null without an equilibrium."""
     return {
@@ -112,7 +117,7 @@ def table(results: ComplianceResults) -> str:
     writer = csv.writer(text, lineterminator="\n")
     first = results.travel
     center = [f"wheel_center_{axis} [mm]" for axis in "xyz"]
-    names = {name: SHOWN.get(each.unit, (each.unit, 1.0)) for name, each in first.outputs.items()}
+    names = {name: _shown(each.unit) for name, each in first.outputs.items()}
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
     if results.signs:
@@ -159,7 +164,7 @@ def lines(results: ComplianceResults) -> Iterator[str]:
         return
     yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
     for name, each in curves.outputs.items():
-        shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        shown, size = _shown(each.unit)
         if not np.isfinite(each.values).any():
             yield f"  {with_unit(name, shown)}  –"
             continue
@@ -203,7 +208,7 @@ def _section(number: int, curves: ComplianceCurves) -> Section:
     unit, factor = unit_of_axis(curves)
     x, diagrams = _drawn(factor * curves.at), list[Diagram]()
     for name, each in {"wheel_load": Curve(curves.wheel_load, "N"), **curves.outputs}.items():
-        shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        shown, size = _shown(each.unit)
         data = [soft.curve(x, _drawn(size * each.values))]
         if name in curves.rigid:
             data.append(rigid.curve(x, _drawn(size * curves.rigid[name])))

@@ -206,7 +206,7 @@ class ParquetStore:
             self._whole.__exit__(None if error is None else type(error), error, trace)
 
     def write(self, chunk: Chunk) -> None:
-        """Write a chunk; see `Store`."""
+        """Write a chunk's values and offsets; chunks come in order."""
         if self.problems:
             return
         parts = zip(*chunk.stored, strict=True)

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -80,20 +79,13 @@ class Capability(msgspec.Struct, frozen=True, kw_only=True):
     sample: int | None = None
 
 
-@dataclass(frozen=True)
-class _Least:
-    """The smallest value of an index over the samples, and its sample."""
-
-    value: float | None
-    sample: int | None
-
-    @staticmethod
-    def of(index: Array) -> _Least:
-        if np.isnan(index).all():
-            return _Least(None, None)
-        sample = int(np.nanargmin(index))
-        value = float(index[sample])
-        return _Least(value if math.isfinite(value) else None, sample)
+def _least(index: Array) -> tuple[float | None, int | None]:
+    """Return the smallest value of an index over the samples, and its sample."""
+    if np.isnan(index).all():
+        return None, None
+    sample = int(np.nanargmin(index))
+    value = float(index[sample])
+    return value if math.isfinite(value) else None, sample
 
 
 def capabilities(
@@ -170,15 +162,15 @@ def _with_indices(
     spread = np.where(spread > NO_SPREAD * size, spread, 0.0)
     values = np.concatenate(kept[limit.row], axis=1)
     with np.errstate(all="ignore"):
-        cp = _Least.of((limit.high - limit.low) / (6.0 * spread))
-        cpk = _Least.of(np.minimum(limit.high - mean, mean - limit.low) / (3.0 * spread))
+        cp, _ = _least((limit.high - limit.low) / (6.0 * spread))
+        cpk, sample = _least(np.minimum(limit.high - mean, mean - limit.low) / (3.0 * spread))
     both = math.isfinite(limit.high - limit.low)
     return msgspec.structs.replace(
         found,
-        cp=cp.value if both else None,
-        cpk=cpk.value,
+        cp=cp if both else None,
+        cpk=cpk,
         by_quantiles=_by_quantiles(values[spread > 0.0], limit.low, limit.high),
-        sample=cpk.sample,
+        sample=sample,
     )
 
 
@@ -190,7 +182,7 @@ def _by_quantiles(values: Array, low: float, high: float) -> float | None:
     below, middle, above = np.nanquantile(known, (TAIL, 0.5, 1.0 - TAIL), axis=1)
     with np.errstate(all="ignore"):
         index = np.minimum((high - middle) / (above - middle), (middle - low) / (middle - below))
-    return _Least.of(index).value
+    return _least(index)[0]
 
 
 # The number of bins is the square root of the number of variants, within these bounds.

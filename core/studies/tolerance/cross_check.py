@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from typing import overload
+from typing import Any, overload
 
 import msgspec
 import numpy as np
@@ -16,11 +16,11 @@ from ...errors import KincheckError, SolveError, shortened
 from ...harness.compare import Curve, curve_of, describe, deviation, pace
 from ...harness.engine import STANDARD, Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
-from ...harness.record import Outcome
+from ...harness.record import Deviation, Outcome
 from ...harness.verdict import NAMED, UNCERTAIN, excess, residual_limit
 from ...kinematics import NativeSolver
 from ...trajectory import QUANTITIES, Array
-from .study import Study
+from .study import ReducedQuantity, Study
 
 
 class Checked(msgspec.Struct, frozen=True, kw_only=True):
@@ -133,10 +133,6 @@ def judge_variant(
         return Checked(variant=variant, outcome=result.outcome, message=result.message)
     case = study.of_variant(variant)
     beat = pace(case)
-    lost, absent = "", list[str]()
-    worst = Checked(
-        variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both"
-    )
     residual = result.residual if result.solved else 0.0
     faults = [
         _contradiction(study, case, result, ours),
@@ -145,7 +141,9 @@ def judge_variant(
     ]
     if any(faults):
         message = "; ".join(filter(None, faults))
-        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=message)
+        return Checked(variant=variant, outcome=Outcome.FAIL, message=message)
+    lost, absent = "", list[str]()
+    worst: tuple[Deviation, ReducedQuantity] | None = None
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
@@ -160,37 +158,25 @@ def judge_variant(
             )
         mine = curve_of(row.output, row.derivative, beat, theirs)
         off = deviation(mine, Curve(values), STANDARD)
-        if off is None:
-            continue
-        ratio = off.ratio
-        if worst.ratio is None or ratio > worst.ratio:
-            told = (
-                row.output.name,
-                QUANTITIES[row.derivative],
-                off,
-                case.sweep.driver,
-                case.sweep.values.tolist(),
-                row.output.unit,
-            )
-            worst = Checked(
-                variant=variant,
-                outcome=Outcome.PASS if off.within else Outcome.FAIL,
-                message="" if off.within else describe(*told),
-                row=row.name,
-                max_abs=off.max_abs,
-                tolerance=off.tolerance,
-                ratio=float(ratio),
-            )
+        if off is not None and (worst is None or off.ratio > worst[0].ratio):
+            worst = off, row
+    outcome, message = Outcome.UNJUDGED, "no row has values from both"
+    figures: dict[str, Any] = {}
+    if worst is not None:
+        off, row = worst
+        outcome = Outcome.PASS if off.within else Outcome.FAIL
+        quantity, sweep = QUANTITIES[row.derivative], case.sweep
+        what = (row.output.name, quantity, off, sweep.driver, sweep.values.tolist())
+        message = "" if off.within else describe(*what, row.output.unit)
+        figures = {"row": row.name, "max_abs": off.max_abs, "tolerance": off.tolerance}
+        figures["ratio"] = float(off.ratio)
+    lack = ""
     if lost:
-        return msgspec.structs.replace(
-            worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message)))
-        )
-    if absent:
+        outcome = Outcome.FAIL
+    elif absent:
         lack = f"{Outcome.UNJUDGED.shown}: {shortened(absent, NAMED)}: the engine gives none"
-        return msgspec.structs.replace(
-            worst, message="; ".join(filter(None, (worst.message, lack)))
-        )
-    return worst
+    message = "; ".join(filter(None, (lost, message, lack)))
+    return Checked(variant=variant, outcome=outcome, message=message, **figures)
 
 
 def _contradiction(study: Study, case: Case, answer: Answer, ours: Array) -> str:

@@ -5,7 +5,6 @@ Numbers are in SI units. A number is null if it was not computed.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -15,6 +14,7 @@ import numpy as np
 from ...case.units import ANGLES, LENGTHS, in_units
 from ...dataset import Dataset, Variable
 from ...errors import number_of
+from ...harness.compare import numbers
 from ...harness.record import Outcome
 from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
@@ -237,11 +237,6 @@ def _bands(each: Envelope) -> list[Numbers]:
 
 
 # Tables of the results, from the chunks and gradients of a study.
-
-
-def numbers(values: Array) -> Numbers:
-    """Return numbers, None for NaN."""
-    return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
 def envelopes(

@@ -276,7 +276,7 @@ class Ready:
         )
         return Ready(study, designs, case.sweep.path)
 
-    def along(self, path: Path) -> Ready:
+    def on_path(self, path: Path) -> Ready:
         """Return the same model on another path of the same drivers."""
         return Ready(self.study, self.designs.on_path(path), path)
 
@@ -306,7 +306,7 @@ class Ready:
     def _rows(self, found: Variants, geometry: Array, forces: ForcesOfDesigns | None) -> Array:
         at: dict[str, Vec3] = {}
         design: dict[str, Vec3] = {}
-        numbers = self._numbers
+        numbers = self.study.variation.slices
         unknown = np.full((1, 1), np.nan)
         for name in without_forces(self.study.case).points:
             known = self.designs.motion(found, name)
@@ -335,15 +335,6 @@ class Ready:
         if not np.isfinite(values.sum()):
             values[~np.isfinite(values)] = np.nan
         return values
-
-    @cached_property
-    def _numbers(self) -> dict[str, slice]:
-        """The slice of each varied place in the geometry."""
-        found: dict[str, slice] = {}
-        first = 0
-        for place, count in self.study.variation.places.items():
-            found[place] = slice(first, first := first + count)
-        return found
 
     def chunk(self, index: int) -> Chunk:
         """Solve a chunk."""
@@ -447,7 +438,7 @@ def gradients(ready: Ready) -> Gradients:
     start = ready.designs.start
     from_design = start.starts_at_design
     if from_design:  # one sample more, at the design position
-        ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))
+        ready = ready.on_path(Path(path.motions, np.append(path.times, start.time), path.design))
     steps = np.array([STEP * _size(study, k) for k in range(count)])
     found = np.empty((count, len(study.rows), n + from_design))
     apart = np.empty_like(found)

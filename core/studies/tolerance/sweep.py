@@ -17,7 +17,7 @@ from functools import partial
 from itertools import islice
 from threading import Lock
 from time import perf_counter, process_time
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from ...version import VERSION
 from ..variation.study_choices import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
 from . import results
-from .chunk_files import Part
+from .chunk_files import ParquetStore, Part
 from .conformance import capabilities, histogram, worst_sample
 from .cross_check import Check, Checked, choose_variants, cross_check, require_able
 from .statistics import quantiles
@@ -165,14 +165,6 @@ class Progress:
     solved: int
 
 
-class Store(Protocol):
-    """Storage for the values of all variants, chunk by chunk."""
-
-    def write(self, chunk: Chunk) -> None:
-        """Store a chunk's values and offsets; chunks come in order."""
-        ...
-
-
 def sweep_designs(
     case: Case,
     variation: Variation,
@@ -186,7 +178,7 @@ def sweep_designs(
     jobs: int = 1,
     source: Source | None = None,
     check: Check | None = None,
-    store: Store | None = None,
+    store: ParquetStore | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
     command: str = "",
     part: Part | None = None,
@@ -301,7 +293,7 @@ def sweep_designs(
     )
 
 
-def _without_store(chunk: Chunk, store: Store | None) -> Chunk:
+def _without_store(chunk: Chunk, store: ParquetStore | None) -> Chunk:
     """Return a chunk without the values of all variants, after their storage."""
     if store is not None:
         store.write(chunk)

@@ -46,10 +46,10 @@ def quantile(law: Law, probability: Array, scale: float, half_width: float) -> A
     """
     match law:
         case Law.NORMAL:
-            return scale * normal_quantile(probability)
+            return scale * _special().ndtri(probability)
         case Law.TRUNCATED_NORMAL:
-            outside = float(normal_share(np.array(-half_width / scale)))
-            offsets = scale * normal_quantile(outside + probability * (1.0 - 2.0 * outside))
+            outside = float(_special().ndtr(np.array(-half_width / scale)))
+            offsets = scale * _special().ndtri(outside + probability * (1.0 - 2.0 * outside))
             return np.clip(offsets, -half_width, half_width)  # round-off at the ends
         case Law.TRIANGULAR:  # with its mode at the nominal value
             low = np.sqrt(2.0 * np.minimum(probability, 1.0 - probability)) - 1.0
@@ -60,18 +60,10 @@ def quantile(law: Law, probability: Array, scale: float, half_width: float) -> A
             raise ValueError("listed offsets have no distribution")
 
 
-def normal_quantile(probability: Array) -> Array:
-    """Return the quantiles of the standard normal distribution."""
-    return _special().ndtri(probability)
-
-
-def normal_share(value: Array) -> Array:
-    """Return the share of the standard normal distribution below a value."""
-    return _special().ndtr(value)
-
-
 def _special() -> Any:
-    """Return the module; few studies need its import."""
+    """Return the module with the normal distribution: `ndtr` is the share below a value, `ndtri`
+    its inverse. Few studies need its import.
+    """
     import scipy.special  # pyright: ignore[reportMissingTypeStubs]
 
     return scipy.special
@@ -112,7 +104,7 @@ class Correlation:
                 found[k:, k] = rest / np.sqrt(rest[0])
         return found
 
-    def mixed(self, independent: Array) -> Array:
+    def correlate(self, independent: Array) -> Array:
         """Return correlated standard normal numbers from independent ones, shape (rows, V).
 
         The sum is computed term by term, as the rounding of a matrix product may depend on the
@@ -404,10 +396,17 @@ class Variation:
 
     def values(self, offsets: Array) -> dict[str, tuple[float, ...]]:
         """Return the value of each varied place of one variant; offsets of shape (coordinates,)."""
-        numbers = iter(self.geometry(offsets[:, None])[:, 0].tolist())
-        return {
-            place: tuple(next(numbers) for _ in range(size)) for place, size in self.places.items()
-        }
+        numbers = self.geometry(offsets[:, None])[:, 0].tolist()
+        return {place: tuple(numbers[own]) for place, own in self.slices.items()}
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """The numbers of each varied place in the geometry."""
+        found: dict[str, slice] = {}
+        first = 0
+        for place, count in self.places.items():
+            found[place] = slice(first, first := first + count)
+        return found
 
     def offsets(self, seed: int, first: int, count: int) -> Array:
         """Return offsets of variants from the nominal design [units], (coordinates, count)."""
@@ -437,13 +436,13 @@ class Variation:
         normal = dict[int, Array]()
         for each in self.correlations:
             rows = [*each.rows]
-            normal |= zip(rows, each.mixed(normal_quantile(at[rows])), strict=True)
+            normal |= zip(rows, each.correlate(_special().ndtri(at[rows])), strict=True)
         found = np.empty_like(at)
         for row, each in enumerate(self.coordinates):
             if each.law is Law.NORMAL and row in normal:
                 found[row] = each.scale * normal[row]
                 continue
-            share = normal_share(normal[row]) if row in normal else at[row]
+            share = _special().ndtr(normal[row]) if row in normal else at[row]
             found[row] = quantile(each.law, share, each.scale, each.bound or each.scale)
         return found
 

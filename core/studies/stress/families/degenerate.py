@@ -104,7 +104,7 @@ def _rocker_of_length_zero(rng: Rng) -> Mechanism:
 def _driver_across_the_motion(rng: Rng) -> Mechanism:
     """Return a four-bar with its crank pin driven along the crank."""
     points, plane = crank_rocker(rng), any_plane(rng)
-    pull = PointCoordinate("pull", "B", plane.along(points[0]))
+    pull = PointCoordinate("pull", "B", plane.direction(points[0]))
     return replace(four_bar(plane, *points, "rod")[0], drivers=[pull])
 
 

@@ -49,18 +49,18 @@ class Plane:
         """Return the normal of the plane, global; turns are right-handed about it."""
         return triple(np.cross(self.e1, self.e2))
 
-    def along(self, at: complex) -> tuple[float, float, float]:
+    def direction(self, at: complex) -> tuple[float, float, float]:
         """Return the global direction of a direction in the plane."""
         return triple(at.real * self.e1 + at.imag * self.e2)
 
-    def turned(self, angle: Real) -> Real:
+    def rotation(self, angle: Real) -> Real:
         """Return the quaternion of a rotation in the plane, shape (4, n)."""
         return about(unit(np.cross(extended(self.e1), extended(self.e2))), angle)
 
     def link(self, a: Planar, b: Planar, now_a: Planar, now_b: Planar) -> Moved:
         """Return the motion of a body from two of its points, at design and now."""
         turn = np.angle(now_b - now_a) - np.angle(b - a)
-        return self.turned(turn), extended(self.point(complex(a[0]))), self.lift(now_a - a)
+        return self.rotation(turn), extended(self.point(complex(a[0]))), self.lift(now_a - a)
 
 
 def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
@@ -126,7 +126,7 @@ def coupler(
     """
     (first, second, coupler), n = names, plane.normal
     pin, other = plane.point(start), plane.point(end)
-    along = plane.along(end - start)
+    along = plane.direction(end - start)
     across = triple(np.cross(n, along))
     if way == "rod":
         return [], [Distance(f"{label}rod", first, second, (pin, other))]
@@ -167,7 +167,7 @@ def four_bar(
 
     def motion(drives: Real) -> Mapping[str, Moved]:
         still = np.zeros((3, drives.shape[1]), dtype=np.longdouble)
-        return {"crank": (plane.turned(drives[0]), extended(pivot), still)}
+        return {"crank": (plane.rotation(drives[0]), extended(pivot), still)}
 
     found, closed = add_loop((crank, motion), plane, b, d, c, way, "", parallel=parallel)
     return replace(found, name="four_bar"), closed
@@ -264,7 +264,7 @@ def slider_crank(plane: Plane, b: complex, c: complex, way: str, drive: str) -> 
         [Body("crank"), Body("slider", slider), *bodies],
         [
             Revolute("pivot", GROUND, "crank", pivot, plane.normal),
-            Translational("guide", GROUND, "slider", slider, plane.along(1.0 + 0j)),
+            Translational("guide", GROUND, "slider", slider, plane.direction(1.0 + 0j)),
             *joints,
         ],
         [Point("B", "crank", pin), Point("C", "slider", slider)],
@@ -289,8 +289,8 @@ def slider_crank(plane: Plane, b: complex, c: complex, way: str, drive: str) -> 
             turn = np.angle(now_b) - np.angle(B)
         still = np.zeros((3, len(turn)), dtype=np.longdouble)
         return {
-            "crank": (plane.turned(turn), extended(pivot), still),
-            "slider": (plane.turned(0.0 * turn), extended(slider), plane.lift(now_c - C)),
+            "crank": (plane.rotation(turn), extended(pivot), still),
+            "slider": (plane.rotation(0.0 * turn), extended(slider), plane.lift(now_c - C)),
             "coupler": plane.link(B, C, now_b, now_c),
         }
 

@@ -158,12 +158,12 @@ def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
         [
             Revolute("base", GROUND, "upper", point=plane.point(0j), axis=side),
             Revolute("elbow", "upper", "lower", point=at, axis=side),
-            Translational("guide", GROUND, "rack", point=side, axis=plane.along(1.0 + 0j)),
+            Translational("guide", GROUND, "rack", point=side, axis=plane.direction(1.0 + 0j)),
         ],
         [Point("tip", "lower", tip), Point("on_rack", "rack", side)],
         [
-            PointCoordinate("x", "tip", plane.along(1.0 + 0j), relative=False),
-            PointCoordinate("y", "tip", plane.along(1j), relative=False),
+            PointCoordinate("x", "tip", plane.direction(1.0 + 0j), relative=False),
+            PointCoordinate("y", "tip", plane.direction(1j), relative=False),
         ],
         [RackPinion("turns", ("base", "guide"), 0.1)],
     )
