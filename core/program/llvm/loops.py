@@ -277,7 +277,7 @@ pass:
   br label %head
 onward:
   {over("copy", "shifted")}
-  {over("calls", "rest")}
+  {over("calls", "remaining")}
   br label %take
 take:
   %before = sub i64 %accepted, 1
@@ -457,7 +457,7 @@ continue:
   {over("copy", "continued")}
   br label %carry
 onward:
-  {over("calls", "rest")}
+  {over("calls", "remaining")}
   {over("copy", "carried")}
   br label %carry
 carry:

@@ -23,7 +23,7 @@ and "state" the number of remembered slots. "behind" is zero without extrapolati
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
 """Addresses of calls: each holds the address of a function of lanes and a table, and of the table.
 """
-CALLS = ("after", "alone", "joined", "onward", "rest")
+CALLS = ("after", "alone", "joined", "onward", "remaining")
 PAIRS = ("carried", "returned", "moves", "continued", "remembered", "shifted")
 TABLES: Mapping[str, int] = {
     **dict.fromkeys(CALLS, 1),
