@@ -163,7 +163,7 @@ class ProveReferences(Command):
         """Do the work of the command line."""
         from ..case.io.atomic_files import unwritable, written
         from ..harness.record import to_json
-        from ..report.terminal import indented, page
+        from ..report.terminal import indent_table, page
         from ..studies.verified_reference import prove_case
 
         unread: dict[str, str] = {}
@@ -183,7 +183,7 @@ class ProveReferences(Command):
             lines = _lines(found, len(found.samples) if self.verbose else NAMED)
             print(*(lines[:1] if self.quiet else lines), sep="\n", flush=True)
             if errors and not self.quiet:
-                page(None).print(indented(_table(errors)))
+                page(None).print(indent_table(_table(errors)))
             if self.out is not None:
                 problems += written(self.out / name, to_json(found))
         refuse(problems)

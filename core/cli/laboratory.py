@@ -272,7 +272,7 @@ class StressEngines(Command):
         """Do the work of the command line."""
         from ..harness.engine import STANDARD
         from ..report.sections import deliver
-        from ..report.terminal import page, unheaded
+        from ..report.terminal import page, table_without_heads
         from ..studies.stress.families import FAMILIES
         from ..studies.stress.report import idle, markdown, report
         from ..studies.stress.verdicts import BAD
@@ -284,7 +284,7 @@ class StressEngines(Command):
             ):
                 raise KincheckError(f"--list runs nothing. Leave out {found}.")
             rows = [(name, family.about) for name, family in FAMILIES.items()]
-            page(None).print(unheaded(rows))
+            page(None).print(table_without_heads(rows))
             return Status.WITHIN
         problems: list[str] = []
         engines = registry.find_engines(self.engine or [STANDARD], problems, self.mode)

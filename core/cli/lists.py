@@ -86,7 +86,7 @@ class List(Command):
 def _print_references(options: List, console: Console) -> None:
     """Print keys and types, with whole lines for a pipe and broken lines for a terminal."""
     from ..case.io import catalogue
-    from ..report.terminal import LOG_WIDTH, indented, unheaded
+    from ..report.terminal import LOG_WIDTH, indent_table, table_without_heads
 
     if options.schema:
         lines = [*_keys()]
@@ -118,7 +118,7 @@ def _print_references(options: List, console: Console) -> None:
             console.print(*remarks, sep="\n")
         for heading, rows in tables().items() if wanted else ():
             console.print(heading)
-            console.print(indented(unheaded(rows)))
+            console.print(indent_table(table_without_heads(rows)))
     if options.outputs:
         console.print(catalogue.ON_OUTPUTS)
 

@@ -354,7 +354,7 @@ def _solve(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | Non
         hold()
         return results, problems, keeping, None
     except (KeyboardInterrupt, ClusterError) as reason:
-        pairs = running.planned(plan.cases, plan.engines, unread)
+        pairs = running.plan_pairs(plan.cases, plan.engines, unread)
         records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
         why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
         problems.append(f"{why}: {len(records)} of {len(pairs)} records were finished and are kept")

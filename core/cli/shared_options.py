@@ -124,10 +124,10 @@ def unreachable(options: Any) -> list[str]:
     """
     if options.scheduler is None:
         return []
-    from ..harness.workers.distributed import ClusterError, connected, loaded
+    from ..harness.workers.distributed import ClusterError, connect_client, load_distributed
 
     try:
-        with connected(loaded(), options.scheduler):
+        with connect_client(load_distributed(), options.scheduler):
             return []
     except ClusterError as error:
         return [str(error)]

@@ -19,7 +19,7 @@ from ..forces import Forces
 from ..trajectory import Array, Trajectory
 from .compare import output_series
 from .engine import Balancing, Engine
-from .provenance import plain, readable, waited
+from .provenance import plain, readable, waiting_seconds
 from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .trajectory_check import Reported, check, faults, held_trajectories
@@ -106,7 +106,7 @@ class Answer:
                 solved=int(solved.sum()),
                 iterations=0,
                 residual=found.residual,
-                message=bounded(found.message),
+                message=shorten_text(found.message),
                 details=plain(found.facts),
                 faults=found.faults,
                 reported=True,
@@ -117,7 +117,7 @@ class Answer:
             solved=int(solved.sum()),
             iterations=int(np.asarray(found.iterations)[solved].sum()),
             residual=float(found.residual),
-            message=bounded("; ".join(filter(None, (found.message, why)))),
+            message=shorten_text("; ".join(filter(None, (found.message, why)))),
             details=plain(found.facts),
             failures=found.failures,
             power=None if found.forces is None else _power(found.forces, solved),
@@ -147,7 +147,7 @@ class Failure:
     def of(error: BaseException) -> Failure:
         """Return the failure that an error of the engine stands for."""
         if isinstance(error, UnsupportedError):
-            return Failure(Outcome.UNSUPPORTED, bounded(error))
+            return Failure(Outcome.UNSUPPORTED, shorten_text(error))
         kind = error.kind if isinstance(error, KincheckError) else None
         return Failure(Outcome.ERROR, error_text(error), kind=kind)
 
@@ -205,13 +205,13 @@ def attempt(pair: Pair, report: Callable[[Facts], object] = lambda facts: None) 
                     " which",
                 )
             )
-        facts = replace(facts, version=bounded(version))
+        facts = replace(facts, version=shorten_text(version))
         report(facts)
         reason = engine.unsupported(case)
         if reason is not None:
-            return become(Failure(Outcome.UNSUPPORTED, bounded(reason)))
+            return become(Failure(Outcome.UNSUPPORTED, shorten_text(reason)))
         if case.balance is not None:
-            return become(_balanced(pair, seconds))
+            return become(_solve_equilibrium(pair, seconds))
         return become(_solve(pair, seconds))
     except KeyboardInterrupt:
         raise
@@ -219,7 +219,7 @@ def attempt(pair: Pair, report: Callable[[Facts], object] = lambda facts: None) 
         return become(Failure.of(error))
 
 
-def _balanced(pair: Pair, seconds: dict[str, float]) -> Answer:
+def _solve_equilibrium(pair: Pair, seconds: dict[str, float]) -> Answer:
     case, engine = pair.case, pair.engine
     if not isinstance(engine, Balancing):
         raise UnsupportedError(f"{engine.name} in mode {engine.mode} finds no equilibria")
@@ -238,10 +238,10 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
     seconds["build"] = perf_counter() - begin
 
     def solve() -> tuple[Trajectory, float, float]:
-        before, begin = waited(), perf_counter()
+        before, begin = waiting_seconds(), perf_counter()
         trajectory = engine.solve(model, case, pair.tol)
         seconds = perf_counter() - begin
-        own = seconds - min(waited() - before, seconds)
+        own = seconds - min(waiting_seconds() - before, seconds)
         check(case, engine.name, trajectory)
         return trajectory, seconds, own
 
@@ -277,13 +277,13 @@ def error_text(error: BaseException) -> str:
         text = str(error)
     except Exception as another:  # __str__ is code of the engine too
         text = f"its text cannot be had ({type(another).__name__})"
-    message = bounded(f"{type(error).__name__}: {text}" if text else type(error).__name__)
+    message = shorten_text(f"{type(error).__name__}: {text}" if text else type(error).__name__)
     if isinstance(error, MemoryError) and (limit := memory_limit()):
         message += f"; this process may have {limit:g} GB, --memory gives it more"
     return message
 
 
-def bounded(text: Any) -> str:
+def shorten_text(text: Any) -> str:
     """Return text of any origin for a record: readable, and of bounded length."""
     whole = text if isinstance(text, str) else str(text)
     if len(whole) > LONGEST_MESSAGE:

@@ -81,10 +81,10 @@ def unsound(record: Record) -> str:
 def unread(run: Mapping[str, Any]) -> str:
     """Return the unreadable cases of a run, from its circumstances; empty if there are none."""
     names = run.get("unread", {})
-    return f"{unread_count(len(names))}: {named([*names])}" if names else ""
+    return f"{unread_count(len(names))}: {shorten_names([*names])}" if names else ""
 
 
-def named(names: Sequence[str], between: str = ", ") -> str:
+def shorten_names(names: Sequence[str], between: str = ", ") -> str:
     """Return the names, or of many the first ones and the number of the others."""
     return shortened(names, NAMED, between)
 
@@ -109,17 +109,18 @@ def number(value: float | None) -> str:
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}" if exponent else mantissa
 
 
-def known(value: Any) -> Any:
+def value_words(value: Any) -> Any:
     """Return a value of any type from a results file, in words."""
     if isinstance(value, Mapping):
         return (
             "; ".join(
-                f"{key} {known(each)}" for key, each in cast("Mapping[str, Any]", value).items()
+                f"{key} {value_words(each)}"
+                for key, each in cast("Mapping[str, Any]", value).items()
             )
             or "–"
         )
     if isinstance(value, list | tuple):
-        return ", ".join(str(known(each)) for each in cast("Sequence[Any]", value)) or "–"
+        return ", ".join(str(value_words(each)) for each in cast("Sequence[Any]", value)) or "–"
     if isinstance(value, float):
         return number(value)
     return "–" if value is None or value == "" else value

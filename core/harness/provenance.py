@@ -55,7 +55,7 @@ def results(
         if (found := suspect(case, records, (native or {}).get(case.name)))
     }
     return Results(
-        run=known | {"engines": versions(records), **missing(plan, records)},
+        run=known | {"engines": versions(records), **missing_pairs(plan, records)},
         records=list(records),
         references=references(cases),
         suspects=suspects,
@@ -113,7 +113,9 @@ def versions(records: Sequence[Record]) -> dict[str, str | None]:
     return {engine: " and ".join(each) or None for engine, each in found.items()}
 
 
-def missing(plan: Sequence[tuple[str, str, str]], records: Sequence[Record]) -> dict[str, Any]:
+def missing_pairs(
+    plan: Sequence[tuple[str, str, str]], records: Sequence[Record]
+) -> dict[str, Any]:
     """Return case, engine and mode of planned pairs without a record, or an empty mapping."""
     made = {(record.case, record.engine, record.mode) for record in records}
     pairs = [list(pair) for pair in plan if pair not in made]
@@ -191,14 +193,14 @@ def calibration() -> float:
     matrix, column = np.eye(12) + 0.01 * np.arange(144.0).reshape(12, 12) / 144.0, np.ones(12)
     times: list[float] = []
     for _ in range(5):
-        before, begin = waited(), perf_counter()
+        before, begin = waiting_seconds(), perf_counter()
         for _ in range(700):
             column = np.linalg.solve(matrix, column)
             column /= np.abs(column).max()
             total = 0.0
             for step in range(500):
                 total += step * 0.5
-        times.append(perf_counter() - begin - (waited() - before))
+        times.append(perf_counter() - begin - (waiting_seconds() - before))
     return float(np.median(times))
 
 
@@ -248,10 +250,10 @@ def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
     A value that JSON cannot represent becomes its text.
     """
 
-    def instead(value: Any) -> Any:
+    def encode_unknown(value: Any) -> Any:
         return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)  # pyright: ignore
 
-    return msgspec.json.decode(msgspec.json.encode(dict(facts), enc_hook=instead))
+    return msgspec.json.decode(msgspec.json.encode(dict(facts), enc_hook=encode_unknown))
 
 
 def readable(text: str) -> str:
@@ -278,7 +280,7 @@ def processor() -> str:
 _ACCOUNT = Path("/proc/thread-self/schedstat")
 
 
-def waited() -> float:
+def waiting_seconds() -> float:
     """Return the seconds this thread was ready and waited for a processor; 0 except on Linux.
 
     Processor time does not replace wall-clock time: it misses the time in which a solve sleeps, or

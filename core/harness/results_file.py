@@ -97,7 +97,7 @@ def read_results(file: Path) -> Results:
 def _checks(results: Results) -> Checks:
     for key, kind in _FACTS.items():
         if key in results.run:
-            yield _converted(f"run.{key}", results.run[key], kind)
+            yield _check_conversion(f"run.{key}", results.run[key], kind)
     samples: dict[str, int] = {}
     for k, record in enumerate(results.records):
         yield from _record_checks(f"records[{k}]", record, samples)
@@ -109,7 +109,7 @@ def _checks(results: Results) -> Checks:
         yield from _scene_checks(join("scenes", case), scene)
 
 
-def _converted(key: str, value: object, kind: Any) -> tuple[str, bool, str]:
+def _check_conversion(key: str, value: object, kind: Any) -> tuple[str, bool, str]:
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
@@ -120,7 +120,7 @@ def _converted(key: str, value: object, kind: Any) -> tuple[str, bool, str]:
 def _record_checks(key: str, record: Record, samples: dict[str, int]) -> Checks:
     kinds = f"found {shown(record.truth)}, expected one of {', '.join(Truth)}"
     yield f"{key}.truth", record.truth in set(Truth), kinds
-    yield _converted(f"{key}.details", record.details, _Details)
+    yield _check_conversion(f"{key}.details", record.details, _Details)
     if record.driver:
         count = samples.setdefault(record.case, len(next(iter(record.driver.values()))))
         for name, values in record.driver.items():

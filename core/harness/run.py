@@ -18,7 +18,15 @@ from .engine import STANDARD, Engine, untimed
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, solve_in_process
 from .provenance import results, truth_of
 from .record import Deviations, Evidence, Outcome, Record, Results, Seconds
-from .verdict import Standard, Verdict, evidence, has_everything, judged, promised, standard_of
+from .verdict import (
+    Standard,
+    Verdict,
+    evidence,
+    has_everything,
+    judge_answer,
+    residual_limit,
+    standard_of,
+)
 
 NULL_REASONS = {
     "residual_max": "no sample was solved, or the engine has none",
@@ -92,7 +100,7 @@ def run(
     _distinct("engines", [f"{engine.name} ({engine.mode})" for engine in engines])
     records = {_key(record): record for record in made}
     ordered = sorted(engines, key=_standard_first)
-    wanted = planned(cases, engines)
+    wanted = plan_pairs(cases, engines)
     judging = {
         case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases
     }
@@ -120,7 +128,7 @@ def run(
                 case.waiting.append((pair, attempt))
             else:
                 judge(pair, attempt, case.standard)
-    found, requested = [records[key] for key in wanted], planned(cases, engines, unread)
+    found, requested = [records[key] for key in wanted], plan_pairs(cases, engines, unread)
     native = {name: each.standard.outputs for name, each in judging.items() if each.standard}
     return results(
         cases,
@@ -143,7 +151,7 @@ def _distinct(what: str, names: Sequence[str]) -> None:
         )
 
 
-def planned(
+def plan_pairs(
     cases: Sequence[Case], engines: Sequence[Engine], unread: Sequence[str] = ()
 ) -> list[tuple[str, str, str]]:
     """Return case, engine and mode of every pair in the order of records, unread cases last."""
@@ -205,12 +213,12 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
     facts = attempt.facts or Facts("unknown")
     result = attempt.result
     if isinstance(result, Answer):
-        tol = promised(engine, pair.tol) if residuals else math.inf
+        tol = residual_limit(engine, pair.tol) if residuals else math.inf
         try:
-            verdict = judged(case, result, native, tol)
+            verdict = judge_answer(case, result, native, tol)
             found = result.outputs if engine.name == STANDARD else native.outputs
             own = evidence(case, found)
-            return _answered(
+            return _answer_record(
                 case, engine, facts, result, attempt.seconds or Seconds(), verdict, own
             )
         except Exception as error:  # for example, an unsuitable reference
@@ -235,7 +243,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
     )
 
 
-def _answered(
+def _answer_record(
     case: Case,
     engine: Engine,
     facts: Facts,

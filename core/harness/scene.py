@@ -90,8 +90,8 @@ def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
                 fixed=body.fixed,
                 origin=list(body.origin),
                 euler_parameters=list(body.euler_parameters),
-                r=_rounded(motions[body.name].r, size) if body.name in motions else [],
-                p=_rounded(motions[body.name].p, 1.0) if body.name in motions else [],
+                r=_round_numbers(motions[body.name].r, size) if body.name in motions else [],
+                p=_round_numbers(motions[body.name].p, 1.0) if body.name in motions else [],
             )
             for body in mechanism.bodies
         ],
@@ -219,5 +219,5 @@ def _size(points: Sequence[Vector]) -> float:
     return float(np.ptp(np.array(points), axis=0).max()) or 1.0 if points else 1.0
 
 
-def _rounded(values: Array, size: float) -> list[list[float]]:
+def _round_numbers(values: Array, size: float) -> list[list[float]]:
     return np.round(values, DIGITS - math.floor(math.log10(size))).tolist()

@@ -82,7 +82,7 @@ def _of_reference(case: Case, mine: Sequence[Record]) -> Suspect | None:
     off = sorted(_off(case, rate_scale, whole[0]), key=lambda each: each.rank)
     if agreement is None or not off:
         return None
-    explained = _explained(case, rate_scale, whole[0], off)
+    explained = _explain(case, rate_scale, whole[0], off)
     engines = list(dict.fromkeys(record.engine for record in mine))
     if len(engines) == 1 and (explained[1] or not explained[0]):
         return None
@@ -128,7 +128,7 @@ def _of_native(case: Case, mine: Sequence[Record], native: Mapping[str, Series])
     off_too = [each for each, others, *_ in found if {*map(id, group)} <= {*map(id, others)}]
     explained: tuple[list[Explanation], list[str]] = ([], [])
     if native:
-        explained = _explained(case, rate_scale, group[0], off_too)
+        explained = _explain(case, rate_scale, group[0], off_too)
     engines = list(dict.fromkeys(record.engine for record in group))
     who = (
         f"{len(_simulators(group))} of {voters} other engines agree with each other within"
@@ -290,7 +290,7 @@ def _off(case: Case, rate_scale: float, record: Record) -> Iterator[_Off]:
                 yield _Off(name, order, held, known, found)
 
 
-def _explained(
+def _explain(
     case: Case, rate_scale: float, record: Record, off: Sequence[_Off]
 ) -> tuple[list[Explanation], list[str]]:
     """Return the slips that explain the deviations, merged if equal, and the unexplained outputs by
@@ -427,20 +427,20 @@ def slips(
         *((f"times {name}", _times(factor)) for name, factor in FACTORS.items()),
     ]
     found = (
-        _fitting(held, reference, definitions)
-        | _fitting(held, reference, scales, constant=True)
-        | _fitting(held, reference, _moves(held, reference, offsets))
-        | _exchanged(reference, others, "")
+        _find_fits(held, reference, definitions)
+        | _find_fits(held, reference, scales, constant=True)
+        | _find_fits(held, reference, _moves(held, reference, offsets))
+        | _find_exchanged(reference, others, "")
     )
     if found:
         return found
     both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
-    found = _fitting(held, reference, both, constant=True)
+    found = _find_fits(held, reference, both, constant=True)
     for words, change in scales:
         changed = reference.changed(change)
-        found |= _fitting(held, changed, definitions, f"{words} and ")
-        found |= _fitting(held, changed, _moves(held, changed, offsets), f"{words} and ")
-    return found | _exchanged(reference.changed(_times(-1.0)), others, f"{OTHER_SIGN} ")
+        found |= _find_fits(held, changed, definitions, f"{words} and ")
+        found |= _find_fits(held, changed, _moves(held, changed, offsets), f"{words} and ")
+    return found | _find_exchanged(reference.changed(_times(-1.0)), others, f"{OTHER_SIGN} ")
 
 
 def _times(factor: float) -> Callable[[Array], Array]:
@@ -469,7 +469,7 @@ def _moves(held: Curve, reference: Curve, offsets: bool) -> list[NamedChange]:
     return found
 
 
-def _fitting(
+def _find_fits(
     held: Curve,
     reference: Curve,
     changes: Sequence[NamedChange],
@@ -497,10 +497,12 @@ def _fitting(
     return found
 
 
-def _exchanged(reference: Curve, others: Mapping[str, Curve], before: str) -> dict[str, Deviation]:
+def _find_exchanged(
+    reference: Curve, others: Mapping[str, Curve], before: str
+) -> dict[str, Deviation]:
     """Return the other outputs that agree with the reference, if the reference varies."""
     found: dict[str, Deviation] = {}
     for name, other in others.items():
         same: list[NamedChange] = [(f"taken as that of output {name}", lambda x: x)]
-        found |= _fitting(other, reference, same, before)
+        found |= _find_fits(other, reference, same, before)
     return found

@@ -125,7 +125,7 @@ class Verdict:
     faults: Sequence[str] = ()
 
 
-def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
+def judge_answer(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     """Return the verdict on an answer.
 
     Args:
@@ -240,7 +240,7 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
     return ""
 
 
-def promised(engine: Engine, tol: float) -> float:
+def residual_limit(engine: Engine, tol: float) -> float:
     """Return the largest residual promised for solved samples, relative to the size.
 
     The tolerance is infinite for engines judged by their outputs alone: a simulation accepts

@@ -34,9 +34,9 @@ from .steps import (
     UNJUDGED,
     crept,
     drift,
-    drifted,
-    lasting,
+    has_drifted,
     slowest,
+    standing_steps,
     steps,
 )
 from .store import Store
@@ -71,7 +71,7 @@ def regressions(
     around = _around(subject, store)
     limit = slowest(_on_machine(subject, around, before=subject.before))
     every = steps(around)
-    standing, over = lasting(every), [each for each in every if each.worse and each.repaired]
+    standing, over = standing_steps(every), [each for each in every if each.worse and each.repaired]
     records, why = subject.results.records, subject.results.unread
     found = [
         Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE))
@@ -81,7 +81,7 @@ def regressions(
         number = -math.inf if against.number is None else against.number
         found += compare(subject, against, _on_machine(subject, around, before=number + 1), limit)
         found += crept(subject, around, found)
-    found += _missing(subject, store, found)
+    found += _find_missing(subject, store, found)
     return Regressions(
         run=subject.label,
         against=against.label if against else None,
@@ -138,7 +138,7 @@ def _since(finding: Finding, standing: list[Step]) -> Finding:
     return finding
 
 
-def _missing(
+def _find_missing(
     subject: Subject, store: Store | None, findings: Sequence[Finding]
 ) -> Iterator[Finding]:
     """Yield the missing pairs of the last run of the same selection, whatever run is compared with:
@@ -179,7 +179,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             continue
         findings += _outcomes(record, old)
         findings += _lost(record, old)
-        findings += _moved(record, old)
+        findings += _find_moved(record, old)
         findings += _errors(record, old)
         findings += _references(record, *references)
         usual = _usual_times(before, old, history.pairs.get(record.pair, ()), history)
@@ -217,10 +217,10 @@ def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
 def _lost(now: Record, before: Record) -> Iterator[Finding]:
     """Yield lost phases, samples, motions and standards."""
 
-    def reached(record: Record, phase: str) -> bool:
+    def has_phase(record: Record, phase: str) -> bool:
         return getattr(record.seconds, phase, None) is not None
 
-    phases = [phase for phase in PHASES if reached(before, phase) and not reached(now, phase)]
+    phases = [phase for phase in PHASES if has_phase(before, phase) and not has_phase(now, phase)]
     if phases:
         why = f": {_result(now)}" if now.outcome is not Outcome.PASS else ""
         yield Finding.of(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
@@ -290,7 +290,7 @@ def values_of(series: OutputSeries | None, motion: str) -> Values:
     return getattr(series, motion, None) or ()
 
 
-def _apart(a: Values, b: Values) -> float:
+def _largest_difference(a: Values, b: Values) -> float:
     """Return the largest difference over the common samples."""
     pairs = zip(a, b, strict=False)
     return max((abs(x - y) for x, y in pairs if x is not None and y is not None), default=0.0)
@@ -308,12 +308,12 @@ def same_samples(now: Record, before: Record) -> bool:
     return {name: len(each) for name, each in mine.items()} == {
         name: len(each) for name, each in other.items()
     } and all(
-        _apart(values, other[name]) <= SAME_SAMPLE * _largest(values)
+        _largest_difference(values, other[name]) <= SAME_SAMPLE * _largest(values)
         for name, values in mine.items()
     )
 
 
-def _moved(now: Record, before: Record) -> Iterator[Finding]:
+def _find_moved(now: Record, before: Record) -> Iterator[Finding]:
     """Yield the outputs with changed values or samples, which only this comparison shows if there
     is no reference.
     """
@@ -330,7 +330,7 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
             outputs = (other for other in before.outputs.values() if other.unit == each.unit)
             scale = _largest(x for other in outputs for x in values_of(other, each.motion))
             limit = DEFAULT_ATOL + UNJUDGED * scale
-        off = _apart(each.old, each.new)
+        off = _largest_difference(each.old, each.new)
         if off > limit and each.output not in moved:
             moved.add(each.output)
             size = value_text(number(off), motion_unit(each.unit, each.motion))
@@ -357,7 +357,11 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                     motion=motion,
                 )
             # an error out of tolerance is a failure, which is reported there
-            if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
+            if (
+                b.within
+                and a.against == b.against
+                and has_drifted(a.max_abs, b.max_abs, b.tolerance)
+            ):
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
                 words = f" ({times}tolerance {number(b.tolerance)})"
                 yield drift(now, output, motion, a.max_abs, b, words)
@@ -369,7 +373,7 @@ def _references(record: Record, now: References, before: References) -> Iterator
         new = now.get(record.case, {}).get(output)
         for motion in QUANTITIES:
             was = values_of(old, motion)
-            off = _apart(was, values_of(new, motion))
+            off = _largest_difference(was, values_of(new, motion))
             if off > SAME_SAMPLE * _largest(was):
                 message = (
                     f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"

@@ -15,7 +15,7 @@ from time import monotonic, sleep
 import msgspec
 
 from ..errors import KincheckError, shortened
-from ..harness.execution import bounded
+from ..harness.execution import shorten_text
 
 APPLICATION = 0x6B696E63
 """The application_id of these files ("kinc"): databases of other programs are refused."""
@@ -223,13 +223,15 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
         if run is not None and _damaged(error):
             raise DamagedRunError(
                 run,
-                f"history {path}: run {run} cannot be {what} ({bounded(error)}); it may be damaged:"
+                f"history {path}: run {run} cannot be {what} ({shorten_text(error)}); it may be damaged:"
                 " restore a copy of the file, or remove the run: kincheck history --history"
                 f" {shlex.quote(str(path))} --remove {run}",
             ) from error
         own = isinstance(error, ValueError) and not isinstance(error, msgspec.MsgspecError)
         advice = "" if own else _advice(str(error))
-        raise HistoryError(f"history {path}: cannot be {what}: {bounded(error)}{advice}") from error
+        raise HistoryError(
+            f"history {path}: cannot be {what}: {shorten_text(error)}{advice}"
+        ) from error
 
 
 def damage_lines(path: Path, passed_over: Mapping[int, str]) -> list[str]:

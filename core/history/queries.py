@@ -229,7 +229,7 @@ def faultless(store: Store) -> set[int]:
     }
 
 
-def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
+def compared_quantities(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
     """Return the compared outputs and motions of a run's pairs whose engine was installed and able.
 
     Raises:

@@ -19,9 +19,9 @@ from ..harness.engine import PATIENCE, Engine, versions
 from ..harness.provenance import circumstances, conditions, plain, references
 from ..harness.record import Facts, Record, Results
 from ..harness.results_file import read_results
-from ..harness.run import planned
+from ..harness.run import plan_pairs
 from .findings import RunName
-from .queries import NIGHTS, alike, choose_state_run, compared, faultless, most_compared
+from .queries import NIGHTS, alike, choose_state_run, compared_quantities, faultless, most_compared
 from .store import HistoryError, Pair, RunRow, Store
 
 LAST_GREEN = "last-green"
@@ -84,7 +84,7 @@ def find(name: str | None, store: Store | None) -> Subject:
             raise KincheckError(
                 f"report: run {row.id} is still running. Report it when it has ended."
             )
-        return _stored(store, row)
+        return _stored_run(store, row)
     rows = [row for row in store.runs() if row.status != "running"]
     row = choose_state_run(rows, faultless(store), NIGHTS)
     if row is None:
@@ -93,7 +93,7 @@ def find(name: str | None, store: Store | None) -> Subject:
             " records one"
         )
     later = [each.id for each in reversed(rows) if each.id > row.id]
-    return replace(_stored(store, row), passed_by=later)
+    return replace(_stored_run(store, row), passed_by=later)
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
@@ -109,7 +109,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
         row = _last_green(store, subject) if name == LAST_GREEN else _baseline(store, name, subject)
         if row is not None:
             with store.sparing():
-                return _stored(store, row, name.replace("-", " ")), ""
+                return _stored_run(store, row, name.replace("-", " ")), ""
             return find_against(name, subject, store)  # the next best
         if name == LAST_GREEN:
             return None, "no earlier green run has any of its pairs"
@@ -140,7 +140,7 @@ def _in_file(file: Path, store: Store | None) -> Subject:
     return Subject(str(file), number, results, number or min(later, default=math.inf))
 
 
-def _stored(store: Store, row: RunRow, rule: str = "") -> Subject:
+def _stored_run(store: Store, row: RunRow, rule: str = "") -> Subject:
     name = f"run {row.id}" + (f" ({rule})" if rule else "")
     if row.status != "finished":
         name += ", without an end" if row.status == "killed" else f", {row.status}"
@@ -156,9 +156,9 @@ def _last_green(store: Store, subject: Subject) -> RunRow | None:
     outputs = {record.pair: {*record.errors} for record in subject.results.records}
     good = faultless(store)
 
-    def shared(row: RunRow) -> int:
+    def shared_count(row: RunRow) -> int:
         """Return the number of comparisons; outputs removed from a case do not count."""
-        there = compared(store, row.id)
+        there = compared_quantities(store, row.id)
         count = 0
         for pair in subject.pairs & there.keys():
             still = outputs.get(pair)  # empty if the comparison is missing
@@ -167,7 +167,7 @@ def _last_green(store: Store, subject: Subject) -> RunRow | None:
 
     most = most_compared(store, subject.pairs)
     rows = [row for row in store.runs() if row.id in good and row.id < subject.before]
-    return _best(store, rows, subject, most, shared)
+    return _best(store, rows, subject, most, shared_count)
 
 
 def _baseline(store: Store, name: str, subject: Subject) -> RunRow | None:
@@ -182,8 +182,8 @@ def _baseline(store: Store, name: str, subject: Subject) -> RunRow | None:
         and row.git.get("branch") == name.removesuffix(BASELINE)
         and not row.git.get("changed")
     ]
-    shared = {row.id: len(subject.pairs.intersection(row.plan)) for row in rows}
-    return _best(store, rows, subject, shared, lambda row: shared[row.id])
+    shared_count = {row.id: len(subject.pairs.intersection(row.plan)) for row in rows}
+    return _best(store, rows, subject, shared_count, lambda row: shared_count[row.id])
 
 
 def _best(
@@ -191,7 +191,7 @@ def _best(
     rows: Sequence[RunRow],
     subject: Subject,
     most: Mapping[int, int],
-    shared: Callable[[RunRow], int],
+    shared_count: Callable[[RunRow], int],
 ) -> RunRow | None:
     """Return the run that shares the most, the latest of several; None without any.
 
@@ -210,7 +210,7 @@ def _best(
         if best and bound < best[0]:
             break
         with store.sparing():
-            amount = shared(row)
+            amount = shared_count(row)
             if amount and (best is None or key(row, amount) > best[0]):
                 best = key(row, amount), row
     return best and best[1]
@@ -327,7 +327,7 @@ def keep(
     facts = circumstances(cases, started=started, tol=tol, command=command) | plain(
         {**settings, **conditions()}
     )
-    plan = planned(cases, engines, unread)
+    plan = plan_pairs(cases, engines, unread)
     # the place of the work and the number of workers change no record
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]
     git: Facts = facts["git"] or {}

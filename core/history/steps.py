@@ -97,7 +97,7 @@ SEEN = 10
 """Fewest runs before a tolerance is called loose: a week and a half of nights."""
 
 
-def drifted(before: float, now: float, tolerance: float) -> bool:
+def has_drifted(before: float, now: float, tolerance: float) -> bool:
     """Return whether an error has grown by more than floor and round-off explain."""
     return now > max(DRIFT_FLOOR * tolerance, DRIFT * before)
 
@@ -271,7 +271,7 @@ def steps(history: History) -> list[Step]:
     return sorted(found, key=lambda step: -step.first)
 
 
-def lasting(found: Sequence[Step]) -> list[Step]:
+def standing_steps(found: Sequence[Step]) -> list[Step]:
     """Return the last step for the worse of each series, unless a later run has repaired it."""
     last: dict[tuple[str | None, ...], Step] = {}
     for step in found:  # the latest first
@@ -418,7 +418,7 @@ def crept(subject: Subject, around: History, findings: Sequence[Finding]) -> Ite
             logs = np.log(above_floor(errors))
             *_, start = 0, *change_points(logs, least=math.log(DRIFT), lasting=1)
             entry, least = min(errors[start:], key=lambda each: (each[1].max_abs, -each[0].run))
-            if drifted(least.max_abs, now.max_abs, now.tolerance):
+            if has_drifted(least.max_abs, now.max_abs, now.tolerance):
                 words = f", gradually since run {entry.run} (tolerance {number(now.tolerance)})"
                 yield drift(record, output, motion, least.max_abs, now, words)
 

@@ -27,7 +27,7 @@ from typing import Any, Literal, Self, TypeAlias
 
 import msgspec
 
-from ..harness.provenance import missing, readable, versions
+from ..harness.provenance import missing_pairs, readable, versions
 from ..harness.record import Record, Results, Seconds, update_outcome
 from .database import (
     DamagedRunError,
@@ -280,7 +280,10 @@ class Store:
             )
             for kind, case, content in self.connection.execute(query, (run,)):
                 attached.setdefault(kind, {})[case] = msgspec.json.decode(zlib.decompress(content))
-            facts = row.circumstances | {"engines": versions(records), **missing(row.plan, records)}
+            facts = row.circumstances | {
+                "engines": versions(records),
+                **missing_pairs(row.plan, records),
+            }
             whole: dict[str, Any] = {"run": facts, "records": [], **attached}
             return msgspec.structs.replace(msgspec.convert(whole, type=Results), records=records)
 

@@ -165,7 +165,9 @@ class LiveServer:
         """The case with the numbers of the page that last had an answer; until then, the file."""
         live = self.live
         return (
-            live.edited(self.points) if self.points and isinstance(live, LiveTable) else live.case
+            live.edited_case(self.points)
+            if self.points and isinstance(live, LiveTable)
+            else live.case
         )
 
     def close(self) -> None:
@@ -376,7 +378,7 @@ class Conversation:
         case = live.case
         if isinstance(live, LiveTable) and message.points is not None:
             with self.server.lock:
-                case = live.referenced(live.edited(message.points))
+                case = live.referenced(live.edited_case(message.points))
         done = 0
 
         def tell(record: Record) -> None:

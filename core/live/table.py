@@ -22,7 +22,7 @@ from ..case.models.files import read_hardpoints
 from ..case.models.hardpoints.read import case_of_hardpoints
 from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
 from ..case.models.saving import free_name, save_table
-from ..case.quantity import Output, Quantity
+from ..case.quantity import Output, Quantity, still_jets
 from ..case.turns import count_output_turns
 from ..errors import KincheckError, unknown
 from ..harness.labels import output_label
@@ -156,7 +156,7 @@ class LiveTable(LiveFile):
             varied=self.variation is not None,
         )
 
-    def edited(self, points: Rows) -> Case:
+    def edited_case(self, points: Rows) -> Case:
         """Return the case of the table with other numbers, by the reader's own rules.
 
         Raises:
@@ -180,7 +180,7 @@ class LiveTable(LiveFile):
             KincheckError: the reader refuses the points.
         """
         times = [perf_counter()]
-        case = self.edited(asked.points)
+        case = self.edited_case(asked.points)
         times.append(perf_counter())
         designs, geometry = self._prepared(case), _geometry(case)
         found = designs.solve(geometry, TOL, alone=asked.whole)
@@ -225,7 +225,7 @@ class LiveTable(LiveFile):
         Raises:
             KincheckError: the reader refuses the points, or there is no such output.
         """
-        case = self.edited(asked.points)
+        case = self.edited_case(asked.points)
         names = [each.name for each in case.hardpoints]
         steps = np.kron(np.eye(3 * len(names)), [[MOVED], [-MOVED]])
         offsets = dict(zip(names, np.split(steps, len(names), axis=1), strict=True))
@@ -250,7 +250,7 @@ class LiveTable(LiveFile):
         """
         if self.vary_file is None:
             raise KincheckError("tolerances: there is no file of them; start kincheck with --vary")
-        case = self.edited(asked.points)
+        case = self.edited_case(asked.points)
         variation = read_variation(self.vary_file, case)
         count = min(variation.count or VARIANTS, VARIANTS)
         varied = variation.geometry(variation.offsets(0, 0, count))
@@ -272,7 +272,7 @@ class LiveTable(LiveFile):
         Raises:
             KincheckError: as `save_table`, or the reader refuses the points.
         """
-        self.edited(asked.points)
+        self.edited_case(asked.points)
         return Saved(name=save_table(self.table, self.supplied, asked.points, asked.name).name)
 
     def _prepare(self, case: Case) -> tuple[list[str], PreparedDesigns]:
@@ -332,7 +332,7 @@ class LiveTable(LiveFile):
         sizes = {place: len(value) for place, value in places(case.mechanism).items()}
         standing = _by_place(sizes, geometry)
         design = {
-            name: Vec3(*(Jet(a, np.zeros(()), np.zeros(())) for a in standing[place]))
+            name: still_jets(standing[place])
             for name in names
             if (place := f"points.{name}.position") in standing
         }

@@ -151,7 +151,9 @@ def driver_axis(facts: Facts, records: Sequence[Record], worst: Iterable[int]) -
     if up and "wheel" in driver.get("point", "") and driver.get("relative", True):
         name = "wheel travel"
         title = f"rebound \N{LEFTWARDS ARROW}  {with_unit(name, unit)}  \N{RIGHTWARDS ARROW} jounce"
-    return Axis(name, unit, swept.scale, values, title, _kept(len(values), worst), up, further)
+    return Axis(
+        name, unit, swept.scale, values, title, _drawn_samples(len(values), worst), up, further
+    )
 
 
 def _upwards(driver: Facts) -> int:
@@ -163,7 +165,7 @@ def _upwards(driver: Facts) -> int:
     return int(math.copysign(1, cosine)) if abs(cosine) >= ALONG else 0
 
 
-def _kept(count: int, worst: Iterable[int]) -> list[int]:
+def _drawn_samples(count: int, worst: Iterable[int]) -> list[int]:
     if count <= SAMPLES:
         return list(range(count))
     even = (round(k * (count - 1) / (SAMPLES - 1)) for k in range(SAMPLES))
@@ -223,7 +225,7 @@ def events(record: Record, facts: Facts) -> dict[str, int]:
         facts: of the case, with the units of its table.
     """
     name, travel = next(iter(record.driver.items()))
-    unit, scale = _shown(DRIVER_UNITS.get(facts["driver"].get("type", ""), ""), facts)
+    unit, scale = _display_unit(DRIVER_UNITS.get(facts["driver"].get("type", ""), ""), facts)
     low, high = (pick(range(len(travel)), key=travel.__getitem__) for pick in (min, max))
     design = min(range(len(travel)), key=lambda k: abs(travel[k]))
     ends = ("rebound", "jounce") if name.endswith("stroke") else ("least", "most")
@@ -238,17 +240,17 @@ def _rows(
     for name, series in record.outputs.items():
         if name.removeprefix("left_").removeprefix("right_") not in NAMES or not series.position:
             continue
-        unit, scale = _shown(series.unit, facts)
+        unit, scale = _display_unit(series.unit, facts)
         cells = [number(series.position[k], scale) for k in samples]
         per = record.outputs.get(name + PER_TRAVEL)
         gradient, per_unit = "", ""
         if per is not None and per.position:
-            per_unit, factor = _shown(per.unit, facts)
+            per_unit, factor = _display_unit(per.unit, facts)
             gradient = number(per.position[design], factor)
         yield visible(with_unit(name, unit)), *cells, gradient, per_unit
 
 
-def _shown(unit: str, facts: Facts) -> tuple[str, float]:
+def _display_unit(unit: str, facts: Facts) -> tuple[str, float]:
     text, size = in_table_units(unit, facts)
     return unit_text(text).replace("deg", "\N{DEGREE SIGN}"), 1.0 / size
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..case.case import MARKER, PER_TRAVEL, Case
 from ..case.units import LENGTHS
 from ..dataset import Dataset, Variable
-from ..harness.labels import named
+from ..harness.labels import shorten_names
 from ..harness.record import Facts, Results
 from ..joints import Kind
 from ..kinematics import kinds, places
@@ -144,7 +144,7 @@ def side_by_side(designs: Designs) -> dict[str, Sequence[float | None]]:
 def exceeded(designs: Designs, accepted: Mapping[str, float]) -> list[str]:
     """Return a sentence on each difference that is larger than accepted, by output."""
     return [
-        f"{name} of {label} differs by {_signed(apart[k])} {designs.units[name]} at"
+        f"{name} of {label} differs by {_signed_number(apart[k])} {designs.units[name]} at"
         f" {designs.at(k)}, more than {number(accepted[name])} {designs.units[name]}."
         for name, label, apart, k in designs.differences()
         if name in accepted and not abs(apart[k]) <= accepted[name]
@@ -173,7 +173,9 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
 
     def cell(label: str, name: str, k: int) -> str:
         value, base = (curves[each].get(name, {k: np.nan})[k] for each in (label, first))
-        apart = f" ({_signed(value - base)})" if label != first and np.isfinite(value) else ""
+        apart = (
+            f" ({_signed_number(value - base)})" if label != first and np.isfinite(value) else ""
+        )
         return number(value if np.isfinite(value) else None) + apart
 
     rows: list[list[str]] = []
@@ -186,7 +188,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
             cells = [cell(label, name, k) for k in samples]
             gradient = f"{cell(label, slope, design)} {designs.units.get(slope, '')}"
             most, k = found.get(label, (0.0, 0))
-            at = ["", ""] if label == first else [_signed(most), designs.at(k)]
+            at = ["", ""] if label == first else [_signed_number(most), designs.at(k)]
             title = with_unit(name, designs.units[name]) if label == first else ""
             rows.append([title, label, *cells, gradient, *at])
     titles = [row[0].partition(" [")[0] for row in rows]
@@ -194,7 +196,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
         verdict.append(f"No difference: {', '.join(equal)}.")
     for label, own in curves.items():
         if lone := [name for name in own if not all(name in each for each in curves.values())]:
-            verdict.append(f"Not in every design, but in {label}: {named(lone)}.")
+            verdict.append(f"Not in every design, but in {label}: {shorten_names(lone)}.")
     verdict += [
         f"Not compared, because defined otherwise: {name} ({what})."
         for name, what in designs.other.items()
@@ -205,7 +207,7 @@ def _of_outputs(designs: Designs, beyond: Sequence[str]) -> Section:
     return Section("Outputs", verdict, notes, columns, 2, rows)
 
 
-def _signed(value: float) -> str:
+def _signed_number(value: float) -> str:
     return f"{'+' if value > ZERO else ''}{number(value)}"
 
 
@@ -224,7 +226,7 @@ def _of_points(cases: Sequence[Case]) -> Section:
             if np.abs(after - before).max() < SAME:
                 continue
             size = 1.0 if of_places.get(key) in WITHOUT_LENGTH else unit.size
-            numbers = (_written(each / size) for each in (before, after, after - before))
+            numbers = (_point_text(each / size) for each in (before, after, after - before))
             title = name if called == name else f"{name} ({called})"
             rows.append([title, other.name, *numbers])
             moved += 1
@@ -233,7 +235,7 @@ def _of_points(cases: Sequence[Case]) -> Section:
             verdict.append(f"No point that both have differs between {pair}.")
         for label, mine, its in ((first.name, old, new), (other.name, new, old)):
             if lone := [name for key, (name, _) in mine.items() if key not in its]:
-                verdict.append(f"Only in {label}: {named(lone)}.")
+                verdict.append(f"Only in {label}: {shorten_names(lone)}.")
     heads = [f"{each} [{unit.name}]" for each in (first.name, "its", "moved by")]
     return Section("Hardpoints", verdict, [], ["point", "design", *heads], 2, rows)
 
@@ -253,7 +255,7 @@ def _points(
     return {name: (name, np.array(value)) for name, value in every if MARKER not in name}
 
 
-def _written(numbers: Array) -> str:
+def _point_text(numbers: Array) -> str:
     """Return numbers as a table has them: what differs by rounding only is no change."""
     return ", ".join(f"{0.0 + round(x, 9):.9g}" for x in numbers.tolist())
 

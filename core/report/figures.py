@@ -252,11 +252,11 @@ def error_figure(
         "meta": {"floor": floor},
     }
     if tolerance:
-        layout["shapes"] = accepted(floor, tolerance)
+        layout["shapes"] = accepted_field(floor, tolerance)
     return {"data": traces, "layout": layout}
 
 
-def accepted(floor: float, tolerance: float) -> list[Figure]:
+def accepted_field(floor: float, tolerance: float) -> list[Figure]:
     """Return the field of accepted errors above a floor, and the line of the tolerance over it."""
     across = {"xref": "paper", "x0": 0, "x1": 1, "y1": tolerance}
     below = {"type": "rect", **across, "y0": floor / 10, "layer": "below"}
@@ -398,9 +398,9 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     for motion in QUANTITIES:
         each = figure([past.errors.get(motion) for past in history])
         if _has_values(each) or (motion == "position" and any(past.bad for past in history)):
-            each = floored(each, f"largest {motion} error [tolerances]", 1.0)
+            each = with_error_axis(each, f"largest {motion} error [tolerances]", 1.0)
             floor = each["layout"]["meta"]["floor"]
-            each["layout"]["shapes"] = [*accepted(floor, 1.0), *lines]
+            each["layout"]["shapes"] = [*accepted_field(floor, 1.0), *lines]
             failures = (_failures(history, style, motion) for style in drawn)
             each["data"] += [trace for trace in failures if trace["x"]]
             made[f"{motion}-error"] = each
@@ -494,10 +494,10 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
     times = [value for trace in traces for value in trace["x"] if value]
     side = ticked_axis(TIMES, times)
     layout = {"xaxis": side, "hovermode": "closest"}
-    return floored({"data": traces, "layout": layout}, "largest position error [m]")
+    return with_error_axis({"data": traces, "layout": layout}, "largest position error [m]")
 
 
-def floored(figure: Figure, title: str, *within: float) -> Figure:
+def with_error_axis(figure: Figure, title: str, *within: float) -> Figure:
     """Return the figure with a vertical axis for errors, which holds these values too."""
     positive = [value for trace in figure["data"] for value in trace["y"] if value]
     positive += within

@@ -60,7 +60,7 @@ class Judged:
         return motion_unit(series.unit, self.motion) if series else ""
 
 
-def judged(records: Sequence[Record]) -> list[Judged]:
+def deviations_of(records: Sequence[Record]) -> list[Judged]:
     """Return every deviation of the records."""
     return [
         Judged(r, output, motion, d)
@@ -77,7 +77,7 @@ def worst(deviations: Iterable[Judged]) -> Judged | None:
 
 def worst_of(record: Record, motion: str | None = None) -> Judged | None:
     """Return the worst deviation of a record, in one motion or any."""
-    return worst(each for each in judged([record]) if motion in (None, each.motion))
+    return worst(each for each in deviations_of([record]) if motion in (None, each.motion))
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def case_view(given: Material, name: str, anchor: str) -> CaseView:
     results = given.results
     records = [record for record in results.records if record.case == name]
     facts: Facts = results.run.get("cases", {}).get(name, {})
-    deviations = judged(records)
+    deviations = deviations_of(records)
     axis = driver_axis(facts, records, (each.deviation.worst_step for each in deviations))
     names = dict.fromkeys(output for record in records for output in record.outputs)
     outputs: list[OutputView] = []

@@ -20,7 +20,7 @@ from ..history.findings import WHY, Finding, Kind, Loose, Regressions, Step
 from ..unit_text import value_text
 from . import terminal
 from .sections import environment
-from .table import escaped, row
+from .table import escape_markdown, row
 
 LONGEST = 12
 """Largest number of rows shown in a group; a broken engine has one for every case. The JSON has
@@ -79,11 +79,11 @@ def headline(found: Regressions) -> str:
             else f"all {judged} right"
         )
         # without a run to compare with there are no other regressions
-        never = _counted(found, Kind.LOST)
+        never = _count_pairs(found, Kind.LOST)
         rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
         rest += [f"{found.unable} unavailable or unsupported"] if found.unable else []
         rest += [f"{never} not run"] if never else []
-        absent = _counted(found, Kind.ABSENT)
+        absent = _count_pairs(found, Kind.ABSENT)
         rest += [f"{absent} {Kind.ABSENT}"] if absent else []
         rest += [unread_count(len(found.unread))] if found.unread else []
         return (
@@ -94,7 +94,7 @@ def headline(found: Regressions) -> str:
     counts = [
         f"{count} {words.get(kind, kind)}"
         for kind in Kind
-        if found.fails(kind) and (count := _counted(found, kind))
+        if found.fails(kind) and (count := _count_pairs(found, kind))
     ]
     counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
@@ -104,7 +104,7 @@ def headline(found: Regressions) -> str:
     rest = [f"{fixed} fixed"] if fixed else []
     rest += [f"{again} judged again"] if again else []
     rest += [f"{len(found.unjudged)} not judged"] if found.unjudged else []
-    absent = 0 if found.missing_is_failure else _counted(found, Kind.ABSENT)
+    absent = 0 if found.missing_is_failure else _count_pairs(found, Kind.ABSENT)
     rest += [f"{absent} {Kind.ABSENT}"] if absent else []
     rest += [f"{known} not right before either"] if known > 0 else []
     rest += [", ".join(map(str, versions(found)))] if versions(found) else []
@@ -125,7 +125,7 @@ def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
     return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
 
 
-def _counted(found: Regressions, kind: Kind) -> int:
+def _count_pairs(found: Regressions, kind: Kind) -> int:
     """Return the number of pairs with findings of a kind; an unreadable case is one fault."""
     return sum(case not in found.unread for case, _, _ in pairs(found, kind))
 
@@ -213,7 +213,7 @@ def loose_says(loose: Sequence[Loose]) -> list[str]:
 
 def to_markdown(found: Regressions) -> str:
     """Return the changes in Markdown, the worst first; long parts are folded."""
-    return "\n".join([f"## {escaped(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
+    return "\n".join([f"## {escape_markdown(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
 
 
 def to_markup(found: Regressions) -> Markup:
@@ -246,7 +246,7 @@ def to_markup(found: Regressions) -> Markup:
 
 def _lines(found: Regressions) -> Iterator[str]:
     if found.changes:
-        yield f"Changed: {escaped(', '.join(map(str, found.changes)))}."
+        yield f"Changed: {escape_markdown(', '.join(map(str, found.changes)))}."
     elif found.against is not None:
         yield "Neither versions nor machine nor commit changed."
     yield ""
@@ -258,13 +258,13 @@ def _lines(found: Regressions) -> Iterator[str]:
         folded = not found.fails(kind) and kind not in (Kind.FIXED, Kind.JUDGED)
         title = f"{kind.capitalize()} ({len(pairs(found, kind))}): {WHY[kind]}"
         yield from (
-            [f"<details><summary>{escaped(title)}</summary>", ""]
+            [f"<details><summary>{escape_markdown(title)}</summary>", ""]
             if folded
-            else [f"**{escaped(title)}**", ""]
+            else [f"**{escape_markdown(title)}**", ""]
         )
         yield from ("| engine | case | what |", "| --- | --- | --- |")
         for each in group[:LONGEST]:
-            yield row(map(escaped, (each.engine, each.where, each.what)))
+            yield row(map(escape_markdown, (each.engine, each.where, each.what)))
         yield ""
         if len(group) > LONGEST:
             yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
@@ -277,7 +277,7 @@ def _lines(found: Regressions) -> Iterator[str]:
                 if over
                 else [f"**{title}**", ""]
             )
-            yield from (f"- {escaped(line)}" for line in lines[:LONGEST])
+            yield from (f"- {escape_markdown(line)}" for line in lines[:LONGEST])
             rest = len(lines) - LONGEST
             yield from [f"- and {rest} more, all in the JSON"] if rest > 0 else []
             yield from ["", "</details>", ""] if over else [""]
@@ -285,7 +285,7 @@ def _lines(found: Regressions) -> Iterator[str]:
         lines = loose_says(found.loose)
         title = f"Tolerances that could be tightened ({number_of(len(lines), 'case')})"
         yield from (f"<details><summary>{title}</summary>", "")
-        yield from (f"- {escaped(line)}" for line in lines)
+        yield from (f"- {escape_markdown(line)}" for line in lines)
         yield from ("", "</details>", "")
 
 
@@ -309,7 +309,7 @@ def print_regressions(found: Regressions, file: TextIO) -> None:
         table = terminal.columns("engine", "case", "what")
         for each in group[:LONGEST]:
             table.add_row(*(Text(visible(cell)) for cell in (each.engine, each.where, each.what)))
-        console.print(terminal.indented(table))
+        console.print(terminal.indent_table(table))
         _print_rest(console, len(group))
     for over, title in STEPS.items():
         _print_list(console, title.lower(), step_lines(found.steps, over=over))

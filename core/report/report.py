@@ -16,9 +16,9 @@ from ..harness.engine import STANDARD
 from ..harness.labels import (
     TRUTHS,
     engine_name,
-    named,
     notes,
     product,
+    shorten_names,
     suspects,
     unread_count,
     validation,
@@ -28,7 +28,7 @@ from ..trajectory import QUANTITIES
 from .axis import SAMPLES
 from .curves import downloads
 from .figures import Effort, Past
-from .page_model import CaseView, Material, case_view, judged, worst_of
+from .page_model import CaseView, Material, case_view, deviations_of, worst_of
 from .sections import environment, figure_parts, packed
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
@@ -44,7 +44,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         limits.append((title, text))
 
     def cases(holds: Callable[[Record], bool]) -> str:
-        return named([*dict.fromkeys(record.case for record in records if holds(record))])
+        return shorten_names([*dict.fromkeys(record.case for record in records if holds(record))])
 
     add(
         "One description for all",
@@ -68,7 +68,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         if pairs and outcome not in ANSWERED:
             add(
                 f"{outcome.shown.capitalize()}: {len(pairs)}",
-                f"There are no results for {named(pairs, '; ')}.",
+                f"There are no results for {shorten_names(pairs, '; ')}.",
             )
     for case, why in results.unread.items():
         add(f"Not read: {case}", f"{why}. There are no results for it.")
@@ -79,7 +79,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
     ]:
         add(
             f"Not run: {len(pairs)}",
-            f"The run ended before them. There are no results for {named(pairs, '; ')}.",
+            f"The run ended before them. There are no results for {shorten_names(pairs, '; ')}.",
         )
     reasons: dict[str, dict[str, None]] = {}
     answered = [record for record in records if record.outcome in ANSWERED]
@@ -95,7 +95,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
             if errors.reason:
                 reasons.setdefault(errors.reason, {})[_pair(record)] = None
     for reason, pairs in reasons.items():
-        add(f"Not judged: {named([*pairs])}", reason)
+        add(f"Not judged: {shorten_names([*pairs])}", reason)
     if len({record.mode for record in answered}) > 1:
         add(
             "Modes",
@@ -193,9 +193,9 @@ def render(given: Material, changes: Markup | None = None) -> str:
             default=None,
         ),
         counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
-        not_judged=_grouped(record for record in records if record.outcome in NOT_JUDGED),
+        not_judged=_group_messages(record for record in records if record.outcome in NOT_JUDGED),
         suspects=suspects(given.results),
-        problems=_grouped(
+        problems=_group_messages(
             record
             for record in records
             if record.outcome in (Outcome.FAIL, *BROKEN) and not given.results.explains(record)
@@ -233,7 +233,9 @@ def headline(results: Results) -> str:
     records, unread = results.records, len(results.unread)
     missing = sum(case not in results.unread for case, _, _ in results.missing)
     # a failure may have no deviation at all, if no sample or no output has a value
-    compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
+    compared = [
+        record for record in records if deviations_of([record]) or record.outcome is Outcome.FAIL
+    ]
     broken = _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
     faults = Counter(_fault(record, results.run.get("tol", 0.0)) for record in failed)
@@ -303,7 +305,7 @@ def _model(record: Record) -> dict[str, Any]:
     }
 
 
-def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
+def _group_messages(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
     """Return outcome, engine and message, each with the cases that share them."""
     groups: dict[tuple[Outcome, str, str], list[str]] = {}
     for record in records:

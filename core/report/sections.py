@@ -21,7 +21,7 @@ from rich.text import Text
 from ..case.io.atomic_files import Content
 from ..case.io.escape import file_name
 from ..errors import refuse
-from ..harness.labels import against, engine_name, known, named, number, output_label
+from ..harness.labels import against, engine_name, number, output_label, shorten_names, value_words
 from ..harness.record import to_json
 from ..unit_text import value_text, with_unit
 from . import terminal
@@ -73,8 +73,8 @@ def environment(*folders: Path) -> Environment:
         label=output_label,
         engine=engine_name,
         against=against,
-        known=known,
-        named=named,
+        known=value_words,
+        named=shorten_names,
         file_name=file_name,
         parted=parted,
         value_text=value_text,

@@ -13,7 +13,16 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
-from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread, unsound
+from ..harness.labels import (
+    against,
+    motion_unit,
+    notes,
+    shorten_names,
+    signs,
+    suspects,
+    unread,
+    unsound,
+)
 from ..harness.record import Deviation, Facts, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import FORCES, motion_word, with_unit
@@ -22,7 +31,7 @@ from .axis import print_travel
 from .terminal import FittingTable
 
 
-def escaped(text: str) -> str:
+def escape_markdown(text: str) -> str:
     """Return text that Markdown shows unchanged on a line or in a cell: without mark-up, links,
     HTML or notified users.
     """
@@ -115,13 +124,13 @@ def print_outputs(results: Results, file: TextIO) -> None:
         titled = [(" · ".join(names), "", cells) for names, cells in rows]
         _print_below_titles(titled, heads, console)
     for record in results.records:
-        for reason, outputs in _missing(record).items():
-            line = f"–: {record.case} · {record.engine}: {named(outputs)}: {reason}"
+        for reason, outputs in _missing_reasons(record).items():
+            line = f"–: {record.case} · {record.engine}: {shorten_names(outputs)}: {reason}"
             console.print(Text(visible(line)), soft_wrap=True)
     print_table(results, file)
 
 
-def _missing(record: Record) -> dict[str, list[str]]:
+def _missing_reasons(record: Record) -> dict[str, list[str]]:
     """Return the reasons why quantities are not compared or have no values, each with its outputs.
 
     A reason about the comparison that only repeats the reason about the values is left out.
@@ -155,11 +164,11 @@ def _cells(record: Record, several: bool, reactions: bool) -> tuple[Text, ...]:
     engine = f"{record.engine} · {record.mode}" if several else record.engine
     outcome = Text(record.outcome.shown, style=COLOURS.get(record.outcome, "bold red"))
     errors = [
-        _shown(worst(record, "position", of=lambda its, unit=unit: its == unit), f"[{unit}]")
+        _error_text(worst(record, "position", of=lambda its, unit=unit: its == unit), f"[{unit}]")
         for unit in (FORCES if reactions else ())
     ]
     errors += [
-        _shown(worst(record, quantity, of=lambda its: not reactions or its not in FORCES))
+        _error_text(worst(record, quantity, of=lambda its: not reactions or its not in FORCES))
         for quantity in QUANTITIES
     ]
     return Text(visible(engine)), outcome, *errors, Text(_time(record.us_per_step))
@@ -185,7 +194,7 @@ def _print_below_titles(
         for *_, cells in group:
             table.add_row(*cells)
         table.show_header, show_header = show_header, False
-        console.print(terminal.indented(table))
+        console.print(terminal.indent_table(table))
 
 
 def _standard(records: Sequence[Record]) -> str:
@@ -222,8 +231,8 @@ def print_messages(results: Results, console: Console) -> None:
         if outcome is Outcome.UNAVAILABLE:
             absent.setdefault(message.removeprefix(f"{engine} is "), []).append(engine)
         else:
-            said.append(f"{outcome.shown}: {named(cases)} · {engine}: {message}")
-    said += [f"{Outcome.UNAVAILABLE}: {named(each)}: {why}" for why, each in absent.items()]
+            said.append(f"{outcome.shown}: {shorten_names(cases)} · {engine}: {message}")
+    said += [f"{Outcome.UNAVAILABLE}: {shorten_names(each)}: {why}" for why, each in absent.items()]
     for line in said:
         console.print(Text(visible(line, also="\n\t")), soft_wrap=True)
     counts = Counter(record.outcome for record in results.records)
@@ -241,7 +250,7 @@ def truth(record: Record) -> str:
     return against(record.truth) + (f" ({said})" if said else "")
 
 
-def _shown(found: tuple[Deviation, str] | None, own: str = "") -> Text:
+def _error_text(found: tuple[Deviation, str] | None, own: str = "") -> Text:
     if found is None:
         return Text("–")
     error, unit = found
@@ -300,7 +309,7 @@ def print_matrix(results: Results, file: TextIO) -> None:
     """
     console = terminal.console(file)
     print_signs(results.run, console)
-    engines, rows = _laid_out(results)
+    engines, rows = _engines_and_rows(results)
     for n, band in enumerate(_bands(engines, rows, console.width)):
         if n:
             console.print()
@@ -314,7 +323,7 @@ def print_matrix(results: Results, file: TextIO) -> None:
             )
             table.add_row(Text(visible(case)), *cells)
         console.print(table)
-    console.print(Text(visible(_reading(results)), style="italic"))
+    console.print(Text(visible(_legend(results)), style="italic"))
     print_messages(results, console)
 
 
@@ -342,22 +351,25 @@ def to_markdown(results: Results) -> str:
     """Return the matrix in Markdown: engines with their versions, and a line for every message
     except those of passed pairs.
     """
-    engines, rows = _laid_out(results)
+    engines, rows = _engines_and_rows(results)
     versions = {record.engine: record.version for record in results.records if record.version}
     head = ["", *(f"{engine} {versions.get(engine, '')}".strip() for engine in engines)]
-    lines = [line for each in signs(results.run) for line in (escaped(f"{each}."), "")]
-    lines += [row(map(escaped, head)), row(["---"] * len(head))] if rows else []
+    lines = [line for each in signs(results.run) for line in (escape_markdown(f"{each}."), "")]
+    lines += [row(map(escape_markdown, head)), row(["---"] * len(head))] if rows else []
     for case, records in rows.items():
         cells = (
-            escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines
+            escape_markdown(cell(records[engine]) if engine in records else NOT_ASKED)
+            for engine in engines
         )
         lines.append(row([code(case), *cells]))
-    lines += ["", f"{escaped(_reading(results))}."]
-    lines += [escaped(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
-    lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
-    lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
+    lines += ["", f"{escape_markdown(_legend(results))}."]
+    lines += [escape_markdown(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
+    lines += [escape_markdown(f"Note: {case}: {note}.") for case, note in notes(results.run)]
+    lines += [escape_markdown(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
-        escaped(f"{outcome.shown.capitalize()}: {named(cases)} in {engine}: {message}.")
+        escape_markdown(
+            f"{outcome.shown.capitalize()}: {shorten_names(cases)} in {engine}: {message}."
+        )
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS
     ]
@@ -377,7 +389,7 @@ def cell(record: Record) -> str:
     return record.outcome.shown
 
 
-def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:
+def _engines_and_rows(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:
     """Return the engines, and the records by case and engine."""
     rows: dict[str, dict[str, Record]] = {}
     for record in results.records:
@@ -385,7 +397,7 @@ def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]
     return list(dict.fromkeys(record.engine for record in results.records)), rows
 
 
-def _reading(results: Results) -> str:
+def _legend(results: Results) -> str:
     """Return a sentence on how to read the cells."""
     standards = sorted(
         {

@@ -153,7 +153,7 @@ def columns(*heads: str, title: str | None = None) -> FittingTable:
     return table
 
 
-def unheaded(rows: Sequence[Sequence[str]]) -> FittingTable:
+def table_without_heads(rows: Sequence[Sequence[str]]) -> FittingTable:
     """Return rows with equal numbers of cells as a table without heads that fits the console."""
     table = columns(*[""] * max(map(len, rows), default=0))
     table.show_header = False
@@ -162,7 +162,7 @@ def unheaded(rows: Sequence[Sequence[str]]) -> FittingTable:
     return table
 
 
-def indented(table: FittingTable) -> Padding:
+def indent_table(table: FittingTable) -> Padding:
     """Return the table, indented below a line of text."""
     return Padding(table, (0, 0, 0, 2), expand=False)
 
@@ -212,7 +212,7 @@ def deliver(
     return problems
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Return the names as one text."""
     return ", ".join(names) or "none"
 

@@ -22,7 +22,7 @@ def timed(monkeypatch, build, *solves, waits=()):
     lengths = chain.from_iterable((0.0, length) for length in (build, *solves, *[0.0] * 9))
     monkeypatch.setattr(execution, "perf_counter", accumulate(lengths).__next__)
     waiting = chain.from_iterable((0.0, length) for length in (*waits, *[0.0] * (20 - len(waits))))
-    monkeypatch.setattr(execution, "waited", accumulate(waiting).__next__)
+    monkeypatch.setattr(execution, "waiting_seconds", accumulate(waiting).__next__)
     engine = Fake()
     return engine, record_of(engine)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
-from kincheck.core.history.steps import change_points, lasting, steps
+from kincheck.core.history.steps import change_points, standing_steps, steps
 from kincheck.core.history.store import Store
 from msgspec.structs import replace
 
@@ -29,7 +29,7 @@ from ..support.history_runs import (
 def found(path, standing=False):
     with Store(path) as store:
         every = steps(read(store))
-    return lasting(every) if standing else every
+    return standing_steps(every) if standing else every
 
 
 def slow_nights(path, factors, seed=3):

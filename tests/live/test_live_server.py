@@ -533,7 +533,7 @@ def test_live_reference_has_tolerance(car, tmp_path):
     assert found.tolerance == pytest.approx(np.radians(0.02 + 0.005))  # and half a digit
     known = [each for each in found.values if np.isfinite(each)]
     assert np.degrees(known) == pytest.approx([0.22, 0.01, -0.18])
-    judged = live.referenced(live.edited(live.positions))
+    judged = live.referenced(live.edited_case(live.positions))
     (record,) = run(judged, "native").records
     assert record.errors["toe"].position.tolerance == pytest.approx(found.tolerance)
 

@@ -1,7 +1,7 @@
 """Markdown in which foreign text is text."""
 
 import pytest
-from kincheck.core.report.table import code, escaped, row
+from kincheck.core.report.table import code, escape_markdown, row
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ from kincheck.core.report.table import code, escaped, row
     ],
 )
 def test_markdown_escapes_foreign_text(text, expected):
-    assert escaped(text) == expected
+    assert escape_markdown(text) == expected
 
 
 def test_markdown_row_with_code():

@@ -56,10 +56,10 @@ def test_slow_first_calls_are_not_timed(monkeypatch):
     def work() -> None:
         now[0] += next(took)
 
-    assert rounds.warmed(work) == pytest.approx(0.001)
+    assert rounds.warm_up(work) == pytest.approx(0.001)
     took = iter([0.3] * 100)
     begin = now[0]
-    assert rounds.warmed(work) == pytest.approx(0.3)
+    assert rounds.warm_up(work) == pytest.approx(0.3)
     assert now[0] - begin == pytest.approx(0.6)  # it is slow: twice is enough
 
 
@@ -123,7 +123,7 @@ def test_unsolved_effort_is_untimed(engine, outcome):
     found = precision.contestants(crank(), {"one": engine}, TOL)
     assert [(each.entry.outcome, each.work) for each in found] == [(outcome, None)]
     assert found[0].entry.message
-    (needed, *_) = precision.needed([each.timed(None) for each in found])
+    (needed, *_) = precision.fastest_efforts([each.timed(None) for each in found])
     assert needed.us_per_sample is None
     assert needed.reason
 
@@ -140,7 +140,7 @@ def entries():
 
 
 def test_fastest_effort_meeting_error():
-    by_error = {each.required: each for each in precision.needed(entries())}
+    by_error = {each.required: each for each in precision.fastest_efforts(entries())}
     assert {required: each.setting for required, each in by_error.items()} == {
         1e-3: "coarse",
         1e-6: "fine",
@@ -148,7 +148,7 @@ def test_fastest_effort_meeting_error():
         1e-12: "fine",
     }
     assert by_error[1e-3].us_per_sample == pytest.approx(1.0)
-    (none,) = [each for each in precision.needed(entries()[:1]) if each.required == 1e-9]
+    (none,) = [each for each in precision.fastest_efforts(entries()[:1]) if each.required == 1e-9]
     assert none.us_per_sample is None
     assert "1.0e-06 m" in none.reason
 

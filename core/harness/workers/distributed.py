@@ -64,15 +64,15 @@ def on_cluster(address: str, limits: Limits, silent: float = SILENT) -> Solver:
     """
 
     def solve(pairs: Sequence[Pair]) -> Attempts:
-        with connected(loaded(), address) as client:
+        with connect_client(load_distributed(), address) as client:
             patience = min(silent, max(HEARTBEATS, limits.timeout))
-            yield from _gathered(Tasks(client, address, patience), pairs, limits)
+            yield from _gather_answers(Tasks(client, address, patience), pairs, limits)
 
     return solve
 
 
 @contextmanager
-def connected(distributed: Any, address: str) -> Generator[Any]:
+def connect_client(distributed: Any, address: str) -> Generator[Any]:
     """Yield a client of the scheduler. The log of the library is off: errors say what it says.
 
     Raises:
@@ -84,7 +84,8 @@ def connected(distributed: Any, address: str) -> Generator[Any]:
             # notebook's thread already has an event loop
             with ThreadPoolExecutor(1) as aside:
                 aside.submit(
-                    asyncio.run, asyncio.wait_for(_asked(distributed, address), 2.0 * ANSWER)
+                    asyncio.run,
+                    asyncio.wait_for(_try_connection(distributed, address), 2.0 * ANSWER),
                 ).result()
             client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
         except OSError as error:
@@ -102,7 +103,7 @@ def connected(distributed: Any, address: str) -> Generator[Any]:
             yield client
 
 
-async def _asked(distributed: Any, address: str) -> None:
+async def _try_connection(distributed: Any, address: str) -> None:
     place = urlsplit(address if "://" in address else f"//{address}")
     # a port out of range raises ValueError on access
     if not place.hostname or place.port == 0:
@@ -235,7 +236,7 @@ class Tasks:
         )
 
 
-def _gathered(tasks: Tasks, pairs: Sequence[Pair], limits: Limits) -> Attempts:
+def _gather_answers(tasks: Tasks, pairs: Sequence[Pair], limits: Limits) -> Attempts:
     for index, pair in enumerate(pairs):
         try:
             packed = pack(pair)
@@ -259,7 +260,7 @@ def _gathered(tasks: Tasks, pairs: Sequence[Pair], limits: Limits) -> Attempts:
         yield index, found
 
 
-def loaded() -> Any:
+def load_distributed() -> Any:
     """Return the package distributed.
 
     Raises:

@@ -25,8 +25,8 @@ from ..execution import (
     Failure,
     Pair,
     Solver,
-    bounded,
     error_text,
+    shorten_text,
     solve_in_process,
 )
 from ..provenance import readable
@@ -173,7 +173,7 @@ class WorkerSlot:
     def solve(self, packed: bytes) -> Attempt:
         """Solve a packed pair."""
         while True:
-            worker = self._seated()
+            worker = self._take_worker()
             if worker is None:
                 return Attempt(None, Failure(Outcome.ERROR, "stopped"))
             used = not worker.fresh
@@ -190,7 +190,7 @@ class WorkerSlot:
                 failure = replace(failure, printed=failure.printed or readable(printed))
                 return replace(found, result=failure)
 
-    def _seated(self) -> Worker | None:
+    def _take_worker(self) -> Worker | None:
         with self._lock:
             if self._worker is None and not self._stopped:
                 self._worker = Worker(self.limits)
@@ -225,7 +225,7 @@ def _last(printed: str) -> str:
     lines = [line.strip() for line in before.splitlines() if line.strip()]
     at = re.search(r"^ *File (.+)$", stack, re.MULTILINE)
     return (f" in {at[1]}" if at else "") + (
-        f"; it last printed: {bounded(lines[-1])}" if lines else ""
+        f"; it last printed: {shorten_text(lines[-1])}" if lines else ""
     )
 
 

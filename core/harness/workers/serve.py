@@ -91,7 +91,7 @@ def serve() -> None:
             os._exit(0)
         found = _solve(packed, answers)
         _flush()
-        write(answers, _packed(found))
+        write(answers, _pack_answer(found))
 
 
 def _channel() -> tuple[BinaryIO, BinaryIO]:
@@ -113,7 +113,7 @@ def _solve(packed: bytes, answers: BinaryIO) -> Attempt:
         return Attempt(None, Failure(Outcome.ERROR, error_text(error)))
 
 
-def _packed(found: Attempt) -> bytes:
+def _pack_answer(found: Attempt) -> bytes:
     try:
         return pack(found)
     except Exception as error:

@@ -31,11 +31,11 @@ from .precision import (
     LoopTime,
     Needed,
     contestants,
+    fastest_efforts,
     floors,
     levels,
     loops_alone,
     measure_loops,
-    needed,
     program_size,
     with_truth,
 )
@@ -207,7 +207,7 @@ def _measure_work(
     begin(f"{case.name}: floors")
     return {
         "entries": entries,
-        "needed": needed(entries),
+        "needed": fastest_efforts(entries),
         "levels": [*native.values()],
         "floors": floors(case, engines),
         "rates": [] if peak is None else _rates(case, native, peak, seconds["peak", ""]),

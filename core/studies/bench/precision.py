@@ -182,7 +182,7 @@ def _entry(case: Case, record: Record, setting: str) -> Entry:
     )
 
 
-def needed(entries: Sequence[Entry]) -> list[Needed]:
+def fastest_efforts(entries: Sequence[Entry]) -> list[Needed]:
     """Return the fastest sufficient effort of each engine for each required error, on each case."""
     found: list[Needed] = []
     for key in dict.fromkeys((e.case, e.engine, e.mode) for e in entries):

@@ -12,7 +12,7 @@ from msgspec.structs import astuple
 
 from ...errors import number_of
 from ...harness.engine import STANDARD
-from ...harness.labels import against, known, motion_unit, number
+from ...harness.labels import against, motion_unit, number, value_words
 from ...report.figures import Figure, Style, precision_figure, ticked_axis
 from ...report.page_model import Plot
 from ...report.sections import Diagram, Report, Section
@@ -86,7 +86,7 @@ def _table(
     diagrams: Sequence[Diagram] = (),
 ) -> Section:
     """Return a section of rows whose values are not yet text."""
-    texts = [[str(known(value)) for value in row] for row in rows]
+    texts = [[str(value_words(value)) for value in row] for row in rows]
     return Section(title, sentences, (note,), columns, labels, texts, diagrams)
 
 

@@ -64,7 +64,7 @@ def take_turns(
     the caches after the previous contestant. Python's garbage is collected only between rounds.
     `progress` is called before each round with the finished share.
     """
-    calls = {key: math.ceil(TURN / warmed(work)) for key, work in contestants.items()}
+    calls = {key: math.ceil(TURN / warm_up(work)) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
     enabled = gc.isenabled()
     try:
@@ -80,7 +80,7 @@ def take_turns(
     return {key: spread(each) for key, each in times.items()}
 
 
-def warmed(work: Work, clock: Callable[[], float] | None = None) -> float:
+def warm_up(work: Work, clock: Callable[[], float] | None = None) -> float:
     """Return the least time of several calls by a clock [s]: a first call may compile."""
     least, begin, clock = math.inf, perf_counter(), clock or perf_counter
     for _ in range(FIRST):

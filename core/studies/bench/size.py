@@ -27,7 +27,7 @@ from ...kinematics import Method, NativeSolver
 from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 from ...mechanism.motions import JointAngle
 from .precision import contestants
-from .rounds import Spread, Work, take_turns, warmed
+from .rounds import Spread, Work, take_turns, warm_up
 
 LEAN = 0.3
 """Angle of the cranks at design [rad]; a quarter turn from upright the ring is singular."""
@@ -235,7 +235,7 @@ def _solved(
         )
         yield solved, each.work
         # processor time, so that the same engines drop out on a busy machine as on a quiet one
-        if each.work is not None and (seconds := warmed(each.work, process_time)) > LONGEST:
+        if each.work is not None and (seconds := warm_up(each.work, process_time)) > LONGEST:
             slow = f"not tried: {loops} took {seconds:.2g} s for {SAMPLES} samples"
 
 

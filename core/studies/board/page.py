@@ -9,7 +9,7 @@ from itertools import groupby, pairwise
 
 from ...errors import number_of
 from ...harness.labels import number
-from ...report.figures import Figure, Style, floored, ticked_axis
+from ...report.figures import Figure, Style, ticked_axis, with_error_axis
 from ...report.page_model import Plot
 from ...report.sections import Diagram, Report, Section
 from .results import Board, Row, Run, TruthFacts
@@ -180,7 +180,7 @@ def _figure(rows: Sequence[Row], styles: Sequence[Style]) -> Figure:
         traces.append(curve | hover)
     axis = ticked_axis("cost: wall time for a simulated second [s/s]", costs)
     layout = {"xaxis": axis, "hovermode": "closest"}
-    return floored({"data": traces, "layout": layout}, "largest position error [m]")
+    return with_error_axis({"data": traces, "layout": layout}, "largest position error [m]")
 
 
 def _settings(rows: Sequence[Row]) -> Section:

@@ -27,7 +27,7 @@ from ...harness.execution import Answer, Failure, Pair, attempt, error_text
 from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
 from ...harness.verdict import Standard
-from ...harness.verdict import judged as verdict_of
+from ...harness.verdict import judge_answer as verdict_of
 from ...joints import AxialJoint, Joint
 from ...kinematics import NativeSolver
 from ...mechanism.body import Body, inertia_matrix

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...report.sections import Report, Section
-from ...report.table import escaped, row
+from ...report.table import escape_markdown, row
 from ...trajectory import QUANTITIES
 from .run import Cell, Finding, Stress, largest
 from .verdicts import ELSEWHERE, SILENT, Verdict
@@ -237,11 +237,11 @@ def _ratio(value: float | None) -> str:
 
 def markdown(made: Report) -> str:
     """Return the tables in Markdown."""
-    lines = [f"# {escaped(made.headline)}", "", escaped(" · ".join(made.facts))]
+    lines = [f"# {escape_markdown(made.headline)}", "", escape_markdown(" · ".join(made.facts))]
     for section in made.sections:
         numbers = len(section.columns) - section.labels
-        lines += ["", f"## {section.title}", "", *map(escaped, section.verdict), ""]
+        lines += ["", f"## {section.title}", "", *map(escape_markdown, section.verdict), ""]
         lines += [row(section.columns), row(["---"] * section.labels + ["---:"] * numbers)]
-        lines += [row(map(escaped, each)) for each in section.rows]
-        lines += ["", *(f"{escaped(note)}\n" for note in section.notes)]
+        lines += [row(map(escape_markdown, each)) for each in section.rows]
+        lines += ["", *(f"{escape_markdown(note)}\n" for note in section.notes)]
     return "\n".join(lines) + "\n"

@@ -17,7 +17,7 @@ from ...harness.compare import Curve, curve_of, describe, deviation, pace
 from ...harness.engine import STANDARD, Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Outcome
-from ...harness.verdict import NAMED, UNCERTAIN, excess, promised
+from ...harness.verdict import NAMED, UNCERTAIN, excess, residual_limit
 from ...kinematics import NativeSolver
 from ...trajectory import QUANTITIES, Array
 from .study import Study
@@ -106,7 +106,7 @@ def cross_check(study: Study, check: Check, picked: Mapping[int, Array]) -> list
         picked: the sweep's values by variant, shape (rows, n).
     """
     pairs = _Pairs(study, check.engine, sorted(picked), check.tol)
-    tol = promised(check.engine, check.tol)
+    tol = residual_limit(check.engine, check.tol)
     found: dict[int, Checked] = {}
     with closing(check.solver(pairs)) as attempts:
         for index, attempt in attempts:

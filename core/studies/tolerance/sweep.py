@@ -26,7 +26,13 @@ from ...errors import KincheckError
 from ...harness.execution import error_text
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
-from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
+from ...harness.workers.distributed import (
+    SILENT,
+    ClusterError,
+    Tasks,
+    connect_client,
+    load_distributed,
+)
 from ...harness.workers.serve import pack
 from ...version import VERSION
 from ..variation.study_choices import Incomplete, Mode, Sampling
@@ -83,7 +89,7 @@ def on_cluster(address: str, silent: float = SILENT) -> Source:
 
     def solve(study: Study, first: int = 0) -> Chunks:
         packed, ready = pack(study), dict[int, Chunk]()
-        with connected(loaded(), address) as client:
+        with connect_client(load_distributed(), address) as client:
             tasks = Tasks(client, address, silent)
             waiting = iter(range(first, study.chunks))
             for index in range(first, study.chunks):
