@@ -36,7 +36,7 @@ class Driving:
 
 def in_words(drive: Driving | None) -> str:
     """Return the range of the swept driver, for a summary; empty if it is unknown."""
-    if drive is None or not len(drive.times):
+    if drive is None or not drive.times.size:
         return ""
     name, values = next(iter(drive.values.items()))
     return f"{name} {values[0]:.6g} to {values[-1]:.6g} {drive.units[name]}"

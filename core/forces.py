@@ -178,14 +178,13 @@ class Reaction:
 
         They are the fewest over the samples, of 3, 3 and 6.
         """
-        parts = (slice(0, 3), slice(3, 6), slice(0, 6))
         there = np.isfinite(self.free).all(axis=(1, 2))
         free, known = self.free[there], np.broadcast_to(self.known, there.shape)[there]
-        loose = [
+        force, moment, wrench = (
             int(np.linalg.matrix_rank(free[:, part], tol=known).max(initial=0)) if free.size else 0
-            for part in parts
-        ]
-        return 3 - loose[0], 3 - loose[1], 6 - loose[2]
+            for part in (slice(0, 3), slice(3, 6), slice(0, 6))
+        )
+        return 3 - force, 3 - moment, 6 - wrench
 
 
 @dataclass(frozen=True, eq=False)

@@ -190,8 +190,7 @@ def with_values(found: T, **values: Any) -> T:
 
 def option_fields(cls: Any) -> Iterator[tuple[Field[Any], Option | None, Any]]:
     """Yield the fields of a class, each with its option, or with the class of its group."""
-    last: Sequence[str] = getattr(cls, "LAST", ())
-    for each in sorted(fields(cls), key=lambda each: each.name in last):
+    for each in fields(cls):
         meaning, below = each.metadata.get("option"), each.metadata.get("group")
         if meaning is not None or below is not None:
             yield each, meaning, below

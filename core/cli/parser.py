@@ -179,6 +179,7 @@ def add_options(parser: argparse.ArgumentParser, cls: Any, given: Collection[str
     known = set[str]()
     # headings of groups stand above those of the class's own options
     own = sorted(option_fields(cls), key=lambda found: bool(found[1] and found[1].heading))
+    own.sort(key=lambda found: found[0].name in getattr(cls, "LAST", ()))
     for each, meaning, below in own:
         if meaning is None:
             known |= add_options(parser, below, given)

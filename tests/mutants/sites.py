@@ -184,29 +184,20 @@ class _Finder(ast.NodeVisitor):
     def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
         """Before Python 3.12 the places of its parts are wrong."""
 
-    def visit_If(self, node: ast.If) -> None:
-        if "TYPE_CHECKING" not in ast.unparse(node.test):
-            self._condition(node.test)
-            self.generic_visit(node)
-
-    def visit_While(self, node: ast.While) -> None:
-        self._condition(node.test)
-        self.generic_visit(node)
-
-    def visit_IfExp(self, node: ast.IfExp) -> None:
-        self._condition(node.test)
-        self.generic_visit(node)
-
-    def visit_comprehension(self, node: ast.comprehension) -> None:
-        for test in node.ifs:
-            self._condition(test)
-        self.generic_visit(node)
-
-    def _condition(self, test: ast.expr) -> None:
-        """Negate a condition that has no operator to change."""
-        if isinstance(test, ast.Name | ast.Attribute | ast.Call | ast.Subscript):
-            start = self._start(test)
-            self._add(start, start, "not ")
+    def visit(self, node: ast.AST) -> None:
+        """Negate conditions that have no operator to change."""
+        tests: list[ast.expr] = []
+        if isinstance(node, ast.comprehension):
+            tests = node.ifs
+        elif isinstance(node, ast.If | ast.While | ast.IfExp):
+            if "TYPE_CHECKING" in ast.unparse(node.test):
+                return
+            tests = [node.test]
+        for test in tests:
+            if isinstance(test, ast.Name | ast.Attribute | ast.Call | ast.Subscript):
+                start = self._start(test)
+                self._add(start, start, "not ")
+        super().visit(node)
 
     def visit_BinOp(self, node: ast.BinOp) -> None:
         old, new = CHANGED[type(node.op)]
