@@ -5,7 +5,13 @@ files.
 import html
 import re
 
-from kincheck.core.case.models.trees.urdf import CLOSING, IN_CONSTRAINT, IN_JOINT, IN_ROBOT, TYPES
+from kincheck.core.case.models.trees.urdf import (
+    IN_CONSTRAINT,
+    IN_JOINT,
+    IN_ROBOT,
+    JOINT_MOVES,
+    TYPES,
+)
 
 from .fuzzing import FOLDER, changing, reading, written
 from .trees import changed_xml
@@ -16,7 +22,7 @@ BESIDE = {
     for kind, ending in (("json", ".constraints.json"), ("yaml", ".yaml"))
 }
 WORDS = (
-    *(*IN_ROBOT, *IN_JOINT, *IN_CONSTRAINT, *TYPES, *CLOSING, "origin", "xyz", "rpy", "link"),
+    *(*IN_ROBOT, *IN_JOINT, *IN_CONSTRAINT, *TYPES, *JOINT_MOVES, "origin", "xyz", "rpy", "link"),
     *("multiplier", "offset", "joint", "type", "name", "closed_loop", "joint_name", "joint_type"),
     *("UJOINT_XY", "SPHERICAL", "6d", "3d", "coincident", "distance", "directions", "linear"),
 )

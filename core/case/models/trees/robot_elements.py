@@ -45,7 +45,7 @@ HALFWAY = (
     " equal for small turns"
 )
 
-CLOSING: Mapping[str, Sequence[Kind]] = {
+JOINT_MOVES: Mapping[str, Sequence[Kind]] = {
     "fixed": (),
     "link": (),
     "revolute": ("hinge",),

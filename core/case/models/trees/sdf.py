@@ -24,10 +24,10 @@ from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
     BUSHING,
-    CLOSING,
     DRAKE_JOINT,
     ENTRIES,
     FRICTION,
+    JOINT_MOVES,
     LAW,
     MIMIC,
     STRUT,
@@ -457,7 +457,7 @@ class _Joint:
         element = self.element
         match self.kind:
             case "revolute2":
-                kinds = CLOSING["universal"]
+                kinds = JOINT_MOVES["universal"]
             case "screw":
                 if (pitch := element.child("screw_thread_pitch")) is None:
                     raise element.fault(
@@ -468,7 +468,7 @@ class _Joint:
                 (lead,) = pitch.text_numbers(1)
                 return screw(self.graph, self.name, lead, self._axis("axis"), element)
             case kind:
-                kinds = CLOSING[kind]
+                kinds = JOINT_MOVES[kind]
         return [
             (f".{k}" * (len(kinds) > 1), each, X if each == "ball" else self._axis(tag))
             for k, (each, tag) in enumerate(zip(kinds, ("axis", "axis2"), strict=False), 1)

@@ -26,10 +26,10 @@ from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
     BUSHING,
-    CLOSING,
     DRAKE_JOINT,
     ENTRIES,
     FRICTION,
+    JOINT_MOVES,
     LAW,
     STRUT,
     Unread,
@@ -246,7 +246,9 @@ class _Robot:
         freedoms: list[Freedom]
         match kind:
             case "revolute" | "continuous" | "prismatic" | "spherical" | "ball" | "fixed":
-                freedoms = [("", each, X if each == "ball" else axis()) for each in CLOSING[kind]]
+                freedoms = [
+                    ("", each, X if each == "ball" else axis()) for each in JOINT_MOVES[kind]
+                ]
             case "floating" if links[0] in graph.fixed:
                 return Joint(name, links, (), element, is_free=True)
             case "floating":
@@ -273,8 +275,10 @@ class _Robot:
         element.require_children((*IN_LOOP, "axis") if loop else IN_CONSTRAINT, closed=True)
         name = element.attributes.get("name", default)
         kind = element.attributes.get("type", "").lower()
-        if kind not in CLOSING:
-            raise element.unknown_name("type", kind, CLOSING, f"one of {', '.join(CLOSING)}")
+        if kind not in JOINT_MOVES:
+            raise element.unknown_name(
+                "type", kind, JOINT_MOVES, f"one of {', '.join(JOINT_MOVES)}"
+            )
         links: list[str] = []
         places: list[Place] = []
         for tag, *others in (("parent", "predecessor"), ("child", "successor")):
@@ -288,7 +292,7 @@ class _Robot:
             links.append(link)
             places.append(self.graph.places[link] * place)
         first, second = places
-        kinds = CLOSING[kind]
+        kinds = JOINT_MOVES[kind]
         ball = "ball" in kinds
         axis = "axis" if loop else "parent_axis"
         if loop and kinds and (kind == "universal" or (not ball and not element.child(axis))):
