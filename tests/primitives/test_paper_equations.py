@@ -162,7 +162,10 @@ def test_printed_dot_products_equal_conventional_rows(rng, number, formed):
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
     condition = conditions(f, g, h, s_i, s_j)[number]
-    printed, conventional = condition.printed(formed=formed), condition.unsimplified("conventional")
+    printed, conventional = (
+        condition.printed_rows(formed=formed),
+        condition.unsimplified_rows("conventional"),
+    )
     i, j = body(rng), body(rng)
     placed = replace(j, u=s_i - s_j + j.u)
     for mine, theirs in zip(printed, conventional, strict=True):
@@ -181,7 +184,7 @@ def test_printed_simplified_rows_equal_paper_style(rng, formed):
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
     paper = {
-        each.name: each.simplified("paper")
+        each.name: each.simplified_rows("paper")
         for each in conditions(f, g, h, s_i, s_j)
         if each.is_simplified
     }
