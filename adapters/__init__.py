@@ -20,20 +20,20 @@ ENGINES = {
 """Engines in projection mode: name on the command line -> module and class."""
 
 SIMULATIONS = {
-    "mujoco": ("mujoco.steps", "stiff"),
-    "mujoco-default": ("mujoco.steps", "default"),
-    "mujoco-projecting": ("mujoco.steps", "projecting"),
+    "mujoco": ("mujoco.steps", "Stepping", "mujoco", "stiff", 4),
+    "mujoco-default": ("mujoco.steps", "Stepping", "mujoco-default", "default", 1),
+    "mujoco-projecting": ("mujoco.steps", "Stepping", "mujoco-projecting", "projecting", 5),
     "pinocchio": ("pinocchio.pinocchio", "Dynamics"),
-    "exudyn": ("exudyn.solvers", "trapezoidal"),
-    "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
-    "exudyn-static": ("exudyn.statics", "static"),
-    "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
+    "exudyn": ("exudyn.solvers", "Solver", "exudyn", "trapezoidal", 4),
+    "exudyn-alpha": ("exudyn.solvers", "Solver", "exudyn-alpha", "generalized alpha", 4),
+    "exudyn-static": ("exudyn.statics", "StaticSolver", "exudyn-static", "static", 1, False),
+    "exudyn-static-modified": ("exudyn.solvers", "Solver", "exudyn-static-modified", "static"),
     "drake": ("drake.drake", "Steps"),
     "dart": ("dart.dart", "Steps"),
     "simbody": ("simbody.assembly", "Assembly"),
 }
-"""Engines in simulate mode: name on the command line -> module and maker of the engine. A
-simulator's bare name is its recommended solver.
+"""Engines in simulate mode: name on the command line -> module, class and arguments. A simulator's
+bare name is its recommended solver.
 
 A record belongs to a case, an engine and a mode, so one name in two modes denotes two products. A
 further variant of a simulator gets another name, not another mode, because each mode is a ranking.
@@ -42,8 +42,8 @@ further variant of a simulator gets another name, not another mode, because each
 
 def engine(name: str, mode: str = "projection") -> Any:
     """Return the engine of a name and mode; its simulator is not imported yet."""
-    module, maker = ENGINES[name] if mode == "projection" else SIMULATIONS[name]
-    return getattr(importlib.import_module(f".{module}", __name__), maker)()
+    module, kind, *arguments = ENGINES[name] if mode == "projection" else SIMULATIONS[name]
+    return getattr(importlib.import_module(f".{module}", __name__), kind)(*arguments)
 
 
 WRITERS = ("mjcf", "exudyn", "urdf", "sdf", "osim")

@@ -88,14 +88,7 @@ class Loads:
         if isinstance(each, Bushing) or (isinstance(each, SpringDamper) and each.curve):
             self.framed.append(each)
         elif isinstance(each, SpringDamper):
-            ends = [rows.marker(*end) for end in zip(each.bodies, each.points, strict=True)]
-            spring = items.ObjectConnectorSpringDamper(
-                markerNumbers=ends,
-                referenceLength=each.free_length,
-                stiffness=each.stiffness,
-                damping=each.damping,
-            )
-            self.springs[each.name] = int(self.mbs.AddObject(spring))
+            self.springs[each.name] = self.add_spring(each, damping=each.damping)
         elif isinstance(each, TorsionSpringDamper):
             self.twisters.append(self._twister(each))
         else:
@@ -116,6 +109,16 @@ class Loads:
                     bodyFixed=each.frame is Axes.BODY,
                 )
             )
+
+    def add_spring(self, each: SpringDamper, **law: Any) -> int:
+        """Add Exudyn's spring between two points; return its number."""
+        item = self.items.ObjectConnectorSpringDamper(
+            markerNumbers=[self.rows.marker(*end) for end in places(each, self.mechanism)],
+            referenceLength=each.free_length,
+            stiffness=each.stiffness,
+            **law,
+        )
+        return int(self.mbs.AddObject(item))
 
     def _twister(self, each: TorsionSpringDamper) -> Twister:
         rows, joint = self.rows, self.mechanism.joint(each.joint)

@@ -167,19 +167,20 @@ class Solver(Simulation):
 
     Attributes:
         kind: "static", one load step per sample, only positions; "trapezoidal", index 2: rates
-            satisfy the constraints and positions drift; "generalized alpha", index 3: positions
-            satisfy the constraints and rates drift.
+            satisfy the constraints and positions drift, the only one without oscillating
+            accelerations; "generalized alpha", index 3: positions satisfy the constraints and rates
+            drift.
+        steps: number of steps between samples.
         modified: whether Newton keeps its Jacobian from step to step, as dynamic solvers always do
             by default.
         tolerance: tolerance of Newton, relative and absolute.
-        steps: number of steps between samples.
     """
 
     name: str
     kind: str
+    steps: int = 1
     modified: bool = True
     tolerance: float = TIGHT
-    steps: int = 1
     projection = Exudyn
     loop = "simulator"
 
@@ -220,21 +221,6 @@ class Solver(Simulation):
     def build(self, case: Case) -> _Solved:
         """Return Exudyn's system and its start."""
         return _Solved(Exudyn().with_known_joints(case), self)
-
-
-def trapezoidal() -> Solver:
-    """Return the time stepping of index 2, the only one without oscillating accelerations."""
-    return Solver("exudyn", "trapezoidal", steps=4)
-
-
-def generalized_alpha() -> Solver:
-    """Return the time stepping that satisfies the position constraints."""
-    return Solver("exudyn-alpha", "generalized alpha", steps=4)
-
-
-def static_modified() -> Solver:
-    """Return load steps with modified Newton."""
-    return Solver("exudyn-static-modified", "static")
 
 
 class _Solved:

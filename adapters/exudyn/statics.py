@@ -53,16 +53,7 @@ class StaticLoads(Loads):
                 )
                 self.mbs.AddLoad(couple)
         elif isinstance(each, SpringDamper) and each.curve:
-            self.mbs.AddObject(
-                items.ObjectConnectorSpringDamper(
-                    markerNumbers=[
-                        rows.marker(*end) for end in zip(each.bodies, each.points, strict=True)
-                    ],
-                    referenceLength=each.free_length,
-                    stiffness=each.stiffness,
-                    springForceUserFunction=_law(each, 0.0),
-                )
-            )
+            self.add_spring(each, springForceUserFunction=_law(each, 0.0))
         elif isinstance(each, TorsionSpringDamper):
             joint: Any = self.mechanism.joint(each.joint)
             turns = items.NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[0.0])
@@ -233,8 +224,3 @@ class StaticSolver(Solver):
         return equilibria(
             case, lambda each, group: Statics(Exudyn().with_known_joints(each)).solve(group)
         )
-
-
-def static() -> StaticSolver:
-    """Return load steps with full Newton."""
-    return StaticSolver("exudyn-static", "static", modified=False)

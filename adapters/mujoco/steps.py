@@ -110,21 +110,6 @@ class Stepping(Simulation):
             return super().solve(model, case, tol)
 
 
-def stiff() -> Stepping:
-    """Return the most accurate time stepping."""
-    return Stepping("mujoco", "stiff", 4)
-
-
-def default() -> Stepping:
-    """Return the time stepping with default settings."""
-    return Stepping("mujoco-default", "default", 1)
-
-
-def projecting() -> Stepping:
-    """Return the time stepping with projection."""
-    return Stepping("mujoco-projecting", "projecting", 5)
-
-
 class _Massless(MuJoCoModel):
     # mj_objectAcceleration subtracts the gravity of the model
     gives_forces = False

@@ -23,14 +23,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.joints import Distance, Fixed
+from ...core.joints import Fixed
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.equivalents import fits
 from ..shared.simulation import SimulatedPose, SteppedTree, Stepping, TiedTree
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeEngine, TreeModel
-from ..shared.tree_plan import Chain, Closure, Link, Relation, relations
+from ..shared.tree_plan import Chain, Closure, Link, Relation
 
 
 class Pinocchio(TreeEngine):
@@ -301,15 +300,4 @@ class Dynamics(Stepping):
         """Return a message on the joint or driver that is not supported here, or None."""
         if (self.version() or "").startswith("3."):
             return "constraintDynamics of Pinocchio 3 has another signature; install Pinocchio 4"
-        case = Pinocchio().with_known_joints(case)
-        for joint in case.mechanism.joints:
-            if relations(joint):
-                return f"{joint} relates coordinates, which Pinocchio's constraintDynamics refuses"
-            if isinstance(joint, Distance) and not fits(joint):
-                return (
-                    f"{joint} has another length than at design; Pinocchio has no distance"
-                    " constraint, and a body in its place would not fit"
-                )
-        for coupler in case.mechanism.couplers:
-            return f"{coupler} relates coordinates, which Pinocchio's constraintDynamics refuses"
-        return Pinocchio().unsupported(case)
+        return super().unsupported(case)

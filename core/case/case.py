@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..caches import cache_last
 from ..errors import CaseError, unknown
 from ..kinematics import places
-from ..mechanism.mechanism import Mechanism
+from ..mechanism.mechanism import Mechanism, extent
 from ..mechanism.motions import Absolute, Motion, Path, Ramp, Slowed
 from ..trajectory import Array
 from .quantity import MARKER as MARKER
@@ -387,8 +387,8 @@ def size(case: Case) -> float:
     points += [position for joint in case.mechanism.joints for position in joint.points_on()]
     shifts = values[~turning_drivers(case)]
     shift = float((shifts.max(axis=1) - shifts.min(axis=1)).max(initial=0.0))
-    extent = max(*(max(each) - min(each) for each in zip(*points, strict=True)), shift)
-    return extent if extent > _COINCIDE * float(np.abs(points).max()) else NO_SIZE
+    largest = max(extent(points), shift)
+    return largest if largest > _COINCIDE * float(np.abs(points).max()) else NO_SIZE
 
 
 def turning_drivers(case: Case) -> NDArray[np.bool_]:

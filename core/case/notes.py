@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import Phrase
 from ..joints.base import unit
-from ..mechanism.mechanism import GROUND, Mechanism, Vector
+from ..mechanism.mechanism import GROUND, Mechanism, Vector, extent
 from ..mechanism.motions import JointDriver, PointCoordinate
 from .case import MARKER, Case
 from .quantity import Output
@@ -199,5 +199,5 @@ def largest_extent(positions: Sequence[Vector]) -> float:
     """
     if not positions:
         return 0.0
-    extent = float(np.ptp(np.array(positions), axis=0).max())
-    return extent if extent > ROUNDING * float(np.abs(positions).max()) else 0.0
+    largest = extent(positions)
+    return largest if largest > ROUNDING * float(np.abs(positions).max()) else 0.0

@@ -5,17 +5,20 @@ the points that they add to a mechanism.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, fields, replace
 from enum import StrEnum
 from functools import reduce
 from operator import add
 from typing import Any, ClassVar, Protocol, cast
 
+import numpy as np
+
 from ..algebra import Vec3
 from ..jet import Jet
 from ..mechanism.mechanism import Mechanism, Point, Vector
 from ..trajectory import MARKER as MARKER
+from ..trajectory import PointMotion
 
 ORDERS = 3
 """Orders of an output of the pose alone: value, velocity and acceleration."""
@@ -89,6 +92,22 @@ class Quantity(Protocol):
             design: the same at the design position, at rest.
         """
         ...
+
+
+def point_jets(motion: PointMotion) -> Vec3:
+    """Return the position of a point as jets [m], with NaN for rates that nobody gives."""
+    x, v, a = (
+        np.full(np.shape(motion.position), np.nan)
+        if each is None
+        else np.asarray(each, dtype=np.float64)
+        for each in (motion.position, motion.velocity, motion.acceleration)
+    )
+    return Vec3(*(Jet(x[:, k], v[:, k], a[:, k]) for k in range(3)))
+
+
+def still_jets(position: Iterable[Any]) -> Vec3:
+    """Return a position at rest as jets [m]."""
+    return Vec3(*(Jet(np.asarray(x), np.zeros(()), np.zeros(())) for x in position))
 
 
 HIDDEN: Mapping[str, Any] = {"hidden": True}

@@ -15,8 +15,8 @@ from ..jet import Jet
 from ..kinematics import (
     DOUBTFUL,
     agreement,
-    followed_angle,
-    followed_attitude,
+    angle_with_turns,
+    attitude_with_turns,
     in_doubt,
     near_design,
 )
@@ -72,7 +72,7 @@ def turns_of(
     count = turns(x, v, output.period, part)
     if near_design(mechanism, path) and not in_doubt(x + output.period * count, v, part.times):
         return count
-    near = _fill_unreached(followed_angle(mechanism, path, output.joint), samples, part.times)
+    near = _fill_unreached(angle_with_turns(mechanism, path, output.joint), samples, part.times)
     if near is None:
         return count
     near = near.reshape(-1, *(1,) * (x.ndim - 1))
@@ -102,7 +102,9 @@ def orient_from_design(
     values = floats(e)
     sign, doubt = signs(values, angular_velocity(e), part)
     if not mechanism.is_fixed(output.body) and (doubt or not near_design(mechanism, path)):
-        near = _fill_unreached(followed_attitude(mechanism, path, output.body), samples, part.times)
+        near = _fill_unreached(
+            attitude_with_turns(mechanism, path, output.body), samples, part.times
+        )
         if near is not None:
             near = near.T.reshape(4, -1, *(1,) * (values.ndim - 2))
             sign = np.where((near * values).sum(axis=0) < 0.0, -1.0, 1.0)

@@ -31,14 +31,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import Vec3
 from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
+from ..case.quantity import point_jets, still_jets
 from ..case.turns import count_output_turns
 from ..errors import CaseError, number_of
-from ..jet import Jet
-from ..mechanism.mechanism import Vector
-from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
+from ..trajectory import PER_TIME, QUANTITIES, Array, Trajectory
 from ..unit_text import motion_word, value_text
 from . import labels
 from .record import Deviation, Deviations, OutputSeries
@@ -68,10 +66,10 @@ def output_series(
     if isinstance(output, ForceMeasure):
         return _force_series(output, trajectory, moved)
     trajectory = moved
-    at = {name: _point_jets(trajectory.points[name]) for name in output.points}
+    at = {name: point_jets(trajectory.points[name]) for name in output.points}
     # NaN marks unknown values, and spreads to all results that depend on them
     with np.errstate(all="ignore"):
-        design = {name: _fixed_jets(case.mechanism.point(name).position) for name in output.points}
+        design = {name: still_jets(case.mechanism.point(name).position) for name in output.points}
         jet = count_output_turns(case.mechanism, case.sweep.path, output, at, design)
     solved = trajectory.solved
     position, *rates = (
@@ -99,29 +97,10 @@ def _force_series(output: ForceMeasure, trajectory: Trajectory, moved: Trajector
     if given is None or not given.has(output.forces):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
     if output.follows_points:
-        output = output.with_points(
-            {name: _point_jets(moved.points[name]) for name in output.points}
-        )
+        at = {name: point_jets(moved.points[name]) for name in output.points}
+        output = output.with_points(at)
     values = np.where(trajectory.solved, output.values(given), np.nan)
     return Series(values, reason=output.undetermined(given))
-
-
-def _point_jets(motion: PointMotion) -> Vec3:
-    """Return a point's position as jets, with NaN for derivatives missing from the engine."""
-    given = (motion.position, motion.velocity, motion.acceleration)
-    x, v, a = (
-        (
-            np.full(np.shape(motion.position), np.nan)
-            if each is None
-            else np.asarray(each, dtype=np.float64)
-        )
-        for each in given
-    )
-    return Vec3(*(Jet(x[:, k], v[:, k], a[:, k]) for k in range(3)))
-
-
-def _fixed_jets(position: Vector) -> Vec3:
-    return Vec3(*(Jet(np.array(x), np.zeros(()), np.zeros(())) for x in position))
 
 
 def as_numbers(series: Series, output: Quantity) -> OutputSeries:

@@ -13,8 +13,9 @@ Solve:
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
     FreePoses          poses reached without drivers, and bodies placed to fit others
-    followed_angle     the angle of a joint with its turns, followed from the design
-    followed_attitude  the attitude of a body with its turns, followed from the design
+    angle_with_turns   the angle of a joint, followed from the design
+    attitude_with_turns
+                       the attitude of a body, followed from the design
     count_turns        an angle known up to whole turns, from sample to sample
     begun_turns        the whole turns at which coupled joints of a recording begin
     residuals          what poses from elsewhere leave of the rows, and what their digits allow
@@ -29,7 +30,7 @@ Describe:
     reduce_rows, largest_residual                   rows that are redundant but for digits
     kinds, places, placed                           the geometry by name
     LoadPlace, load_places                          masses and loads by name
-    Ranks, freeing, conditioning, describe_screws   rank, conditioning and screws at a pose
+    Ranks, joints_that_free, conditioning, describe_screws   rank, conditioning and screws at a pose
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     is_continuation, continuous, regular_between    tests of a step
@@ -72,13 +73,13 @@ if TYPE_CHECKING:
         Screw,
         Violation,
         describe_screws,
-        freeing,
+        joints_that_free,
     )
     from .followed import (
         DOUBTFUL,
         agreement,
-        followed_angle,
-        followed_attitude,
+        angle_with_turns,
+        attitude_with_turns,
         follower,
         in_doubt,
         near_design,
@@ -108,7 +109,7 @@ if TYPE_CHECKING:
         count_turns,
         judged_part,
         needed_forces,
-        replayed,
+        replay_motions,
         residuals,
     )
     from .statics.equations import LoadPoint, with_free_coordinates
@@ -130,10 +131,11 @@ _NAMES = {
     "design_forces": "ForcesOfDesigns",
     "diagnosis.conditioning": "Conditioning Gradient PoseConditioning conditioning",
     "diagnosis.rank": (
-        "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws freeing"
+        "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws"
+        " joints_that_free"
     ),
     "followed": (
-        "DOUBTFUL agreement followed_angle followed_attitude follower in_doubt near_design"
+        "DOUBTFUL agreement angle_with_turns attitude_with_turns follower in_doubt near_design"
     ),
     "forces.reactions": "forces_of motion_defects with_forces",
     "formulation.acceptance_criteria": (
@@ -148,8 +150,8 @@ _NAMES = {
     "motion_solver": "Solver",
     "one_design": "solve",
     "replay": (
-        "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces replayed"
-        " residuals"
+        "TURN Needed Residuals Worst begun_turns count_turns judged_part needed_forces"
+        " replay_motions residuals"
     ),
     "statics.equations": "LoadPoint with_free_coordinates",
     "statics.equilibrium": "Equilibria StaticModel",

@@ -33,7 +33,7 @@ from .continuation.walk import FINER, ROOM, follow_samples
 from .formulation.acceptance_criteria import is_uncertain
 from .formulation.parameters import every_place, placed, places
 from .motion_solver import ONE_PROGRAM
-from .one_design import driving, parse_solve_arguments, prepare, start_notes
+from .one_design import driving_of, parse_solve_arguments, prepare, start_notes
 from .structure.degrees_of_freedom import require_driven
 
 # Steps of the straight way from the design to a start away from it: a sixteenth of it is a step
@@ -418,7 +418,7 @@ def solve_designs(
         for name, each in motion.items()
     }
     notes = start_notes(mechanism, request, path, tol)
-    drive = driving(mechanism, path, driver, np.array(values, dtype=float))
+    drive = driving_of(mechanism, path, driver, np.array(values, dtype=float))
     return Designs(found, solved, messages, notes, drive)
 
 

@@ -90,7 +90,7 @@ def _alone(route: Route, wanted: WantedForces, geometry: Array, tol: float) -> S
     each = [variant_of(model, numbers) for numbers in geometry.T]
     if len(model.frame.moving) > ONE_PROGRAM:  # as their motion, by themselves
         plain = replace(request, varied=())
-        return [_wanted(prepare(mechanism, plain, path)(tol).forces) for mechanism in each]
+        return [_require_forces(prepare(mechanism, plain, path)(tol).forces) for mechanism in each]
     motion = motion_only(model.mechanism, replace(request, points=()))
     bodies = route.thread_cache(
         ("bodies of", wanted), lambda: Route(compile_model(model.mechanism, motion), path)
@@ -115,6 +115,6 @@ def _motion(model: Model, found: Variants, k: int) -> Trajectory:
     return Trajectory(none, solved, np.zeros(len(solved), np.int64), 0.0, bodies=bodies)
 
 
-def _wanted(forces: Forces | None) -> Forces:
+def _require_forces(forces: Forces | None) -> Forces:
     assert forces is not None  # the request wants them
     return forces

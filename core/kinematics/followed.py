@@ -59,7 +59,7 @@ class Followed(Protocol):
         """Return the names of the bodies it reads, of those that move."""
         ...
 
-    def counted(
+    def count_turns(
         self, mechanism: Mechanism, times: Array, motion: Trajectory, order: Indices
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return the values at ordered samples but for turns, shape (m, ...), the turns between
@@ -71,12 +71,12 @@ class Followed(Protocol):
         """Return the turns that bring a value near to another."""
         ...
 
-    def turned(self, values: Array, turns: Array) -> Array:
+    def with_turns(self, values: Array, turns: Array) -> Array:
         """Return values after numbers of turns."""
         ...
 
 
-def _counted(
+def _count_from(
     what: Followed, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
 ) -> tuple[Array, bool]:
     """Return the value at each sample, counted both ways from the value `at` the start and NaN if
@@ -87,12 +87,12 @@ def _counted(
     order = reached[np.argsort(times[reached], kind="stable")]
     if not len(order):
         return found, True
-    values, changes, doubtful = what.counted(mechanism, times, motion, order)
+    values, changes, doubtful = what.count_turns(mechanism, times, motion, order)
     first = int(np.argmin(np.abs(times[order] - start)))
     turns = np.full(len(order), what.turns(values[first], at))
     turns[first + 1 :] += np.cumsum(changes[first:])
     turns[:first] -= np.cumsum(changes[:first][::-1])[::-1]
-    found[order] = what.turned(values, turns)
+    found[order] = what.with_turns(values, turns)
     return found, not doubtful.any()
 
 
@@ -111,11 +111,11 @@ def near_design(mechanism: Mechanism, path: Path) -> bool:
     # turns are read from samples as if the design were at time zero
     if not start.starts_at_design or start.time != 0.0:
         return False
-    return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
+    return bool(_way(mechanism, path, _sorted_times(path, start.time)).max(initial=0.0) <= NEAR)
 
 
 @cache_last(32, when=_is_builtin)
-def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+def follow_turns(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     """Return values at the samples of a path, turns counted on the way from the design; NaN if a
     sample is not reached or its turns are in doubt.
 
@@ -124,7 +124,7 @@ def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     found: Array | None = None
     for part in PARTS:
         try:
-            found, sure = _followed(mechanism, path, what, part)
+            found, sure = _follow_in_parts(mechanism, path, what, part)
         except SolveError:
             return None
         if sure:
@@ -132,7 +132,9 @@ def followed(mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
     return found
 
 
-def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> tuple[Array, bool]:
+def _follow_in_parts(
+    mechanism: Mechanism, path: Path, what: Followed, part: float
+) -> tuple[Array, bool]:
     """Return the values by further samples, and whether no number of turns is in doubt."""
     fine = _fine(mechanism, path, part)
     motion = _motion(mechanism, fine, what)
@@ -141,9 +143,9 @@ def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> 
     if any(taken["lead"].values()):
         lead = _lead(mechanism, path, taken["time"], part)
         led = _motion(mechanism, lead, what)
-        values, sure = _counted(what, mechanism, lead.times, led, 0.0, at_start)
+        values, sure = _count_from(what, mechanism, lead.times, led, 0.0, at_start)
         at_start = np.asarray(values[-1])
-    found, certain = _counted(what, mechanism, fine.times, motion, taken["time"], at_start)
+    found, certain = _count_from(what, mechanism, fine.times, motion, taken["time"], at_start)
     return found[: len(path.times)], sure and certain
 
 
@@ -153,16 +155,18 @@ def _followed(mechanism: Mechanism, path: Path, what: Followed, part: float) -> 
 @cache_last(4, when=_is_builtin)
 def _fine(mechanism: Mechanism, path: Path, part: float) -> Path:
     """Return a path with further samples."""
-    times = _sorted(path, start_of(mechanism, path).time)
+    times = _sorted_times(path, start_of(mechanism, path).time)
     # the samples first: they decide where the motion starts
-    return replace(path, times=np.concatenate([path.times, _divided(mechanism, path, times, part)]))
+    return replace(
+        path, times=np.concatenate([path.times, _divide_times(mechanism, path, times, part)])
+    )
 
 
 @cache_last(4, when=_is_builtin)
 def _lead(mechanism: Mechanism, path: Path, to: float, part: float) -> Path:
     """Return the way from the design to a time of a path, with further samples."""
     lead = path.lead_in(to)
-    return replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
+    return replace(lead, times=_divide_times(mechanism, lead, np.array([0.0, 1.0]), part))
 
 
 def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
@@ -170,15 +174,15 @@ def _motion(mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
     bodies = tuple(body.name for body in mechanism.moving)
     if len(bodies) * len(path.times) > MOST_POSES:
         bodies = what.bodies(mechanism)
-    return _solved(mechanism, path, bodies)
+    return _solve_motion(mechanism, path, bodies)
 
 
 @cache_last(2, when=_is_builtin)
-def _solved(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajectory:
+def _solve_motion(mechanism: Mechanism, path: Path, bodies: tuple[str, ...]) -> Trajectory:
     return prepare_motion(mechanism, Request(tuple(path.motions), (), bodies, 1), path)(TOL)
 
 
-def _sorted(path: Path, start: float) -> Array:
+def _sorted_times(path: Path, start: float) -> Array:
     """Return the times of samples and start, increasing."""
     return np.unique([start, *path.times]) if path.covers(start) else np.unique(path.times)
 
@@ -198,7 +202,7 @@ def _way(mechanism: Mechanism, path: Path, times: Array) -> Array:
     return ways.max(axis=0)
 
 
-def _divided(mechanism: Mechanism, path: Path, times: Array, part: float) -> Array:
+def _divide_times(mechanism: Mechanism, path: Path, times: Array, part: float) -> Array:
     """Return increasing times with further ones between them, so that drivers go a part at most."""
     parts = np.ceil(_way(mechanism, path, times) / part).clip(1.0)
     if parts.sum() > MOST:
@@ -223,11 +227,11 @@ def in_doubt(x: Array, v: Array, times: Array) -> bool:
     return bool((np.abs(expected_change(v, t) - np.diff(x, axis=0)) > DOUBT).any())
 
 
-def followed_angle(mechanism: Mechanism, path: Path, joint: str) -> Array | None:
+def angle_with_turns(mechanism: Mechanism, path: Path, joint: str) -> Array | None:
     """Return a joint's angle [rad] at the samples of a path, zero at design, turns counted on the
-    way from there; shape (n,). See `followed`.
+    way from there; shape (n,). See `follow_turns`.
     """
-    return followed(mechanism, path, _OfJoint(joint))
+    return follow_turns(mechanism, path, _OfJoint(joint))
 
 
 def follower(mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]) -> Follow:
@@ -236,7 +240,7 @@ def follower(mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]) -> Fol
     def follow(joint: str, angle: Array, rate: Array) -> Array:
         if near_design(mechanism, path) and not in_doubt(angle, rate, path.times[solved]):
             return angle
-        if (found := followed_angle(mechanism, path, joint)) is None:
+        if (found := angle_with_turns(mechanism, path, joint)) is None:
             return angle
         return angle + TURN * np.round((found[solved] - angle) / TURN)
 
@@ -259,7 +263,7 @@ class _OfJoint:
         moving = {body.name for body in mechanism.moving}
         return tuple(name for name in mechanism.joint(self.joint).bodies if name in moving)
 
-    def counted(
+    def count_turns(
         self, mechanism: Mechanism, times: Array, motion: Trajectory, order: Indices
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return the angle but for turns; see `Followed`."""
@@ -276,7 +280,7 @@ class _OfJoint:
         """Return whole turns."""
         return float(np.rint((near - value) / TURN))
 
-    def turned(self, values: Array, turns: Array) -> Array:
+    def with_turns(self, values: Array, turns: Array) -> Array:
         """Return the angle with its turns."""
         return values + TURN * turns
 
@@ -285,11 +289,11 @@ DOUBTFUL = float(np.cos(0.5 * DOUBT))
 """Agreement less than this, of either sign, might be another number of turns."""
 
 
-def followed_attitude(mechanism: Mechanism, path: Path, body: str) -> Array | None:
+def attitude_with_turns(mechanism: Mechanism, path: Path, body: str) -> Array | None:
     """Return Euler parameters of a moving body's rotation since design at the samples of a path,
-    their sign continuous on the way from there; global axes, shape (n, 4). See `followed`.
+    their sign continuous on the way from there; global axes, shape (n, 4). See `follow_turns`.
     """
-    return followed(mechanism, path, _OfBody(body))
+    return follow_turns(mechanism, path, _OfBody(body))
 
 
 def agreement(change: Quat, rate: Array, dt: Array) -> Array:
@@ -324,7 +328,7 @@ class _OfBody:
         """Return the body."""
         return (self.body,)
 
-    def counted(
+    def count_turns(
         self, mechanism: Mechanism, times: Array, motion: Trajectory, order: Indices
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return the parameters but for their sign, and where it changes; see `Followed`."""
@@ -348,6 +352,6 @@ class _OfBody:
         """Return one for the other sign."""
         return float(value @ near < 0.0)
 
-    def turned(self, values: Array, turns: Array) -> Array:
+    def with_turns(self, values: Array, turns: Array) -> Array:
         """Return the parameters, of the other sign after an odd number of turns."""
         return (1.0 - 2.0 * (turns % 2.0))[:, None] * values

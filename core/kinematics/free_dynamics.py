@@ -231,12 +231,12 @@ class _Run:
             np.zeros_like(high),
             end,
             rtol=looser * RTOL,
-            atol=looser * self._allowed(high),
+            atol=looser * self._error_allowed(high),
             max_step=min(most, end - begin),
             **first,
         )
 
-    def _allowed(self, high: Array) -> Array:
+    def _error_allowed(self, high: Array) -> Array:
         """Return the error allowed in a step: of the largest number of poses, rates and work, and
         at least of a motion of the mechanism's size in the whole time.
         """

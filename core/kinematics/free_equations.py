@@ -148,10 +148,10 @@ class FreeEquations:
     def rate(self, _: float, y: Array) -> Array:
         """Return the rate of a state."""
         at = self.evaluate(y)
-        found = self.moved(y, y[len(self.design) : -1], self.accelerations(at), at.power)
+        found = self.state_rate(y, y[len(self.design) : -1], self.accelerations(at), at.power)
         return np.where(np.abs(found) < NOTHING, 0.0, found)
 
-    def moved(self, y: Array, v: Array, a: Array, power: float) -> Array:
+    def state_rate(self, y: Array, v: Array, a: Array, power: float) -> Array:
         """Return the rate of a state by the rates of the unknowns and their accelerations."""
         n = self.bodies
         e = y[3 * n : 7 * n].reshape(n, 4)
@@ -232,7 +232,7 @@ class FreeEquations:
             total[3 * n : 7 * n] += (excess * e).ravel()
             at = self.evaluate(y + total)
             step, _ = self.split(at.rows, -at.phi)
-            total[position] += self.moved(y + total, step, step, 0.0)[position]
+            total[position] += self.state_rate(y + total, step, step, 0.0)[position]
         rows = self.evaluate(y + total).rows
         total[v] = -self.split(rows, rows @ y[v])[0]
         return total

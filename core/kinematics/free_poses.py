@@ -97,7 +97,7 @@ class FreePoses:
             )
             largest = np.abs(step).max(axis=1, initial=0.0)[:, None]
             step *= lengths[:, None] / np.maximum(largest, SHORTEST)
-            trial, left = self._closed(self._moved(at, step), everywhere)
+            trial, left = self._close(self._step(at, step), everywhere)
             poses = self._poses(trial)
             far = outside(poses)
             good = (left < HOLDS) & (far <= out + HOLDS) & (counts < steps)
@@ -113,7 +113,7 @@ class FreePoses:
             lengths = np.where(good, np.minimum(1.5 * lengths, STEP), 0.5 * lengths)
             found.append(poses)
             kept.append(good)
-        return Walked(self._in_order(found, np.array(kept)), walks * steps, freedom)
+        return Walked(self._order_walks(found, np.array(kept)), walks * steps, freedom)
 
     def placed(self, poses: Poses) -> Poses:
         """Return poses of all moving bodies; those without given ones fit the rows best."""
@@ -132,7 +132,7 @@ class FreePoses:
         columns = [k for name in missing for k in range(f.columns[name], f.columns[name] + COLUMNS)]
         own = [*range(COLUMNS * len(f.bodies), f.unknowns)]
         return (
-            self._poses(self._closed(at, np.array(columns + own, dtype=np.intp))[0])
+            self._poses(self._close(at, np.array(columns + own, dtype=np.intp))[0])
             if missing
             else poses
         )
@@ -142,10 +142,10 @@ class FreePoses:
         f, lanes = self.formulation, len(next(iter(at.state.values()))[0])
         return columns_of(f.phi(at), lanes), dense(f.rows(at), f.unknowns, lanes)
 
-    def _moved(self, at: Configuration, step: Array) -> Configuration:
+    def _step(self, at: Configuration, step: Array) -> Configuration:
         return self.formulation.configuration(self.formulation.retract(at, [*step.T]))
 
-    def _closed(self, at: Configuration, columns: NDArray[np.intp]) -> tuple[Configuration, Array]:
+    def _close(self, at: Configuration, columns: NDArray[np.intp]) -> tuple[Configuration, Array]:
         """Return the nearest configuration on the rows, and their residual, shape (n,)."""
         residuals, rows = self._rows(at)
         for _ in range(MOST_STEPS):
@@ -154,7 +154,7 @@ class FreePoses:
             step = np.zeros((len(rows), rows.shape[2]))
             inverse: Any = np.linalg.pinv(rows[:, :, columns], rcond=RANK)
             step[:, columns] = -np.einsum("nur,nr->nu", inverse, residuals)
-            at = self._moved(at, np.clip(step, -LONGEST, LONGEST))
+            at = self._step(at, np.clip(step, -LONGEST, LONGEST))
             residuals, rows = self._rows(at)
             if np.abs(step).max() < SHORTEST:
                 break
@@ -165,7 +165,7 @@ class FreePoses:
         found = placed_bodies(self.mechanism, self.frame, at.poses, lanes)
         return {name: np.hstack(pair) for name, pair in found.items()}
 
-    def _in_order(self, found: Sequence[Poses], kept: Bools) -> Poses:
+    def _order_walks(self, found: Sequence[Poses], kept: Bools) -> Poses:
         """Return the kept poses walk by walk, after the design."""
         return {
             body.name: np.concatenate(

@@ -251,7 +251,7 @@ class PreparedDesigns:
     route: Route
     wanted: WantedForces | None = None
 
-    def along(self, path: Path) -> PreparedDesigns:
+    def on_path(self, path: Path) -> PreparedDesigns:
         """Return the same programs on another path of the same drivers."""
         return replace(self, route=Route(self.route.model, path))
 

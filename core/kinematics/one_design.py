@@ -173,14 +173,14 @@ def solve(
         tol=tol,
         style=style,
     )
-    moved = partial(driving, mechanism, path, driver, np.array(values, dtype=float))
+    moved = partial(driving_of, mechanism, path, driver, np.array(values, dtype=float))
     if forces is not False:
         names = None if forces is True else forces
         request = replace(request, forces=wanted_forces(mechanism, names))
     return prepare(mechanism, request, path)(tol).along(moved)
 
 
-def driving(mechanism: Mechanism, path: Path, driver: str, values: Array) -> Driving:
+def driving_of(mechanism: Mechanism, path: Path, driver: str, values: Array) -> Driving:
     """Return the driver values of a path; those of the swept driver are given."""
     moved = path.drive([*path.motions], path.times)[0]
     found = {

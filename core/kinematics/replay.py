@@ -134,7 +134,7 @@ def residuals(
         if digits and name in digits:
             half = _table("digits", name, digits, numbers.shape)
             moved[name] = [_motion(numbers + half * row) for row in np.eye(numbers.shape[1])]
-    return replayed(mechanism, motions, moved)
+    return replay_motions(mechanism, motions, moved)
 
 
 def _table(what: str, name: str, given: Mapping[str, ArrayLike], shape: tuple[int, ...]) -> Array:
@@ -153,7 +153,7 @@ def _motion(numbers: Array) -> BodyMotion:
     return BodyMotion(r, p, v if v.size else None, a if a.size else None)
 
 
-def replayed(
+def replay_motions(
     mechanism: Mechanism,
     motions: Mapping[str, BodyMotion],
     moved: Mapping[str, Sequence[BodyMotion]] | None = None,
@@ -257,10 +257,10 @@ class _Rows:
         count = len(next(iter(rated.values())).r)
         lines = _force_rows(self.mechanism, rated, np.zeros(count))
         formulation, unit = lines.formulation, lines.frame.unit
-        at = formulation.configuration(self._turned({**lines.equations.at.state}))
+        at = formulation.configuration(self._with_turns({**lines.equations.at.state}))
         return [unit * each for each, _ in islice(lines.remainders(at), self.orders)]
 
-    def _turned(self, state: dict[str, Any]) -> dict[str, Any]:
+    def _with_turns(self, state: dict[str, Any]) -> dict[str, Any]:
         """Return a state with all turns of coupled joints."""
         turning = [name for name in self.formulation.coordinates if "rotation" in name]
         if not self.turns:
@@ -272,14 +272,14 @@ class _Rows:
             slides = {name: state[f"x {name}"][0] for name in self.formulation.coordinates}
             for c in self.formulation.constraints:
                 if isinstance(c, Relation):
-                    self._begin(c, {**slides, **self.turns})
+                    self._begin_count(c, {**slides, **self.turns})
         for name in turning:
             (x,) = state[f"x {name}"]
             around = np.resize(self.turns[name], len(x))
             state[f"x {name}"] = (x - TURN * np.round((x - around) / TURN),)
         return state
 
-    def _begin(self, relation: Relation, values: Mapping[str, Array]) -> None:
+    def _begin_count(self, relation: Relation, values: Mapping[str, Array]) -> None:
         """Begin to count at the fewest whole turns with which coupled joints fit: poses leave them
         open, and a recording may begin after several.
         """
@@ -315,12 +315,12 @@ class _Rows:
         """Return what moved numbers change in the rows, summed over the numbers."""
         found = [np.zeros_like(each) for each in left]
         at_once = max(1, MOST_LANES // len(left[0]))
-        for group in self._apart([name for name in moved if name in motions]):
+        for group in self._independent_groups([name for name in moved if name in motions]):
             most = max(len(moved[name]) for name in group)
             for first in range(0, most, at_once):
                 columns = range(first, min(first + at_once, most))
                 lanes = {
-                    name: _joined(
+                    name: _join_lanes(
                         [
                             moved[name][k] if name in group and k < len(moved[name]) else motion
                             for k in columns
@@ -332,7 +332,7 @@ class _Rows:
                     total += np.abs(x.reshape(len(columns), *y.shape) - y).sum(axis=0)
         return found
 
-    def _apart(self, names: Sequence[str]) -> list[list[str]]:
+    def _independent_groups(self, names: Sequence[str]) -> list[list[str]]:
         """Return groups of bodies; two of a group share no row, and are moved together."""
         groups: list[list[str]] = []
         for name in names:
@@ -353,7 +353,7 @@ def _trajectory(motions: Mapping[str, BodyMotion], n: int) -> Trajectory:
     return Trajectory({}, solved, none, 0.0, bodies=motions)
 
 
-def _joined(motions: Sequence[BodyMotion]) -> BodyMotion:
+def _join_lanes(motions: Sequence[BodyMotion]) -> BodyMotion:
     """Return the lanes of several motions, one after the other."""
     parts = [[getattr(each, key) for each in motions] for key in ("r", "p", "v", "a")]
     return BodyMotion(*(None if each[0] is None else np.concatenate(each) for each in parts))  # pyright: ignore[reportArgumentType]

@@ -22,7 +22,7 @@ from ..case.models.files import read_hardpoints
 from ..case.models.hardpoints.read import case_of_hardpoints
 from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
 from ..case.models.saving import free_name, save_table
-from ..case.quantity import Output, Quantity
+from ..case.quantity import Output, Quantity, still_jets
 from ..case.turns import count_output_turns
 from ..errors import KincheckError, unknown
 from ..harness.labels import output_label
@@ -332,7 +332,7 @@ class LiveTable(LiveFile):
         sizes = {place: len(value) for place, value in places(case.mechanism).items()}
         standing = _by_place(sizes, geometry)
         design = {
-            name: Vec3(*(Jet(a, np.zeros(()), np.zeros(())) for a in standing[place]))
+            name: still_jets(standing[place])
             for name in names
             if (place := f"points.{name}.position") in standing
         }

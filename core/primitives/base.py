@@ -29,9 +29,10 @@ twist and dpi of a row have components in their own body.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from functools import cache
+from typing import Any, ClassVar, NamedTuple, cast
 
 from ..algebra import (
     IDENTITY,
@@ -282,7 +283,10 @@ class _Derivation:
             x: {0: sum((k * motion[n] for n, k in slopes.items()), 0.0)}
             for x, slopes in self.slopes.items()
         }
-        self.primitive: Primitive = self._lift(primitive)
+        # numbers of other kinds are inputs too
+        self.primitive: Primitive = map_numbers(
+            primitive, lambda x: self._input(x) if _is_varied(x) else x, _is_varied
+        )
         if hasattr(primitive, "drive"):
             self.primitive = replace(self.primitive, drive=self._lift_drive(primitive.drive))
 
@@ -319,18 +323,42 @@ class _Derivation:
             self.speeds[x] = {0: speed}
         return driven
 
-    def _lift(self, value: Any) -> Any:
-        """Return a value with its numbers of other kinds, such as those of varied geometry, as
-        inputs.
-        """
-        if isinstance(value, int | float | complex | str):
-            return value
-        if hasattr(value, "__truediv__"):
-            return self._input(value)
-        if isinstance(value, tuple):
-            return tuple(map(self._lift, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-        if is_dataclass(value) and not isinstance(value, type):
-            parts = {each.name: getattr(value, each.name) for each in fields(value)}
-            lifted = {name: self._lift(part) for name, part in parts.items()}
-            return replace(value, **{k: x for k, x in lifted.items() if x is not parts[k]})
-        return value
+
+def _is_varied(value: Any) -> bool:
+    """Return whether a value is a number of another kind, such as one of varied geometry."""
+    return hasattr(value, "__truediv__") and not isinstance(value, int | float | complex)
+
+
+def map_numbers(
+    value: Any, change: Callable[[Any], Any], is_number: Callable[[Any], bool] | None = None
+) -> Any:
+    """Return a value with its numbers, and all else that has no parts, passed to a function; the
+    parts of tuples, lists, dictionaries and data classes are looked into.
+
+    Args:
+        is_number: whether a value is one number, although it may have parts.
+    """
+
+    def map_part(part: Any) -> Any:
+        if is_number is not None and is_number(part):
+            return change(part)
+        if isinstance(part, tuple | list):
+            parts = cast("tuple[Any, ...]", part)
+            return (
+                [*map(map_part, parts)] if isinstance(part, list) else tuple(map(map_part, parts))
+            )
+        if isinstance(part, dict):
+            return {key: map_part(each) for key, each in cast("dict[Any, Any]", part).items()}
+        names = field_names(part.__class__)
+        if names is None:
+            return change(part)
+        new = {name: map_part(getattr(part, name)) for name in names}
+        return replace(part, **{k: x for k, x in new.items() if x is not getattr(part, k)})
+
+    return map_part(value)
+
+
+@cache
+def field_names(kind: Any) -> tuple[str, ...] | None:
+    """Return the names of the fields of a data class; None of another type."""
+    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else None

@@ -133,10 +133,7 @@ class Core:
                 v[k] = v[k] - entry * x[j]
         for k, step in enumerate(self.steps):
             for i, larger, other in step.exchanges:
-                v[k], v[i] = (
-                    where_larger(larger, other, v[i], v[k]),
-                    where_larger(larger, other, v[k], v[i]),
-                )
+                v[k], v[i] = _exchange(larger, other, v[k], v[i])
             for i, factor in step.multipliers:
                 v[i] = v[i] - factor * v[k]
         for k in reversed(range(len(v))):
@@ -159,14 +156,16 @@ class Core:
             for i, factor in step.multipliers:
                 v[k] = v[k] - factor * v[i]
             for i, larger, other in reversed(step.exchanges):
-                v[k], v[i] = (
-                    where_larger(larger, other, v[i], v[k]),
-                    where_larger(larger, other, v[k], v[i]),
-                )
+                v[k], v[i] = _exchange(larger, other, v[k], v[i])
         for i, known, value in zip(self.rows, self.before, v, strict=True):
             y[i] = value
             for j, entry in known:
                 c[j] = c[j] - entry * value
+
+
+def _exchange(x: Scalar, y: Scalar, a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
+    """Return a and b, exchanged where x is larger than y."""
+    return where_larger(x, y, b, a), where_larger(x, y, a, b)
 
 
 SAFE_LITERAL = 0.5

@@ -16,7 +16,7 @@ from ..case.case import Case, size
 from ..case.units import LENGTHS
 from ..errors import shortened
 from ..harness.trajectory_check import CONSTRAINED
-from ..kinematics import Needed, Residuals, Worst, needed_forces, replayed
+from ..kinematics import Needed, Residuals, Worst, needed_forces, replay_motions
 from ..mechanism.mechanism import Mechanism
 from ..trajectory import PER_TIME, QUANTITIES, Array, BodyMotion
 from ..unit_text import value_text
@@ -51,7 +51,7 @@ def judge_rows(case: Case, samples: Samples, accuracy: Accuracy) -> Judged:
     if not samples.motions:
         return Judged()
     angles = driven_angles(case, samples)
-    found = replayed(case.mechanism, samples.motions, samples.moved, angles)
+    found = replay_motions(case.mechanism, samples.motions, samples.moved, angles)
     allowed = _tolerances(case, samples, accuracy)
     largest = dict[str, float]()
     faults = list[str]()
@@ -123,7 +123,7 @@ def _fitting_readings(case: Case, samples: Samples, tolerance: float) -> str:
     which the poses satisfy the rows; empty without any.
     """
     angles = driven_angles(case, samples)
-    stated = replayed(case.mechanism, samples.motions, angles=angles).position
+    stated = replay_motions(case.mechanism, samples.motions, angles=angles).position
     limit = _LESS * float(np.nanmax(np.abs(stated)))
     meaning = samples.meaning
     changes = dict[str, Meaning]()
@@ -144,11 +144,11 @@ def _fitting_readings(case: Case, samples: Samples, tolerance: float) -> str:
         if change == meaning:
             continue
         other = samples_of(case, samples.recording, change, digits=False)
-        tried = replayed(case.mechanism, other.motions, angles=angles).position
+        tried = replay_motions(case.mechanism, other.motions, angles=angles).position
         if not np.nanmax(np.abs(tried)) <= limit:
             continue
         other = samples_of(case, samples.recording, change)
-        whole = replayed(case.mechanism, other.motions, other.moved, angles)
+        whole = replay_motions(case.mechanism, other.motions, other.moved, angles)
         worst = whole.worst("position", tolerance)
         if worst is not None and worst.value <= worst.allowed:
             found.append(words)

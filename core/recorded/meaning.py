@@ -19,7 +19,7 @@ import numpy as np
 
 from ..algebra import Quat, Vec3, X, Y, Z, quat
 from ..case.case import TIME, Case, Quantity
-from ..case.io.document import decimal, fault, require_known, shown, unknown_name
+from ..case.io.document import decimal, fault, number_or_nan, require_known, shown, unknown_name
 from ..case.io.reference_samples import RATES, known_columns
 from ..case.io.table import read_unit, require_unit
 from ..errors import MOST_NAMED, brief, shortened
@@ -395,10 +395,7 @@ def _term(text: str, known: Collection[str]) -> tuple[str, float, float] | None:
         return text, sign, 0.0
     for place in [each.start() for each in re.finditer(r"[+-]", text)]:
         name, number = text[:place].strip(), text[place:].replace(" ", "")
-        try:
-            offset = decimal(number)
-        except ValueError:
-            continue
+        offset = number_or_nan(number)
         if name in known and abs(offset) < float("inf"):
             return name, sign, offset
     return None
@@ -473,10 +470,7 @@ def read_accuracy(file: Path, case: Case, texts: Sequence[str]) -> Accuracy:
         expected = f"{', '.join(QUANTITIES)} or an output"
         require_known(file, ACCURACY, name, units, expected)
         number, _, unit = right.partition(" ")
-        try:
-            found = decimal(number)
-        except ValueError:
-            found = float("nan")
+        found = number_or_nan(number)
         if not 0.0 < found < float("inf"):
             raise fault(
                 file, ACCURACY, f"found {shown(text)}, expected a positive number; {ACCURACY_FORM}"

@@ -18,7 +18,7 @@ from ..case.case import TIME, Case, Quantity
 from ..case.curves import are_even_steps, have_common_factor
 from ..case.io.document import fault, shown
 from ..case.measures import coordinate_of
-from ..case.quantity import with_markers
+from ..case.quantity import point_jets, still_jets, with_markers
 from ..errors import MOST_NAMED, number_of, shortened
 from ..jet import Jet
 from ..kinematics import count_turns
@@ -322,15 +322,8 @@ def jet_of(
         motion = point_motion(mechanism, motions, name, count)
         if motion is None:
             return None
-        none = np.full_like(motion.position, np.nan)
-        orders = (none if x is None else x for x in (motion.velocity, motion.acceleration))
-        columns = zip(*(x.T for x in (motion.position, *orders)), strict=True)
-        at[name] = Vec3(*(Jet(*each) for each in columns))
-    still = np.zeros(())
-    design = {
-        name: Vec3(*(Jet(np.array(x), still, still) for x in mechanism.point(name).position))
-        for name in measure.points
-    }
+        at[name] = point_jets(motion)
+    design = {name: still_jets(mechanism.point(name).position) for name in measure.points}
     with np.errstate(invalid="ignore"):
         return measure.of(at, design)
 

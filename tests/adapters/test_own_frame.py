@@ -13,7 +13,6 @@ from kincheck.core.errors import SolveError
 from kincheck.core.joints import Kind
 
 from ..kinematics.test_equivalence import case_of, motion
-from ..kinematics.test_invariance import snapped
 from ..support.engine_motion import installed, mechanism_of
 from ..support.mechanisms import ORIGIN, X, Z, mcpherson, placed
 from .test_projection import Crank
@@ -40,23 +39,17 @@ def jack():
 
 
 def moved(mechanism, factor, offset=(0.0, 0.0, 0.0)):
-    """Of another size, then elsewhere."""
-    found = placed(
-        mechanism,
-        lambda point: tuple(
-            float(factor * x + o) for x, o in zip(snapped(point), offset, strict=True)
-        ),
-        factor=factor,
-    )
-    joints = [
-        replace(joint, lead=factor * joint.lead) if isinstance(joint, Screw) else joint
-        for joint in found.joints
-    ]
-    return replace(
-        found,
-        joints=joints,
-        couplers=[replace(each, radius=factor * each.radius) for each in found.couplers],
-    )
+    """Of another size, then elsewhere, with points rounded to 2^-30 m: sums with whole metres are
+    exact.
+    """
+
+    def place(point):
+        rounded = np.round(np.array(point) * 2.0**30) / 2.0**30
+        return tuple(float(factor * x + o) for x, o in zip(rounded, offset, strict=True))
+
+    found = placed(mechanism, place, factor=factor)
+    couplers = [replace(each, radius=factor * each.radius) for each in found.couplers]
+    return replace(found, couplers=couplers)
 
 
 @OF_SIMULATORS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.trees.assembly import assemble
-from kincheck.core.case.models.trees.driving import Freedom, read_start
+from kincheck.core.case.models.trees.driving import UndrivenMotions, read_start
 from kincheck.core.harness.compare import output_series
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.mechanism.motions import Table
@@ -58,7 +58,7 @@ def test_motion_evaluations_grow_linearly_with_motors(limits, tmp_path, monkeypa
 def test_freedoms_of_separate_joints(tmp_path):
     model = assemble(read_start(read_tree(board(tmp_path, 5)), ()), None)
     assert [part.basis.shape for part in model.free] == [(1, 1)] * 5
-    freedom = Freedom(model, {})
+    freedom = UndrivenMotions(model, {})
     freedom.take("j2")
     assert (freedom.dof, freedom.remaining, freedom.count("j2"), freedom.count("j3")) == (
         5,

@@ -8,7 +8,7 @@ from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.case.models.trees.driving import read_start
 
 from ..support.case_texts import complains, refused
-from ..support.mjcf_models import agree, model, mujoco
+from ..support.mjcf_models import agree, model, mujoco, stands_as
 from ..support.model_files import driven
 from ..support.model_poses import EXACT, near, solution
 
@@ -38,9 +38,7 @@ def test_start_pose_matches_mujoco(tmp_path, said):
     places = {name: there.moving[name] for name in tree.places if name in there.moving}
     assert len(places) == 4
     for name, place in places.items():
-        assert near([*place.at], data.body(name).xpos)
-        turned = np.abs([*place.turn] @ data.body(name).xquat)
-        assert turned == pytest.approx(1.0, abs=EXACT)
+        assert stands_as(place, data.body(name))
     assert near([*there.sites["tip"][1].at], data.site("tip").xpos)
     for name in ("turn", "push", "lone"):
         assert there.joints[name].value == pytest.approx(data.joint(name).qpos[0], abs=EXACT)

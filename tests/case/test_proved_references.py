@@ -20,10 +20,9 @@ from kincheck.core.jet import arctan2
 from kincheck.core.program import ball_executor
 from kincheck.core.studies.verified_reference import prove_case
 
-from ..kinematics.test_chain import chain
-from ..kinematics.test_singular import BRANCH
 from ..support.case_texts import refused
 from ..support.fakes import RADIUS, crank
+from ..support.mechanisms import BRANCH, chain
 
 flint = pytest.importorskip("flint")
 TOL = 1e-12

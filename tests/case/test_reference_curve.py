@@ -10,7 +10,6 @@ import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.io.reference_samples import read_table, samples_of
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
@@ -183,8 +182,8 @@ def test_faulty_curve_is_refused(tmp_path, car, kind):
 
 
 def test_run_with_measured_curve(tmp_path, car, capsys):
+    strut_of_table(tmp_path, "0.05:21")
     table = tmp_path / "car.csv"
-    table.write_text(sample_table(TEMPLATES["mcpherson"]))
     toe, camber = car[1]
     file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
     stated = ["--map", "z=stroke", "--map", "Spur=-toe [deg]", "--map", "Sturz=camber"]

@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.io.catalogue import output_catalogue
-from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.case.suspension.base import Attitude
 from kincheck.core.cli import main
@@ -22,7 +19,15 @@ from kincheck.core.report.table import print_matrix, print_table, to_markdown
 
 from ..support.case_texts import refused
 from ..support.rods_of_templates import solved
-from ..support.suspension_files import STRUT, TABLE, TOE, changed, loaded, unreferenced
+from ..support.suspension_files import (
+    STRUT,
+    TABLE,
+    TOE,
+    changed,
+    loaded,
+    strut_of_table,
+    unreferenced,
+)
 from ..support.variations import HEAD
 from ..support.written_again import written_again
 
@@ -371,14 +376,9 @@ def test_wrong_wheel_point_is_refused(changes, key, words):
 
 @pytest.mark.parametrize("axle", [None, "roll"])
 def test_import_keeps_wheel_points(tmp_path, axle):
-    table = tmp_path / "car.csv"
-    table.write_text(sample_table(TEMPLATES["mcpherson"]) + "wheel_axis,1,790,309,\n")
-    case = load(table, Supplied(travel="0.04:3", axle=axle))
-    again = written_again(case, tmp_path)
-    vehicle = again.outputs[0].vehicle
+    case = strut_of_table(tmp_path, "0.04:3", "wheel_axis,1,790,309,\n", axle=axle)
+    vehicle = written_again(case, tmp_path).outputs[0].vehicle
     side = "left_" if axle else ""
-    assert (vehicle.wheel_axis, vehicle.wheel_contact) == (
-        f"{side}wheel_axis",
-        f"{side}wheel_contact",
-    )
+    assert vehicle.wheel_axis == f"{side}wheel_axis"
+    assert vehicle.wheel_contact == f"{side}wheel_contact"
     assert vehicle.wheel_radius == pytest.approx(0.31)

@@ -24,7 +24,7 @@ from ..support.mechanisms import (
     mcpherson,
     slider_crank,
 )
-from .test_sparse_choice import inside
+from .test_large_mechanisms import inside
 
 METHODS = Method.ONE_PROGRAM, Method.BY_COMPONENTS, Method.SPARSE
 

@@ -158,6 +158,12 @@ def test_extrapolation_carries_no_earlier_step(order):
     }
 
 
+def test_gaps_of_neighbours_reach_lane_before():
+    programs = compile_model(mcpherson(), Request(("stroke",), ())).programs
+    for name, neighbours in (("joined_gaps", True), ("alone_gaps", False)):
+        assert ("before" in {node[0] for node in programs[name].nodes}) == neighbours
+
+
 GRIDS = {
     "every sample twice": np.repeat(STROKES, 2),
     "a fine grid gets coarse": [*np.linspace(0.0, 0.008, 17), *np.linspace(0.01, 0.08, 8)],

@@ -19,8 +19,8 @@ from kincheck.core.harness.run import run
 from kincheck.core.joints import Cylindrical, Gear, Revolute, Spherical, Translational, Universal
 from kincheck.core.kinematics import (
     NativeSolver,
+    angle_with_turns,
     followed,
-    followed_angle,
     follower,
     forces_of,
     in_doubt,
@@ -136,7 +136,7 @@ def test_angle_at_fold_adds_no_turn():
     )
     end = math.sqrt(2.5**2 - 0.8**2) - 2.1  # crank and rod in line
     values = np.array([0.0, end / 2, end * (1 - 1e-7)])
-    found = followed_angle(crank, Path({"push": Ramp(1.0)}, values), "pivot")
+    found = angle_with_turns(crank, Path({"push": Ramp(1.0)}, values), "pivot")
     assert found is not None
     x = 2.1 + values  # of the wrist, 0.8 above the pivot
     to_wrist, beside = np.hypot(x, 0.8), np.arctan2(0.8, x)
@@ -155,7 +155,7 @@ def test_angles_share_one_followed_motion(monkeypatch):
 
     monkeypatch.setattr(followed, "prepare_motion", prepare)
     path = Path({"turn": Ramp(7.5)}, np.array([1.0]))
-    first, second = (followed_angle(shafts(), path, joint) for joint in "ab")
+    first, second = (angle_with_turns(shafts(), path, joint) for joint in "ab")
     assert asked == [2]
     assert first == pytest.approx([7.5])
     assert second == pytest.approx(driven([7.5]))

@@ -22,9 +22,7 @@ from kincheck.core.program.llvm.compiler import available
 
 from ..oracles import naive, newton_euler
 from ..support.loads import GRAVITY, loaded, pushes, six, solved
-from ..support.mechanisms import X, Z
-from .test_chain import chain
-from .test_singular import BRANCH
+from ..support.mechanisms import BRANCH, X, Z, chain
 
 EQUILIBRIUM = [
     "mcpherson_strut",

@@ -57,7 +57,7 @@ def test_freedom_account_of_mcpherson():
     coordinates, rank 17.
     """
     found = account_of(mcpherson())
-    assert found.counted == "35 - 34 = 1"
+    assert found.paper_count == "35 - 34 = 1"
     assert (found.bodies, found.coordinates, found.equations) == (5, 35, 34)
     assert (found.moving_coordinates, found.rows, found.rank, found.dof) == (18, 17, 17, 1)
     assert found.redundant_rows == ()

@@ -9,7 +9,7 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.kinematics.formulation.constraints import frames, structure
 from kincheck.core.kinematics.formulation.parameters import placed, places
-from kincheck.core.kinematics.structure.components import components, described
+from kincheck.core.kinematics.structure.components import components, describe_components
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.mechanism import Mechanism
 from kincheck.core.studies.stress.reduction import reduce_case, round_geometry
@@ -62,7 +62,7 @@ def test_component_programs_ignore_masses():
         parts = components(mechanism, frames(mechanism))
         every = [each.name for each in mechanism.points], [each.name for each in mechanism.moving]
         numbers: list[list[float]] = [[] for _ in parts]
-        found = described(mechanism, parts, *every)
+        found = describe_components(mechanism, parts, *every)
         return [
             (structure(each.section, own), own) for each, own in zip(found, numbers, strict=True)
         ]

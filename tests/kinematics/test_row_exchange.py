@@ -14,7 +14,7 @@ from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
 from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation import segments, singular_samples
-from kincheck.core.kinematics.continuation.segments import Followed, chosen, with_better_rows
+from kincheck.core.kinematics.continuation.segments import Followed, choose_rows, with_better_rows
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import SideWalk, follow_samples
 from kincheck.core.kinematics.diagnosis.conditioning import conditioning
@@ -244,12 +244,14 @@ def test_dead_centre_is_examined_once(monkeypatch):
 def test_known_rows_are_chosen_if_good():
     matrix = np.array([[1.0, 0.0], [0.0, 1e-3], [0.0, 1.0], [0.0, 0.2]])
     drivers, none = 0, ()
-    assert chosen(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 2)
-    assert chosen(matrix, [(0, 1), (0, 2)], drivers, none) == (0, 2)
+    assert choose_rows(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 2)
+    assert choose_rows(matrix, [(0, 1), (0, 2)], drivers, none) == (0, 2)
     matrix[3, 1] = 0.5
-    assert chosen(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 3)
+    assert choose_rows(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 3)
     # there are not two
-    assert chosen(np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1e-17]]), [(0, 1)], drivers, none) == (
+    assert choose_rows(
+        np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1e-17]]), [(0, 1)], drivers, none
+    ) == (
         0,
         1,
     )
@@ -268,9 +270,9 @@ def test_pose_off_chosen_rows_is_refused():
     assert standing is not None
     before = {name: lane[model.vectors[f"from {name}"]] for name in model.state}
     sample = beside.sampled(np.array([ALONG - 1e-3]))
-    assert segments._standing(standing.model, before, sample, 1e-6) is not None
+    assert segments._lane_near(standing.model, before, sample, 1e-6) is not None
     off = {name: value + 1e-3 * (name == "u coupler") for name, value in before.items()}
-    assert segments._standing(standing.model, off, sample, 1e-6) is None
+    assert segments._lane_near(standing.model, off, sample, 1e-6) is None
 
 
 def test_pose_against_redundant_rows_is_refused(monkeypatch):
@@ -284,9 +286,9 @@ def test_pose_against_redundant_rows_is_refused(monkeypatch):
     model = recent_model(mechanism, Request(("turn",), ()))
     state = {name: np.array(value) for name, value in model.state.items()}
     sample = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.3]))).sampled(np.array([0.3]))
-    assert segments._standing(model, state, sample, 1.0) is not None
+    assert segments._lane_near(model, state, sample, 1.0) is not None
     monkeypatch.setattr(segments, "CONSISTENT", 1e-12)
-    assert segments._standing(model, state, sample, 1.0) is None
+    assert segments._lane_near(model, state, sample, 1.0) is None
 
 
 @pytest.mark.parametrize("part", [2.0, 4.0])
@@ -305,9 +307,9 @@ def test_sample_is_replaced_if_more_regular(part, monkeypatch):
 
 def test_row_exchange_comes_before_division(monkeypatch):
     """Down to where nothing is seen through rounding takes thirty parts each time."""
-    divided, divide = list[float](), SideWalk._divided
+    divided, divide = list[float](), SideWalk._divide_step
     monkeypatch.setattr(
-        SideWalk, "_divided", lambda self, *where: divided.append(1.0) or divide(self, *where)
+        SideWalk, "_divide_step", lambda self, *where: divided.append(1.0) or divide(self, *where)
     )
     found = solve(loop(), "turn", np.linspace(0.0, 2.0 * np.pi, 73))
     assert found.details["rows_chosen_anew"] >= 3

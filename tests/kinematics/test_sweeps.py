@@ -312,10 +312,10 @@ def assert_right(found, values):
 @pytest.fixture
 def divided(monkeypatch):
     """The steps of which parts were looked for one by one."""
-    aims, divide = list[float](), SideWalk._divided
+    aims, divide = list[float](), SideWalk._divide_step
     monkeypatch.setattr(
         SideWalk,
-        "_divided",
+        "_divide_step",
         lambda self, anchor, aim: aims.append(aim) or divide(self, anchor, aim),
     )
     return aims

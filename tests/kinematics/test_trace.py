@@ -92,6 +92,8 @@ def test_trace_of_rod_below_crank():
     limit = np.arcsin(rod / CRANK)
     assert [event.value for event in curve.events] == pytest.approx([limit, -limit], abs=1e-12)
     assert curve.closed
+    low, high = (f"{each:.6g}" for each in (curve.values.min(), curve.values.max()))
+    assert curve.summary().startswith(f"turn from {low} to {high} rad, ")
     offset = curve.points["end"][:, 0] - CRANK * np.cos(curve.values)
     # 1e-16 under the root
     assert np.abs(offset) == pytest.approx(

@@ -114,7 +114,7 @@ def test_trace_cache_key_distinguishes_requests(cache_folder, monkeypatch):
             monkeypatch.setattr(compiled_model, "_source", lambda: b"changed")
         times.clear()
         for _ in range(2):
-            compiled_model.traced(*given or (CRANK, request))
+            compiled_model.load_or_trace(*given or (CRANK, request))
         assert times == ["traced"]
 
 
@@ -124,7 +124,7 @@ def test_user_joint_traces_are_not_cached(cache_folder, own_joint_types):
 
     (hinge,) = CRANK.joints
     mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
-    compiled_model.traced(replace(CRANK, joints=[mine]), Request(("turn",), ()))
+    compiled_model.load_or_trace(replace(CRANK, joints=[mine]), Request(("turn",), ()))
     assert not cache_folder.exists()
 
 

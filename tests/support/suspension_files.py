@@ -44,11 +44,11 @@ def loaded(data, csv=TABLE):
         return load_case(file)
 
 
-def strut_of_table(folder, travel, more=""):
-    """The case of the sample table of a strut, with further rows."""
+def strut_of_table(folder, travel, more="", **options):
+    """The case of the sample table of a strut, with further rows, in car.csv."""
     file = folder / "car.csv"
     file.write_text(sample_table(TEMPLATES["mcpherson"]) + more)
-    return load(file, Supplied(travel=travel))
+    return load(file, Supplied(travel=travel, **options))
 
 
 def mirrored(data, turn=MIRROR):

@@ -12,10 +12,11 @@ from typing import Any, TypeAlias, TypeVar, cast
 import msgspec
 
 from ...errors import MechanismError
-from ...joints import Coupler, Joint, Kind
+from ...joints import Coupler, Joint
 from ...mechanism.body import dimension_of
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
 from ...mechanism.motions import Motion
+from ..joint_probe import specimen
 from ..measures import Measure, key_of
 from ..quantity import own_keys
 from ..suspension import SuspensionOutput
@@ -36,18 +37,6 @@ from .schema import (
     keys_of,
     own_fields,
 )
-
-# Geometry for any joint. A universal joint needs two perpendicular directions; these are, up to the
-# rounding of a table. A constant-velocity joint needs shafts in the same sense.
-_EXAMPLES: Mapping[Kind | None, Any] = {
-    Kind.POSITION: (0.0, 0.0, 0.0),
-    Kind.DIRECTION: (1.0, 0.0, 0.0),
-    Kind.POSITIONS: ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    Kind.DIRECTIONS: ((1.0, 0.0, 0.0), (0.005, 1.0, 0.0)),
-    Kind.LENGTH: 1.0,
-    None: 1.0,
-}
-
 
 _SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
 """The end of a sentence."""
@@ -133,12 +122,11 @@ def _rows(
 
 
 def rows_of(cls: type[Joint]) -> int | None:
-    """Return the number of constraint equations of a joint type; None if the example geometry does
-    not suit it.
+    """Return the number of constraint equations of a joint type; None if no specimen of it can be
+    made.
     """
-    given = {each.name: _EXAMPLES[each.metadata.get("kind")] for each in own_fields(cls)}
     try:
-        return cls("example", "first", "second", **given).rows
+        return specimen(cls).rows
     except MechanismError:
         return None
 

@@ -140,6 +140,14 @@ def decimal(text: str) -> float:
     return float(text)
 
 
+def number_or_nan(text: str) -> float:
+    """Return the number of a text as `decimal` reads it; NaN for any other text."""
+    try:
+        return decimal(text)
+    except ValueError:
+        return math.nan
+
+
 def measure(text: str, units: Mapping[str, Unit], bare: str) -> tuple[float, str]:
     """Return a measure of an option in SI and the name of its unit: "0.05", "50mm" or "-30 deg".
 

@@ -20,7 +20,7 @@ from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
 from ..suspension import Convention, PerTravel, SuspensionOutput
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
-from .document import decimal, fault, require_known, shown
+from .document import fault, number_or_nan, require_known, shown
 from .reader_options import CurveOptions
 from .reference import compare_at_samples
 from .reference_file import sha256
@@ -223,10 +223,7 @@ def size_of(file: Path, option: str, name: str, text: str, unit: str, bare: Conv
         CaseError: another text, or a unit of something else.
     """
     _, number, stated = re.split(r"^([-+.\deE]*)", text.strip(), maxsplit=1)
-    try:
-        size = decimal(number)
-    except ValueError:
-        size = float("nan")
+    size = number_or_nan(number)
     if not 0.0 < size < float("inf"):
         raise fault(
             file,

@@ -14,7 +14,6 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -26,7 +25,7 @@ from ...trajectory import Array
 from ..case import PER_TRAVEL, Quantity
 from ..curves import Printed
 from ..units import Convert, FileUnits, Unit, si_of
-from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
+from .document import LARGEST, SMALLEST, fault, number_or_nan, read_text, shown
 from .schema import ReferenceKeys
 from .table import (
     DELIMITERS,
@@ -316,9 +315,7 @@ def _decimal_sign(table: Table, layout: Layout, wanted: Sequence[int]) -> str:
 
 
 def _number(file: Path, where: str, cell: object, text: str) -> float:
-    number = math.nan
-    with suppress(ValueError):
-        number = decimal(text)
+    number = number_or_nan(text)
     if not abs(number) <= LARGEST:
         raise fault(
             file,

@@ -9,14 +9,13 @@ import numpy as np
 
 from ...algebra import Vec3
 from ...errors import CaseError, MechanismError
-from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, with_free_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp, Table
-from ...trajectory import Array
+from ...trajectory import Array, PointMotion
 from ..case import TIME, Case, Resting, Sweep, pace, size
 from ..measures import DriverEffort, coordinate_of
-from ..quantity import with_markers
+from ..quantity import point_jets, still_jets, with_markers
 from .outputs import default, largest_load
 
 
@@ -98,7 +97,7 @@ def _values(mechanism: Mechanism, driver: Any, found: Equilibria) -> Array:
     for name in measure.points:
         point = marked.point(name)
         place = found.place(point.body, point.position)
-        still, zero = np.zeros(len(place)), np.zeros(())
-        at[name] = Vec3(*(Jet(place[:, k], still, still) for k in range(3)))
-        design[name] = Vec3(*(Jet(np.array(x), zero, zero) for x in point.position))
+        still = np.zeros_like(place)
+        at[name] = point_jets(PointMotion(place, still, still))
+        design[name] = still_jets(point.position)
     return np.asarray(measure.of(at, design).x)

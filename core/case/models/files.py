@@ -152,21 +152,21 @@ def read_tree(file: Path, without: Collection[str] = ()) -> Tree:
             from .trees.sdf import read_sdf as read
             from .trees.sdf import whole_sdf
 
-            root = whole_sdf(file, root)
+            root = whole_sdf(root)
         case "OpenSimDocument":
             from .trees.osim import read_osim as read
             from .trees.osim import whole_osim
 
-            root = whole_osim(file, root)
+            root = whole_osim(root)
         case "usd":
             from .trees.usd import read_usd as read
         case _:
             from .trees.mjcf import read_mjcf as read
             from .trees.mjcf import whole_mjcf
 
-            root = whole_mjcf(file, root)
+            root = whole_mjcf(root)
     omitted: list[tuple[str, Element]] = []
-    tree = read(file, root.without_named(without, omitted))
+    tree = read(root.without_named(without, omitted))
     tree.without = {name for name, _ in omitted}
     if omitted:
         tree.notes.append(f"{WITHOUT}{', '.join(str(each) for _, each in omitted)}")

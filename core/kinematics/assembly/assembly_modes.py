@@ -329,7 +329,7 @@ def find_assemblies(
     sought = near or dict.fromkeys(closing.moving, GROUND_POSE)
     placed = {name: (motion.r[lanes], motion.p[lanes]) for name, motion in ended.bodies.items()}
     poses = displaced(mechanism, frame, placed)
-    apart = _apart({name: poses[name] for name in sought}, sought)
+    apart = _distances({name: poses[name] for name in sought}, sought)
     distances = np.sqrt((apart * apart).sum(axis=-1).mean(axis=-1))
     branches = Branches.of(mechanism, frame, closing.values)
     found: list[Assembly] = []
@@ -344,7 +344,7 @@ def find_assemblies(
     return Assemblies(tuple(found), samples, samples - len(lanes) - spurious, spurious)
 
 
-def _apart(poses: Mapping[str, Pose], others: Mapping[str, Pose]) -> Array:
+def _distances(poses: Mapping[str, Pose], others: Mapping[str, Pose]) -> Array:
     """Displacements [mechanism sizes] and turns [rad] between poses of the same bodies, shape (n,
     bodies, 2).
     """
@@ -376,7 +376,7 @@ def _groups(poses: Mapping[str, Pose], n: int) -> list[NDArray[np.intp]]:
     left = np.arange(n)
     while len(left):
         first = {name: _lane(pose, int(left[0])) for name, pose in poses.items()}
-        alike = _apart(poses, first)[left].max(axis=(1, 2)) <= SAME
+        alike = _distances(poses, first)[left].max(axis=(1, 2)) <= SAME
         groups.append(left[alike])
         left = left[~alike]
     return groups
@@ -402,8 +402,8 @@ def _starts(
         known = near.get(branch.child)
         if known is not None and spread is not None:
             turn, shift = spread
-            found[branch.child] = _where(
-                first, known, _shaken(known, turn * rng.uniform(size=n), shift, n, rng)
+            found[branch.child] = _select_lanes(
+                first, known, _shake(known, turn * rng.uniform(size=n), shift, n, rng)
             )
             continue
         parent = found.get(branch.parent, GROUND_POSE)
@@ -412,11 +412,11 @@ def _starts(
         apart = (1.0 if branch.joint is None else ANYWHERE) * rng.normal(size=(3, n))
         e = rng.normal(size=(4, n))  # of such rotations none is likelier than another
         pose = Pose.of(carried + vec([*apart]), quat(e / np.linalg.norm(e, axis=0)))
-        found[branch.child] = pose if known is None else _where(first, known, pose)
+        found[branch.child] = pose if known is None else _select_lanes(first, known, pose)
     return found
 
 
-def _shaken(pose: Pose, angle: Array, shift: float, n: int, rng: np.random.Generator) -> Pose:
+def _shake(pose: Pose, angle: Array, shift: float, n: int, rng: np.random.Generator) -> Pose:
     """The pose turned by the angles about axes of any direction, and shifted."""
     axis = rng.normal(size=(3, n))
     axis /= np.linalg.norm(axis, axis=0)
@@ -424,7 +424,7 @@ def _shaken(pose: Pose, angle: Array, shift: float, n: int, rng: np.random.Gener
     return Pose.of(pose.u + vec([*(shift * rng.normal(size=(3, n)))]), turn * pose.q)
 
 
-def _where(these: NDArray[np.bool_], one: Pose, other: Pose) -> Pose:
+def _select_lanes(these: NDArray[np.bool_], one: Pose, other: Pose) -> Pose:
     """One pose in these lanes, the other elsewhere."""
     pairs = zip((*one.u, one.q.e0, *one.q.e), (*other.u, other.q.e0, *other.q.e), strict=True)
     numbers: list[Any] = [np.where(these, a, b) for a, b in pairs]

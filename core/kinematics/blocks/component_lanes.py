@@ -39,8 +39,8 @@ from ..continuation.singular_poses import SOUND, Anchor, Numbers
 from ..formulation.acceptance_criteria import is_uncertain
 from ..formulation.constraints import frames, structure
 from ..formulation.state_vectors import samples
-from ..structure.components import Alike, components, described
-from ..structure.degrees_of_freedom import counted
+from ..structure.components import Alike, components, describe_components
+from ..structure.degrees_of_freedom import freedom_account
 from .sparse_lanes import SparseLanes
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
@@ -117,7 +117,7 @@ class ComponentLanes(Lanes):
         self.mechanism, self.request = mechanism, request
         if parts is None:
             parts = components(mechanism, frames(mechanism))
-        self.parts = described(mechanism, parts, request.points, request.bodies)
+        self.parts = describe_components(mechanism, parts, request.points, request.bodies)
         self.unit = self.parts[0].section.unit
         self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
         numbers: list[list[float]] = [[] for _ in self.parts]
@@ -148,7 +148,7 @@ class ComponentLanes(Lanes):
         self._samples = [
             aligned(len(kind.model.sampled) * room).reshape(-1, room) for kind in self.kinds
         ]
-        self._carried = [_carried(kind.model.plan) for kind in self.kinds]
+        self._carried = [_carried_columns(kind.model.plan) for kind in self.kinds]
         # from what is fixed now, and from what is ahead
         self._calls: list[list[Callable[[int], object]]] = [[], []]
         self._tables: list[Parts] = []  # calls know addresses, not arrays
@@ -184,7 +184,7 @@ class ComponentLanes(Lanes):
             which = f"components like that of {like} ({len(members)})"
             sizes |= {f"{name}, {which}": size for name, size in model.sizes.items()}
         return {
-            **counted(self.mechanism, unknowns, rows, redundant).details,
+            **freedom_account(self.mechanism, unknowns, rows, redundant).details,
             "components": len(self.parts),
             "largest_component": max(
                 kind.model.selection.account.moving_coordinates for kind in self.kinds
@@ -281,7 +281,7 @@ class ComponentLanes(Lanes):
         for fixed, kept in zip(self._fixed, anchor.pose, strict=True):
             fixed[:] = kept
 
-    def sampled(self, times: Array, path: Path) -> list[Array]:
+    def sample_tables(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`: by component type; types without drivers share one table."""
         alone = times[None]
         return [
@@ -317,9 +317,9 @@ class ComponentLanes(Lanes):
             return {}
         at = np.flatnonzero(is_uncertain(sigma, closure, self._tol))
         state = np.stack([self._state(k) for k in at.tolist()], axis=1)
-        sample = self._whole.sampled(self._times[at], path)[0]
+        sample = self._whole.sample_tables(self._times[at], path)[0]
         errors = self._whole.error_bounds(state, sample)
-        return self.refused(at, errors, self._tol)
+        return self.refuse_uncertain(at, errors, self._tol)
 
     @cached_property
     def _whole(self) -> SparseLanes:
@@ -406,7 +406,7 @@ class ComponentLanes(Lanes):
         )
 
 
-def _carried(plan: Plan) -> list[tuple[Indices, Indices]]:
+def _carried_columns(plan: Plan) -> list[tuple[Indices, Indices]]:
     """Return the carried columns of kept, sampled and fixed values, and their targets among the
     fixed ones.
     """

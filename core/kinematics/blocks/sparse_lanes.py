@@ -44,7 +44,12 @@ from ..formulation.acceptance_criteria import (
 from ..formulation.constraints import measured
 from ..formulation.relative import row_names
 from ..formulation.state_vectors import turns
-from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
+from ..structure.degrees_of_freedom import (
+    NullSpaces,
+    freedom_account,
+    locked_drivers,
+    require_driven,
+)
 from ..structure.sparse_lu import Blocks, FactorsOfLanes, Pattern, SingularError
 from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Indices, Lanes
 
@@ -159,7 +164,7 @@ FOLD = 32
 """Rows side by side: of rows as short as the lanes, numpy takes seven times as long."""
 
 
-def folded(function: Any, values: Array) -> Array:
+def fold_rows(function: Any, values: Array) -> Array:
     """Return the reduction over one or more rows, shape (rows, lanes)."""
     rows, lanes = values.shape
     whole = rows - rows % FOLD
@@ -174,7 +179,7 @@ def largest_size(values: Array) -> Array:
     if not len(values):
         return np.zeros(len(values.T))
     sizes: Array = np.abs(values)
-    return folded(np.maximum, sizes)
+    return fold_rows(np.maximum, sizes)
 
 
 def _numbers(here: Poses) -> Numbers:
@@ -214,11 +219,11 @@ class SparseLanes(Lanes):
         self._angles = [names.index(name) for name in turns(mechanism, request.drivers)]
         self._vectors = [*Columns(request).by_vector]
         self.worst = np.zeros((len(WORST), POSES))
-        self.here = self._closed()
+        self.here = self._close_design()
         self.design = self.anchor(0.0)
         self.begin()
 
-    def _closed(self) -> Poses:
+    def _close_design(self) -> Poses:
         """Choose the rows, and return the design position; a rod given longer or shorter than its
         design distance is taken up here.
         """
@@ -239,12 +244,12 @@ class SparseLanes(Lanes):
         self.rows = self._rows_of(kept, entries[:, 0])
         redundant, count = self._redundant, len(phi) - drivers
         self.details = {
-            **counted(mechanism, system.unknowns, count, redundant).details,
+            **freedom_account(mechanism, system.unknowns, count, redundant).details,
             "unknowns": system.unknowns,
             "program": system.sizes,
             "factor_entries": self.rows.pattern.factor(entries[:, 0]).entries,
         }
-        found = self._iterated(system.design, sample, CLOSED, ASSEMBLING)
+        found = self._iterate(system.design, sample, CLOSED, ASSEMBLING)
         (closure,) = found.rest.closure
         zero = np.zeros((system.unknowns, 1))
         (branch,) = system.outputs(found.state, sample, zero, zero)["branch"]
@@ -290,12 +295,12 @@ class SparseLanes(Lanes):
     def set_prediction_start(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`."""
         try:
-            self._stand(self.sampled(np.array([time]), path)[0])
+            self._stand_at(self.sample_tables(np.array([time]), path)[0])
         except SingularError:
             return PoseFailure(FailureKind.SINGULAR_ROWS)
         return None
 
-    def _stand(self, sample: Array) -> None:
+    def _stand_at(self, sample: Array) -> None:
         """Stand at the pose before the lanes, with rates by a sample and no step behind.
 
         Raises:
@@ -334,7 +339,7 @@ class SparseLanes(Lanes):
         """See `Lanes`."""
         self.here, self.rows = anchor.pose
 
-    def sampled(self, times: Array, path: Path) -> list[Array]:
+    def sample_tables(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`."""
         return [self.system.samples(path, times)]
 
@@ -358,11 +363,11 @@ class SparseLanes(Lanes):
             taylor = self.system.stepped(whole, h * (rates + (0.5 * h) * accelerations))
             lack = np.where(ABOUT * abs(last) > np.abs(h), (h / (last or 1.0)) ** 3, 0.0)
             predicted = taylor + lack * (here.state - here.taylor)[:, None]
-            solved = self._iterated(predicted, sample, self._limits.tol, MAX_ITERATIONS, count)
+            solved = self._iterate(predicted, sample, self._limits.tol, MAX_ITERATIONS, count)
             self._judge(solved, sample, taylor, count, neighbours=neighbours)
         return self.worst[MARGINS, :count].copy()
 
-    def _iterated(
+    def _iterate(
         self, state: Array, sample: Array, tol: float, most: int, count: int = 1
     ) -> Solved:
         """Iterate the first lanes until their residuals get no smaller."""
@@ -423,7 +428,7 @@ class SparseLanes(Lanes):
         known = maximum(previous(slopes, slope), least)
         highest: Array = np.maximum.accumulate(sigmas, axis=1)
         largest, high = (maximum(each[:, None], highest) for each in (here.largest, here.high))
-        sigma = folded(np.minimum, sigmas)
+        sigma = fold_rows(np.minimum, sigmas)
         candidate = Candidate(
             done=solved.done.astype(float),
             closure=closure,
@@ -435,12 +440,12 @@ class SparseLanes(Lanes):
             turns=[sample[k] - previous(sample[k], here.sample[k]) for k in self._angles],
             sigma=sigma,
             before=previous(sigma, here.sigmas.min()),
-            largest=folded(np.minimum, largest),
+            largest=fold_rows(np.minimum, largest),
             reversal=sign - previous(sign, here.sign),
             blocks=[Block(sigmas, previous(sigmas, here.sigmas), maximum(slopes, known))],
         )
         self._margins = {
-            name: folded(np.minimum, margin.reshape(-1, POSES))
+            name: fold_rows(np.minimum, margin.reshape(-1, POSES))
             for name, margin in margins(candidate, self._limits).items()
         }
         margin: Array = np.minimum.reduce([*self._margins.values()])
@@ -493,7 +498,7 @@ class SparseLanes(Lanes):
         least = max(BETTER * here.sigmas.min(), SEEN * here.largest.min())
         if kept is not None:
             self.rows = self._rows_of(kept, entries[:, 0])
-            self._stand(sample)
+            self._stand_at(sample)
             if self.here.sigmas.min() > least:
                 self._renewed += 1
                 return
@@ -510,7 +515,7 @@ class SparseLanes(Lanes):
         closure, sigma = self.worst[CLOSURES, :count], self.worst[SIGMAS, :count]
         at = np.flatnonzero(is_uncertain(sigma, closure, tol))
         errors = self.error_bounds(found.state[:, at], found.sample[:, at])
-        return self.refused(at, errors, tol)
+        return self.refuse_uncertain(at, errors, tol)
 
     def error_bounds(self, state: Array, sample: Array) -> Array:
         """Return bounds of the errors of poses [of the mechanism's size] and of their rates and

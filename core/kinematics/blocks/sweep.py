@@ -28,8 +28,8 @@ from ..continuation.singular_poses import (
     NEARLY,
     Anchor,
     PassedSingularity,
-    interpolated,
-    listed,
+    interpolation_error,
+    list_names,
     pass_over,
 )
 from ..continuation.walk import Walk, longest, part_of_step
@@ -69,7 +69,7 @@ class Lanes(ABC):
         """Solve all blocks at times, up to the number of lanes, each lane alone; return the margin
         of each time, positive if accepted.
         """
-        return self.attempt_at(self.sampled(times, path))
+        return self.attempt_at(self.sample_tables(times, path))
 
     def solve_near(self, anchor: Anchor, tol: float, *, crossing: bool = False) -> None:
         """Set the pose before the lanes, the tolerance, and whether a singular pose may be
@@ -94,7 +94,7 @@ class Lanes(ABC):
     def anchor(self, time: float) -> Anchor:
         """Return the pose before the lanes, at a time."""
 
-    def taken(self, time: float) -> Anchor:
+    def carried_anchor(self, time: float) -> Anchor:
         """Return the pose that was carried from the first lane, with its motions."""
         closure, sigma = (float(self.worst[row, 0]) for row in (CLOSURES, SIGMAS))
         error = WORSE * max(closure, EPSILON) / sigma
@@ -105,12 +105,12 @@ class Lanes(ABC):
         """Set the pose before the lanes."""
 
     @abstractmethod
-    def sampled(self, times: Array, path: Path) -> list[Array]:
+    def sample_tables(self, times: Array, path: Path) -> list[Array]:
         """Return the inputs at times, tables of shape (numbers, times)."""
 
     @abstractmethod
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
-        """Attempt all blocks as `attempt` does, with tables from `sampled`.
+        """Attempt all blocks as `attempt` does, with tables from `sample_tables`.
 
         Args:
             neighbours: the times are neighbours on the way.
@@ -134,7 +134,7 @@ class Lanes(ABC):
         error of each.
         """
 
-    def refused(self, lanes: Indices, errors: Array, tol: float) -> dict[int, float]:
+    def refuse_uncertain(self, lanes: Indices, errors: Array, tol: float) -> dict[int, float]:
         """Return the errors of lanes that are too large, or no numbers."""
         found = zip(lanes.tolist(), errors.tolist(), strict=True)
         return {k: error for k, error in found if not error <= AMPLIFIED * tol}
@@ -171,7 +171,7 @@ class _Side:
     Attributes:
         order: their numbers.
         times: of the samples.
-        given: their inputs, see `Lanes.sampled`.
+        given: their inputs, see `Lanes.sample_tables`.
     """
 
     path: Path
@@ -241,7 +241,7 @@ class BlockWalk(Walk):
             # the last part is left: a sample ends an iteration of its own
             parts = np.arange(1.0, lanes.many) / lanes.many
             times: Array = self.time + (wanted - self.time) * parts
-            accepted = leading(lanes.attempt_at(lanes.sampled(times, path), neighbours=True))
+            accepted = leading(lanes.attempt_at(lanes.sample_tables(times, path), neighbours=True))
             if accepted:
                 lanes.carry(accepted - 1)
                 self.time = float(times[accepted - 1])
@@ -268,7 +268,7 @@ class _Run:
         self.lanes, self.tol, self.columns = lanes, tol, Columns(lanes.request)
         self.table = np.full((self.columns.count, count), np.nan)
         self.worst = np.full((len(WORST), count), np.nan)
-        self.refused = dict[int, float]()
+        self.refuse_uncertain = dict[int, float]()
         self.messages, self.notes = list[str](), list[str]()
         self.failures = list[FailureKind]()
 
@@ -283,7 +283,7 @@ class _Run:
         self.table[:, at] = self.lanes.motions(count)
         self.worst[:, at] = self.lanes.worst[:, :count]
         for lane, error in self.lanes.uncertain(count, side.path).items():
-            self.refused[int(at[lane])] = error
+            self.refuse_uncertain[int(at[lane])] = error
 
     def follow(
         self, side: _Side, start: Anchor, keep: Keep, *, watch: bool = False
@@ -328,7 +328,7 @@ class _Run:
             lanes.solve_near(start, self.tol)
             came = start, None
         if refused:
-            places = listed([path.where(float(times[k])) for k in refused])
+            places = list_names([path.where(float(times[k])) for k in refused])
             self.end(
                 f"refused at {places}: so near a singular pose that neither side reaches it; keep"
                 " away from it",
@@ -360,11 +360,11 @@ class _Run:
                     return None
                 lanes.carry(part)
                 if part == 0:
-                    return lanes.taken(time)
+                    return lanes.carried_anchor(time)
                 here = float(parts[part])
             return None
 
-        measure = partial(interpolated, self.columns.by_vector, lanes.unit, rates=rates)
+        measure = partial(interpolation_error, self.columns.by_vector, lanes.unit, rates=rates)
         known = near and (near.numbers.state, NEARLY)
         return pass_over(sound, known, time, way, reach, measure, AMPLIFIED * tol)
 
@@ -389,15 +389,15 @@ class _Run:
         """Replace refused samples by interpolation between both sides of them, where the motion
         continues.
         """
-        for at in np.flatnonzero([int(k) in self.refused for k in side.order]).tolist():
+        for at in np.flatnonzero([int(k) in self.refuse_uncertain for k in side.order]).tolist():
             ahead = replace(side, times=side.times[: at + 1])
-            came = _Run(self.lanes, self.tol).follow(ahead, start, _nothing, watch=True)
+            came = _Run(self.lanes, self.tol).follow(ahead, start, _keep_none, watch=True)
             if came is not None and self.interpolate(side, at, *came):
-                del self.refused[int(side.order[at])]
+                del self.refuse_uncertain[int(side.order[at])]
 
     def take_away(self, path: Path) -> None:
         """Take away the samples left uncertain, and say so."""
-        refused = self.refused
+        refused = self.refuse_uncertain
         if refused:
             self.table[:, [*refused]] = np.nan
             self.worst[:, [*refused]] = np.nan
@@ -465,7 +465,7 @@ class BlockSweep:
         if departure is not None:
             for side in self._sides:
                 run.follow(side, departure, partial(run.keep, side))
-            for side in self._sides if len(run.refused) <= BRIDGED else ():
+            for side in self._sides if len(run.refuse_uncertain) <= BRIDGED else ():
                 run.interpolate_refused(side, departure)
         run.take_away(self.path)
         return run.trajectory()
@@ -475,7 +475,7 @@ class BlockSweep:
         """The samples of each side of the start, outwards."""
         path, sides = self.path, outwards(self.path.times, self.start.time)
         return [
-            _Side(path, side, path.times[side], self._lanes.sampled(path.times[side], path))
+            _Side(path, side, path.times[side], self._lanes.sample_tables(path.times[side], path))
             for side in sides
         ]
 
@@ -489,8 +489,8 @@ class BlockSweep:
         if way := begin.lead:
             times = np.array([0.0, 1.0])
             lanes.set_prediction_start(0.0, way)
-            side = _Side(way, np.arange(2), times, lanes.sampled(times, way))
-            run.follow(side, lanes.anchor(0.0), _nothing)
+            side = _Side(way, np.arange(2), times, lanes.sample_tables(times, way))
+            run.follow(side, lanes.anchor(0.0), _keep_none)
             if run.messages:
                 run.messages[:] = [f"on the way to {begin.name}: {run.messages[0]}"]
                 return None, run
@@ -501,5 +501,5 @@ class BlockSweep:
         return lanes.anchor(begin.time), run
 
 
-def _nothing(samples: Indices) -> None:
+def _keep_none(samples: Indices) -> None:
     """Keep none of the samples."""

@@ -91,7 +91,7 @@ class Tracing:
     frame: Frames
 
 
-def traced(mechanism: Mechanism, request: Request, alike: Alike | None = None) -> Tracing:
+def load_or_trace(mechanism: Mechanism, request: Request, alike: Alike | None = None) -> Tracing:
     """Select the rows and trace the programs of a request, or load them from the disk cache.
 
     Raises:
@@ -161,7 +161,7 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         programs.append(tracer.prepared.program())
         if not request.state:
             programs.append(step_programs.extend(tracer))
-    carried, continued = step_programs.carried(tracer), step_programs.continued(tracer)
+    carried, continued = step_programs.carried_slots(tracer), step_programs.continued_slots(tracer)
     tracer.layout.scalar(ITERATIONS)
     slots, vectors, state = tracer.layout.slots, tracer.layout.vectors, tracer.formulation.design
     sampled = [slots[TIME], *slots_of(vectors, (f"drive {name}" for name in request.drivers))]
@@ -225,7 +225,7 @@ def compile_model(mechanism: Mechanism, request: Request, alike: Alike | None = 
     """
     if request.compiled and available():
         make_loops_ready()
-    return Model(mechanism, request, traced(mechanism, request, alike))
+    return Model(mechanism, request, load_or_trace(mechanism, request, alike))
 
 
 def is_known(mechanism: Mechanism, _: Request) -> bool:

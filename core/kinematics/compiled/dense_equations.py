@@ -117,7 +117,7 @@ class System:
             tables = {**found.tables, outputs.name: last}
             programs = [Program(name, (), {}) for name in found.tables]
         else:
-            programs = self._traced(names)
+            programs = self._trace_programs(names)
             self.sizes = {each.name: each.size for each in programs}
         self.sizes[outputs.name] = outputs.size
         self._vectors = {name: _run(slots) for name, slots in tracer.layout.vectors.items()}
@@ -129,7 +129,7 @@ class System:
         self._plan = plan
         self._code = LlvmCode(plan, often=math.inf, tables=tables) if compiled else None
 
-    def _traced(self, names: Mapping[str, Sequence[int]]) -> list[Program]:
+    def _trace_programs(self, names: Mapping[str, Sequence[int]]) -> list[Program]:
         """Return the programs of all rows, of gamma and of a step."""
         tracer, vector = self.tracer, self.tracer.layout.vector
         formulation, at = tracer.formulation, tracer.at

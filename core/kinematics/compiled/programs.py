@@ -92,7 +92,9 @@ class Tracer:
         given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
         slots = {slot for place in given for slot in self.layout.vectors[place]}
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)
-        self.prescribed = {name: self._moved(name) for name in (alike.first.given if alike else ())}
+        self.prescribed = {
+            name: self._prescribed_body(name) for name in (alike.first.given if alike else ())
+        }
         self.drives = {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
         if alike:
             section = alike.with_numbers(given.get("geometry", ()))
@@ -129,7 +131,7 @@ class Tracer:
             return Relative.of(mechanism, frame, found)
         return Cartesian(found, frame.moving)
 
-    def _moved(self, name: str) -> PrescribedBody:
+    def _prescribed_body(self, name: str) -> PrescribedBody:
         """A prescribed body, its motion read from slots."""
         u, q, v, w, v_t, w_t = (
             self.vector(f"prescribed {label} {name}", count) for label, count in PRESCRIBED.items()
@@ -164,13 +166,13 @@ class Tracer:
         formulation = self._formulate(*self._described, {})
         return select_rows(*self._described, formulation, self.request.rows)
 
-    def _kept(self, values: Sequence[Any]) -> list[Any]:
+    def _chosen_rows(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]
 
     @cached_property
     def factor(self) -> Elimination:
         """The factored rows at the state, for iterations and, at the solution, for the rates."""
-        return Elimination(self._kept(self.formulation.rows(self.at)))
+        return Elimination(self._chosen_rows(self.formulation.rows(self.at)))
 
     @property
     def turns(self) -> Sequence[str]:
@@ -184,7 +186,7 @@ class Tracer:
 
     def newton(self) -> Program:
         """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
-        phi = self._kept(self.formulation.phi(self.at))
+        phi = self._chosen_rows(self.formulation.phi(self.at))
         out: dict[int, Scalar] = {
             # iterations end by this: a pose is off by the residual over sigma, and the next one by
             # the square of that
@@ -215,10 +217,10 @@ class Tracer:
         # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves
         # both; the paper iterates, (31)
         if order:
-            v = self.factor.solve(self._kept(self.formulation.nu(self.at)))
+            v = self.factor.solve(self._chosen_rows(self.formulation.nu(self.at)))
             self.store(out, RATE, v)
         if order == 2:
-            a = self.factor.solve(self._kept(self.formulation.gamma(self.at, v)))
+            a = self.factor.solve(self._chosen_rows(self.formulation.gamma(self.at, v)))
             self.store(out, RATE_T, a)
         return v, a, out
 
@@ -243,7 +245,7 @@ class Tracer:
         """
         v, a, out = self._solve_rates(self.request.order)
         phi = self.formulation.phi(self.at)
-        out[self.layout.scalar("closure")] = largest(self._kept(phi))
+        out[self.layout.scalar("closure")] = largest(self._chosen_rows(phi))
         out[self.layout.scalar("leftover")] = largest([phi[k] for k in self.selection.dropped])
         return self._outputs(v, a, out)
 

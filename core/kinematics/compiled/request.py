@@ -89,7 +89,7 @@ def by_block(label: str, blocks: int) -> Sequence[str]:
     return [label] if blocks == 1 else [f"{label} {k}" for k in range(blocks)]
 
 
-def remembered(blocks: int) -> Sequence[str]:
+def remembered_tests(blocks: int) -> Sequence[str]:
     """Return the slots of tests to remember of the start of a prediction, for this number of blocks
     of the rows.
     """
@@ -196,7 +196,7 @@ def kept_tests(request: Request, blocks: int) -> Sequence[str]:
     """Return the names of the tests kept of a sample, for this number of blocks of the rows."""
     # a part of a large mechanism: the cause of a failure, and the criteria of the next sample
     if request.state:
-        return ("closure", *remembered(blocks))
+        return ("closure", *remembered_tests(blocks))
     return TESTS_OF_VARIANTS if request.varied else TESTS
 
 

@@ -198,7 +198,10 @@ def _differ(
         motion.position - second.points[name].position for name, motion in found.points.items()
     ]
     for name, body in found.bodies.items():
-        apart += [body.r - second.bodies[name].r, size * _turned(body.p, second.bodies[name].p)]
+        apart += [
+            body.r - second.bodies[name].r,
+            size * _turn_between(body.p, second.bodies[name].p),
+        ]
     worst = max((float(np.abs(each[both]).max(initial=0.0)) for each in apart), default=0.0)
     if worst <= APART * size:
         return []
@@ -209,7 +212,7 @@ def _differ(
     ]
 
 
-def _turned(p: Array, q: Array) -> Array:
+def _turn_between(p: Array, q: Array) -> Array:
     """Return how far two sets of Euler parameters are apart; p and -p are the same."""
     return np.minimum(np.abs(p - q).max(axis=1), np.abs(p + q).max(axis=1))
 
@@ -350,9 +353,9 @@ class Route:
     @cached_property
     def sides(self) -> tuple[Side, ...]:
         """The side after the start and the side before it, as far as there are samples."""
-        return self.divided(1)
+        return self.sides_in_parts(1)
 
-    def divided(self, parts: int) -> tuple[Side, ...]:
+    def sides_in_parts(self, parts: int) -> tuple[Side, ...]:
         """The sides with every step in equal parts, the last of which ends at the sample; see
         `ends`.
         """
@@ -380,7 +383,10 @@ class Route:
         """Return the samples of each side, for lanes with motions of their own."""
 
         def made() -> tuple[Array, ...]:
-            given = [side.samples[: len(self.origin), : side.count] for side in self.divided(parts)]
+            given = [
+                side.samples[: len(self.origin), : side.count]
+                for side in self.sides_in_parts(parts)
+            ]
             return tuple(np.concatenate([each, weights_of_samples(each[0])]) for each in given)
 
         return self.thread_cache(parts, made)

@@ -59,7 +59,7 @@ from .request import (
     SLOPE,
     TIME,
     by_block,
-    remembered,
+    remembered_tests,
 )
 
 if TYPE_CHECKING:
@@ -73,13 +73,13 @@ ABOUT = 1.5
 """A step may be this much longer than the one it learns from."""
 
 
-def carried(tracer: Tracer) -> list[tuple[int, int]]:
+def carried_slots(tracer: Tracer) -> list[tuple[int, int]]:
     """Return pairs of slots to copy from a solved lane to the start of the next prediction."""
     sizes = {name: len(value) for name, value in tracer.formulation.design.items()}
     sizes |= {PREDICTED + name: count for name, count in sizes.items()}
     sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
     pairs = [(tracer.layout.scalar(FROM + TIME), tracer.layout.scalar(EARLIER + TIME))]
-    told = TIME, *remembered(tracer.blocks), *tracer.turns
+    told = TIME, *remembered_tests(tracer.blocks), *tracer.turns
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(FROM + name)) for name in told]
     pairs += [(tracer.layout.scalar(name), tracer.layout.scalar(name)) for name in ACCEPT]
     for name, count in sizes.items():
@@ -89,8 +89,8 @@ def carried(tracer: Tracer) -> list[tuple[int, int]]:
     return pairs
 
 
-def continued(tracer: Tracer) -> list[tuple[int, int]]:
-    """Return the pairs of `carried` still needed if lanes are continued through earlier ones.
+def continued_slots(tracer: Tracer) -> list[tuple[int, int]]:
+    """Return the pairs of `carried_slots` still needed if lanes are continued through earlier ones.
 
     Tests need them, predictions do not. A Taylor step after such lanes has no step behind it, and
     no correction.
@@ -104,7 +104,7 @@ def continued(tracer: Tracer) -> list[tuple[int, int]]:
     ahead += [
         slot for name in (RATE, RATE_T) for slot in tracer.layout.vector(FROM + name, unknowns)
     ]
-    (_, earlier), *pairs = carried(tracer)
+    (_, earlier), *pairs = carried_slots(tracer)
     return [(time, earlier), *(pair for pair in pairs if pair[1] not in ahead)]
 
 
@@ -148,7 +148,7 @@ def extrapolate(tracer: Tracer, lanes: int) -> Program:
     last, given = NODES - 1, {tracer.layout.scalar(name) for name in (TIME, *tracer.turns)}
     stood = {
         target: tracer.tape.at(last, source)
-        for source, target in continued(tracer)
+        for source, target in continued_slots(tracer)
         if source not in (*given, target)
     }
     state, behind = _state_slots(tracer), groups_behind(lanes)
@@ -163,7 +163,7 @@ def extrapolate(tracer: Tracer, lanes: int) -> Program:
         group, _ = place_of(k, lanes)
         return tracer.tape.at(k, groups[group][place[slot]])
 
-    return _continued(tracer, "extrapolate", at, stood)
+    return _continue_state(tracer, "extrapolate", at, stood)
 
 
 def extend(tracer: Tracer) -> Program:
@@ -172,7 +172,7 @@ def extend(tracer: Tracer) -> Program:
     """
     state, past = _state_slots(tracer), _past_slots(tracer)
     place = {slot: k for k, slot in enumerate(state)}
-    return _continued(
+    return _continue_state(
         tracer, "extend", lambda k, slot: tracer.tape.input(past[k * len(state) + place[slot]]), {}
     )
 
@@ -187,7 +187,7 @@ def _past_slots(tracer: Tracer) -> list[int]:
     return tracer.layout.vector(PAST, NODES * len(_state_slots(tracer)))
 
 
-def _continued(
+def _continue_state(
     tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]
 ) -> Program:
     """Return the program of the state by Lagrange's formula, without v and a, with further outputs;

@@ -119,7 +119,7 @@ class ArclengthWalk:
                 break  # the last step gained nothing: rounding
             closure = float(found.closure[0])
             try:
-                across = _bordered(found.jacobian[0], found.nu[0], spot.dq)
+                across = _border(found.jacobian[0], found.nu[0], spot.dq)
                 step = _solution(across, np.append(-found.phi[0], 0.0))
             except np.linalg.LinAlgError:
                 return None
@@ -132,9 +132,9 @@ class ArclengthWalk:
             after = _spot(found, state, time, spot.dq, spot.arc + h)
         except np.linalg.LinAlgError:
             return None
-        return after if self._solved(after) else None
+        return after if self._is_solution(after) else None
 
-    def _solved(self, spot: CurvePoint) -> bool:
+    def _is_solution(self, spot: CurvePoint) -> bool:
         zero, sample = np.zeros((self.system.unknowns, 1)), self.sample(spot.time)
         tests = self.system.equations(spot.state, sample)
         (branch,) = self.system.outputs(spot.state, sample, zero, zero)["branch"]
@@ -143,7 +143,7 @@ class ArclengthWalk:
             closure <= self.tol and leftover <= max(CONSISTENT, self.tol) and branch[0] > 0.0
         )
 
-    def along(
+    def spots_after(
         self, spot: CurvePoint, length: float, longest: float, attempts: int | None = None
     ) -> Iterator[CurvePoint]:
         """Yield spots after one, up to a length from the beginning of the walk; stop early if steps
@@ -213,10 +213,10 @@ class ArclengthWalk:
             offsets, spots = nodes
             root = _root(offsets, np.array([spot.dt for spot in spots]))
             if np.isfinite(root):
-                return NearbyPoint(best, best.arc + root, _between(offsets, spots, root))
+                return NearbyPoint(best, best.arc + root, _time_between(offsets, spots, root))
         return NearbyPoint(best, best.arc, best.time)
 
-    def branching(self, before: CurvePoint, after: CurvePoint) -> NearbyPoint | None:
+    def branch_point(self, before: CurvePoint, after: CurvePoint) -> NearbyPoint | None:
         """Return the branch point between two spots, or None.
 
         Corrections do not converge there, but sigma falls to zero linearly on both sides: with its
@@ -234,7 +234,9 @@ class ArclengthWalk:
         )
         if not abs(from_left - from_right) <= MEETS:
             return None
-        return NearbyPoint(spots[3], before.arc + centre + root, _between(offsets, spots, root))
+        return NearbyPoint(
+            spots[3], before.arc + centre + root, _time_between(offsets, spots, root)
+        )
 
     def _nodes(
         self, before: CurvePoint, after: CurvePoint, centre: float
@@ -269,15 +271,15 @@ def _spot(found: Equations, state: Array, time: float, along: Array, arc: float)
     Raises:
         np.linalg.LinAlgError: the curve has no single tangent there.
     """
-    bordered = _bordered(found.jacobian[0], found.nu[0], along)
+    bordered = _border(found.jacobian[0], found.nu[0], along)
     tangent = _solution(bordered, np.append(np.zeros(len(along)), 1.0))
     tangent /= np.linalg.norm(tangent[:-1])
     sigma = float(np.linalg.svd(bordered[:-1], compute_uv=False)[-1])
-    sign = float(np.linalg.slogdet(_bordered(found.jacobian[0], found.nu[0], tangent[:-1]))[0])
+    sign = float(np.linalg.slogdet(_border(found.jacobian[0], found.nu[0], tangent[:-1]))[0])
     return CurvePoint(state, time, tangent[:-1], float(tangent[-1]), arc, sigma, sign)
 
 
-def _bordered(jacobian: Array, nu: Array, dq: Array) -> Array:
+def _border(jacobian: Array, nu: Array, dq: Array) -> Array:
     n = len(dq)
     found = np.zeros((n + 1, n + 1))
     found[:n, :n], found[:n, n], found[n, :n] = jacobian, -nu, dq
@@ -288,7 +290,7 @@ def _solution(matrix: Array, b: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix, b), dtype=np.float64)
 
 
-def _between(offsets: Array, spots: Sequence[CurvePoint], at: float) -> float:
+def _time_between(offsets: Array, spots: Sequence[CurvePoint], at: float) -> float:
     """The time at an offset among spots, interpolated."""
     times = [spot.time for spot in spots]
     return float(np.polynomial.Polynomial.fit(offsets, times, len(times) - 1)(at))

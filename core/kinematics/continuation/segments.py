@@ -65,7 +65,7 @@ def with_better_rows(route: Route, lane: Array, path: Path, models: list[Model])
     if not _sigma(matrix, range(len(matrix))) > least:
         return None
     known = {each.selection.chosen: each for each in models}
-    rows = chosen(matrix, [*known], len(model.mechanism.drivers), system.conditions)
+    rows = choose_rows(matrix, [*known], len(model.mechanism.drivers), system.conditions)
     sigma = _sigma(matrix, rows)
     if not sigma > least:
         return None
@@ -74,7 +74,7 @@ def with_better_rows(route: Route, lane: Array, path: Path, models: list[Model])
         best = recent_model(model.mechanism, replace(model.request, rows=rows))
         models.append(best)
     state = {name: lane[model.vectors[FROM + name]] for name in model.state}
-    stands = _standing(best, state, sample, NEAR * sigma)
+    stands = _lane_near(best, state, sample, NEAR * sigma)
     if stands is None:
         return None
     # beside a corner all rows are nearly singular: the scale is that of the motion, not of what it
@@ -84,7 +84,7 @@ def with_better_rows(route: Route, lane: Array, path: Path, models: list[Model])
     return Route(best, path, stands, time)
 
 
-def chosen(
+def choose_rows(
     matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, conditions: Sequence[Condition]
 ) -> tuple[int, ...]:
     """Return the rows to solve at a pose: the best known ones if others are hardly better, else
@@ -102,10 +102,10 @@ def chosen(
     return rows if len(rows) == len(best) else best
 
 
-def chosen_at(
+def choose_rows_at(
     mechanism: Mechanism, change: Mapping[str, float], state: Array, known: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """As `chosen`, at a pose of the native formulation.
+    """As `choose_rows`, at a pose of the native formulation.
 
     Args:
         change: of the moving drivers from the design [SI].
@@ -117,7 +117,7 @@ def chosen_at(
     at = formulation.configuration(
         {name: [next(numbers) for _ in value] for name, value in formulation.design.items()}
     )
-    return chosen(
+    return choose_rows(
         jacobian(formulation, at), [known], len(mechanism.drivers), formulation.conditions
     )
 
@@ -127,7 +127,7 @@ def _sigma(matrix: Array, rows: Sequence[int]) -> float:
     return float(np.linalg.svd(matrix[[*rows]], compute_uv=False)[-1])
 
 
-def _standing(model: Model, state: dict[str, Array], sample: Array, nearby: float) -> Array | None:
+def _lane_near(model: Model, state: dict[str, Array], sample: Array, nearby: float) -> Array | None:
     """Return a lane of a model at a sample, no farther from a state than the given distance, or
     None.
 

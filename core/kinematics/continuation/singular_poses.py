@@ -83,10 +83,11 @@ class Singularity:
     @property
     def words(self) -> str:
         """The dependent rows and the moving bodies, for a message after a place."""
+        owners = list_names(self.owners)
         if self.regular:
             return (
                 f"smallest singular value {self.sigma:.3g} of the rows that were chosen at the"
-                f" design position, of {listed(self.owners)}, and {self.of_all:.3g} of all rows:"
+                f" design position, of {owners}, and {self.of_all:.3g} of all rows:"
                 " the mechanism is regular there; it has more rows than it needs; let the design"
                 " be nearer, or have joints that constrain nothing twice (kincheck explain names"
                 " the rows)"
@@ -101,7 +102,7 @@ class Singularity:
         ]
         return (
             f"smallest singular value {self.sigma:.3g}: {what} ({self.kind}), of"
-            f" {listed(self.owners)}; free to first order with the drivers held: {listed(how)}"
+            f" {owners}; free to first order with the drivers held: {list_names(how)}"
         )
 
     @property
@@ -118,7 +119,7 @@ class Singularity:
         }
 
 
-def listed(names: Sequence[str]) -> str:
+def list_names(names: Sequence[str]) -> str:
     """Names in a sentence, the first few."""
     return shortened(names, NAMED)
 
@@ -233,7 +234,7 @@ def solve_closely(system: System, state: Array, sample: Array) -> Solved:
         best, closure = np.where(better, state, best), np.where(better, found.closure, closure)
         if not better.any():
             break
-        state = system.stepped(best, -_solved(found.jacobian, found.phi).T)
+        state = system.stepped(best, -_least_solution(found.jacobian, found.phi).T)
     _, sigma, z = np.linalg.svd(_finite(system.equations(best, sample).jacobian))
     rate, rate_t = _rates(system, best, sample)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -257,12 +258,12 @@ def solve_closely(system: System, state: Array, sample: Array) -> Solved:
 
 def _rates(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
     found = system.equations(state, sample)
-    rate = _solved(found.jacobian, found.nu)
+    rate = _least_solution(found.jacobian, found.nu)
     gamma = system.gamma(state, sample, rate.T)[[*system.tracer.selection.chosen]]
-    return rate, _solved(found.jacobian, gamma.T)
+    return rate, _least_solution(found.jacobian, gamma.T)
 
 
-def _solved(jacobian: Array, b: Array) -> Array:
+def _least_solution(jacobian: Array, b: Array) -> Array:
     """Return the least solution by singular values, without those at the level of rounding; NaN if
     anything is not finite.
     """
@@ -370,7 +371,7 @@ def pass_over(
         time: of the singular pose.
         way: its sign is the direction of the motion.
         measure: bounds the errors of motions interpolated between eight, shape (rows, 8), at a
-            largest rate, see `interpolated`.
+            largest rate, see `interpolation_error`.
         limit: of the errors.
     """
     speed = float(np.abs(sound.numbers.rates).max(initial=0.0))
@@ -443,14 +444,14 @@ def bridge(
         solved = solve_closely(system, system.state(near[:, None]), route.sampled(at))
         known = solved.state[:, 0], WORSE * float(solved.error[0, 0])
     sound = Anchor(time_of(model, lane), lane, numbers)
-    measure = partial(interpolated, model.rows, model.frame.unit, rates=rates)
+    measure = partial(interpolation_error, model.rows, model.frame.unit, rates=rates)
     return pass_over(sound, known, time, time - sound.time, reach, measure, AMPLIFIED * tol)
 
 
 ORDERS = {"velocity": 1, "rdot": 1, "omega": 1, "acceleration": 2, "rddot": 2, "omega_t": 2}
 
 
-def interpolated(
+def interpolation_error(
     rows: Mapping[str, slice], unit: float, whole: Array, speed: float, *, rates: bool = True
 ) -> float:
     """Return a bound of the errors of motions interpolated between eight poses: of positions by the

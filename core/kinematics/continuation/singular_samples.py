@@ -34,7 +34,7 @@ from .singular_poses import (
     bridge,
     examine,
     examine_lane,
-    listed,
+    list_names,
     smallest_singular_values,
     solve_closely,
 )
@@ -168,7 +168,7 @@ class _Scrutiny:
             return findings
         self.followed.go_on()
         self._samples()
-        self._stuck()
+        self._bridge_stuck()
         self._passages()
         for end in self.followed.ends:
             self._end(end)
@@ -184,7 +184,7 @@ class _Scrutiny:
         """
         indices, doubtful = np.flatnonzero(self.followed.needs_check), self.followed.is_uncertain
         visited = self.followed.visit(indices.tolist()) if len(indices) else {}
-        self._lost([k for k in indices.tolist() if k not in visited and doubtful[k]])
+        self._refuse_lost([k for k in indices.tolist() if k not in visited and doubtful[k]])
         better: dict[int, Array] = {}
         for model, samples in self._by_model(visited):
             # the estimate says too little of many unknowns: most of their samples are beyond doubt
@@ -200,23 +200,23 @@ class _Scrutiny:
         self.followed.renew(better)
         doubtful = self.followed.is_uncertain
         for model, samples in self._by_model(k for k in visited if doubtful[k]):
-            self._closely(system_of(model), samples, self._lanes(visited, samples))
+            self._solve_closely(system_of(model), samples, self._lanes(visited, samples))
 
     def _by_model(self, samples: Iterable[int]) -> Iterator[tuple[Model, NDArray[np.intp]]]:
         """Return the samples by the model they were followed with."""
         found: dict[Model, list[int]] = {}
         for k in sorted(samples):
-            found.setdefault(self._followed_on(k).model, []).append(k)
+            found.setdefault(self._route_of(k).model, []).append(k)
         for model, each in found.items():
             yield model, np.array(each, np.intp)
 
-    def _followed_on(self, k: int) -> Route:
+    def _route_of(self, k: int) -> Route:
         return self.followed.parts[int(self.followed.part_of[k])].route
 
     def _lanes(self, visited: Mapping[int, Array], samples: NDArray[np.intp]) -> Array:
         return np.stack([visited[k] for k in samples.tolist()], axis=1)
 
-    def _closely(self, system: System, indices: NDArray[np.intp], lanes: Array) -> None:
+    def _solve_closely(self, system: System, indices: NDArray[np.intp], lanes: Array) -> None:
         """Solve samples closely."""
         state, sample = system.state(lanes), self.route.sampled(self.times[indices])
         solved = solve_closely(system, state, sample)
@@ -240,29 +240,29 @@ class _Scrutiny:
         # a motion passes singular poses one by one; where all its samples are nearly singular there
         # is nothing to pass
         tried = doubted if len(doubted) <= BRIDGED else []
-        passed = {at for at in tried if self._passed(int(indices[at]), lanes[:, at])}
+        passed = {at for at in tried if self._interpolate(int(indices[at]), lanes[:, at])}
         refused = [at for at in doubted if at not in passed]
         if refused:
             error = solved.error[: self.orders, refused]
             self._refuse(system, indices[refused], state[:, refused], error)
 
-    def _lost(self, samples: list[int]) -> None:
+    def _refuse_lost(self, samples: list[int]) -> None:
         """Refuse doubtful samples not reached a second time: rounding made them acceptable."""
         if samples:
             self.found.kept[:, samples], self.found.solved[samples] = np.nan, False
             self.findings.uncertain += samples
-            places = listed([self._where(k) for k in samples])
+            places = list_names([self._where(k) for k in samples])
             why = (
                 "reached once and not again, so near are residuals to the tolerance"
                 f" {self.tol:.3g}; allow more"
             )
             self.findings.add_failure(f"refused at {places}: {why}", FailureKind.UNREPEATABLE)
 
-    def _stuck(self) -> None:
+    def _bridge_stuck(self) -> None:
         """Interpolate samples not reached from either side of a passage, or refuse them."""
         stuck = [each for each in self.followed.stuck if not self.found.solved[each.sample]]
         for each in stuck[:BRIDGED]:
-            self.found.solved[each.sample] = self._bridged(
+            self.found.solved[each.sample] = self._bridge(
                 each.route, each.sample, each.before, each.near, passed=True
             )
         for each in stuck:
@@ -272,14 +272,14 @@ class _Scrutiny:
                 state, error = system.state(each.near[:, None]), np.full((1, 1), self.tol**0.5)
                 self._refuse(system, np.array([k]), state, error)
 
-    def _passed(self, k: int, near: Array) -> bool:
+    def _interpolate(self, k: int, near: Array) -> bool:
         """Replace a sample by interpolation between both sides of it, if the motion continues."""
         time, number = float(self.times[k]), int(self.followed.part_of[k])
         side = 1.0 if time >= self.followed.parts[number].route.start else -1.0
         lane = self.followed.before(time, side, number)
-        return lane is not None and self._bridged(self._followed_on(k), k, lane, near)
+        return lane is not None and self._bridge(self._route_of(k), k, lane, near)
 
-    def _bridged(
+    def _bridge(
         self, route: Route, k: int, lane: Array, near: Array, *, passed: bool = False
     ) -> bool:
         time = float(self.times[k])
@@ -315,7 +315,7 @@ class _Scrutiny:
         uncertain += (
             f", rates by {error[1:, worst].max():.2g} of their own" if len(error) > 1 else ""
         )
-        places = listed([self._where(k) for k in indices.tolist()])
+        places = list_names([self._where(k) for k in indices.tolist()])
         uncertain += f" (at {self._where(indices[worst])}), allowed {self.limit:.2g}"
         if singularity.sigma < REGULAR:
             why = (
@@ -339,12 +339,12 @@ class _Scrutiny:
             if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)
         ]
         for each in others[:NAMED]:
-            self._crossed(each)
+            self._note_crossing(each)
         if len(others) > NAMED:
             more = f"crosses {len(others) - NAMED} more singular poses, between samples"
             self.findings.notes.append(more)
 
-    def _crossed(self, end: End) -> None:
+    def _note_crossing(self, end: End) -> None:
         path, time = end.route.path, end.time
         singularity = examine_lane(end.route, end.lane, time)
         if singularity.regular:  # the motion knows nothing of the choice of rows

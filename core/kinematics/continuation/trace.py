@@ -183,7 +183,7 @@ def trace(
         driver=driver,
         arc=direction * np.array([spot.arc for spot in spots]),
         values=np.array([spot.time for spot in spots]),
-        sigma=np.linalg.svd(system.equations(*_stacked(walk, spots)).jacobian)[1][:, -1],
+        sigma=np.linalg.svd(system.equations(*_stack(walk, spots)).jacobian)[1][:, -1],
         points=_points(walk, spots),
         events=tuple(trail.events),
         closed=trail.closed,
@@ -201,7 +201,7 @@ def limit_ahead(
         spot = walk.begin(state, time, direction)
     except np.linalg.LinAlgError:
         return None
-    for after in walk.along(spot, NEARBY, LONGEST, ATTEMPTS):
+    for after in walk.spots_after(spot, NEARBY, LONGEST, ATTEMPTS):
         if _turns_back(spot, after):
             return _event(walk, walk.limit(spot, after))
         spot = after
@@ -238,9 +238,9 @@ class _Trail:
 
     def follow(self, length: float) -> None:
         """Walk up to a length, or until the curve closes."""
-        for spot in self.walk.along(self.first, length, self.longest):
+        for spot in self.walk.spots_after(self.first, length, self.longest):
             before = self.spots[-1]
-            closing = self._passed(before, spot)
+            closing = self._closing_spot(before, spot)
             after = closing or spot
             self.spots.append(after)
             if _turns_back(before, after):
@@ -251,14 +251,14 @@ class _Trail:
         self._note_branches()
         self.events.sort(key=lambda event: event.arc)
 
-    def _passed(self, before: CurvePoint, after: CurvePoint) -> CurvePoint | None:
+    def _closing_spot(self, before: CurvePoint, after: CurvePoint) -> CurvePoint | None:
         """Return the beginning as a spot at its length on the curve if the step between two spots
         passes it, else None.
         """
         if float(self.first.dq @ after.dq) < SAME_WAY:
             return None
         change, change_after = self._change(before), self._change(after)
-        ahead, beyond = self._along(change), -self._along(change_after)
+        ahead, beyond = self._length_along(change), -self._length_along(change_after)
         if not (ahead > 0.0 <= beyond and np.abs(change_after).max() <= 2.0 * self.longest):
             return None
         share = ahead / (ahead + beyond)
@@ -271,7 +271,7 @@ class _Trail:
             if spot is None:
                 break
             change = self._change(spot)
-            gap, apart = self._along(change), np.abs(change).max()
+            gap, apart = self._length_along(change), np.abs(change).max()
             h += gap
             if abs(gap) <= SMALL * SMALL:
                 break
@@ -290,7 +290,7 @@ class _Trail:
         )
         return self._poses - there
 
-    def _along(self, change: Array) -> float:
+    def _length_along(self, change: Array) -> float:
         """Return the length of a change along the curve, to first order."""
         return float((change * self._way).sum() / (self._way * self._way).sum())
 
@@ -301,7 +301,7 @@ class _Trail:
             least = two.sigma < min(one.sigma, three.sigma)
             if not least and not (two.sign != three.sign and two.sigma > three.sigma):
                 continue
-            found = self.walk.branching(one, three)
+            found = self.walk.branch_point(one, three)
             if found is None or not first.arc <= (arc := found.arc % self.length) <= last.arc:
                 continue
             # each is seen from both sides
@@ -339,7 +339,7 @@ def _event(walk: ArclengthWalk, found: NearbyPoint) -> Event:
     return Event(found.arc, found.time, singularity, points)
 
 
-def _stacked(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> tuple[Array, Array]:
+def _stack(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> tuple[Array, Array]:
     """Return states and samples of spots, shapes (numbers, spots) and (sampled, spots)."""
     state = np.concatenate([spot.state for spot in spots], axis=1)
     return state, np.concatenate([walk.sample(spot.time) for spot in spots], axis=1)
@@ -347,5 +347,5 @@ def _stacked(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> tuple[Array, A
 
 def _points(walk: ArclengthWalk, spots: Sequence[CurvePoint]) -> dict[str, Array]:
     zero = np.zeros((walk.system.unknowns, len(spots)))
-    found = walk.system.outputs(*_stacked(walk, spots), zero, zero)
+    found = walk.system.outputs(*_stack(walk, spots), zero, zero)
     return {name: found[f"position {name}"].T for name in walk.system.tracer.request.points}

@@ -34,7 +34,7 @@ from ..compiled.request import (
     TIME,
     accept_by,
     by_block,
-    remembered,
+    remembered_tests,
 )
 from ..compiled.routes import AS_THEY_ARE, Route
 from ..compiled.step_programs import candidate, limits
@@ -283,7 +283,7 @@ class Grid:
 
     def __init__(self, route: Route, departure: Array, parts: int) -> None:
         self.parts, self.ends = parts, route.ends(parts)
-        self.sides = route.sides if parts == 1 else route.divided(parts)
+        self.sides = route.sides if parts == 1 else route.sides_in_parts(parts)
         self.track = route.model.executor(route.lanes).track(
             self.sides, departure[route.model.ahead], parts * len(self.ends)
         )
@@ -424,7 +424,7 @@ class SideWalk(Walk):
         if self.leaves_off:
             return PoseFailure(FailureKind.LEFT_OFF)
         anchor = self.marcher.anchor(self.number)
-        found = self._divided(anchor, float(self.side.samples[0, at]))
+        found = self._divide_step(anchor, float(self.side.samples[0, at]))
         if isinstance(found, PoseFailure):
             return found
         self.track.anchors[self.number] = found[self.model.ahead]
@@ -457,7 +457,7 @@ class SideWalk(Walk):
             stop = at + 1
         return at
 
-    def _divided(self, anchor: Array, aim: float) -> Array | PoseFailure:
+    def _divide_step(self, anchor: Array, aim: float) -> Array | PoseFailure:
         """Return a lane after a part of the step, or the failure of the shortest part."""
         parts, every = self.model.executor(AT_ONCE), range(len(self.model.slots))
         margin = self.model.slots[MARGIN]
@@ -536,6 +536,6 @@ def lane_at_start(model: Model, lane: Array) -> Array:
     found = lane.copy()
     for name in model.state:
         found[model.vectors[name]] = lane[model.vectors[FROM + name]]
-    for name in remembered(model.blocks):
+    for name in remembered_tests(model.blocks):
         found[model.slots[name]] = lane[model.slots[FROM + name]]
     return found

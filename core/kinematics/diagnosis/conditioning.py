@@ -29,7 +29,7 @@ from ...primitives.base import GROUND_POSE, Drive, Twist
 from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import compile_model
 from ..compiled.request import Request
-from ..continuation.segments import chosen
+from ..continuation.segments import choose_rows
 from ..continuation.sweep import sweep
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames
@@ -207,7 +207,9 @@ def conditioning(
         matrix = jacobian(formulation, configuration)
         matrices.append(matrix)
         kept = list(
-            chosen(matrix, [model.selection.chosen], len(mechanism.drivers), formulation.conditions)
+            choose_rows(
+                matrix, [model.selection.chosen], len(mechanism.drivers), formulation.conditions
+            )
         )
         dropped = [row for row in range(len(matrix)) if row not in kept]
         solved, rest = matrix[kept], matrix[dropped]

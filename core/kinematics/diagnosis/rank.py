@@ -428,7 +428,7 @@ def _direction(a: Array) -> str:
     return "(" + ", ".join(f"{x if abs(x) > OWED else 0.0:.3g}" for x in a * np.sign(a[k])) + ")"
 
 
-def freeing(ranks: Ranks) -> tuple[list[str], int]:
+def joints_that_free(ranks: Ranks) -> tuple[list[str], int]:
     """Return the joints and couplers of which any one, taken out alone, frees all blocked drivers,
     and the number of motions that are free then with the drivers held.
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import cache
 from typing import Any, Never, TypeVar, cast
 
 from ... import primitives as p
@@ -23,7 +22,7 @@ from ...joints.base import unit
 from ...mechanism.mechanism import GROUND, Mechanism, Vector, extent
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...mechanism.tree import spanning_tree
-from ...primitives.base import Drive
+from ...primitives.base import Drive, field_names, map_numbers
 from ...program import Traced
 from .formulation import Relation as Relation
 
@@ -332,17 +331,7 @@ _Value = TypeVar("_Value")
 
 def with_numbers(value: _Value, numbers: Iterator[Scalar]) -> _Value:
     """Return a value with other numbers, in the order of `structure`."""
-    if _is_number(value):
-        return next(numbers)
-    names, parts = _parts(value)
-    if parts is None:
-        return value
-    new = [with_numbers(part, numbers) for part in parts]
-    other: Any = value
-    if isinstance(value, tuple):
-        return cast("_Value", tuple(new))
-    named = dict(zip(names, new, strict=True))
-    return cast("_Value", named) if isinstance(value, dict) else replace(other, **named)
+    return map_numbers(value, lambda x: next(numbers) if _is_number(x) else x, _is_number)
 
 
 def _is_number(value: Any) -> bool:
@@ -356,11 +345,5 @@ def _parts(value: Any) -> tuple[Sequence[str], Sequence[Any] | None]:
     if isinstance(value, dict):
         named = cast("dict[str, Any]", value)
         return tuple(named), tuple(named.values())
-    names = _names(value.__class__)
+    names = field_names(value.__class__)
     return names or (), None if names is None else [getattr(value, name) for name in names]
-
-
-@cache
-def _names(kind: Any) -> tuple[str, ...] | None:
-    """Return the names of the fields of a data class; None of another type."""
-    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else None

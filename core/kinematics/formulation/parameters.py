@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from typing import Any, TypeVar
 
 from ...algebra import Scalar
@@ -19,7 +18,7 @@ from ...mechanism.body import MASS, Body, Dimension, dimension_of
 from ...mechanism.loads import ForceElement
 from ...mechanism.mechanism import Mechanism, Point
 
-_Part = TypeVar("_Part", Body, ForceElement)
+_Part = TypeVar("_Part", Body, ForceElement, Joint)
 
 
 @dataclass(frozen=True)
@@ -126,8 +125,13 @@ def every_place(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
 
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:
     """Return the mechanism with other values, of any scalar type, at some places, unchecked."""
-    joints = [joint.changed(**_changes(joint, values)) for joint in mechanism.joints]
-    reduced = [each.changed(partial(_at_points, values)) for each in mechanism.reduced]
+    joints = [_change(joint, _changes(joint, values)) for joint in mechanism.joints]
+
+    def at_points(joint: Joint) -> Joint:
+        # the directions of a part of a reduced joint are not those of the joint that holds the rest
+        return _change(joint, _changes(joint, values, Kind.POSITION))
+
+    reduced = [each.changed(at_points) for each in mechanism.reduced]
     points = [
         _move(point, values.get(f"points.{point.name}.position")) for point in mechanism.points
     ]
@@ -137,29 +141,15 @@ def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mech
     )
 
 
-def _at_points(values: Mapping[str, Sequence[Scalar]], joint: Joint) -> Joint:
-    """Return a joint of a reduced one with its points moved: its directions are not those of the
-    joint that holds the rest.
-    """
-    changes = _changes(joint, values)
-    kinds = {name: kind.single for name, kind, _ in joint.geometry()}
-    return joint.changed(**{k: x for k, x in changes.items() if kinds[k] is Kind.POSITION})
-
-
-def _changes(joint: Joint, values: Mapping[str, Sequence[Scalar]]) -> dict[str, Any]:
-    changes: dict[str, Any] = {}
-    for name, kind, value in joint.geometry():
-        place = f"joints.{joint.name}.{name}"
-        if kind.pair:
-            given = tuple(values.get(f"{place}.{k}") for k in range(2))
-            if given != (None, None):
-                changes[name] = tuple(
-                    old if new is None else tuple(new)
-                    for new, old in zip(given, value, strict=True)
-                )
-        elif place in values:
-            changes[name] = values[place][0] if kind is Kind.LENGTH else tuple(values[place])
-    return changes
+def _changes(
+    joint: Joint, values: Mapping[str, Sequence[Scalar]], only: Kind | None = None
+) -> dict[str, Any]:
+    """Return the new values of a joint's places, of one kind if it is given."""
+    return {
+        name: values[place][0] if kind is Kind.LENGTH else tuple(values[place])
+        for name, kind, _ in joint.parts()
+        if (place := f"joints.{joint.name}.{name}") in values and only in (None, kind)
+    }
 
 
 def _move(point: Point, position: Sequence[Scalar] | None) -> Point:

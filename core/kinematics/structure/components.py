@@ -36,7 +36,7 @@ from ..formulation.constraints import (
     with_numbers,
 )
 from ..formulation.state_vectors import jacobian
-from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection, selected
+from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection, selection_of
 from .redundancy import independent_rows
 
 
@@ -183,7 +183,7 @@ def components(mechanism: Mechanism, frame: Frames) -> list[tuple[str, ...]]:
     return [tuple(members[k]) for k in TopologicalSorter(before).static_order()]
 
 
-def described(
+def describe_components(
     mechanism: Mechanism,
     parts: Sequence[tuple[str, ...]],
     points: Collection[str],
@@ -284,4 +284,4 @@ def select_section(section: Section) -> Selection:
     rows = len(matrix) - len(section.drivers)
     coordinates = COORDINATES * bodies
     found = FreedomAccount(bodies, coordinates, rows + bodies, unknowns, rows, rows, ())
-    return selected(found, formulation, kept)
+    return selection_of(found, formulation, kept)

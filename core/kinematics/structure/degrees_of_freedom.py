@@ -72,7 +72,7 @@ class FreedomAccount:
         return self.moving_coordinates - self.rank
 
     @property
-    def counted(self) -> str:
+    def paper_count(self) -> str:
         """The paper's count (Table 5)."""
         return f"{self.coordinates} - {self.equations} = {self.coordinates - self.equations}"
 
@@ -83,7 +83,7 @@ class FreedomAccount:
             "bodies": self.bodies,
             "coordinates": self.coordinates,
             "equations": self.equations,
-            "paper": self.counted,
+            "paper": self.paper_count,
             "moving_coordinates": self.moving_coordinates,
             "rows": self.rows,
             "rank": self.rank,
@@ -109,10 +109,10 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     kept = set(independent_joint_rows(formulation, matrix[:joint_rows]))
     names = row_names(formulation)
     redundant = [names[k] for k in range(joint_rows) if k not in kept]
-    return counted(mechanism, formulation.unknowns, joint_rows, redundant)
+    return freedom_account(mechanism, formulation.unknowns, joint_rows, redundant)
 
 
-def counted(
+def freedom_account(
     mechanism: Mechanism, unknowns: int, rows: int, redundant_rows: Sequence[str]
 ) -> FreedomAccount:
     """Return the account of a mechanism from its unknowns, joint rows and redundant rows."""
@@ -166,12 +166,12 @@ def select_rows(
     matrix = jacobian(formulation)
     kept = wanted or independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
-        raise SolveError(_locked(mechanism, formulation, matrix), FailureKind.LOCKED)
+        raise SolveError(_locked_message(mechanism, formulation, matrix), FailureKind.LOCKED)
     # drivers first and in this formulation, other rows may be left out
-    return selected(found, formulation, kept)
+    return selection_of(found, formulation, kept)
 
 
-def selected(found: FreedomAccount, formulation: Formulation, kept: Sequence[int]) -> Selection:
+def selection_of(found: FreedomAccount, formulation: Formulation, kept: Sequence[int]) -> Selection:
     """Return the selection of rows, with the names of the others in the account."""
     names, solved = row_names(formulation), set(kept)
     dropped = tuple(k for k in range(len(names)) if k not in solved)
@@ -179,7 +179,7 @@ def selected(found: FreedomAccount, formulation: Formulation, kept: Sequence[int
     return Selection(replace(found, redundant_rows=redundant), tuple(kept), dropped)
 
 
-def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:
+def _locked_message(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:
     """Return the message on drivers that do not move the mechanism at the design position.
 
     The message names these drivers, and the joints and drivers that hold them.

@@ -221,7 +221,7 @@ class _Held:
                 found[n:, k + 3 : k + COLUMNS] = sign * self.turns
         return found
 
-    def parted(self, sums: Array) -> tuple[_Held, _Held]:
+    def part(self, sums: Array) -> tuple[_Held, _Held]:
         """Return the rest after ending vanishing sums of rows, and the part left out.
 
         Args:
@@ -309,18 +309,18 @@ def reduce_rows(
         own = columns[part]
         if part not in span:
             _require_affordable(joint, len(whole[part]), len(own))
-            span[part] = _spanned(np.empty((0, len(own))), matrix[np.ix_(whole[part], own)])
+            span[part] = _extend_span(np.empty((0, len(own))), matrix[np.ix_(whole[part], own)])
         rows = holds.rows(joint, frame, formulation)[:, own]
         left, sizes, _ = np.linalg.svd(_without(rows, span[part]), full_matrices=True)
         weak = np.concatenate([sizes <= enough, np.ones(len(rows) - len(sizes), dtype=np.bool_)])
         if weak.any():
-            holds, less = holds.parted(left[:, weak].T)
+            holds, less = holds.part(left[:, weak].T)
             kept = changed[joint.name] = holds.joints(joint)
             names = tuple(each.name for each in kept)
             left_out = tuple(each.changed(name=joint.name) for each in less.joints(joint))
             reduced.append(Reduced(joint, names, left_out))
             rows = holds.rows(joint, frame, formulation)[:, own]
-        span[part] = _spanned(span[part], rows)
+        span[part] = _extend_span(span[part], rows)
     joints = [each for joint in mechanism.joints for each in changed.get(joint.name, [joint])]
     return Reduction(
         replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism,
@@ -455,7 +455,7 @@ def _require_affordable(joint: Joint, rows: int, columns: int) -> None:
         )
 
 
-def _spanned(span: Array, rows: Array) -> Array:
+def _extend_span(span: Array, rows: Array) -> Array:
     """Return an orthonormal basis of a span and further rows."""
     _, sizes, basis = np.linalg.svd(_without(rows, span), full_matrices=False)
     return np.concatenate([span, basis[sizes > RANK_TOLERANCE]])

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from typing import Any, cast
 
@@ -23,7 +23,7 @@ from ...errors import SolveError
 from ...joints import Spline
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import Mechanism
-from ...primitives.base import GROUND_POSE, Drive
+from ...primitives.base import GROUND_POSE, Drive, map_numbers
 from ...program import Program, Tape, Traced, program
 from ...program.ball_executor import Ball, flint
 from ...program.tape import jacobian
@@ -185,25 +185,13 @@ def _convert(mechanism: Mechanism, number: Callable[[Any], Any]) -> Mechanism:
     def member(item: Any) -> Any:
         new: Any = object.__new__(cast("type[Any]", type(item)))
         for each in fields(item):
-            object.__setattr__(new, each.name, _map(getattr(item, each.name), number))
+            object.__setattr__(new, each.name, map_numbers(getattr(item, each.name), number))
         return new
 
     kinds = ("points", "drivers", "couplers", "bodies", "forces")
     changes = {kind: [*map(member, getattr(mechanism, kind))] for kind in kinds}
-    gravity = _map(mechanism.gravity, number)
+    gravity = map_numbers(mechanism.gravity, number)
     return mechanism.with_joints(member, grounded=(), gravity=gravity, **changes)
-
-
-def _map(value: Any, number: Callable[[Any], Any]) -> Any:
-    """Return a value with the numbers in it passed to a function."""
-    if isinstance(value, Mapping):
-        return {key: _map(each, number) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
-    if isinstance(value, tuple):
-        return tuple(_map(each, number) for each in value)  # pyright: ignore[reportUnknownVariableType]
-    if is_dataclass(value) and not isinstance(value, type):
-        changes = {f.name: _map(getattr(value, f.name), number) for f in fields(value)}
-        return replace(value, **changes)
-    return number(value)
 
 
 class _Inputs:
@@ -220,7 +208,7 @@ class _Inputs:
 
     def lift(self, value: Any) -> Any:
         """Return a value with its exact numbers as program inputs, or literals if trivial."""
-        return _map(value, self.number)
+        return map_numbers(value, self.number)
 
     def number(self, value: Any) -> Any:
         """Return an exact number as an input, or a literal if it is trivial."""

@@ -21,7 +21,7 @@ from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import compile_model
 from ..compiled.request import Request
 from ..compiled.routes import start_of
-from ..continuation.segments import chosen_at
+from ..continuation.segments import choose_rows_at
 from ..continuation.sweep import sweep
 from ..forces.reactions import Follow, ForceRows, with_forces
 from ..forces.wanted import WantedForces, wanted_forces
@@ -80,7 +80,7 @@ def prove_pose(
     frame = frames(mechanism)
     change = {name: float(value) for name, (value, *_) in drives.items()}
     selected = select_rows(mechanism, frame, Cartesian.of(mechanism, frame)).chosen
-    kept = chosen_at(mechanism, change, pose, selected)
+    kept = choose_rows_at(mechanism, change, pose, selected)
     with precision(bits):
         traced = equations(exact_mechanism(mechanism, as_double), tuple(drives), points, kept)
         driven = _balls(mechanism, traced.frame.unit, drives)
@@ -184,7 +184,7 @@ def prove(
                     )
                 change = {name: float(drives[name][k][0]) for name in drives}
                 rows = (
-                    chosen_at(mechanism, change, poses[k], kept)
+                    choose_rows_at(mechanism, change, poses[k], kept)
                     if model.selection.dropped
                     else kept
                 )

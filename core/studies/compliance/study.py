@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Vec3
 from ...case.case import TIME, Balance, Case, Load, Rig, Sweep, Truth
 from ...case.measures import DriverEffort
-from ...case.quantity import ORDERS, Output, Quantity, with_markers
+from ...case.quantity import ORDERS, Output, Quantity, point_jets, still_jets, with_markers
 from ...case.suspension import PerTravel
 from ...errors import KincheckError, SolveError, number_of, shortened
 from ...harness.record import Results
@@ -31,7 +30,7 @@ from ...jet import Jet
 from ...kinematics import Equilibria, StaticModel, solve
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Motion, Ramp
-from ...trajectory import Array
+from ...trajectory import Array, PointMotion
 from .rig import CONTACT, PER, Wheel, held_drivers, wheels_of
 
 # Engines agree on equilibria to round-off of their positions, which stiffness turns into forces.
@@ -383,13 +382,8 @@ class _Study:
 
     def _output(self, output: Quantity, at: Callable[[str], tuple[Array, Array]], n: int) -> Jet:
         """Return an output of n samples by places of points and their rates, shape (n, 3)."""
-        unknown, still = np.full(n, np.nan), np.zeros(())
-        moving, design = dict[str, Vec3](), dict[str, Vec3]()
-        for name in output.points:
-            place, rate = at(name)
-            moving[name] = Vec3(*(Jet(place[:, k], rate[:, k], unknown) for k in range(3)))
-            position = self.mechanism.point(name).position
-            design[name] = Vec3(*(Jet(np.array(x), still, still) for x in position))
+        moving = {name: point_jets(PointMotion(*at(name), None)) for name in output.points}
+        design = {name: still_jets(self.mechanism.point(name).position) for name in output.points}
         jet = output.of(moving, design)
         x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
         return Jet(x, v, a)

@@ -26,7 +26,7 @@ from ...kinematics import (
     conditioning,
     describe_screws,
     forces_of,
-    freeing,
+    joints_that_free,
 )
 from ...trajectory import Array, Trajectory
 from ..variation.varied_places import Geometry
@@ -253,7 +253,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         account.moving_coordinates,
         account.rows,
         account.rank,
-        account.counted,
+        account.paper_count,
     )
     design = {name: np.array(mechanism.point(name).position) for name in read_points(case)}
     derived = swept is not None and bool(swept.poses)
@@ -272,7 +272,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         nearly_redundant=[Nearly(size, rows) for size, rows in ranks.nearly],
         free=ranks.free,
         blocked=ranks.blocked,
-        freeing=freeing(ranks)[0] if ranks.blocked else [],
+        freeing=joints_that_free(ranks)[0] if ranks.blocked else [],
         contradictions=ranks.contradictions,
         swept=case.sweep.driver,
         reached=int(swept.trajectory.solved.sum()) if swept else 0,
@@ -320,7 +320,7 @@ def _verdict(
     if ranks.contradictions:
         return f"the joints contradict each other: it does not close at the design ({count})"
     if ranks.blocked:
-        names, free = freeing(ranks)
+        names, free = joints_that_free(ranks)
         remedy = f"; it moves without {_alternatives(names)}" if names else ""
         more = f", which leaves {number_of(free, 'motion')} free" if names and free else ""
         return f"over-constrained, a driver cannot move: {count}{remedy}{more}"
@@ -383,7 +383,7 @@ def _remedy(ranks: Ranks) -> str:
             f"a combination of rows of {owners} nearly vanishes ({size:.1e}): make their geometry"
             " exactly parallel or aligned"
         )
-    names, free = freeing(ranks)
+    names, free = joints_that_free(ranks)
     if not names:
         return "remove a driver or free the mechanism"
     more = f", which leaves {number_of(free, 'motion')} free" if free else ""

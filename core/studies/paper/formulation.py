@@ -12,7 +12,7 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 import msgspec
@@ -28,6 +28,7 @@ from ...joints import Kind
 from ...kinematics import Style, solve
 from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives import Pose, Twist
+from ...primitives.base import map_numbers
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES, Array, Trajectory
 from ...unit_text import with_unit
@@ -162,9 +163,7 @@ def _errors_of(
     to_exact = cast("Callable[[Any], Any]", np.frompyfunc(exact, 1, 1))
     motions = [each.motion(equations[0].body_axes) for each in (i, j)]
     rounded = _values(equations, (i, j), motions)
-    exactly = _values(
-        *(_map_numbers(to_exact, each) for each in (list(equations), [i, j], motions))
-    )
+    exactly = _values(*(map_numbers(each, to_exact) for each in (list(equations), [i, j], motions)))
     found: list[Error] = []
     for values, true in zip(rounded, exactly, strict=True):
         off = [abs(to_exact(a) - b) for a, b in zip(values, true, strict=True)]
@@ -184,20 +183,6 @@ def _values(
         [x for each in equations for row in each.rows(*pair) for block in row for x in block],
         [x for each in equations for x in each.gamma(*pair, *motions)],
     )
-
-
-def _map_numbers(number: Callable[[Any], Any], value: Any) -> Any:
-    """Return a copy with every number replaced."""
-    if isinstance(value, list):
-        return [_map_numbers(number, each) for each in cast("list[Any]", value)]
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(
-            value,
-            **{
-                each.name: _map_numbers(number, getattr(value, each.name)) for each in fields(value)
-            },
-        )
-    return value if isinstance(value, bool) else number(value)
 
 
 def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool) -> States:

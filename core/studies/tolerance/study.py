@@ -19,6 +19,7 @@ from ...algebra import Vec3
 from ...case.case import Case, Quantity, size, without_forces
 from ...case.closing import require_no_held
 from ...case.measures import ForceMeasure
+from ...case.quantity import still_jets
 from ...case.turns import count_output_turns
 from ...errors import KincheckError
 from ...jet import Jet
@@ -277,7 +278,7 @@ class Ready:
 
     def along(self, path: Path) -> Ready:
         """Return the same model on another path of the same drivers."""
-        return Ready(self.study, self.designs.along(path), path)
+        return Ready(self.study, self.designs.on_path(path), path)
 
     @property
     def lanes(self) -> int:
@@ -317,7 +318,7 @@ class Ready:
                 if place in numbers
                 else np.array(self.study.case.mechanism.point(name).position)
             )
-            design[name] = Vec3(*(Jet(each, np.zeros(()), np.zeros(())) for each in where))
+            design[name] = still_jets(where)
         values = np.empty((len(self.study.rows), *found.solved.shape))
         # unknown numbers are NaN, and every result of them is NaN
         with np.errstate(all="ignore"):

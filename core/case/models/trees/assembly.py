@@ -94,7 +94,7 @@ class Pose:
                     if move.kind == "slide"
                     else _about(move.point, Place(turn=turn_about(move.axis, value)))
                 )
-            found[move.inner] = found[move.outer].then(value)
+            found[move.inner] = found[move.outer] * value
         return found
 
     @cached_property
@@ -141,7 +141,7 @@ class Pose:
                 continue
             shift = Vec3(*change[:3]) if move.kind == "free" else ZERO
             turned = Place(shift, turn_by(Vec3(*change[-3:])))
-            values.append(_about(value.point(move.point), turned).then(value))
+            values.append(_about(value.point(move.point), turned) * value)
         return Pose(self.tree, values)
 
     def as_tree(self) -> Tree:
@@ -159,14 +159,12 @@ class Pose:
         return replace(
             tree,
             moves=moves,
-            moving={name: carried[name].then(place) for name, place in tree.moving.items()},
+            moving={name: carried[name] * place for name, place in tree.moving.items()},
             places={
-                name: carried[tree.carriers[name]].then(place)
-                for name, place in tree.places.items()
+                name: carried[tree.carriers[name]] * place for name, place in tree.places.items()
             },
             sites={
-                name: (link, carried[link].then(place))
-                for name, (link, place) in tree.sites.items()
+                name: (link, carried[link] * place) for name, (link, place) in tree.sites.items()
             },
             ties=[
                 replace(each, places=self.ends(each)) if isinstance(each, Closure) else each

@@ -42,7 +42,7 @@ from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,
     Driving,
-    Freedom,
+    UndrivenMotions,
     choose_held,
     driving_of_motors,
     read_driving,
@@ -104,12 +104,10 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     used = Counter({"keyframe: key": any(each.startswith(KEYFRAME) for each in supplied.start)})
     if not (driving.moves or driving.fixed or supplied.hold_rest):
         own, note = driving_of_motors(tree, supplied)
-        if own.driven and len(own.driven) == Freedom(model, axes).dof:
+        if own.driven and len(own.driven) == UndrivenMotions(model, axes).dof:
             driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
-    counts = Counter(tree.left_out) - used
-    left_out = {what: counts[what] for what in tree.left_out if counts[what]}
-    model = replace(model, tree=replace(model.tree, left_out=left_out))
+    model = replace(model, tree=replace(model.tree, left_out=tree.left_out - used))
     chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:
@@ -155,12 +153,12 @@ class _Parts:
         others = ", ".join(left_out) or "nothing"
         source = f"{tree.described}, from {model.start}{heavy}{LEFT_OUT}{others}"
         digits = {"hinge": closing.tolerance / closing.size, "slide": closing.tolerance}
-        zeros = {
-            name: move.value
+        axial = {
+            name: move
             for name, move in tree.joints.items()
             if isinstance(self.joints.get(name), Revolute | Translational)
-            and abs(move.value) > digits[move.kind]
         }
+        zeros = {x: move.value for x, move in axial.items() if abs(move.value) > digits[move.kind]}
         sweep, notes = self._sweep(), [*tree.notes, *model.notes]
         if zeros:
             values = [f"{name} {value:.9g}" for name, value in zeros.items()]
@@ -171,8 +169,8 @@ class _Parts:
             )
         ranges = {
             (name, FREEDOMS[move.kind]): (move.limit.lower, move.limit.upper)
-            for name, move in tree.joints.items()
-            if isinstance(self.joints.get(name), Revolute | Translational) and move.limit.is_range
+            for name, move in axial.items()
+            if move.limit.is_range
         }
         notes += self.driving.beyond_limits(tree, digits)
         name, truth = tree.file.stem, Truth.CONSENSUS_ONLY

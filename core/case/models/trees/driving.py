@@ -22,7 +22,7 @@ from ...io.schema import MOST_SAMPLES
 from ...units import ANGLES, LENGTHS
 from .assembly import AT_REST, Assembled, Pose, Start, Value
 from .element import Element
-from .place import ORIGIN, Place, unit_quaternion
+from .place import Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
 
 COORDINATES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}
@@ -123,7 +123,7 @@ def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = N
         raise error(f"the quaternion of {move.name!r} is zero, expected one of length one")
     turn, frame = unit_quaternion(quat(numbers[-4:])), tree.moving[move.inner]
     if move.kind == "free":
-        return Place(vec(numbers[:3]), turn).then(ORIGIN.relative_to(frame))
+        return Place(vec(numbers[:3]), turn) * frame.inverse
     # MuJoCo has the turn in the axes of the body
     turn = frame.turn * turn * frame.turn.conjugate()
     return Place(move.point - Place(turn=turn).direction(move.point), turn)
@@ -272,7 +272,7 @@ def driving_of_motors(tree: Tree, supplied: Supplied) -> tuple[Driving, str]:
     return read_driving(tree, replace(supplied, drive=ranges)), note
 
 
-class Freedom:
+class UndrivenMotions:
     """The motions of a model not driven or held so far.
 
     Attributes:
@@ -329,7 +329,7 @@ def choose_held(
         CaseError: freedoms are left, more are driven and held than there are, or --hold-rest would
             hold many joints that no motor moves.
     """
-    freedom, tree, named = Freedom(model, spins), model.tree, driving.held
+    freedom, tree, named = UndrivenMotions(model, spins), model.tree, driving.held
     # a joint may have the name of a link that another one moves
     moves = {move.inner: name for name, move in tree.moves.items()} | {x: x for x in tree.moves}
     for option, names in (("--drive", driving.driven), ("--hold", driving.held + driving.fixed)):
@@ -383,7 +383,7 @@ def _candidates(tree: Tree, driving: Driving) -> list[Move]:
     return sorted(loose, key=order)
 
 
-def _freedom_error(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
+def _freedom_error(tree: Tree, driving: Driving, freedom: UndrivenMotions) -> CaseError:
     """Return the error of a model whose degrees of freedom differ from the driven ones."""
     dof, count = freedom.dof, freedom.taken
     if dof == 0:
@@ -430,7 +430,7 @@ def _motors(tree: Tree, dof: int) -> str:
     return f"{which} do without --hold-rest"
 
 
-def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:
+def _to_hold(candidates: Sequence[Move], freedom: UndrivenMotions) -> str:
     """Return the moves to hold, by their kinds."""
     counts = [(move, freedom.count(move.name)) for move in candidates]
     loose = [move for move, count in counts if count == UNKNOWNS[move.kind]]

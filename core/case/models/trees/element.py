@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
 
-from ....algebra import Vec3
+from ....algebra import Vec3, vec
 from ....errors import CaseError, remedy, similar
 from ...io.document import decimal, fault, shown, unknown_name, usable
 from .place import unit_vector
@@ -28,6 +28,7 @@ _CARRYING = ("body", "frame")
 MOST_ELEMENTS = 200_000
 # Two words are alike if a typing error makes one of the other.
 ALIKE = 0.75
+ZEROS = (0.0, 0.0, 0.0)
 USD = "usd"
 """Tag of the root of a stage of USD, whose numbers are in single precision."""
 EXTENDED = ("robot", "link", "model", "world")
@@ -242,6 +243,14 @@ class Element:
         if "value" in child.attributes:
             return child.numbers("value", count)
         return child.text_numbers(count)
+
+    def child_number(self, tag: str, default: float) -> float:
+        """Return the number of the child of a tag; see `value`."""
+        return self.value(tag, 1, (default,))[0]
+
+    def child_vector(self, tag: str) -> Vec3:
+        """Return the three numbers of the child of a tag, zeros without one; see `value`."""
+        return vec(self.value(tag, 3, ZEROS))
 
     def child_text(self, tag: str) -> str:
         """Return the text of the child of a tag; empty without one."""

@@ -376,12 +376,13 @@ class FramedJoint:
                 moved.append((each, axis, value))
         return Place(at, unit_quaternion(turn)), moved
 
-    def global_frames(self, places: Mapping[str, Place]) -> tuple[Place, Place]:
-        """Return its frames, global, by the places of links."""
-        first, second = (
-            places[link].then(frame) for link, frame in zip(self.links, self.frames, strict=True)
-        )
-        return first, second
+
+def global_frames(
+    places: Mapping[str, Place], links: tuple[str, str], frames: Iterable[Place]
+) -> tuple[Place, Place]:
+    """Return a frame of each of two links, global, by the places of links."""
+    first, second = (places[link] * frame for link, frame in zip(links, frames, strict=True))
+    return first, second
 
 
 def _angle(axis: Vec3, turn: Quat) -> float:
@@ -403,14 +404,14 @@ def join(graph: Graph, joints: Collection[FramedJoint]) -> dict[str, list[Move]]
     for each in spanning:
         joint = named[each.name]
         (a, b), (f, g) = joint.links, joint.frames
-        first, second = joint.global_frames(own)
+        first, second = global_frames(own, joint.links, joint.frames)
         motion, _ = joint.motion(second.relative_to(first))
         if each.links == joint.links:
-            placed = graph.places[a].then(f).then(motion)
-            graph.places[b] = placed.then(ORIGIN.relative_to(g))
+            placed = graph.places[a] * f * motion
+            graph.places[b] = placed * g.inverse
         else:
-            placed = graph.places[b].then(g).then(ORIGIN.relative_to(motion))
-            graph.places[a] = placed.then(ORIGIN.relative_to(f))
+            placed = graph.places[b] * g * motion.inverse
+            graph.places[a] = placed * f.inverse
     moves: dict[str, list[Move]] = {}
     closing = [each.name for each in loops]
     closing += [each.name for each in joints if each.closes]
@@ -421,9 +422,9 @@ def join(graph: Graph, joints: Collection[FramedJoint]) -> dict[str, list[Move]]
 
 def _graph_joint(graph: Graph, joint: FramedJoint, moves: dict[str, list[Move]]) -> Joint:
     """Return a joint of the graph with its frames, the first one behind its moves."""
-    first, second = joint.global_frames(graph.places)
+    first, second = global_frames(graph.places, joint.links, joint.frames)
     motion, moved = joint.motion(second.relative_to(first))
-    behind = first.then(motion)
+    behind = first * motion
     moves[joint.name] = [
         Move(
             *(each.name, each.kind, behind.at, first.direction(axis), each.element, value),

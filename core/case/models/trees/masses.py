@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ from ....algebra import ZERO, X, Y, Z, quat, vec
 from ....errors import CaseError
 from ....trajectory import Array
 from ...io.document import usable
-from .element import Element
+from .element import ZEROS, Element
 from .mjcf_language import Classes, Compiler
 from .place import Place, turn_to, unit_quaternion
 from .tree import Mass, sum_of_masses
@@ -51,13 +52,13 @@ def mass_of(
     if inertials and not (compiler.from_geoms == "true" and geoms):
         element, at, _ = inertials[-1]
         found = _inertial(element)
-        place = at.then(compiler.place(element))
+        place = at * compiler.place(element)
         return None if found.is_stand_in else _within_bounds(found.in_frame(place), compiler)
     masses: list[Mass] = []
     for element, at, within in geoms if compiler.from_geoms != "false" else ():
         complete = classes.complete(element, "geom", within)
         if (found := _geom(complete, compiler)) is not None:
-            masses.append(found.in_frame(at.then(compiler.place(complete))))
+            masses.append(found.in_frame(at * compiler.place(complete)))
     if not masses and any(compiler.least):
         # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
         masses.append(Mass(0.0, compiler.place(body).at, np.zeros((3, 3))))
@@ -71,7 +72,7 @@ def _inertial(element: Element) -> Mass:
         raise element.fault("mass: is negative, expected a positive number of kg; correct it")
     if "fullinertia" in element.attributes:
         return Mass(mass, ZERO, inertia_of(element.numbers("fullinertia", 6)))
-    moments = element.numbers("diaginertia", 3, default=(0.0, 0.0, 0.0))
+    moments = element.numbers("diaginertia", 3, default=ZEROS)
     return Mass(mass, ZERO, np.diag(moments))
 
 
@@ -172,45 +173,41 @@ USD_SHAPES = {
 _ALIKE = 1e-6
 
 
-def masses_of(
-    bodies: Mapping[str, Element],
-    colliders: Mapping[str, Sequence[Element]],
-    prims: Mapping[str, Element],
-    frame_of: FrameOf,
-    units: tuple[float, float],
-) -> dict[str, Mass | None]:
-    """Return the masses of bodies in their frames; None of one that cannot be read.
+@dataclass(frozen=True)
+class StageMasses:
+    """The masses of a stage of USD.
 
-    Args:
-        bodies: by name.
-        colliders: in each of them.
+    Attributes:
         prims: by path, for materials.
-        units: of length and mass of the stage [m, kg].
+        frame_of: see `FrameOf`.
+        metre, kilogram: units of the stage [m, kg].
     """
-    reader = _Masses(prims, frame_of, *units)
-    found: dict[str, Mass | None] = {}
-    for name, body in bodies.items():
-        said = body.attributes
-        if not (colliders.get(name) or "physics:mass" in said or "physics:density" in said):
-            continue
-        try:
-            found[name] = reader.of(body, colliders.get(name, ()))
-        except CaseError:  # motion needs none
-            found[name] = None
-    return found
 
+    prims: Mapping[str, Element]
+    frame_of: FrameOf
+    metre: float
+    kilogram: float
 
-class _Masses:
-    def __init__(
-        self, prims: Mapping[str, Element], frame_of: FrameOf, metre: float, kilogram: float
-    ) -> None:
-        self.prims, self.frame_of, self.metre, self.kilogram = prims, frame_of, metre, kilogram
+    def of_bodies(
+        self, bodies: Mapping[str, Element], colliders: Mapping[str, Sequence[Element]]
+    ) -> dict[str, Mass | None]:
+        """Return the masses of bodies in their frames, by name; None of one that cannot be read."""
+        found: dict[str, Mass | None] = {}
+        for name, body in bodies.items():
+            inside, said = colliders.get(name, ()), body.attributes
+            if not (inside or "physics:mass" in said or "physics:density" in said):
+                continue
+            try:
+                found[name] = self._of(body, inside)
+            except CaseError:  # motion needs none
+                found[name] = None
+        return found
 
-    def of(self, body: Element, colliders: Sequence[Element]) -> Mass | None:
+    def _of(self, body: Element, colliders: Sequence[Element]) -> Mass | None:
         """Return the mass of a body."""
         place, scales = self.frame_of(body)
         mass = self.kilogram * body.number("physics:mass", 0.0)
-        center, moments = ZERO, body.numbers("physics:diagonalInertia", 3, default=(0.0,) * 3)
+        center, moments = ZERO, body.numbers("physics:diagonalInertia", 3, default=ZEROS)
         said = body.attributes.get("physics:centerOfMass", "-inf")
         has_center, has_moments = "inf" not in said, min(moments) > 0.0
         if not (mass > 0.0 and has_center and has_moments):
@@ -263,7 +260,7 @@ class _Masses:
                 0.5 * shape.number("height", height) * sizes[along],
             )
             volume, moments = solid(kind.lower(), lengths)
-            place = place.then(Place(turn=turn_to(axis)))
+            place = place * Place(turn=turn_to(axis))
         own = 0.0 if shape is body else self.kilogram * shape.number("physics:mass", 0.0)
         mass = own if own > 0.0 else volume * self._density(body, shape)
         return Mass(mass, ZERO, mass * np.diag(moments)).in_frame(place.relative_to(around))

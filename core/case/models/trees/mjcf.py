@@ -8,14 +8,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 from typing import TypeAlias, cast
 
 from ....algebra import X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
 from ...io.document import shown
-from .element import Element, significant_digits, words
+from .element import ZEROS, Element, significant_digits, words
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     DYNAMIC,
@@ -63,15 +62,15 @@ _ACTUATORS = words("general motor position velocity intvelocity damper cylinder 
 RANGES = f"{DYNAMIC['range']} of joints"
 
 
-def whole_mjcf(file: Path, root: Element) -> Element:
+def whole_mjcf(root: Element) -> Element:
     """Return a model with all that it includes; see `expand`."""
     _require_model(root)
-    root = expand(file, root)
+    root = expand(root)
     _require_model(root)
     return root
 
 
-def read_mjcf(file: Path, root: Element) -> Tree:
+def read_mjcf(root: Element) -> Tree:
     """Return the tree of a whole model, in its pose qpos0.
 
     Raises:
@@ -80,7 +79,7 @@ def read_mjcf(file: Path, root: Element) -> Tree:
     """
     require_known_attributes(root)
     _require_rigid(root)
-    return _Reader(file, root).read()
+    return _Reader(root).read()
 
 
 def _require_model(root: Element) -> None:
@@ -120,11 +119,12 @@ def _require_rigid(root: Element) -> None:
 class _Reader:
     """A model during its reading."""
 
-    def __init__(self, file: Path, root: Element) -> None:
+    def __init__(self, root: Element) -> None:
         self.root, self.classes, self.compiler = root, Classes(root), read_compiler(root)
-        model = root.attributes.get("model", file.stem)
-        described = f"MJCF model {model!r} of {file.name}"
-        self.tree = Tree(file, described, "its pose qpos0", digits=significant_digits(root))
+        model = root.attributes.get("model", root.file.stem)
+        described = f"MJCF model {model!r} of {root.file.name}"
+        digits = significant_digits(root)
+        self.tree = Tree(root.file, described, "its pose qpos0", digits=digits)
         flags = [flag for option in root.findall("option") for flag in option.findall("flag")]
         self.disabled = {
             key for flag in flags for key, value in flag.attributes.items() if value == "disable"
@@ -196,7 +196,7 @@ class _Reader:
                 case "site":
                     site = self.classes.complete(element, "site", childclass)
                     if (name := site.attributes.get("name")) is not None:
-                        self.tree.mark(site, name, link, place.then(self.compiler.place(site)))
+                        self.tree.mark(site, name, link, place * self.compiler.place(site))
                 case "joint" | "freejoint" if link == WORLD:
                     raise element.fault("is in no body, expected joints in bodies; remove it")
                 case "joint" | "freejoint" | "inertial":
@@ -213,7 +213,7 @@ class _Reader:
         tree = self.tree
         if (name := element.attributes.get("name")) is None:
             name = tree.names.new(f"body{len(tree.places)}")
-        place = around.then(self.compiler.place(element))
+        place = around * self.compiler.place(element)
         # one more than are read is too many already
         moves = [*islice(self._moves(element, name, place, childclass), MOST_MOVING + 1)]
         tree.hang(element, name, outer, place, moves)
@@ -248,7 +248,7 @@ class _Reader:
                 yield element, at, within
                 continue
             inner, own = (
-                at.then(self.compiler.place(element)),
+                at * self.compiler.place(element),
                 element.attributes.get("childclass", within),
             )
             waiting += [(each, inner, own) for each in reversed(element.children)]
@@ -283,7 +283,7 @@ class _Reader:
             if attribute in element.attributes:
                 self.tree.count(f"{what} of joints")
         reference = element.number("ref", 0.0)
-        point = given.point(vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0))))
+        point = given.point(vec(element.numbers("pos", 3, default=ZEROS)))
         limit = self._limit(element)
         if kind == "hinge":
             angle = self.compiler.angle
@@ -356,7 +356,7 @@ class _Reader:
         if "site1" in element.attributes:
             (i, first), (j, second) = (self._site(element, key) for key in ("site1", "site2"))
             if welded:
-                first = first.then(ORIGIN)
+                first = first * ORIGIN
             return Closure(name, (i, j), (first, second), element, holds)
         if "body1" not in element.attributes:
             raise element.fault(
@@ -377,7 +377,7 @@ class _Reader:
         wanted = second.relative_to(first)
         if any(relpose[3:]):
             wanted = Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:])))
-        return Closure(name, links, (first.then(wanted), second), element, holds)
+        return Closure(name, links, (first * wanted, second), element, holds)
 
     def _site(self, element: Element, key: str) -> tuple[str, Place]:
         name = element.attributes.get(key, "")
@@ -517,7 +517,7 @@ class _Reader:
         found = self.tree.gravity
         for option in self.root.findall("option"):
             if any(flag.attributes.get("gravity") == "disable" for flag in option.findall("flag")):
-                return (0.0, 0.0, 0.0)
+                return ZEROS
             x, y, z = option.numbers("gravity", 3, default=found)
             found = x, y, z
         return found

@@ -15,7 +15,7 @@ from pathlib import Path
 from ....algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
-from .element import MOST_ELEMENTS, Element, file_near, parse_xml, words
+from .element import MOST_ELEMENTS, ZEROS, Element, file_near, parse_xml, words
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")
@@ -223,7 +223,7 @@ class Compiler:
             first, second = vec(numbers[:3]), vec(numbers[3:])
             axis = element.direction((*(first - second),), "fromto")
             return Place(0.5 * (first + second), turn_to(axis))
-        at = vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0)))
+        at = vec(element.numbers("pos", 3, default=ZEROS))
         given = [name for name in ORIENTATION if name in element.attributes]
         if len(given) > 1:
             raise element.fault(
@@ -370,8 +370,8 @@ class _Expansion:
                 " correct it"
             )
         count, separator = int(text), element.attributes.get("sep", "")
-        offset = vec(element.numbers("offset", 3, default=(0.0, 0.0, 0.0)))
-        turn = element.numbers("euler", 3, default=(0.0, 0.0, 0.0))
+        offset = vec(element.numbers("offset", 3, default=ZEROS))
+        turn = element.numbers("euler", 3, default=ZEROS)
         self.elements += count * sum(1 + sum(1 for _ in each.descendants()) for each in inside)
         if self.elements > MOST_ELEMENTS:
             raise element.fault(f"makes more than {MOST_ELEMENTS} elements; lower its count")
@@ -401,12 +401,13 @@ def _with_suffix(element: Element, suffix: str) -> Element:
     return renamed(element.rebuild(lambda each: (renamed(each),)))
 
 
-def expand(file: Path, root: Element) -> Element:
+def expand(root: Element) -> Element:
     """Return the model without includes and replicates.
 
     Raises:
         CaseError: a file is missing, elsewhere or taken twice, a replicate or a setting of the
             compiler makes no sense, or there is too much of either.
     """
-    whole = _Expansion(file.resolve()).expand(root)
-    return _Expansion(file.resolve(), read_compiler(whole)).expand(whole)
+    file = root.file.resolve()
+    whole = _Expansion(file).expand(root)
+    return _Expansion(file, read_compiler(whole)).expand(whole)

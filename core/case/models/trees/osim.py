@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from posixpath import join as joined
@@ -19,14 +18,14 @@ from posixpath import normpath
 
 from numpy.polynomial import Polynomial
 
-from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
+from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z
 from ....errors import KincheckError
 from ....extras import library
 from ....joints import PiecewisePolynomial, Spline
 from ...io.case_file import LARGEST_FILE
 from ...io.document import fault, read_text, shown
-from .element import Element, parse_xml, words
-from .graph import FramedFreedom, FramedJoint, Graph, Joint, join
+from .element import ZEROS, Element, parse_xml, words
+from .graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
 from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .robot_elements import HALFWAY
@@ -91,7 +90,7 @@ ON_LINE = 1e-12
 """Distance of points from a line, over the largest value, that rounding in doubles leaves."""
 
 
-def whole_osim(file: Path, root: Element) -> Element:
+def whole_osim(root: Element) -> Element:
     """Return a document in the form of version 4.
 
     Raises:
@@ -113,20 +112,23 @@ def whole_osim(file: Path, root: Element) -> Element:
     with tempfile.TemporaryDirectory() as folder:
         newer = Path(folder) / "newer.osim"
         try:
-            opensim.Model(str(file)).printToXML(str(newer))
+            opensim.Model(str(root.file)).printToXML(str(newer))
         except RuntimeError as error:
             reason = " ".join(str(error).split())
-            raise fault(file, "", f"OpenSim cannot read it: {reason}; correct the model") from None
-        return parse_xml(file, read_text(newer, 2 * LARGEST_FILE, "take out what does not move"))
+            raise fault(
+                root.file, "", f"OpenSim cannot read it: {reason}; correct the model"
+            ) from None
+        text = read_text(newer, 2 * LARGEST_FILE, "take out what does not move")
+        return parse_xml(root.file, text)
 
 
-def read_osim(file: Path, root: Element) -> Tree:
+def read_osim(root: Element) -> Tree:
     """Return the tree of a whole document, in its default pose.
 
     Raises:
         CaseError: an unknown joint, function or constraint, an unknown frame or coordinate.
     """
-    return _Reader(file, root).read()
+    return _Reader(root).read()
 
 
 class _Reader:
@@ -138,13 +140,13 @@ class _Reader:
         coordinates: moves by name of the coordinate.
     """
 
-    def __init__(self, file: Path, root: Element) -> None:
+    def __init__(self, root: Element) -> None:
         models = [*root.findall("Model", "ModelComponentSet")]
         if len(models) != 1 or models[0].tag != "Model":
             raise root.fault("found no single <Model>, expected one; give a model of OpenSim")
         self.model = models[0]
-        name = self.model.attributes.get("name", file.stem)
-        self.graph = Graph.of(root, f"OpenSim model {name!r} of {file.name}")
+        name = self.model.attributes.get("name", root.file.stem)
+        self.graph = Graph.of(root, f"OpenSim model {name!r} of {root.file.name}")
         self.graph.tree.zero = "its default pose"
         self.paths: dict[str, Element] = {}
         self.owners: dict[int, str] = {}
@@ -176,10 +178,10 @@ class _Reader:
         self._forces()
         for marker in self._all("Marker"):
             link, place = self._frame(marker, "socket_parent_frame")
-            at = place.then(Place(_vector(marker, "location")))
+            at = place * Place(marker.child_vector("location"))
             name = marker.require("name")
             name += ".marker" * (name in graph.places)
-            graph.frames[name] = link, graph.places[link].then(at)
+            graph.frames[name] = link, graph.places[link] * at
         x, y, z = self.model.value("gravity", 3, GRAVITY)
         tree.gravity = x, y, z
         for section in self.model.children:
@@ -211,9 +213,9 @@ class _Reader:
             raise element.repeated_name(name, "the bodies")
         graph.places[name], graph.elements[name] = ORIGIN, element
         xx, yy, zz, xy, xz, yz = element.value("inertia", 6, (0.0,) * 6)
-        (mass,) = element.value("mass", 1, (0.0,))
+        mass = element.child_number("mass", 0.0)
         if mass != 0.0:
-            place = Place(_vector(element, "mass_center"))
+            place = Place(element.child_vector("mass_center"))
             graph.masses[name] = mass_in(place, mass, (xx, yy, zz, xy, xz, yz))
 
     def _frame(self, element: Element, key: str, depth: int = 0) -> tuple[str, Place]:
@@ -240,8 +242,8 @@ class _Reader:
             raise frame.fault("hangs on itself by a ring of frames; correct socket_parent")
         frame.require_children(IN_FRAME)
         link, place = self._frame(frame, "socket_parent", depth + 1)
-        angles = frame.value("orientation", 3, (0.0,) * 3)
-        return link, place.then(Place(_vector(frame, "translation"), _turn(angles)))
+        angles = frame.value("orientation", 3, ZEROS)
+        return link, place * Place(frame.child_vector("translation"), _turn(angles))
 
     def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
         """Return a joint; None of one that leaves its link free."""
@@ -261,7 +263,7 @@ class _Reader:
         found = FramedJoint(name, element, (a, b), (f, g), freedoms)
         if element.tag == "FreeJoint" and a in graph.fixed and freedoms[-1].kind == "ball":
             motion, _ = found.motion(ORIGIN)
-            graph.places[b] = f.then(motion).then(ORIGIN.relative_to(g))
+            graph.places[b] = f * motion * g.inverse
             return None
         return found
 
@@ -298,7 +300,7 @@ class _Reader:
         return [*slides, FramedFreedom(name, "ball", X, element, turn=turn)]
 
     def _default(self, coordinate: Element) -> float:
-        return coordinate.value("default_value", 1, (0.0,))[0]
+        return coordinate.child_number("default_value", 0.0)
 
     def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> FramedFreedom:
         """Return the move of a coordinate; lock it if the file does."""
@@ -398,9 +400,8 @@ class _Reader:
         keys = ("socket_frame{}",) if welded else ("socket_body_{}", "location_body_{}")
         links, (first, second) = self._ends(element, *keys)
         if element.tag == "ConstantDistanceConstraint":
-            (length,) = element.value("constant_distance", 1, (0.0,))
-            rod = Closure(name, links, (Place(first.at), Place(second.at)), element, "distance")
-            graph.rods.append(replace(rod, length=length))
+            length = element.child_number("constant_distance", 0.0)
+            graph.rods.append(Closure(name, links, (first, second), element, "distance", length))
             return
         moves = () if welded else (Move(name, "ball", first.at, X, element),)
         graph.loops.append(Joint(name, links, moves, element, (first, second)))
@@ -412,7 +413,7 @@ class _Reader:
         for key, each in [("dependent", follower), *(("independent", x) for x in leaders)]:
             if each not in self.values:
                 raise element.unknown_name(f"{key}_coordinate", each, self.values, "a coordinate")
-        (scale,) = element.value("scale_factor", 1, (1.0,))
+        scale = element.child_number("scale_factor", 1.0)
         around = element.child("coupled_coordinates_function")
         functions = around.children if around else []
         if len(functions) != 1:
@@ -445,8 +446,7 @@ class _Reader:
                 tree.count("forces that are not applied")
             elif each.tag == "SpringGeneralizedForce" and coordinate in self.values:
                 numbers = [
-                    each.value(key, 1, (0.0,))[0]
-                    for key in ("stiffness", "viscosity", "rest_length")
+                    each.child_number(key, 0.0) for key in ("stiffness", "viscosity", "rest_length")
                 ]
                 tree.springs[coordinate] = Spring(*numbers)
             elif each.tag == "BushingForce":
@@ -462,24 +462,23 @@ class _Reader:
         self, element: Element, socket: str, point: str = ""
     ) -> tuple[tuple[str, str], tuple[Place, Place]]:
         """Return two links and a frame of each, global, by the keys of sockets and points."""
-        links: list[str] = []
-        places: list[Place] = []
-        for k in (1, 2):
-            link, place = self._frame(element, socket.format(k))
-            place = place.then(Place(_vector(element, point.format(k)))) if point else place
-            links.append(link)
-            places.append(self.graph.places[link].then(place))
-        element.require_two(*links)
-        return (links[0], links[1]), (places[0], places[1])
+
+        def end(k: int) -> tuple[str, Place]:
+            link, frame = self._frame(element, socket.format(k))
+            return link, frame * Place(element.child_vector(point.format(k))) if point else frame
+
+        (a, f), (b, g) = map(end, (1, 2))
+        element.require_two(a, b)
+        return (a, b), global_frames(self.graph.places, (a, b), (f, g))
 
     def _add_spring(self, element: Element) -> None:
-        stiffness, rest = (element.value(key, 1, (0.0,))[0] for key in ("stiffness", "rest_length"))
+        stiffness, rest = (element.child_number(key, 0.0) for key in ("stiffness", "rest_length"))
         ends = self._ends(element, "socket_body{}", "point{}")
         self._add_strut(element, *ends, Spring(stiffness, 0.0, rest))
 
     def _add_bushing(self, element: Element) -> None:
         laws = [
-            element.value(f"{kind}_{law}", 3, (0.0, 0.0, 0.0))
+            element.value(f"{kind}_{law}", 3, ZEROS)
             for law in ("stiffness", "damping")
             for kind in ("translational", "rotational")
         ]
@@ -542,14 +541,14 @@ def _function(element: Element) -> PiecewisePolynomial:
     """Return a function of one coordinate."""
     match element.tag:
         case "Constant":
-            return _polynomial(*element.value("value", 1, (0.0,)))
+            return _polynomial(element.child_number("value", 0.0))
         case "LinearFunction":
             return _polynomial(*element.value("coefficients", 2)[::-1])
         case "PolynomialFunction":
             count = len(element.child_text("coefficients").split())
             return _polynomial(*element.value("coefficients", max(count, 1))[::-1])
         case "MultiplierFunction":
-            (scale,) = element.value("scale", 1, (1.0,))
+            scale = element.child_number("scale", 1.0)
             around = element.child("function")
             inner = [each for each in (around or element).children if each.tag != "scale"]
             if len(inner) != 1:
@@ -586,10 +585,6 @@ def _turn(angles: Sequence[float]) -> Quat:
     """Return the turns about x, y and z of the body, one after the other."""
     turns = (turn_about(axis, angle) for axis, angle in zip((X, Y, Z), angles, strict=True))
     return unit_quaternion(reduce(Quat.__mul__, turns, IDENTITY))
-
-
-def _vector(element: Element, tag: str) -> Vec3:
-    return vec(element.value(tag, 3, (0.0, 0.0, 0.0)))
 
 
 def _flag(element: Element, tag: str, *, default: bool = False) -> bool:

@@ -34,7 +34,7 @@ class Place:
     at: Vec3 = ZERO
     turn: Quat = IDENTITY
 
-    def then(self, inner: Place) -> Place:
+    def __mul__(self, inner: Place) -> Place:
         """Return a frame given in this one, as this one is given."""
         return Place(self.point(inner.at), unit_quaternion(self.turn * inner.turn))
 
@@ -50,6 +50,11 @@ class Place:
         """Return this frame as the other one sees it, both given alike."""
         back = outer.turn.conjugate()
         return Place(Place(ZERO, back).direction(self.at - outer.at), back * self.turn)
+
+    @property
+    def inverse(self) -> Place:
+        """The frame around this one, as this one sees it."""
+        return ORIGIN.relative_to(self)
 
 
 ORIGIN = Place()

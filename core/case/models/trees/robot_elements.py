@@ -17,13 +17,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ....algebra import Vec3, X, cross, vec
+from ....algebra import Vec3, X, cross
 from ....errors import CaseError
 from ...io.document import decimal, shown, usable
 from .element import Element, Names, words
-from .graph import Freedom, Graph, Joint
+from .graph import Freedom, Graph, Joint, global_frames
 from .place import Place, coordinates, turn_of_axes
-from .tree import BushingLaw, Coupling, Spring, Strut
+from .tree import BushingLaw, Coupling, Kind, Spring, Strut
 
 BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
 BUSHING, DRAKE_JOINT = "drake:linear_bushing_rpy", "drake:joint"
@@ -44,6 +44,20 @@ HALFWAY = (
     " axes are halfway between both frames, and the torque is that of roll, pitch and yaw; both are"
     " equal for small turns"
 )
+
+CLOSING: Mapping[str, Sequence[Kind]] = {
+    "fixed": (),
+    "link": (),
+    "revolute": ("hinge",),
+    "continuous": ("hinge",),
+    "prismatic": ("slide",),
+    "cylindrical": ("slide", "hinge"),
+    "universal": ("hinge", "hinge"),
+    "spherical": ("ball",),
+    "ball": ("ball",),
+    "position": ("ball",),
+}
+"""Moves of joints by their types; `link` joins the halves of a link."""
 
 # What is seen, touched or measured joins nothing.
 _APART = words(
@@ -99,9 +113,14 @@ def screw(graph: Graph, name: str, lead: float, axis: Vec3, element: Element) ->
     return [(shift, "slide", axis), (turn, "hinge", axis)]
 
 
-def mimic(move: str, leader: str, offset: float, factor: float, element: Element) -> Coupling:
-    """Return a move that follows another one."""
-    return Coupling(f"{move}.mimic", {move: 1.0}, {leader: 1.0}, (offset, factor), element)
+def planar(x: Vec3, y: Vec3, normal: Vec3) -> list[Freedom]:
+    """Return the freedoms of a joint in a plane."""
+    return [(".slide1", "slide", x), (".slide2", "slide", y), (".rotation", "hinge", normal)]
+
+
+def mimic(move: str, leader: str, powers: Sequence[float], element: Element) -> Coupling:
+    """Return a move that follows a polynomial of another one, from the constant on."""
+    return Coupling(f"{move}.mimic", {move: 1.0}, {leader: 1.0}, powers, element)
 
 
 def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) -> None:
@@ -136,11 +155,8 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
             names.add(name)
         else:  # several may hold two links together
             name = names.new(name)
-        first, second = (
-            graph.places[link].then(end) for link, end in zip(links, ends, strict=True)
-        )
-        frames = first, second
-        graph.loops.append(Joint.of(name, links, first.at, freedoms, element, frames=frames))
+        frames = global_frames(graph.places, links, ends)
+        graph.loops.append(Joint.of(name, links, frames[0].at, freedoms, element, frames=frames))
 
     for links, ties in found.items():
         ties[0][0].require_two(*links)
@@ -154,16 +170,14 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
 
 def _strut(graph: Graph, element: Element, link_of: LinkOf) -> Strut:
     links, points = _ends(element, link_of)
-    first, second = (
-        graph.places[link].then(Place(point)) for link, point in zip(links, points, strict=True)
-    )
+    ends = global_frames(graph.places, links, map(Place, points))
     stiffness, damping, length = (
-        element.value(f"{element.tag}_{each}", 1, (0.0,))[0] for each in STRUT_LAW
+        element.child_number(f"{element.tag}_{each}", 0.0) for each in STRUT_LAW
     )
     if min(stiffness, damping, length) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     spring = Spring(stiffness, damping, length)
-    return Strut(_name(element, links), links, (first, second), spring, element, STRUT)
+    return Strut(_name(element, links), links, ends, spring, element, STRUT)
 
 
 def _bushing_strut(element: Element, frame_of: FrameOf) -> Strut:
@@ -176,7 +190,7 @@ def _bushing_strut(element: Element, frame_of: FrameOf) -> Strut:
     for part in laws:
         if element.child(part) is None:
             raise element.fault(f"<{part}>: missing, expected three numbers; add it")
-    values = [coordinates(vec(element.value(part, 3, (0.0, 0.0, 0.0)))) for part in laws]
+    values = [coordinates(element.child_vector(part)) for part in laws]
     if min(map(min, values)) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     element.require_two(first, second)
@@ -205,7 +219,7 @@ def _ends(element: Element, link_of: LinkOf) -> tuple[tuple[str, str], tuple[Vec
     parts = [*(f"{tag}_body_{side}" for side in "AB"), f"{tag}_p_AP", f"{tag}_p_BQ"]
     element.require_children((*parts, *(f"{tag}_{each}" for each in STRUT_LAW)), closed=True)
     first, second = (link_of(*_named_child(element, part)) for part in parts[:2])
-    p, q = (vec(element.value(part, 3, (0.0, 0.0, 0.0))) for part in parts[2:])
+    p, q = (element.child_vector(part) for part in parts[2:])
     return (first, second), (p, q)
 
 

@@ -17,13 +17,14 @@ from ....algebra import Vec3, X, Y, Z
 from ....errors import CaseError
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
-from .element import Element, file_near, parse_xml, words
+from .element import ZEROS, Element, file_near, parse_xml, words
 from .graph import Freedom, Graph, Joint
 from .masses import mass_in
 from .place import ORIGIN, Place
 from .robot_elements import (
     BALL,
     BUSHING,
+    CLOSING,
     DRAKE_JOINT,
     ENTRIES,
     FRICTION,
@@ -34,6 +35,7 @@ from .robot_elements import (
     add_spring,
     add_ties,
     mimic,
+    planar,
     screw,
 )
 from .sdf_frames import (
@@ -41,6 +43,7 @@ from .sdf_frames import (
     MODEL,
     PLACED,
     TRUE,
+    Framed,
     Frames,
     endings,
     flag_of,
@@ -96,13 +99,13 @@ UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 _AXES_IN_JOINT = (1, 5)
 
 
-def whole_sdf(file: Path, root: Element) -> Element:
+def whole_sdf(root: Element) -> Element:
     """Return a document with the models that it includes from files beside it.
 
     Raises:
         CaseError: a model is elsewhere, or an option of its inclusion is not read.
     """
-    folder = file.parent.resolve()
+    folder = root.file.parent.resolve()
     return _Inclusion(folder, folder.parent, _version(root)).with_models(root)
 
 
@@ -189,14 +192,14 @@ class _Inclusion:
         return file
 
 
-def read_sdf(file: Path, root: Element) -> Tree:
+def read_sdf(root: Element) -> Tree:
     """Return the tree of all models in a document, and their worlds, in its zero pose.
 
     Raises:
         CaseError: unknown frames, or an unknown joint.
     """
-    name = root.attributes.get("name", file.stem)
-    graph, frames = Graph.of(root, f"SDF model {name!r} of {file.name}"), Frames()
+    name = root.attributes.get("name", root.file.stem)
+    graph, frames = Graph.of(root, f"SDF model {name!r} of {root.file.name}"), Frames()
     graph.tree.gravity = GRAVITY
     worlds = [*root.findall("world")]
     if not (worlds or any(root.findall("model"))):
@@ -266,12 +269,12 @@ def _mass(element: Element) -> Mass | None:
             return None  # that of its collision shapes
         matrix = element.child("inertia")
         entries = [
-            matrix.value(name, 1, (default,))[0]
+            matrix.child_number(name, default)
             if matrix is not None and matrix.child_text(name)
             else default
             for name, default in zip(ENTRIES, UNIT, strict=True)
         ]
-        (mass,) = element.value("mass", 1, (1.0,))
+        mass = element.child_number("mass", 1.0)
         return mass_in(pose_of(element.child("pose")), mass, entries)
     except CaseError:
         return None
@@ -331,13 +334,9 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         element.require_children(IN_JOINT, closed=True)
         for each in element.findall(*BARE):
             each.require_known((), "SDF")
-        ends: list[str] = []
-        for tag in ("parent", "child"):
-            link = frames.link(element, full_name_of(framed.scope, text_of(element, tag)))
-            ends.append(frames.short_name(link) if link else graph.add_world())
-        links = ends[0], ends[1]
-        element.require_two(*links)
-        if {*ends} <= graph.fixed:
+        (first, _), (second, _) = _ends(graph, frames, framed, ("parent", "child"))
+        links = first, second
+        if {*links} <= graph.fixed:
             graph.tree.count("joints of what stands still")
             continue
         joint = _Joint(graph, frames, full, version)
@@ -362,31 +361,33 @@ def _planar(graph: Graph, frames: Frames, scope: str, element: Element) -> Joint
     element.require_known(("name", "type"), "SDF")
     element.choice("type", ("planar",), "")
     element.require_children(IN_DRAKE, closed=True)
-    if any(element.value("drake:damping", 3, (0.0, 0.0, 0.0))):
+    if any(element.value("drake:damping", 3, ZEROS)):
         graph.tree.count("dynamics of joints")
-    ends: list[str] = []
-    places: list[Place] = []
-    for tag in IN_DRAKE[:2]:
-        full = full_name_of(scope, text_of(element, tag))
-        link = frames.link(element, full)
-        ends.append(frames.short_name(link) if link else graph.add_world())
-        places.append(frames.place(element, full))
-    element.require_two(*ends)
-    apart = places[1].relative_to(places[0])
+    ends = _ends(graph, frames, Framed(element, scope, scope), IN_DRAKE[:2])
+    (outer, place), (inner, other) = ((link, frames.place(element, full)) for link, full in ends)
+    apart = other.relative_to(place)
     near = 10.0 ** (1 - graph.tree.digits)
     if apart.at @ apart.at > near**2 or apart.turn.e @ apart.turn.e > near**2:
         raise element.fault(
             "its frames are apart in the poses of the links, and Drake puts them together, expected"
             " one place; correct the pose of the child"
         )
-    x, y, z = map(places[0].direction, (X, Y, Z))
-    freedoms: list[Freedom] = [
-        (".slide1", "slide", x),
-        (".slide2", "slide", y),
-        (".rotation", "hinge", z),
-    ]
+    freedoms = planar(*map(place.direction, (X, Y, Z)))
     name = frames.short_name(full_name_of(scope, element.require("name")))
-    return Joint.of(name, (ends[0], ends[1]), places[0].at, freedoms, element)
+    return Joint.of(name, (outer, inner), place.at, freedoms, element)
+
+
+def _ends(
+    graph: Graph, frames: Frames, framed: Framed, tags: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Return the two links of a joint, and the full names of the frames that it names."""
+    ends: list[tuple[str, str]] = []
+    for tag in tags:
+        full = full_name_of(framed.scope, text_of(framed.element, tag))
+        link = frames.link(framed.element, full)
+        ends.append((frames.short_name(link) if link else graph.add_world(), full))
+    framed.element.require_two(ends[0][0], ends[1][0])
+    return ends
 
 
 class _Joint:
@@ -432,7 +433,7 @@ class _Joint:
         element, named = self.element, text_of(self.element, "gearbox_reference_body")
         reference = self.frames.link(element, full_name_of(self.framed.scope, named))
         around = self.frames.short_name(reference) if reference else WORLD
-        (ratio,) = element.value("gearbox_ratio", 1, (1.0,))
+        ratio = element.child_number("gearbox_ratio", 1.0)
         second = "axis2" if element.child("axis2") is not None else "axis"
         weights: dict[str, float] = {}
         for tag, link, weight in (("axis", links[0], ratio), (second, links[1], 1.0)):
@@ -455,14 +456,8 @@ class _Joint:
     def _freedoms(self) -> list[Freedom]:
         element = self.element
         match self.kind:
-            case "revolute" | "continuous":
-                return [("", "hinge", self._axis("axis"))]
-            case "prismatic":
-                return [("", "slide", self._axis("axis"))]
-            case "universal" | "revolute2":
-                return [(".1", "hinge", self._axis("axis")), (".2", "hinge", self._axis("axis2"))]
-            case "ball":
-                return [("", "ball", X)]
+            case "revolute2":
+                kinds = CLOSING["universal"]
             case "screw":
                 if (pitch := element.child("screw_thread_pitch")) is None:
                     raise element.fault(
@@ -472,8 +467,12 @@ class _Joint:
                     )
                 (lead,) = pitch.text_numbers(1)
                 return screw(self.graph, self.name, lead, self._axis("axis"), element)
-            case _:
-                return []
+            case kind:
+                kinds = CLOSING[kind]
+        return [
+            (f".{k}" * (len(kinds) > 1), each, X if each == "ball" else self._axis(tag))
+            for k, (each, tag) in enumerate(zip(kinds, ("axis", "axis2"), strict=False), 1)
+        ]
 
     def _axis(self, tag: str) -> Vec3:
         """Return an axis, global; z of the joint unless given."""
@@ -520,10 +519,10 @@ class _Joint:
         if self.frames.joints[full].element.attributes.get("type") in TWO_AXES:
             name = f"{name}.{1 + (other == 'axis2')}"
         factor, offset, reference = (
-            element.value(tag, 1, (default,))[0]
+            element.child_number(tag, default)
             for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
         )
-        return mimic(move.name, name, offset - factor * reference, factor, element)
+        return mimic(move.name, name, (offset - factor * reference, factor), element)
 
     def _drake_mimic(self, moves: Sequence[Move], element: Element) -> Coupling:
         """Return the mimic of a joint in Drake's form."""
@@ -539,4 +538,4 @@ class _Joint:
                 " correct it"
             )
         factor, offset = element.number("multiplier", 1.0), element.number("offset", 0.0)
-        return mimic(self.name, self.frames.short_name(leader), offset, factor, element)
+        return mimic(self.name, self.frames.short_name(leader), (offset, factor), element)

@@ -149,7 +149,7 @@ class Frames:
                 )
             name = self.require_known_frame(self.found[name].element, self._base(name))
         for name in reversed(chain):
-            self._places[name] = self._places[self._base(name)].then(self._pose(name))
+            self._places[name] = self._places[self._base(name)] * self._pose(name)
         return self._places[full]
 
     def _pose(self, full: str) -> Place:
@@ -160,8 +160,8 @@ class Frames:
             name = self.require_known_frame(element, full_name_of(full, placed))
         for _ in self.found:
             if name == full:
-                return pose.then(ORIGIN.relative_to(inside))
-            inside = self._pose(name).then(inside)
+                return pose * inside.inverse
+            inside = self._pose(name) * inside
             name = self.require_known_frame(element, self._base(name))
             if not name:
                 break

@@ -96,6 +96,8 @@ class Limit:
 
 
 NO_LIMIT = Limit()
+Ends: TypeAlias = tuple[Place, Place]
+"""A frame of each of two links."""
 
 
 def limit_of(element: Element, texts: Mapping[str, str]) -> Limit:
@@ -347,7 +349,7 @@ class Tree:
     motors: Counter[str] = field(default_factory=Counter[str])
     starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
     keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
-    left_out: dict[str, int] = field(default_factory=dict[str, int])
+    left_out: Counter[str] = field(default_factory=Counter[str])
     notes: list[str] = field(default_factory=list[str])
     without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
@@ -363,7 +365,7 @@ class Tree:
 
     def count(self, what: str) -> None:
         """Count one more omitted item."""
-        self.left_out[what] = self.left_out.get(what, 0) + 1
+        self.left_out[what] += 1
 
     def add_motor(self, part: str, moves: Collection[str]) -> None:
         """Add a motor of moves, which is a part that is left out."""

@@ -11,22 +11,22 @@ Drake, with link1, link2, their places, and axis.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from ....algebra import Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
-from .beside import read_beside
-from .element import Element, words
+from .element import ZEROS, Element, words
 from .graph import Freedom, Graph, Joint
+from .loop_files import read_loop_files
 from .masses import mass_in
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .robot_elements import (
     BALL,
     BUSHING,
+    CLOSING,
     DRAKE_JOINT,
     ENTRIES,
     FRICTION,
@@ -36,10 +36,11 @@ from .robot_elements import (
     add_spring,
     add_ties,
     mimic,
+    planar,
     screw,
 )
 from .sdf import Frames, joints_of
-from .tree import NO_LIMIT, WORLD, Kind, Limit, Mass, Move, Tree, limit_of
+from .tree import NO_LIMIT, WORLD, Limit, Mass, Move, Tree, limit_of
 
 GAZEBO, PITCH = "gazebo", "drake:screw_thread_pitch"
 JOINTS, CONSTRAINTS = ("joint", DRAKE_JOINT), ("constraint", "loop_joint")
@@ -73,29 +74,16 @@ DRAKE_TYPES = ("ball", "planar", "screw", "universal")
 # Of the axes of SDF in <gazebo>: those in the joint's own frame.
 SDF_VERSION = (1, 7)
 
-CLOSING: Mapping[str, Sequence[Kind]] = {
-    "fixed": (),
-    "link": (),
-    "revolute": ("hinge",),
-    "continuous": ("hinge",),
-    "prismatic": ("slide",),
-    "cylindrical": ("slide", "hinge"),
-    "universal": ("hinge", "hinge"),
-    "spherical": ("ball",),
-    "ball": ("ball",),
-    "position": ("ball",),
-}
-"""Moves of a <constraint>, by its type; `link` joins the halves of a link."""
 _AXES = {"x": X, "y": Y, "z": Z}
 
 
-def read_urdf(file: Path, root: Element) -> Tree:
+def read_urdf(root: Element) -> Tree:
     """Return the tree of a robot, in its zero pose.
 
     Raises:
         CaseError: no tree of links, or an unknown joint or condition.
     """
-    robot = _Robot(file, root)
+    robot = _Robot(root)
     robot.read()
     tree = robot.graph.hang()
     robot.beside.place(tree)
@@ -105,11 +93,11 @@ def read_urdf(file: Path, root: Element) -> Tree:
 class _Robot:
     """A robot during its reading."""
 
-    def __init__(self, file: Path, root: Element) -> None:
-        self.root, self.beside = root, read_beside(file, root)
-        name, beside = root.attributes.get("name", file.stem), self.beside.names
+    def __init__(self, root: Element) -> None:
+        self.root, self.beside = root, read_loop_files(root)
+        name, beside = root.attributes.get("name", root.file.stem), self.beside.names
         others = f" with {', '.join(beside)}" if beside else ""
-        described = f"URDF robot {name!r} of {file.name}{others}"
+        described = f"URDF robot {name!r} of {root.file.name}{others}"
         self.graph = Graph.of(root, described, closes=self.beside.pairs is None)
         self.joints: dict[str, Element] = {}
 
@@ -136,7 +124,7 @@ class _Robot:
                 if leader not in self.joints:
                     raise each.unknown_name("joint", leader, self.joints, "a joint")
                 offset, factor = each.number("offset", 0.0), each.number("multiplier", 1.0)
-                graph.couplings.append(mimic(name, leader, offset, factor, each))
+                graph.couplings.append(mimic(name, leader, (offset, factor), each))
         for k, element in enumerate(root.findall(*CONSTRAINTS), 1):
             graph.loops.append(self._constraint(element, f"{element.tag}{k}"))
         frames = self._gazebo()
@@ -215,7 +203,7 @@ class _Robot:
         while waiting:
             link = waiting.pop()
             for child, element in below.get(link, ()):
-                graph.places[child] = graph.places[link].then(_origin(element.child("origin")))
+                graph.places[child] = graph.places[link] * _origin(element.child("origin"))
                 waiting.append(child)
         if ring := [name for name in graph.elements if name not in graph.places]:
             raise graph.elements[ring[0]].fault(
@@ -265,13 +253,11 @@ class _Robot:
                 freedoms = [(f".{each}", "slide", place.direction(a)) for each, a in _AXES.items()]
                 freedoms.append(("", "ball", X))
             case "planar":
-                f, g, h = triad((*axis(),))
-                freedoms = [(".slide1", "slide", f), (".slide2", "slide", g)]
-                freedoms.append((".rotation", "hinge", h))
+                freedoms = planar(*triad((*axis(),)))
             case "screw":
                 if element.child(PITCH) is None:
                     raise element.fault(f"<{PITCH}>: missing, expected metres in a turn; add it")
-                freedoms = screw(graph, name, element.value(PITCH, 1, (0.0,))[0], axis(), element)
+                freedoms = screw(graph, name, element.child_number(PITCH, 0.0), axis(), element)
             case "universal":  # of Drake: about x of the parent, then y of the child
                 axes = enumerate((X, Y), 1)
                 freedoms = [(f".{k}", "hinge", place.direction(a)) for k, a in axes]
@@ -300,7 +286,7 @@ class _Robot:
                 origin = within.child("origin")
             place = _pose(origin) if loop and origin else _origin(origin)
             links.append(link)
-            places.append(self.graph.places[link].then(place))
+            places.append(self.graph.places[link] * place)
         first, second = places
         kinds = CLOSING[kind]
         ball = "ball" in kinds
@@ -337,7 +323,7 @@ class _Robot:
         for element in root.findall("frame"):  # of Drake
             link, name = element.attributes.get("link", ""), element.attributes.get("name", "")
             if link in graph.places and name and name not in frames.found:
-                frames.add_given(name, element, graph.places[link].then(_pose(element)), link)
+                frames.add_given(name, element, graph.places[link] * _pose(element), link)
         for gazebo in root.findall(GAZEBO):
             gazebo.require_known(("reference",), "URDF")
             for element in gazebo.findall("link", "model"):
@@ -415,7 +401,7 @@ def _origin(element: Element | None) -> Place:
 
 
 def _pose(element: Element) -> Place:
-    at, angles = (element.numbers(name, 3, default=(0.0, 0.0, 0.0)) for name in POSE)
+    at, angles = (element.numbers(name, 3, default=ZEROS) for name in POSE)
     return Place(vec(at), roll_pitch_yaw(angles))
 
 

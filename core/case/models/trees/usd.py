@@ -15,22 +15,21 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import cast
 
 from ....algebra import X, Y, Z, cross, quat, vec
 from ....errors import remedy, shortened, similar
 from ....mechanism.mechanism import Vector
-from .element import Element, words
-from .graph import FramedFreedom, FramedJoint, Graph, join
-from .masses import COLLIDER, masses_of
+from .element import ZEROS, Element, words
+from .graph import FramedFreedom, FramedJoint, Graph, global_frames, join
+from .masses import COLLIDER, StageMasses
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
+from .robot_elements import mimic
 from .tree import (
     INFINITE,
     NO_LIMIT,
     UNKNOWNS,
     Closure,
-    Coupling,
     Kind,
     Limit,
     Move,
@@ -84,13 +83,13 @@ CLOSE = 0.86
 MOST_NAMED = 8
 
 
-def read_usd(file: Path, root: Element) -> Tree:
+def read_usd(root: Element) -> Tree:
     """Return the tree of a stage, in its pose.
 
     Raises:
         CaseError: a joint of no known kind, an unknown body, or numbers that make no sense.
     """
-    return _Reader(file, root).read()
+    return _Reader(root).read()
 
 
 class _Reader:
@@ -99,25 +98,28 @@ class _Reader:
     Attributes:
         prims: by path.
         names: of bodies, by path.
-        leads: by joint, its moves.
+        rods: with frames in their links.
+        moves: by joint.
     """
 
-    def __init__(self, file: Path, root: Element) -> None:
-        self.root, self.graph = root, Graph.of(root, f"USD stage of {file.name}")
+    def __init__(self, root: Element) -> None:
+        self.root, self.graph = root, Graph.of(root, f"USD stage of {root.file.name}")
         self.graph.tree.zero = "its pose"
         self.metre, self.kilogram = (root.number(each) for each in UNITS[:2])
         self.prims = {each.attributes["path"]: each for each in root.descendants()}
         bodies = [path for path, each in self.prims.items() if _is_body(each)]
         self.names = _short_names(bodies)
         self.joints: dict[str, FramedJoint] = {}
-        self.rods: list[tuple[str, Element, tuple[str, str], tuple[Place, Place], float]] = []
+        self.rods: list[Closure] = []
         self.moves: dict[str, list[Move]] = {}
 
     def read(self) -> Tree:
         """Return the tree."""
         root, graph, tree = self.root, self.graph, self.graph.tree
         if not (self.metre > 0.0 and self.kilogram > 0.0):
-            raise root.fault("metersPerUnit, kilogramsPerUnit: expected positive numbers; correct")
+            raise root.fault(
+                "metersPerUnit, kilogramsPerUnit: expected positive numbers; correct them"
+            )
         if "metersPerUnit" not in root.attributes["said"].split():
             tree.notes.append(f"metersPerUnit is not given: lengths are in {self.metre:g} m")
         for path, name in self.names.items():
@@ -136,8 +138,8 @@ class _Reader:
             on = element.flag("physics:collisionEnabled", default=True)
             if COLLIDER in element.attributes["apis"].split() and on:
                 colliders.setdefault(self._body_of(path), []).append(element)
-        units = self.metre, self.kilogram
-        graph.masses |= masses_of(bodies, colliders, self.prims, self._frame, units)
+        masses = StageMasses(self.prims, self._frame, self.metre, self.kilogram)
+        graph.masses |= masses.of_bodies(bodies, colliders)
         graph.hang()
         self._keyframes()
         for each in filter(None, (each.attributes["variants"] for each in root.descendants())):
@@ -267,7 +269,7 @@ class _Reader:
 
     def _end_of_joint(self, element: Element, side: int) -> tuple[str, Place]:
         """Return the body of a joint, empty for the world, and the joint's frame in it [m]."""
-        at = element.numbers(f"physics:localPos{side}", 3, default=(0.0, 0.0, 0.0))
+        at = element.numbers(f"physics:localPos{side}", 3, default=ZEROS)
         numbers = element.numbers(f"physics:localRot{side}", 4, default=(1.0, 0.0, 0.0, 0.0))
         if not any(numbers):
             raise element.fault(f"physics:localRot{side}: is zero, expected a turn; correct it")
@@ -286,7 +288,7 @@ class _Reader:
         name = self._body_of(paths[0])
         if self.names.get(paths[0]):
             return name, frame
-        frame = place.then(frame)
+        frame = place * frame
         return name, frame.relative_to(self.graph.places[name]) if name else frame
 
     def _add_rod(
@@ -298,7 +300,7 @@ class _Reader:
         if least < 0.0 and most < 0.0:
             self.graph.tree.notes.append(f"{element} holds nothing: it has no distance")
         elif least == most:
-            self.rods.append((name, element, links, frames, most))
+            self.rods.append(Closure(name, links, frames, element, "distance", most))
         else:
             raise element.fault(
                 "physics:minDistance, physics:maxDistance: found a range, which acts at its ends"
@@ -311,13 +313,9 @@ class _Reader:
         graph, own = self.graph, dict(self.graph.places)
         self.moves = join(graph, self.joints.values())
         self._note_moved_bodies(own)
-        for name, element, links, frames, length in self.rods:
-            places = [
-                Place(graph.places[link].point(frame.at))
-                for link, frame in zip(links, frames, strict=True)
-            ]
-            rod = Closure(name, links, (places[0], places[1]), element, "distance", length)
-            graph.rods.append(rod)
+        for rod in self.rods:
+            places = global_frames(graph.places, rod.links, rod.places)
+            graph.rods.append(replace(rod, places=places))
 
     def _unit(self, kind: Kind) -> float:
         """Return the unit of a coordinate [rad or m]."""
@@ -353,9 +351,7 @@ class _Reader:
         for joint in self.joints.values():
             for lead, powers in self._mimics(joint):
                 move = self._one_move(joint.element, joint.name).name
-                pair = {move: 1.0}, {lead.name: 1.0}
-                tie = Coupling(f"{move}.mimic", *pair, powers, joint.element)
-                self.graph.couplings.append(tie)
+                self.graph.couplings.append(mimic(move, lead.name, powers, joint.element))
                 followers.add(move)
         for joint, move, axis in self._axes():
             said = joint.element.attributes
@@ -390,7 +386,8 @@ class _Reader:
                 lead, unit, other = self._leader(joint, f"{start}referenceJoint")
                 if unit != other:
                     raise element.fault(
-                        f"{start}referenceJoint: turns where it slides; couple alike"
+                        f"{start}referenceJoint: joins a hinge with a slide, expected two alike;"
+                        " correct it"
                     )
                 if element.number(f"{start}naturalFrequency", 0.0) > 0.0:
                     self.graph.tree.notes.append(
@@ -444,7 +441,7 @@ class _Reader:
         scenes = [each for each in self.root.descendants() if each.tag == "PhysicsScene"]
         if len(scenes) > 1:
             self.graph.tree.notes.append(f"gravity is that of {scenes[0]}, the first scene")
-        size, down = EARTH, (0.0, 0.0, 0.0)
+        size, down = EARTH, ZEROS
         for scene in scenes[:1]:
             if scene.attributes.get("physics:gravityMagnitude", "-inf") != "-inf":
                 given = scene.number("physics:gravityMagnitude")

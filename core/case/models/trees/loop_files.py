@@ -31,7 +31,7 @@ from ....mechanism.mechanism import Vector
 from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
 from .element import Element
 from .graph import Freedom, Graph, Joint
-from .place import ORIGIN, Place, unit_quaternion, unit_vector
+from .place import Place, unit_quaternion, unit_vector
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
 CONSTRAINTS = ".constraints.json"
@@ -45,14 +45,14 @@ _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
 _TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
 
 
-class End(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class LinkPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A point of a link, in its axes [m]."""
 
     link: str
     point: Vector
 
 
-class Along(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class LinkDirection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A direction of a link, in its axes [-]."""
 
     link: str
@@ -66,10 +66,10 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     kind: Literal[
         "coincident", "distance", "directions", "offset", "linear", "polynomial", "spline"
     ]
-    i: End | None = None
-    j: End | None = None
-    x: Along | None = None
-    y: Along | None = None
+    i: LinkPoint | None = None
+    j: LinkPoint | None = None
+    x: LinkDirection | None = None
+    y: LinkDirection | None = None
     value: float = 0.0
     weights: dict[str, float] = {}
     driven: str = ""
@@ -104,7 +104,7 @@ class PairsFile(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True)
-class Beside:
+class LoopFiles:
     """Content of the files beside a URDF.
 
     Attributes:
@@ -151,27 +151,27 @@ class Beside:
                 raise fault(file, f"bodies: {name}", "has no frame; export the case anew")
             turn = unit_quaternion(quat(each.euler_parameters))
             frame = Place(vec(each.origin), turn)
-            tree.places[name] = tree.places[name].then(frame)
+            tree.places[name] = tree.places[name] * frame
             if name in tree.moving:
-                tree.moving[name] = tree.moving[name].then(frame)
-                back = ORIGIN.relative_to(frame)
+                tree.moving[name] = tree.moving[name] * frame
+                back = frame.inverse
                 masses = tree.masses.get(name, ())
                 tree.masses |= {name: [mass.in_frame(back) for mass in masses]} if masses else {}
 
 
-def read_beside(file: Path, root: Element) -> Beside:
+def read_loop_files(root: Element) -> LoopFiles:
     """Read the files beside a URDF, of the same name with another ending.
 
     Raises:
         CaseError: one of them cannot be read, or PyYAML is missing.
     """
-    constraints, types = None, dict[str, str]()
+    file, constraints, types = root.file, None, dict[str, str]()
     own = file.with_suffix(CONSTRAINTS)
     if own.exists():
         constraints = own, _constraints(own)
     paired = next((each for each in map(file.with_suffix, YAML) if each.exists()), None)
     if paired is None:
-        return Beside(constraints)
+        return LoopFiles(constraints)
     pairs = _pairs(paired)
     for name, kind in zip(pairs.joint_name, pairs.joint_type, strict=True):
         types[name] = _TYPES.get(kind, kind.removeprefix("UJOINT_"))
@@ -182,7 +182,7 @@ def read_beside(file: Path, root: Element) -> Beside:
                 f"found {name!r}, expected a joint of {file.name}; correct it, or remove it with"
                 " its joint_type",
             )
-    return Beside(constraints, (paired, pairs), types)
+    return LoopFiles(constraints, (paired, pairs), types)
 
 
 def _text(file: Path) -> str:
@@ -323,13 +323,13 @@ class _Group:
             )
         return name
 
-    def _point(self, end: End | None) -> Vec3:
+    def _point(self, end: LinkPoint | None) -> Vec3:
         """Return a point, global."""
         if end is None:
             raise self._fault("found a condition without i and j, expected two points")
         return self.graph.places[self._link(end.link)].point(vec(end.point))
 
-    def _axis(self, along: Along | None) -> Vec3:
+    def _axis(self, along: LinkDirection | None) -> Vec3:
         """Return a direction, global, length one."""
         if along is None:
             raise self._fault("found a condition without x, expected a direction")
