@@ -352,7 +352,7 @@ MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
 
 
 def kincheck(*arguments, limit=None, **environment):
-    """The command line of fake_command_line.py. limit: on the size of files
+    """The command line of fake_command.py. limit: on the size of files
     [bytes].
     """
     restrict = (
