@@ -97,7 +97,7 @@ class MeasureCompliance(Isolated):
         from ..case.units import LENGTHS
         from ..harness.engine import STANDARD
         from ..harness.record import to_json
-        from ..report.progress import complain, lacking
+        from ..report.progress import complain, missing_requirements
         from ..report.table import print_table
         from ..report.terminal import with_json
         from ..studies.compliance import study, views
@@ -142,7 +142,7 @@ class MeasureCompliance(Isolated):
             complain(f"note: {note}" for note in (*case.assembly, *results.travel.notes))
         named = [each.name for each in engines if each.name != STANDARD]
         problems += views.failures(results)
-        problems += lacking(checked, (), named) if checked else []
+        problems += missing_requirements(checked, (), named) if checked else []
         refuse(problems)
         return Status.of(checked) if checked is not None else Status.WITHIN
 

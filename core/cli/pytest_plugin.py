@@ -159,7 +159,7 @@ def _solve(case: Case, engine: Engine) -> Record:
     """Return the record of the pair. A simulator runs in a separate process, because a crash would
     end the tests.
     """
-    from ..harness.engine import STANDARD, may_run_here
+    from ..harness.engine import STANDARD, runs_in_process
     from ..harness.execution import solve_in_process
     from ..harness.resource_limits import Limits
     from ..harness.run import run
@@ -167,7 +167,7 @@ def _solve(case: Case, engine: Engine) -> Record:
     from .shared_options import TOL
 
     native = engine.name == STANDARD
-    solver = solve_in_process if may_run_here(engine) else in_workers(1, Limits())
+    solver = solve_in_process if runs_in_process(engine) else in_workers(1, Limits())
     (record,) = run(
         [case],
         [engine],

@@ -33,7 +33,7 @@ from ..options import (
     verbosity,
     with_values,
 )
-from ..report.progress import complain, lacking, progress, uncompared
+from ..report.progress import complain, explain_no_comparison, missing_requirements, progress
 from . import shared_options
 from .class_loading import WHERE
 from .registry import Registry, Status, tell_left_out
@@ -213,7 +213,9 @@ class Run(Isolated, WithRecordings):
                 sep="\n",
                 file=sys.stderr if self.json == "-" else sys.stdout,
             )
-        problems += lacking(results, plan.required, plan.named) + uncompared(results)
+        problems += missing_requirements(
+            results, plan.required, plan.named
+        ) + explain_no_comparison(results)
         complain(problems)
         if stopped is not None:
             return stopped
@@ -355,7 +357,7 @@ def _solve(options: Run, plan: _Plan) -> tuple[Results, list[str], Keeping | Non
         return results, problems, keeping, None
     except (KeyboardInterrupt, ClusterError) as reason:
         pairs = running.plan_pairs(plan.cases, plan.engines, unread)
-        records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
+        records.sort(key=lambda each: pairs.index(each.pair))
         why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
         problems.append(f"{why}: {len(records)} of {len(pairs)} records were finished and are kept")
         results = running.results(plan.cases, records, started=started, plan=pairs, **about)
@@ -516,13 +518,13 @@ def _open_history(
 
 def _is_in_history(path: Path, facts: Facts) -> bool:
     """Return whether a history has a run that was asked for the same."""
-    from ..history.queries import same
+    from ..history.queries import same_task
     from ..history.store import Store
 
     if not os.path.exists(path):
         return False
     with Store(path, writable=False) as store:
-        return any(same(row.key, facts) for row in store.runs())
+        return any(same_task(row.key, facts) for row in store.runs())
 
 
 def past(keeping: Keeping, problems: list[str]) -> Trends:

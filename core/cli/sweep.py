@@ -27,7 +27,7 @@ from ..options import (
     verbosity,
     whole,
 )
-from ..report.progress import complain, lacking, uncompared
+from ..report.progress import complain, explain_no_comparison, missing_requirements
 from ..studies.variation.study_choices import Incomplete, Sampling
 from ..version import VERSION
 from . import shared_options
@@ -411,7 +411,9 @@ def replay(options: Sweep, registry: Registry, study: Study, engine: Engine | No
     problems: list[str] = []
     deliver(results, problems, options)
     if engine is not None:
-        problems += lacking(results, [], [engine.name]) + uncompared(results)
+        problems += missing_requirements(results, [], [engine.name]) + explain_no_comparison(
+            results
+        )
     complain(problems)
     return Status.FAILED if problems else Status.of(results)
 
@@ -420,7 +422,7 @@ def checking_solver(options: Sweep, engine: Engine) -> Solver:
     """Return the solver of checked variants: this process for an engine without foreign code,
     worker processes for others.
     """
-    from ..harness.engine import may_run_here
+    from ..harness.engine import runs_in_process
     from ..harness.execution import solve_in_process
     from ..harness.resource_limits import Limits, default_jobs
     from ..harness.workers.distributed import on_cluster
@@ -428,6 +430,6 @@ def checking_solver(options: Sweep, engine: Engine) -> Solver:
 
     if options.scheduler is not None:
         return on_cluster(options.scheduler, Limits())
-    if may_run_here(engine):
+    if runs_in_process(engine):
         return solve_in_process
     return in_workers(options.jobs or default_jobs(), Limits())

@@ -80,7 +80,7 @@ class Engine(Protocol):
         ...
 
 
-def may_run_here(engine: Engine) -> bool:
+def runs_in_process(engine: Engine) -> bool:
     """Return whether an engine may run in this process, by its attribute `in_process`. Other
     engines run in separate processes.
     """
@@ -168,7 +168,7 @@ def versions(engines: Sequence[Engine], patience: float = PATIENCE) -> list[str 
 
 
 def _version(engine: Engine, patience: float) -> str | None:
-    if may_run_here(engine):
+    if runs_in_process(engine):
         return engine.version()
     ask = partial(
         subprocess.run, [sys.executable, "-P", "-c", COMMAND], capture_output=True, check=True

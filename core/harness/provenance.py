@@ -117,7 +117,7 @@ def missing_pairs(
     plan: Sequence[tuple[str, str, str]], records: Sequence[Record]
 ) -> dict[str, Any]:
     """Return case, engine and mode of planned pairs without a record, or an empty mapping."""
-    made = {(record.case, record.engine, record.mode) for record in records}
+    made = {record.pair for record in records}
     pairs = [list(pair) for pair in plan if pair not in made]
     return {"missing": pairs} if pairs else {}
 

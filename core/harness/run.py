@@ -98,7 +98,7 @@ def run(
     started = datetime.now(UTC)
     _distinct("cases", [case.name for case in cases])
     _distinct("engines", [f"{engine.name} ({engine.mode})" for engine in engines])
-    records = {_key(record): record for record in made}
+    records = {record.pair: record for record in made}
     ordered = sorted(engines, key=_standard_first)
     wanted = plan_pairs(cases, engines)
     judging = {
@@ -112,7 +112,7 @@ def run(
     def judge(pair: Pair, attempt: Attempt, standard: Standard) -> Record:
         record = _record(pair, attempt, standard, residuals=residuals)
         if pair.engine is not baseline:
-            records[_key(record)] = record
+            records[record.pair] = record
             if progress is not None:
                 progress(record, len(records), len(wanted))
         return record
@@ -165,10 +165,6 @@ def plan_pairs(
 
 def _standard_first(engine: Engine) -> bool:
     return engine.name != STANDARD
-
-
-def _key(record: Record) -> tuple[str, str, str]:
-    return record.case, record.engine, record.mode
 
 
 def _to_solve(

@@ -18,7 +18,7 @@ from ..harness.record import Deviation, Facts, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Finding, Kind, Loose, Regressions, Step, changes, same_machine
-from .queries import IDLE, NIGHTS, NOTHING, Entry, History, calibration, read, same
+from .queries import IDLE, NIGHTS, NOTHING, Entry, History, calibration, read, same_task
 from .runs import Subject
 from .steps import (
     ENOUGH,
@@ -147,7 +147,7 @@ def _find_missing(
     earlier = (
         row
         for row in (store.runs() if store else ())
-        if row.status != "running" and row.id < subject.before and same(row.key, subject.facts)
+        if row.status != "running" and row.id < subject.before and same_task(row.key, subject.facts)
     )
     last = next(earlier, None)
     if last is None:

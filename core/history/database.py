@@ -220,7 +220,7 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
         zlib.error,
         msgspec.MsgspecError,
     ) as error:
-        if run is not None and _damaged(error):
+        if run is not None and _is_damaged(error):
             raise DamagedRunError(
                 run,
                 f"history {path}: run {run} cannot be {what} ({shorten_text(error)}); it may be damaged:"
@@ -246,7 +246,7 @@ def damage_lines(path: Path, passed_over: Mapping[int, str]) -> list[str]:
     return lines
 
 
-def _damaged(error: Exception) -> bool:
+def _is_damaged(error: Exception) -> bool:
     """Return whether the stored data are damaged, as opposed to a failed access."""
     return (
         not isinstance(error, OSError | sqlite3.OperationalError)

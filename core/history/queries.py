@@ -25,7 +25,7 @@ from .database import OUTCOME
 from .store import Pair, RunRow, Store
 
 
-def same(a: Facts, b: Facts) -> bool:
+def same_task(a: Facts, b: Facts) -> bool:
     """Return whether two runs were asked for the same cases and engines with the same options."""
     if a.get("selection") and b.get("selection"):
         return a["selection"] == b["selection"]
@@ -49,7 +49,7 @@ def _of_its_files(later: Facts, earlier: Facts) -> bool:
     )
 
 
-def alike(a: Facts, b: Facts) -> bool:
+def same_options(a: Facts, b: Facts) -> bool:
     """Return whether two runs solve and judge alike, as far as both tell their options."""
     ours, theirs = a.get("selection"), b.get("selection")
     return not (ours and theirs) or ours["options"] == theirs["options"]
@@ -67,9 +67,9 @@ def series(rows: Iterable[RunRow]) -> list[list[RunRow]]:
         going_on = [
             each
             for each in found
-            if same(row.key, each[-1].key)
+            if same_task(row.key, each[-1].key)
             or (
-                alike(row.key, each[-1].key)
+                same_options(row.key, each[-1].key)
                 and {*row.plan}.issuperset(each[-1].plan)
                 and _of_its_files(row.key, each[-1].key)
             )
@@ -169,7 +169,7 @@ def read(
         for row in store.runs()
         if row.status != "running"
         and row.id < before
-        and (like is None or alike(row.key, like))
+        and (like is None or same_options(row.key, like))
         and (any(map(wanted, row.plan)) or not (cases or engines))
     )
     runs = {row.id: row for row in reversed([*islice(rows, last)])}

@@ -21,7 +21,14 @@ from ..harness.record import Facts, Record, Results
 from ..harness.results_file import read_results
 from ..harness.run import plan_pairs
 from .findings import RunName
-from .queries import NIGHTS, alike, choose_state_run, compared_quantities, faultless, most_compared
+from .queries import (
+    NIGHTS,
+    choose_state_run,
+    compared_quantities,
+    faultless,
+    most_compared,
+    same_options,
+)
 from .store import HistoryError, Pair, RunRow, Store
 
 LAST_GREEN = "last-green"
@@ -202,7 +209,7 @@ def _best(
     """
 
     def key(row: RunRow, amount: int) -> tuple[bool, int, int]:
-        return alike(row.key, subject.facts), amount, row.id
+        return same_options(row.key, subject.facts), amount, row.id
 
     best: tuple[tuple[bool, int, int], RunRow] | None = None
     sharing = [(key(row, most[row.id]), row) for row in rows if most.get(row.id)]

@@ -262,9 +262,7 @@ class Store:
                 update_outcome(msgspec.json.decode(zlib.decompress(blob), type=Record))
                 for (blob,) in rows
             ]
-        return sorted(
-            records, key=lambda each: place.get((each.case, each.engine, each.mode), len(place))
-        )
+        return sorted(records, key=lambda each: place.get(each.pair, len(place)))
 
     def results(self, run: int) -> Results:
         """Return the results of a run as the command wrote them.

@@ -182,7 +182,7 @@ class LiveTable(LiveFile):
         times = [perf_counter()]
         case = self.edited_case(asked.points)
         times.append(perf_counter())
-        designs, geometry = self._prepared(case), _geometry(case)
+        designs, geometry = self._current_designs(case), _geometry(case)
         found = designs.solve(geometry, TOL, alone=asked.whole)
         times.append(perf_counter())
         outputs = [each for each in case.outputs if asked.whole or _alone(each) not in self._held]
@@ -280,7 +280,7 @@ class LiveTable(LiveFile):
         path = case.sweep.path
         bodies = [body.name for body in case.mechanism.moving]
 
-        def prepared(path: Way) -> PreparedDesigns:
+        def prepare(path: Way) -> PreparedDesigns:
             wanted = [*places(case.mechanism)], without_forces(case).points
             designs = NativeSolver().prepare_designs(case.mechanism, path, *wanted, bodies=bodies)
             designs.solve(_geometry(case), TOL)
@@ -292,15 +292,15 @@ class LiveTable(LiveFile):
 
             at_once = compiled_at_once()
         with at_once:  # otherwise an edit in between waits for the compiler
-            designs = prepared(path)
+            designs = prepare(path)
             self._held = {
-                alone: prepared(_in_parts(held_case(case, alone).sweep.path))
+                alone: prepare(_in_parts(held_case(case, alone).sweep.path))
                 for alone in dict.fromkeys(map(_alone, case.outputs))
                 if alone and not moves_alone(path, alone)
             }
         return _structure(case), designs
 
-    def _prepared(self, case: Case) -> PreparedDesigns:
+    def _current_designs(self, case: Case) -> PreparedDesigns:
         """Return the program of a case: the same for all numbers, unless they change the joints."""
         if self._structure != _structure(case):
             self._structure, self._designs = self._prepare(case)
@@ -315,7 +315,7 @@ class LiveTable(LiveFile):
         known = {each.name: each for each in case.outputs if not each.forces}
         if name not in known:
             raise KincheckError(unknown("output", name, known))
-        designs = self._prepared(case)
+        designs = self._current_designs(case)
         found = designs.solve(geometry, TOL, alone=False)
         return found, self._outputs(case, designs, found, geometry, [known[name]])[name]
 

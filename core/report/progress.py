@@ -39,7 +39,9 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
     return show
 
 
-def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
+def missing_requirements(
+    results: Results, required: Sequence[str], named: Sequence[str] = ()
+) -> list[str]:
     """Return messages on failures of required engines and on named engines that are missing."""
     from ..harness.labels import NAMED
     from ..harness.record import Outcome
@@ -64,7 +66,7 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
     return list(dict.fromkeys(lines))
 
 
-def uncompared(results: Results) -> list[str]:
+def explain_no_comparison(results: Results) -> list[str]:
     """Return the reason if a run has compared nothing, so that no result is right or wrong."""
     from ..harness.record import Outcome
 

@@ -122,7 +122,7 @@ def versions(found: Regressions) -> list[str]:
 
 def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
     """Return the pairs with findings of a kind."""
-    return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
+    return {each.pair for each in found.findings if each.kind is kind}
 
 
 def _count_pairs(found: Regressions, kind: Kind) -> int:
@@ -136,7 +136,7 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
     """
     by_pair: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in findings:
-        by_pair.setdefault((finding.case, finding.engine, finding.mode), []).append(finding)
+        by_pair.setdefault(finding.pair, []).append(finding)
     alike: dict[tuple[str, str, int | None, int], list[str]] = {}
     for (case, engine, mode), each in by_pair.items():
         first = max(each, key=lambda finding: finding.ratio or 0.0)

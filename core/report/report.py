@@ -29,7 +29,7 @@ from .axis import SAMPLES
 from .curves import downloads
 from .figures import Effort, Past
 from .page_model import CaseView, Material, case_view, deviations_of, worst_of
-from .sections import environment, figure_parts, packed
+from .sections import environment, figure_parts, pack_text
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
 """Outcomes of pairs with an answer."""
@@ -217,9 +217,9 @@ def render(given: Material, changes: Markup | None = None) -> str:
         answered=ANSWERED,
         validation=validation,
         severity=severity,
-        searched=searched,
+        searched=search_words,
         curves=curves,
-        packed_curves=packed(json.dumps(curves)),
+        packed_curves=pack_text(json.dumps(curves)),
         **figure_parts(
             given.figures,
             drivers={case.anchor: case.axis.shown for case in cases},
@@ -287,7 +287,7 @@ def severity(case: CaseView) -> float:
     return 1e300 if broken else min(case.worst.ratio, 1e299) if case.worst else -1.0
 
 
-def searched(case: CaseView) -> str:
+def search_words(case: CaseView) -> str:
     """Return the words by which the overview finds a case."""
     words = [case.name, case.source, TRUTHS[case.truth], *(output.name for output in case.outputs)]
     words += [

@@ -76,7 +76,7 @@ def environment(*folders: Path) -> Environment:
         known=value_words,
         named=shorten_names,
         file_name=file_name,
-        parted=parted,
+        parted=split_message,
         value_text=value_text,
         with_unit=with_unit,
     )
@@ -104,7 +104,7 @@ def figure_parts(
     return {
         "css": style_sheet(),
         "script": "\n".join(script_of(name) for name in SCRIPTS),
-        "data": packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
+        "data": pack_text(json.dumps(data, allow_nan=False, separators=(",", ":"))),
     }
 
 
@@ -114,7 +114,7 @@ def script_of(name: str, folder: Path = _HERE) -> str:
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
-def parted(message: str) -> tuple[str, str]:
+def split_message(message: str) -> tuple[str, str]:
     """Return the start of a long message, up to the end of a line or sentence, and the rest."""
     if len(message) <= LONG:
         return message, ""
@@ -122,7 +122,7 @@ def parted(message: str) -> tuple[str, str]:
     return (message[: ends[-1]], message[ends[-1] :]) if ends else (message, "")
 
 
-def packed(text: str) -> str:
+def pack_text(text: str) -> str:
     """Return text as base64 of its zlib stream, which has a third of the size and cannot end its
     script element.
     """

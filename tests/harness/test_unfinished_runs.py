@@ -120,7 +120,7 @@ def test_every_format_names_missing_pairs(path):
 def test_file_of_interrupted_run_is_reported(path, tmp_path):
     """What the command writes where it is interrupted."""
     nights(path, 1)
-    pairs = [[each.case, each.engine, each.mode] for each in records()[1:]]
+    pairs = [[*each.pair] for each in records()[1:]]
     file = tmp_path / "results.json"
     file.write_bytes(
         to_json(Results(run={**FACTS, "started": "now", "missing": pairs}, records=records()[:1]))

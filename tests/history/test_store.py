@@ -193,7 +193,7 @@ from kincheck.core.harness.run import run
 from tests.support.fakes import Fake, crank
 records = run([crank(f"c{k}") for k in range(20)], [Fake()], tol=1e-12).records
 with Store(Path(sys.argv[1])) as store:
-    number = store.begin_run("same", [(each.case, each.engine, each.mode) for each in records], {"started": "now", "command": ""})
+    number = store.begin_run("same", [each.pair for each in records], {"started": "now", "command": ""})
     for record in records:
         store.add_record(number, record)
     store.finish(number)
@@ -352,7 +352,7 @@ MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
 
 
 def kincheck(*arguments, limit=None, **environment):
-    """The command line of fake_command_line.py. limit: on the size of files
+    """The command line of fake_command.py. limit: on the size of files
     [bytes].
     """
     restrict = (

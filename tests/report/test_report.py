@@ -14,7 +14,7 @@ from kincheck.core import solve
 from kincheck.core.harness.record import Results
 from kincheck.core.report import sections
 from kincheck.core.report.report import headline
-from kincheck.core.report.sections import parted
+from kincheck.core.report.sections import split_message
 from kincheck.core.studies.bench.size import ring
 from msgspec.structs import replace
 
@@ -173,7 +173,7 @@ def test_page_of_empty_run(tmp_path):
     ids=["short", "sentences", "lines", "word"],
 )
 def test_page_folds_long_messages(message, head, tmp_path):
-    shown, rest = parted(message)
+    shown, rest = split_message(message)
     assert (shown, shown + rest) == (head, message)
     run = results()
     failed = replace(run.records[1], message=message)

@@ -88,9 +88,7 @@ def keep(path, all_records, *, status="finished", **facts):
             "git": git,
         }
         known |= {"calibration_seconds": 0.02, "cases": RESULTS.run["cases"], **facts}
-        run_number = store.begin_run(
-            "same", [(each.case, each.engine, each.mode) for each in all_records], known
-        )
+        run_number = store.begin_run("same", [each.pair for each in all_records], known)
         for record in all_records:
             store.add_record(run_number, record)
         if status != "running":

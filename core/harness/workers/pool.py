@@ -17,7 +17,7 @@ from threading import Lock, Thread, Timer
 from typing import IO, BinaryIO, cast
 
 from ...extras import THREADS
-from ..engine import Engine, may_run_here
+from ..engine import Engine, runs_in_process
 from ..execution import (
     Attempt,
     Attempts,
@@ -240,7 +240,7 @@ def solver_for(
             process would cost more time than most cases take natively.
     """
     if jobs is None:
-        jobs = 0 if limits is None and all(map(may_run_here, engines)) else default_jobs()
+        jobs = 0 if limits is None and all(map(runs_in_process, engines)) else default_jobs()
     return (in_workers(jobs, limits or Limits()), jobs) if jobs else (solve_in_process, 0)
 
 

@@ -15,6 +15,7 @@ from ...case.case import Case, without_forces
 from ...errors import KincheckError, number_of
 from ...extras import THREADS
 from ...harness.engine import Engine, Measurable
+from ...harness.labels import product
 from ...harness.native_engine import NativeEngine
 from ...harness.provenance import circumstances
 from ...program.llvm import compiler
@@ -269,7 +270,5 @@ def effort(entry: Entry) -> list[Effort]:
     """
     if entry.us_per_sample is None or entry.errors.position is None:
         return []
-    name = entry.engine if entry.mode == "projection" else f"{entry.engine} · {entry.mode}"
-    return [
-        Effort(name, entry.setting, entry.errors.position, entry.us_per_sample.median, entry.mode)
-    ]
+    name, us = product(entry.engine, entry.mode), entry.us_per_sample.median
+    return [Effort(name, entry.setting, entry.errors.position, us, entry.mode)]

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import msgspec
 
 from ...case.case import Case
-from ...harness.engine import Engine, may_run_here
+from ...harness.engine import Engine, runs_in_process
 from ...harness.native_engine import NativeEngine
 from .precision import level
 from .rounds import Spread, spread
@@ -158,7 +158,7 @@ def measure_processes(
             mode = "" if engine.mode == "projection" else f" --mode {engine.mode}"
             options = f"--engine {engine.name}{mode}"
             arguments = ["run", name, *options.split(), "--jobs", "0"]
-            turns = rounds if may_run_here(engine) else 1
+            turns = rounds if runs_in_process(engine) else 1
             kinds.append(_Kind(f"kincheck run {options}", _RUN, arguments, rounds=turns))
         # fills the code cache, and the file cache of the system
         _once(_Kind(CACHED, _FIRST_USE, given=given, folder=kept), kept)

@@ -56,7 +56,7 @@ def report(found: Bench) -> Report:
     ]
     sections: list[Section] = []
     for case, mode in dict.fromkeys((entry.case, entry.mode) for entry in found.entries):
-        sections += [_precision(found, case, mode), _needed(found, case, mode)]
+        sections += [_precision(found, case, mode), _required_times(found, case, mode)]
         if mode == "projection" and any(each.case == case for each in found.floors):
             sections.append(_floors(found, case))
     sections += [_levels(found, case) for case in dict.fromkeys(e.case for e in found.levels)]
@@ -90,7 +90,7 @@ def _table(
     return Section(title, sentences, (note,), columns, labels, texts, diagrams)
 
 
-def _timed(us: Spread | None) -> tuple[float | None, str | None]:
+def _median_and_quartiles(us: Spread | None) -> tuple[float | None, str | None]:
     """Return median and quartiles."""
     return (None, None) if us is None else (us.median, f"{number(us.lower)} … {number(us.upper)}")
 
@@ -139,7 +139,7 @@ def _precision(found: Bench, case: str, mode: str) -> Section:
                 e.outcome,
                 *astuple(e.errors),
                 e.iterations,
-                *_timed(e.us_per_sample),
+                *_median_and_quartiles(e.us_per_sample),
             )
             for e in entries
         ],
@@ -148,7 +148,7 @@ def _precision(found: Bench, case: str, mode: str) -> Section:
     )
 
 
-def _needed(found: Bench, case: str, mode: str) -> Section:
+def _required_times(found: Bench, case: str, mode: str) -> Section:
     mine = [each for each in found.needed if (each.case, each.mode) == (case, mode)]
     rows: dict[str, list[str]] = {}
     for each in mine:
@@ -229,7 +229,9 @@ def _levels(found: Bench, case: str) -> Section:
         us = entry.us_per_sample
         part = None if us is None or whole is None else us.median / whole
         errors = astuple(entry.errors)
-        rows.append((entry.setting, entry.loop, entry.outcome, *errors, *_timed(us), part))
+        rows.append(
+            (entry.setting, entry.loop, entry.outcome, *errors, *_median_and_quartiles(us), part)
+        )
     others = [
         (e.us_per_sample, e)
         for e in found.needed
@@ -301,7 +303,7 @@ def _batches(found: Bench) -> Section:
         [
             (
                 e.variants,
-                *_timed(e.us_per_sample),
+                *_median_and_quartiles(e.us_per_sample),
                 e.gflops,
                 None if e.of_peak is None else f"{100 * e.of_peak:.1f} %",
                 f"{100 * e.solved:.4g} %",
@@ -347,8 +349,8 @@ def _studies(found: Bench) -> Section:
         [
             (
                 e.jobs,
-                *_timed(e.us_per_sample),
-                *_timed(e.times),
+                *_median_and_quartiles(e.us_per_sample),
+                *_median_and_quartiles(e.times),
                 e.peak_times and e.peak_times.median,
                 e.unsolved,
             )
@@ -398,7 +400,7 @@ def _sizes(found: Bench, family: str) -> Section:
                 e.outcome,
                 e.error,
                 e.residual,
-                *_timed(e.us_per_sample),
+                *_median_and_quartiles(e.us_per_sample),
             )
             for e in sizes
         ],
@@ -455,7 +457,7 @@ def _scalings(found: Bench) -> Section:
                 e.path,
                 e.error,
                 e.residual,
-                *_timed(e.us_per_value),
+                *_median_and_quartiles(e.us_per_value),
             )
             for e in found.scalings
         ],
@@ -484,7 +486,7 @@ def _processes(found: Bench) -> Section:
         [
             (
                 e.what,
-                *_timed(e.seconds),
+                *_median_and_quartiles(e.seconds),
                 *(e.stages[name].median if e.stages else None for name in STAGES),
                 e.beyond_numpy,
                 e.status,

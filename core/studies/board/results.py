@@ -121,7 +121,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
         """Case and name."""
         return f"{self.case}: {self.name}"
 
-    def dated(self, earlier: Mapping[str, Row]) -> Row:
+    def with_history(self, earlier: Mapping[str, Row]) -> Row:
         """Return the row with its history, which continues an earlier row with the same steps."""
         before, today = earlier.get(self.key), date.today().isoformat()
         if before is None or not self.compares_with(before):

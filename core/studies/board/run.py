@@ -123,7 +123,7 @@ def rows_of(
             try:
                 texts = files(stepper.engine, truth)
             except UnsupportedError as error:
-                yield msgspec.structs.replace(row, message=str(error)).dated(earlier)
+                yield msgspec.structs.replace(row, message=str(error)).with_history(earlier)
                 continue
             name = f"{stepper.engine}-{stepper.integrator}-{column}"
             folder = Path(file_name(truth.case.name)) / file_name(name)
@@ -145,7 +145,7 @@ def rows_of(
             if stepper.samples and done.measured:
                 end = truth.times[: stepper.samples][-1]
                 done = msgspec.structs.replace(done, message=f"the first {end:.3g} s alone")
-            done = better(default, done).dated(earlier)
+            done = better(default, done).with_history(earlier)
             _write(out / folder, {"row.json": to_json(done).decode()})
             yield done
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...case.case import TIME, Case
 from ...case.joint_probe import probe, probes
 from ...errors import shortened
-from ...harness.engine import STANDARD, Engine, may_run_here, versions
+from ...harness.engine import STANDARD, Engine, runs_in_process, versions
 from ...harness.execution import (
     Answer,
     Attempt,
@@ -205,7 +205,7 @@ def check_engine(
     ]
     again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
     found.append(_check_repetition("determinism", again, mine, in_workers(1, Limits())))
-    if may_run_here(engine):
+    if runs_in_process(engine):
         found.append(_check_repetition("isolation: in this process", again, mine, solve_in_process))
     return Report(engine.name, (), None, tuple(found))
 

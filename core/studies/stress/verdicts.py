@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...case.case import Case
 from ...errors import KincheckError
 from ...failures import FailureKind
-from ...harness.engine import Engine, may_run_here
+from ...harness.engine import Engine, runs_in_process
 from ...harness.execution import Answer, Failure, Pair, error_text
 from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
@@ -249,7 +249,7 @@ def with_numpy_executor(engine: NativeEngine) -> NativeEngine:
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
     """Return the answers in order; an error becomes a failure."""
-    found = {k: once(pair) for k, pair in enumerate(pairs) if may_run_here(pair.engine)}
+    found = {k: once(pair) for k, pair in enumerate(pairs) if runs_in_process(pair.engine)}
     if away := [k for k in range(len(pairs)) if k not in found]:
         from ...harness.workers.pool import in_workers
 
