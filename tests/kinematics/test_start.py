@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import adapters
 from kincheck.adapters.exudyn.exudyn import Exudyn
-from kincheck.adapters.exudyn.statics import static
 from kincheck.adapters.mujoco.mujoco import MuJoCo
 from kincheck.adapters.pinocchio.pinocchio import Pinocchio
 from kincheck.core import (
@@ -371,16 +371,17 @@ def test_simulator_starts_at_typed_phase():
     """Turns of a coupled joint are counted from the design, where a typed phase begins as well as
     an exact one.
     """
-    if static().version() is None:
+    static = adapters.engine("exudyn-static", "simulate")
+    if static.version() is None:
         pytest.skip("not installed")
     mechanism = turned_arm(60.0)
     near, far = (
         case_of(mechanism, {"u": Sine(1.0, 0.3, phase), "v": Ramp(0.1)})
         for phase in (six(math.pi), 1.0)
     )
-    assert static().unsupported(near) is None
-    assert "count from the design" in str(static().unsupported(far))
-    found = static().solve(static().build(near), near, 1e-12)
+    assert static.unsupported(near) is None
+    assert "count from the design" in str(static.unsupported(far))
+    found = static.solve(static.build(near), near, 1e-12)
     assert found.points["r"].position[:, 0] == pytest.approx(
         RADIUS * near.sweep.motions["u"].at(TIMES)[0], abs=1e-9
     )
