@@ -243,6 +243,17 @@ def test_html_curve_has_gaps_and_escapes():
     assert "–" in html
 
 
+def test_html_curve_fills_its_frame():
+    """A straight line goes from the lower left corner to the upper right one."""
+    html = Made(y=Variable("k", [1.0, 2.0, 3.0]))._repr_html_()
+    rect = re.search("<rect x='(.*?)' y='(.*?)' width='(.*?)' height='(.*?)'", html)
+    left, top, width, height = map(float, rect.groups())
+    (line,) = re.findall("<polyline points='(.*?)'", html)
+    assert np.array([each.split(",") for each in line.split()], float) == pytest.approx(
+        np.linspace((left, top + height), (left + width, top), 3), abs=0.1
+    )
+
+
 def test_unsolved_curve_is_shown():
     found = Made(y=Variable("k", [np.nan] * 3))
     assert "<polyline" not in found._repr_html_()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kincheck import cases
 from kincheck.adapters import engine
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
@@ -22,7 +23,7 @@ from kincheck.core.studies.stress.families import FAMILIES, Family, Specimen
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.linkages import any_plane, crank_rocker, four_bar
 from kincheck.core.studies.stress.reduction import judge as judge_file
-from kincheck.core.studies.stress.reduction import round_geometry
+from kincheck.core.studies.stress.reduction import reduce_case, round_geometry
 from kincheck.core.studies.stress.report import report
 from kincheck.core.studies.stress.run import specimen, specimens, stress
 from kincheck.core.studies.stress.verdicts import (
@@ -453,3 +454,16 @@ def test_force_case_is_rejudged_and_rounded(made):
     short = round_geometry(one.case, 9)
     assert short is not None
     assert short.forces == one.case.forces
+
+
+def test_reduced_case_keeps_relevant_parts():
+    """What concerns the crank's pin alone is a crank on its pivot, with numbers of one digit."""
+    found, _ = reduce_case(
+        cases.load("rssr"), lambda case: "crank_pin_y" in [each.name for each in case.outputs]
+    )
+    mechanism = found.mechanism
+    assert [each.name for each in mechanism.bodies] == ["crank"]
+    assert [(each.name, each.position) for each in mechanism.points] == [
+        ("crank_pin", (1.0, 0.0, 0.0))
+    ]
+    assert [each.name for each in found.outputs] == ["crank_pin_y"]
