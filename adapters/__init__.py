@@ -5,6 +5,7 @@ adapter is imported at its first use.
 import importlib
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +20,21 @@ ENGINES = {
 }
 """Engines in projection mode: name on the command line -> module and class."""
 
-SIMULATIONS = {
-    "mujoco": ("mujoco.steps", "Stepping", "mujoco", "stiff", 4),
-    "mujoco-default": ("mujoco.steps", "Stepping", "mujoco-default", "default", 1),
-    "mujoco-projecting": ("mujoco.steps", "Stepping", "mujoco-projecting", "projecting", 5),
-    "pinocchio": ("pinocchio.pinocchio", "Dynamics"),
-    "exudyn": ("exudyn.solvers", "Solver", "exudyn", "trapezoidal", 4),
-    "exudyn-alpha": ("exudyn.solvers", "Solver", "exudyn-alpha", "generalized alpha", 4),
-    "exudyn-static": ("exudyn.statics", "StaticSolver", "exudyn-static", "static", 1, False),
-    "exudyn-static-modified": ("exudyn.solvers", "Solver", "exudyn-static-modified", "static"),
-    "drake": ("drake.drake", "Steps"),
-    "dart": ("dart.dart", "Steps"),
-    "simbody": ("simbody.assembly", "Assembly"),
+SIMULATIONS: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
+    "mujoco": ("mujoco.steps", "Stepping", {"kind": "stiff", "effort": 4}),
+    "mujoco-default": ("mujoco.steps", "Stepping", {"kind": "default", "effort": 1}),
+    "mujoco-projecting": ("mujoco.steps", "Stepping", {"kind": "projecting", "effort": 5}),
+    "pinocchio": ("pinocchio.pinocchio", "Dynamics", {}),
+    "exudyn": ("exudyn.solvers", "Solver", {"kind": "trapezoidal", "steps": 4}),
+    "exudyn-alpha": ("exudyn.solvers", "Solver", {"kind": "generalized alpha", "steps": 4}),
+    "exudyn-static": ("exudyn.statics", "StaticSolver", {"kind": "static", "modified": False}),
+    "exudyn-static-modified": ("exudyn.solvers", "Solver", {"kind": "static"}),
+    "drake": ("drake.drake", "Steps", {}),
+    "dart": ("dart.dart", "Steps", {}),
+    "simbody": ("simbody.assembly", "Assembly", {}),
 }
-"""Engines in simulate mode: name on the command line -> module, class and arguments. A simulator's
-bare name is its recommended solver.
+"""Engines in simulate mode: name on the command line -> module, class and fields of the class. A
+simulator's bare name is its recommended solver.
 
 A record belongs to a case, an engine and a mode, so one name in two modes denotes two products. A
 further variant of a simulator gets another name, not another mode, because each mode is a ranking.
@@ -42,8 +43,13 @@ further variant of a simulator gets another name, not another mode, because each
 
 def engine(name: str, mode: str = "projection") -> Any:
     """Return the engine of a name and mode; its simulator is not imported yet."""
-    module, kind, *arguments = ENGINES[name] if mode == "projection" else SIMULATIONS[name]
-    return getattr(importlib.import_module(f".{module}", __name__), kind)(*arguments)
+    fields: Mapping[str, Any] = {}
+    if mode == "projection":
+        module, kind = ENGINES[name]
+    else:
+        module, kind, fields = SIMULATIONS[name]
+    maker = getattr(importlib.import_module(f".{module}", __name__), kind)
+    return maker(name=name, **fields) if fields else maker()
 
 
 WRITERS = ("mjcf", "exudyn", "urdf", "sdf", "osim")
