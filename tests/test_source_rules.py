@@ -61,15 +61,27 @@ def bare_packages(path, syntax):
             yield f"imports {'.'.join(target)}: say kincheck.{target[0]}"
 
 
+MOST_WORDS = 6
+
+
+def long_test_names(path, syntax):
+    """Yield tests whose names are sentences: a name says feature, situation and result."""
+    for node in ast.walk(syntax):
+        name = getattr(node, "name", None) or ""
+        if name.startswith("test_") and name.count("_") > MOST_WORDS:
+            yield f"{name} has more than {MOST_WORDS} words"
+
+
 RULES = {
     rule.__name__: rule
-    for rule in (past_the_door, simulators_at_import, undocumented, bare_packages)
+    for rule in (past_the_door, simulators_at_import, undocumented, bare_packages, long_test_names)
 }
+OF_TESTS = {"bare_packages", "long_test_names"}
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_sources_follow_rules(rule):
-    paths = TESTS if rule == "bare_packages" else SOURCES
+    paths = TESTS if rule in OF_TESTS else SOURCES
     found = {str(path): each for path in paths if (each := list(RULES[rule](path, tree(path))))}
     assert found == {}
 
@@ -103,6 +115,7 @@ undocumented | core/new.py | "Doc."\\ndef f(): ...
 undocumented | core/new.py | "Doc."\\nclass A: ...
 bare_packages | tests/test_new.py | from core.mechanism import Body
 bare_packages | tests/test_new.py | import adapters.native
+long_test_names | tests/test_new.py | def test_what_is_left_of_it_is_told(): ...
 """
 ALLOWED = """
 past_the_door | adapters/shared/new.py

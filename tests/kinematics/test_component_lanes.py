@@ -49,7 +49,7 @@ from ..support.mechanisms import (
 )
 
 
-def test_singular_pose_before_first_sample_is_reported():
+def test_singular_pose_before_sweep_is_reported():
     path = Path({"turn": Sine(2.4, 1e-2, np.pi / 2.0)}, np.linspace(2.0, 3.0, 5))
     solve = NativeSolver(method=Method.BY_COMPONENTS).prepare(chain(6), path, ("end",))
     told = [solve(1e-12).details["notes"] for _ in range(2)]

@@ -116,7 +116,7 @@ def test_grid_has_each_combination_once(tmp_path):
     assert huge.count == 10**24
 
 
-def test_one_at_a_time_begins_at_nominal(tmp_path):
+def test_single_changes_begin_at_nominal(tmp_path):
     points = {
         "tip": {"at": "tip", "sigma": [1, 0, 2]},
         "pivot": {"at": "pivot", "values": [[-3, 0, 3], [4], [5]]},
