@@ -108,6 +108,17 @@ def test_urdf_constraint_types_close_loop(closing, tmp_path):
         assert np.abs(found.bodies[name].r - same[name].r).max() < EXACT
 
 
+def test_universal_constraint_has_both_axes(tmp_path):
+    """The second is in the frame of its link, turned by half a radian at zero. In a plane the joint
+    turns about the first alone: motion does not tell the second.
+    """
+    text = TREE.replace("</robot>", CLOSED["universal"] + "</robot>")
+    joints = load(robot(tmp_path, text), DRIVE).mechanism.joints
+    axes = {each.name: each.axis for each in joints if each.name.startswith("constraint1.hinge")}
+    assert near(axes["constraint1.hinge1"], (0.0, 1.0, 0.0))
+    assert near(axes["constraint1.hinge2"], (math.sin(0.5), 0.0, math.cos(0.5)))
+
+
 def test_left_out_elements_are_listed(tmp_path):
     text = FOUR_BAR.replace(
         '<link name="c"/>', '<link name="c"><visual><mesh filename="no.stl"/></visual></link>'
