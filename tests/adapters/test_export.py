@@ -23,6 +23,7 @@ from kincheck.core.case.joint_probe import probes
 from kincheck.core.case.models.files import load
 from kincheck.core.cli import main
 from kincheck.core.cli.files import FORMATS
+from kincheck.core.joints import Joint
 from kincheck.core.kinematics import NativeSolver, largest_residual
 from kincheck.core.trajectory import BodyMotion
 from scipy.spatial.transform import Rotation
@@ -277,6 +278,19 @@ def carried(case, again):
         p = Rotation.from_matrix(turns).as_quat(scalar_first=True)
         motions[body.name] = BodyMotion(r, p, None, None)
     return motions
+
+
+@pytest.mark.parametrize("name", sorted(Joint.registry))
+def test_urdf_loop_read_again_moves_alike(name, tmp_path):
+    """The joint closes a loop: the conditions beside the URDF tell its freedoms."""
+    case = CASES[name]
+    with cutting(
+        *(each.name for each in case.mechanism.joints if each.name in ("tested", "second"))
+    ):
+        file = exported(case, "urdf", tmp_path)
+    motions = carried(case, read_again(case, file))
+    assert largest_residual(case.mechanism, case.mechanism.joints, motions) < EXACT
+    assert max(np.ptp(motion.p, axis=0).max() for motion in motions.values()) > 1e-5
 
 
 @pytest.mark.parametrize(("name", "kind"), PAIRS)
