@@ -127,7 +127,7 @@ def judge(mutant: Mutant, sandbox: Sandbox, entered: Entered, quick: bool) -> di
             run = _run(mutant, sandbox, tests, entered)
             if run.outcome != "passed":
                 end = "timeout" if run.outcome == "timeout" else "killed"
-                by = run.failing[0] if run.failing else run.output.strip().splitlines()[-1]
+                by = [*run.failing, *reversed(run.output.strip().splitlines()), "no output"][0]
                 break
     return {
         "end": end,
