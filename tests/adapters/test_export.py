@@ -100,6 +100,13 @@ def test_export_start_out_of_reach_fails():
         way_to(CASES["mcpherson"], 0.5)
 
 
+def test_export_start_names_held_drivers():
+    five_bar = cases.load("five_bar")
+    case = replace(five_bar, sweep=replace(five_bar.sweep, motions={}))
+    found = written(case, lambda mechanism, way, start, zeros, ranges: start, at=0.1)
+    assert found == {"left": 0.1, "right": 0.0}
+
+
 # The command
 
 
