@@ -361,16 +361,25 @@ def _array(a: Vec3) -> Array:
     return np.array([*a], dtype=float)
 
 
+class Coordinates(Protocol):
+    """The coordinates of a tree; see `TreeModel`."""
+
+    q: Array
+    v: Array
+
+    @property
+    def unknowns(self) -> int: ...
+
+    def coordinate(self, body: Any) -> tuple[int, int]: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Linear:
     """A weighted sum of coordinates [m or rad]: a driver's value, or zero for a coupler or a
     joint's own relation.
-
-    Attributes:
-        of: the `TreeModel`.
     """
 
-    of: Any
+    of: Coordinates
     bodies: list[Any]
     weights: Array
     n = 1

@@ -16,20 +16,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from ...core.case.case import Case
 from ...core.joints import Joint
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import ForceElement, TorsionSpringDamper
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .constraints import BodyFrame, skew
+from .constraints import BodyFrame, Condition, Coordinates, skew
 from .force_solution import (
     Element,
     LeftOut,
+    RowWrench,
     axis_of,
     left_out_of,
     places,
@@ -138,10 +140,39 @@ def of_relations(
 NO_MASS = 1e-100
 
 
+class Tree(Coordinates, Protocol):
+    """What forces need of a `TreeModel`, which says what each is."""
+
+    case: Case
+    carrier: dict[str, int]
+    parents: list[int]
+    coordinates: dict[tuple[str, str], tuple[Any, int]]
+    branch_of: dict[str, tuple[int, int]]
+    tied: list[tuple[str, Condition, tuple[BodyFrame, BodyFrame]]]
+    related: list[tuple[Condition, Relation]]
+    recursion: ClassVar[bool]
+    J: Array
+
+    @property
+    def own_rows(self) -> list[tuple[slice, str | Relation]]: ...
+
+    def add_frame(self, body: int, at: Vector) -> BodyFrame: ...
+
+    def rows_of(self, condition: Condition) -> slice: ...
+
+    def row_wrenches(self) -> list[RowWrench]: ...
+
+    def look(self, frame: BodyFrame) -> None: ...
+
+    def inverse_dynamics(self, v: Array, a: Array) -> Array: ...
+
+    def passed_on(self, body: int, point: Array) -> Array: ...
+
+
 class TreeForces:
     """Frames of joints, masses and force elements of a `TreeModel`, and their forces."""
 
-    def __init__(self, model: Any) -> None:
+    def __init__(self, model: Tree) -> None:
         self.model, mechanism = model, model.case.mechanism
         self.gravity = np.array(mechanism.gravity)
         self.frames: list[BodyFrame] = []
