@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from ..caches import cache_last
@@ -85,15 +86,11 @@ def by_blocks(
         by_components = 0 < max(map(len, parts), default=0) <= COMPONENT
     lanes = _lanes(mechanism, request, parts) if by_components else SparseLanes(mechanism, request)
 
-    @cache_last(1, when=_is_builtin)
+    @cache_last(1, when=attrgetter("is_builtin"))
     def prepare(path: Path) -> Solver:
         return BlockSweep(lanes, path).solve
 
     return prepare
-
-
-def _is_builtin(path: Path) -> bool:
-    return path.is_builtin
 
 
 def _lanes(
@@ -118,6 +115,4 @@ def _lanes(
 
 
 # One only, and of its paths the last: they fill much of the memory. A thread solves it in place.
-@cache_last(1, per_thread=True, when=is_known)
-def _recent_blocks(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver]:
-    return by_blocks(mechanism, request)
+_recent_blocks = cache_last(1, per_thread=True, when=is_known)(by_blocks)
