@@ -20,7 +20,8 @@ from ...report.sections import Diagram, Report, Section
 from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
-from .study import MOST_SAID, ComplianceCurves, ComplianceResults, Curve
+from .rates import Curve
+from .study import MOST_SAID, NOT_COMPUTED, ComplianceCurves, ComplianceResults
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -94,6 +95,7 @@ def _data(curves: ComplianceCurves) -> dict[str, Any]:
             for name, each in curves.outputs.items()
         },
         "rigid": {name: _rows_or_none(values) for name, values in curves.rigid.items()},
+        "not_computed": {**curves.not_computed},
         "notes": [*curves.notes],
     }
 
@@ -120,8 +122,9 @@ def table(results: ComplianceResults) -> str:
     names = {name: _shown(each.unit) for name, each in first.outputs.items()}
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
-    if results.signs:
-        text.write(f"# {results.signs}\n")
+    missing = [note for note in first.notes if note.startswith(NOT_COMPUTED)]
+    if said := "; ".join(filter(None, (results.signs, *missing))):
+        text.write(f"# {said}\n")
     writer.writerow(["over", "value", "unit", *center, "wheel_load [N]", *heads])
     for curves in (first, *results.loads.values()):
         unit, factor = unit_of_axis(curves)
