@@ -38,9 +38,9 @@ class FromDesign(Supplied):
     """Options of the readers; the travel counts from design, of any file."""
 
     travel: str | None = option(
-        "travel of the wheel from design, or of the steering with --axle steer: up and down, default"
-        " 60mm:25, as kincheck run has it; or START:STOP:SAMPLES, positive up: --travel=-40:60mm:21;"
-        " in metres without a unit",
+        "travel of the wheel from design, or of the steering with --axle steer: up and down,"
+        " default 60mm:25, as in kincheck run; or START:STOP:SAMPLES, positive up:"
+        " --travel=-40:60mm:21; in metres without a unit",
         metavar="LENGTH[:N]|A:B:N",
         heading=HARDPOINTS,
     )
@@ -216,11 +216,16 @@ def _both_ways(travel: str) -> str:
     length, *count = travel.split(":")
     if not count and length.startswith("-"):
         raise KincheckError(
-            f"--travel {travel}: expected a length such as 60mm, up and down, or START:STOP:SAMPLES;"
-            f" one sample is {travel}:{travel}:1"
+            f"--travel {travel}: expected a length such as 60mm, up and down, or"
+            f" START:STOP:SAMPLES; one sample is {travel}:{travel}:1"
         )
     if len(count) > 1 or length.startswith("-") or not all(map(str.isdecimal, count)):
         return travel
+    if count and int(count[0]) < 2:
+        raise KincheckError(
+            f"--travel {travel}: found {count[0]} sample up and down, expected 2 or more, or"
+            " START:STOP:SAMPLES"
+        )
     return ":".join([f"-{length}", length, *count])
 
 

@@ -41,6 +41,8 @@ GOAL = "engines differ by round-off"
 DEFAULT_TRAVEL = np.linspace(-0.06, 0.06, 25)
 MOST_SAID = 5
 """Failures that messages name."""
+WHEEL_LOAD = "wheel_load"
+"""Name of the first curve, which a driver's effort in a case may have as well."""
 NOT_COMPUTED = "not computed: "
 """Before the outputs without a curve, in notes."""
 NO_VALUE = "it has no value at any of these samples, by its definition"
@@ -281,7 +283,10 @@ class _Study:
     ) -> ComplianceCurves:
         wheel, lost = self.wheels[0], ~found.reached
         outputs, own = self._outputs(found), self._rates(found)
-        if twice := sorted(outputs.keys() & own.keys()):
+        taken = {*own, WHEEL_LOAD}
+        if any(x.name == WHEEL_LOAD and isinstance(x, DriverEffort) for x in self.computed):
+            taken.remove(WHEEL_LOAD)
+        if twice := sorted(outputs.keys() & taken):
             raise KincheckError(
                 f"{self.case.name}: output {twice[0]!r} has the name of a result of kincheck kc;"
                 " give it another name"
@@ -423,7 +428,8 @@ class _Study:
         """Return an output of n samples by places of points and their rates, shape (n, 3)."""
         moving = {name: point_jets(PointMotion(*at(name), None)) for name in output.points}
         design = {name: still_jets(self.mechanism.point(name).position) for name in output.points}
-        jet = output.of(moving, design)
+        with np.errstate(all="ignore"):  # NaN marks unknown values
+            jet = output.of(moving, design)
         x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
         return Jet(x, v, a)
 
@@ -489,7 +495,9 @@ def lacking(case: Case, soft: Mechanism) -> dict[str, str]:
     known = {each.name for each in (*soft.given_joints, *soft.forces)} | held
     for output in case.outputs:
         read = {*output.forces} - known
-        if isinstance(output, DriverEffort) and output.at is not None:
+        if isinstance(output, PerTravel) and output.of_output.orders < ORDERS:
+            found[output.name] = "a slope of a slope; kincheck run has it for rigid joints"
+        elif isinstance(output, DriverEffort) and output.at is not None:
             found[output.name] = (
                 "an effort at another joint follows the motion of rigid joints; kincheck run has it"
             )

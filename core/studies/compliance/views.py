@@ -21,7 +21,7 @@ from ...report.sections import page as render
 from ...trajectory import Array
 from ...unit_text import with_unit
 from .rates import Curve
-from .study import MOST_SAID, NOT_COMPUTED, ComplianceCurves, ComplianceResults
+from .study import MOST_SAID, NOT_COMPUTED, WHEEL_LOAD, ComplianceCurves, ComplianceResults
 
 SCHEMA = "kincheck-compliance/1"
 DEGREE = 180.0 / math.pi
@@ -119,13 +119,13 @@ def table(results: ComplianceResults) -> str:
     writer = csv.writer(text, lineterminator="\n")
     first = results.travel
     center = [f"wheel_center_{axis} [mm]" for axis in "xyz"]
-    names = {name: _shown(each.unit) for name, each in first.outputs.items()}
+    names = {name: _shown(each.unit) for name, each in first.outputs.items() if name != WHEEL_LOAD}
     heads = [with_unit(name, unit) for name, (unit, _) in names.items()]
     heads += [with_unit(f"{name}.rigid", names[name][0]) for name in first.rigid]
     missing = [note for note in first.notes if note.startswith(NOT_COMPUTED)]
     if said := "; ".join(filter(None, (results.signs, *missing))):
         text.write(f"# {said}\n")
-    writer.writerow(["over", "value", "unit", *center, "wheel_load [N]", *heads])
+    writer.writerow(["over", "value", "unit", *center, f"{WHEEL_LOAD} [N]", *heads])
     for curves in (first, *results.loads.values()):
         unit, factor = unit_of_axis(curves)
         columns: list[Sequence[float] | Array] = [
@@ -210,7 +210,7 @@ def _section(number: int, curves: ComplianceCurves) -> Section:
     styles = [soft, rigid] if curves.rigid else [soft]
     unit, factor = unit_of_axis(curves)
     x, diagrams = _drawn(factor * curves.at), list[Diagram]()
-    for name, each in {"wheel_load": Curve(curves.wheel_load, "N"), **curves.outputs}.items():
+    for name, each in {WHEEL_LOAD: Curve(curves.wheel_load, "N"), **curves.outputs}.items():
         shown, size = _shown(each.unit)
         data = [soft.curve(x, _drawn(size * each.values))]
         if name in curves.rigid:
