@@ -30,8 +30,9 @@ def left_by_moves(case: Case) -> dict[str, list[float | None]]:
     a move out of reach, or where the moved table cannot be solved.
     """
     found = dict[str, list[float | None]]()
-    slope = _slope_of_toe(case)
-    for row in case.hardpoints if slope is not None else ():
+    if (slope := _slope_of_toe(case)) is None:
+        return found
+    for row in case.hardpoints:
         if row.no_bump_steer is not None:
             found[row.name] = [
                 _solved(_moved(case.mechanism, row, k, move), slope, case.sweep.driver)

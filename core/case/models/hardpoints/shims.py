@@ -77,11 +77,12 @@ def shims(
     rows[rods[0]] = np.r_[0.0, 0.0, 0.0, x * spin[2], y * spin[2], -x * x - y * y]
     with np.errstate(divide="ignore", invalid="ignore"):
         try:
-            v, w = np.linalg.solve(rows, np.eye(6)[5]).reshape(2, 3)
+            solved = np.asarray(np.linalg.solve(rows, np.eye(6)[5]), float)
         except np.linalg.LinAlgError:  # the tie rod does not steer
             return found, {}
+        v, w = solved.reshape(2, 3)
         end = v + np.cross(w, places[outer] - places[WHEEL_CENTER])
-        off = along @ end
+        off = float(along @ end)
         return found, {TIEROD_INNER: off / end, outer: -off / (end + np.cross(along, w))}
 
 
