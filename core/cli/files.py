@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -68,16 +69,21 @@ class Export(OfCase):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ..case.io.model_writer import written
+        from ..report.progress import complain
 
         if self.to not in registry.writers:
             raise KincheckError(unknown("format", self.to, registry.writers))
         case = registry.case_of(self, driven=False)
-        keep_texts(
-            written(case, registry.writer(self.to), driver_value(self.at, case)),
-            case.name,
-            self.out,
-        )
+        texts = written(case, registry.writer(self.to), driver_value(self.at, case))
+        keep_texts(texts, case.name, self.out)
+        complain(f"note: left out: {each}" for each in _left_out(texts))
         return Status.WITHIN
+
+
+def _left_out(texts: Mapping[str, str]) -> list[str]:
+    """Return what the comments of written files say that their format cannot hold."""
+    lines = " ".join(each.lstrip("# ") for text in texts.values() for each in text.splitlines())
+    return re.findall(r"Left out: (.+?)\.(?= |$)", lines)
 
 
 def keep_texts(
