@@ -101,7 +101,23 @@ def test_symmetric_axle_outputs_are_symmetric(template, motion, tmp_path, capsys
 # Trailing arms about y, with their own bump stops and a bar, by hand
 
 
-def arm_case(folder, name="axle", *, mirrored=False, seen_from="left", down=(), more=()):
+VECTORS = ("position", "point", "axis", "direction", "forward", "up", "turning_stiffness")
+
+
+def turned(keys):
+    """Return the keys of a case with x in place of y, y of z and z of x."""
+    found = dict(keys)
+    for key, value in keys.items():
+        if isinstance(value, dict):
+            found[key] = turned(value)
+        elif key in VECTORS:
+            found[key] = value if isinstance(value, str) else [value[2], value[0], value[1]]
+        elif key == "component":
+            found[key] = {"x": "y", "y": "z", "z": "x"}[value]
+    return found
+
+
+def arm_case(folder, name="axle", *, mirrored=False, seen_from="left", down=(), odd=False, more=()):
     """Write trailing arms, the left one with the stiffer stop; mirrored, the right one."""
     stops = {
         "left": [[-0.3, -20.0], [0.0, 0.0], [0.05, 20.0], [0.2, 900.0]],
@@ -174,6 +190,7 @@ def arm_case(folder, name="axle", *, mirrored=False, seen_from="left", down=(), 
         "right_toe": {"type": "toe", "side": "right"},
         "roll_angle": {"type": "roll_angle"},
     } | dict(more)
+    case = turned(case) if odd else case
     (file := folder / f"{name}.json").write_text(json.dumps(case))
     return file
 
@@ -189,7 +206,7 @@ def curves_of(file, motion):
 
 @pytest.mark.parametrize("motion", ["heave", "roll"])
 def test_unlike_axle_follows_exchange_of_sides(motion, tmp_path):
-    """By its mirror image, by the order of the file, and by drivers that count downwards."""
+    """By its mirror image, the order of the file, drivers that count downwards, and other axes."""
     given = curves_of(arm_case(tmp_path), motion)
     turned = slice(None, None, 1 if motion == "heave" else -1)
     image = curves_of(arm_case(tmp_path, "image", mirrored=True), motion)
@@ -197,7 +214,12 @@ def test_unlike_axle_follows_exchange_of_sides(motion, tmp_path):
         sign = -1.0 if name.startswith("roll_angle") else 1.0
         wanted = sign * given[exchanged(name)][turned]
         assert image[name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), name
-    for options in ({"seen_from": "right"}, {"down": ("left",)}, {"down": ("left", "right")}):
+    for options in (
+        {"seen_from": "right"},
+        {"down": ("left",)},
+        {"down": ("left", "right")},
+        {"odd": True},
+    ):
         again = curves_of(arm_case(tmp_path, "again", **options), motion)
         assert again.keys() == given.keys()
         for name in given.keys() - {"effort"}:

@@ -117,13 +117,11 @@ def test_free_motion_equals_integration(name, tmp_path):
     assert np.asarray(found.outputs["tip"]) == pytest.approx(heights, abs=1e-11)
 
 
-@EVERY
-def test_kc_equals_virtual_work(name, tmp_path):
-    """The wheel's centre is the crank's tip: its load F has F dz = (V' - Q) dq."""
-    subject, travel = SUBJECTS[name], np.array([-0.06, -0.03, 0.0101, 0.05])
+def lifted(tmp_path, subject):
+    """Write the crank as a suspension, its tip being the wheel's centre."""
     points = {"tip": {"body": "crank", "position": [ARM, 0.0, 0.0]}}
     lift = {"type": "point_coordinate", "point": "tip", "direction": [0, 0, 1]}
-    file = write(
+    return write(
         tmp_path,
         subject,
         drivers={"travel": lift},
@@ -131,7 +129,13 @@ def test_kc_equals_virtual_work(name, tmp_path):
         sweep={"driver": "travel", "start": 0.0, "stop": 0.01, "steps": 2},
         compliance={"wheel": "crank", "contact": "tip"},
     )
-    found = kincheck.compliance(str(file), travel).travel
+
+
+@EVERY
+def test_kc_equals_virtual_work(name, tmp_path):
+    """The load F of the wheel has F dz = (V' - Q) dq."""
+    subject, travel = SUBJECTS[name], np.array([-0.06, -0.03, 0.0101, 0.05])
+    found = kincheck.compliance(str(lifted(tmp_path, subject)), travel).travel
 
     def load_at(z):
         q = math.asin(-z / ARM)
@@ -145,6 +149,17 @@ def test_kc_equals_virtual_work(name, tmp_path):
         for z in travel
     ]
     assert found.outputs["wheel_rate"].values == pytest.approx(rates, rel=1e-8)
+
+
+@pytest.mark.nightly
+@EVERY
+@pytest.mark.parametrize("engine", [*SIMULATORS, "exudyn-static"])
+def test_kc_passes_in_engines(engine, name, tmp_path):
+    installed(engine.removesuffix("-static"))
+    file = lifted(tmp_path, SUBJECTS[name])
+    found = kincheck.compliance(str(file), [-0.03, 0.0101], engines=[engine])
+    record = checked(found.checked.records, engine)
+    assert record.outcome.value == "pass", record.message
 
 
 @EVERY

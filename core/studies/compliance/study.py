@@ -45,6 +45,7 @@ WHEEL_LOAD = "wheel_load"
 """Name of the first curve, which a driver's effort in a case may have as well."""
 NOT_COMPUTED = "not computed: "
 """Before the outputs without a curve, in notes."""
+SHARED = "redundant rows share its load; kincheck run --static tells what is determined"
 NO_VALUE = "it has no value at any of these samples, by its definition"
 
 
@@ -298,12 +299,12 @@ class _Study:
             for name, each in outputs.items()
             if found.reached.any() and not np.isfinite(each.values[found.reached]).any()
         }
-        undetermined = {
-            x.name: reason
+        shared = {
+            x.name: SHARED
             for x in self.computed
-            if isinstance(x, ForceMeasure) and (reason := x.undetermined(found.forces))
+            if isinstance(x, ForceMeasure) and x.undetermined(found.forces)
         }
-        not_computed = {**self.lacking, **none, **undetermined}
+        not_computed = {**self.lacking, **none, **shared}
 
         def blank(values: Array) -> Array:
             return _blank_rows(values, lost)
