@@ -1,0 +1,184 @@
+"""Shims against the carrier's pose with links of given lengths, solved by Newton's method."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.cli.main import main
+from kincheck.core.extensions.hardpoints.shims import shims
+from kincheck.core.extensions.hardpoints.templates import TEMPLATES
+
+from ...oracles.rods import rotation
+from ...support.rods_of_templates import RODS, solved
+
+STEP = 1e-5
+"""Half a difference [m]: its square, and round-off over it, are below the tolerance."""
+BALLS = {"mcpherson": (), "three_link": ("arm_pivot",), "semi_trailing_arm": ("arm_inner",)}
+
+
+def angles_of(name, role, shift, spin):
+    """Toe, camber and caster with the joint of a role shifted: inner ends on the chassis, outer
+    ones on the carrier.
+    """
+    at = {each: np.array(place) for each, place in TEMPLATES[name].sample.items()}
+    rods, center = RODS.get(name, ()), at["wheel_center"]
+    on_body, on_carrier = dict(at), dict(at)
+    outer = {end for _, end in rods}
+    (on_carrier if role in outer else on_body)[role] = at[role] + shift
+
+    def moved(pose):
+        return {
+            each: center + pose[:3] + rotation(pose[3:]) @ (place - center)
+            for each, place in on_carrier.items()
+        }
+
+    def misfit(pose):
+        now = moved(pose)
+        found = [pose[2]]
+        for a, b in rods:
+            found.append(np.linalg.norm(now[b] - on_body[a]) - np.linalg.norm(at[b] - at[a]))
+        if name == "mcpherson":
+            axis = rotation(pose[3:]) @ (at["strut_upper"] - at["strut_lower"])
+            away = on_body["strut_upper"] - now["strut_lower"]
+            found += np.cross(axis / np.linalg.norm(axis), away).tolist()
+        for ball in BALLS.get(name, ()):
+            found += (now[ball] - on_body[ball]).tolist()
+        if name == "semi_trailing_arm":
+            axis = on_body["arm_outer"] - on_body["arm_inner"]
+            away = now["arm_outer"] - on_body["arm_outer"]
+            found += np.cross(axis / np.linalg.norm(axis), away).tolist()
+        return np.array(found)
+
+    pose = np.zeros(6)
+    for _ in range(6):
+        jacobian = [(misfit(pose + d) - misfit(pose - d)) / 2e-6 for d in 1e-6 * np.eye(6)]
+        pose = pose - np.linalg.lstsq(np.transpose(jacobian), misfit(pose), rcond=None)[0]
+    s = rotation(pose[3:]) @ spin
+    angles = [np.arctan2(s[0], s[1]), -np.arcsin(s[2])]
+    if (ends := TEMPLATES[name].kingpin) and isinstance(ends[0], str):
+        low, high = ((moved(pose) if end in outer else on_body)[end] for end in ends)
+        angles.append(np.arctan2(low[0] - high[0], high[2] - low[2]))
+    return np.array(angles)
+
+
+def write_table(folder, name, toe, camber, moved):
+    """Write the sample table of a template, x rearward and y right; return the wheel's axis."""
+    spin = np.array(
+        [math.sin(toe) * math.cos(camber), math.cos(toe) * math.cos(camber), -math.sin(camber)]
+    )
+    sample = dict(TEMPLATES[name].sample)
+    sample["wheel_axis"] = tuple((np.array(sample["wheel_center"]) + 0.2 * spin).tolist())
+    for role, shift in moved.items():
+        sample[role] = tuple((np.array(sample[role]) + shift).tolist())
+    lines = ["# units: m", "# axes: rearward,right,up", f"# template: {name}", "name,x,y,z"]
+    lines += [f"{role},{-x!r},{-y!r},{z!r}" for role, (x, y, z) in sample.items()]
+    (folder / "car.csv").write_text("\n".join(lines) + "\n")
+    return spin
+
+
+@pytest.mark.parametrize("name", [*RODS])
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (0.3, -2.0)])
+def test_template_shims_equal_differences(tmp_path, name, angles):
+    toe, camber = map(math.radians, angles)
+    spin = write_table(tmp_path, name, toe, camber, {})
+    found = {each.roles[0]: each.shim for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
+    checked = [role for role, shim in found.items() if shim is not None]
+    ends = {end for rod in RODS[name] for end in rod}
+    assert ends <= {*checked}
+    for role in checked:
+        for k, sign in enumerate((-1.0, -1.0, 1.0)):
+            shift = STEP * sign * np.eye(3)[k]
+            up, down = (angles_of(name, role, way * shift, spin) for way in (1, -1))
+            assert found[role][:, k] == pytest.approx((up - down) / (2 * STEP), abs=1e-6), (role, k)
+
+
+@pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) > 2])
+def test_tie_rod_moves_cancel_bump_steer(tmp_path, name):
+    def bump_steer(moved):
+        write_table(tmp_path, name, 0.01, -0.03, moved)
+        return solved(load(tmp_path / "car.csv", Supplied(travel="0.01:3")))["toe.per_travel"][1]
+
+    write_table(tmp_path, name, 0.01, -0.03, {})
+    ends = {each.roles[0]: each for each in load(tmp_path / "car.csv", Supplied()).hardpoints}
+    found = {
+        role: each.no_bump_steer for role, each in ends.items() if each.no_bump_steer is not None
+    }
+    assert found.keys() == {*RODS[name][-1]}
+    before = abs(bump_steer({}))
+    for role, moves in found.items():
+        for k, sign in enumerate((-1.0, -1.0, 1.0)):
+            # metres of travel by round-off of the pose; moves of a metre leave long rods
+            assert abs(bump_steer({role: sign * moves[k] * np.eye(3)[k]})) < 1e-9 * before, (
+                role,
+                k,
+            )
+
+
+@pytest.mark.parametrize("name", [name for name, rods in RODS.items() if len(rods) == 5])
+def test_tie_rod_moves_equal_rod_formula(name):
+    """(l . v) / v_i of the inner end, v being the outer end's velocity at toe rate zero, found by
+    differences of the carrier on the other four rods.
+    """
+    at = {role: np.array(place) for role, place in TEMPLATES[name].sample.items()}
+    center, (*rods, (inner, outer)) = at["wheel_center"], RODS[name]
+    place = dict(TEMPLATES[name].sample)
+
+    def misfit(pose, height):
+        turn, s = rotation(pose[3:]), rotation(pose[3:]) @ np.array([0.0, 1.0, 0.0])
+        gaps = [
+            np.linalg.norm(center + pose[:3] + turn @ (at[b] - center) - at[a])
+            - np.linalg.norm(at[b] - at[a])
+            for a, b in rods
+        ]
+        return np.array([*gaps, pose[2] - height, np.arctan2(s[0], s[1])])
+
+    def outer_end(height):
+        pose = np.zeros(6)
+        for _ in range(8):
+            steps = 1e-6 * np.eye(6)
+            slopes = [(misfit(pose + d, height) - misfit(pose - d, height)) / 2e-6 for d in steps]
+            pose = pose - np.linalg.solve(np.transpose(slopes), misfit(pose, height))
+        return center + pose[:3] + rotation(pose[3:]) @ (at[outer] - center)
+
+    v = (outer_end(1e-4) - outer_end(-1e-4)) / 2e-4
+    _, found = shims(TEMPLATES[name], place, 0.0, 0.0)
+    # differences over 0.2 mm have an error of 1e-8 of the curvature
+    assert found[inner] == pytest.approx((at[outer] - at[inner]) @ v / v, rel=1e-5)
+
+
+def test_explain_prints_shims_in_degrees(tmp_path, capsys):
+    main(["templates", "double_wishbone"])
+    (tmp_path / "car.csv").write_text(capsys.readouterr().out)
+    assert (
+        main(
+            [
+                "explain",
+                str(tmp_path / "car.csv"),
+                "--samples",
+                "2",
+                f"--json={tmp_path / 'told.json'}",
+            ]
+        )
+        == 0
+    )
+    printed = capsys.readouterr().out
+    assert "shims of 1 mm at design" in printed
+    ends = {each.name: each.no_bump_steer for each in load(tmp_path / "car.csv").hardpoints}
+    rows = [line for line in printed.splitlines() if "deg/m" in line]
+    assert "(-8.7 deg/m now)" in rows[0]
+    for name, row in zip(("tierod_inner", "tierod_outer"), rows[1:], strict=False):
+        assert row.startswith(name)
+        for x in ends[name]:
+            assert f"{1e3 * x:+.1f}" in row
+        assert row.count("none in reach (") == sum(abs(x) > 0.05 for x in ends[name]) == 2
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told["bump_steer"] == pytest.approx(math.radians(-8.7037), rel=1e-4)
+    for name, left in told["bump_steer_left"].items():
+        assert [x is None for x in left] == [abs(x) > 0.05 for x in told["no_bump_steer"][name]]
+        assert all(abs(x) < 1e-9 for x in left if x is not None)
+    (row,) = [line for line in printed.splitlines() if line.startswith("uca_outer  ")]
+    degrees = math.degrees(1e-3 * load(tmp_path / "car.csv").hardpoints[2].shim[1][1])
+    assert f"{degrees:+.4f}" in row.split()
