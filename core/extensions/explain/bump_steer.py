@@ -25,8 +25,8 @@ def bump_steer(case: Case) -> float | None:
 
 
 def left_by_moves(case: Case) -> dict[str, list[float | None]]:
-    """Return the bump steer that the moves of a row along x, y or z leave, by row [rad/m]; None for
-    a move out of reach, or where the moved table cannot be solved.
+    """Return the bump steer with each move along x, y or z, by row [rad/m]; None for a move out of
+    reach, or if the moved table cannot be solved.
     """
     found = dict[str, list[float | None]]()
     if (slope := _slope_of_toe(case)) is None:

@@ -237,7 +237,7 @@ def _shims(found: Diagnosis) -> Iterator[Text | Table]:
 
 
 def _move(move: float | None, left: float | None) -> str:
-    """Return a move with what it leaves, or that none is in reach."""
+    """Return a move and the bump steer left with it; or no move in reach."""
     if move is None:
         return "–"
     shown = f"{1e3 * move:+.1f}"

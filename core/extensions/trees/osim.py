@@ -84,10 +84,7 @@ IN_CONSTRAINT = (
 _INSIDE = ("objects", "components", "frames", "coordinates", "Model")
 _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
 GRAVITY = (0.0, -9.80665, 0.0)
-BY_RATES = (
-    "its damping about the axes is by the angular velocity; in OpenSim it is by the rates of the"
-    " three angles; both are equal for small turns"
-)
+BY_RATES = "its turning damping is by the angular velocity, and in OpenSim by rates of angles"
 """Gravity unless given [m/s^2]."""
 DEEPEST_FRAME = 50
 ON_LINE = 1e-12
