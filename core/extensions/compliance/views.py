@@ -165,7 +165,9 @@ def lines(results: ComplianceResults) -> Iterator[str]:
     if not math.isfinite(curves.wheel_load[k]):
         yield f"no equilibrium at any of {len(curves.at)} samples of travel"
         return
-    yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
+    load = float(curves.wheel_load[k])
+    load = 0.0 if abs(load) < ZERO else load
+    yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {load:.6g} N"
     for name, each in curves.outputs.items():
         shown, size = _shown(each.unit)
         if not np.isfinite(each.values).any():

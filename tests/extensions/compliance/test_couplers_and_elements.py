@@ -9,12 +9,12 @@ from dataclasses import replace
 import kincheck
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.measures import DriverEffort
 from kincheck.core.case.models.files import load
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.main import main
+from kincheck.core.doors import offers
 from kincheck.core.joints import Coupler
 from kincheck.core.mechanism.loads import ELEMENTS
 
@@ -211,7 +211,7 @@ def test_reference_is_proved_or_refused(name, tmp_path, capsys):
 
 
 @EVERY
-@pytest.mark.parametrize("to", adapters.WRITERS)
+@pytest.mark.parametrize("to", offers("writers"))
 def test_export_holds_or_names_it(to, name, tmp_path, capsys):
     subject = SUBJECTS[name]
     ending = ".py" if to == "exudyn" else f".{'xml' if to == 'mjcf' else to}"
