@@ -16,7 +16,7 @@ from ...report.table import print_signs
 from ...report.terminal import FittingTable
 from .conformance import Capability, sparkline
 from .results import Gradient, SweepResults
-from .study_choices import Incomplete
+from .study_choices import Incomplete, Mode
 
 
 def limit_notes(results: SweepResults) -> list[str]:
@@ -92,9 +92,10 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
 
 
 def _extremes(results: SweepResults) -> FittingTable:
+    by = "offset" if results.mode == Mode.ONE_AT_A_TIME else "st. dev."
     table = terminal.columns(
         *("output", "unit", ">least", ">variant", ">most", ">variant"),
-        *(">largest\nst. dev.", ">largest\n1-99 %", "largest effect\n(gradient x st. dev.)"),
+        *(">largest\nst. dev.", ">largest\n1-99 %", f"largest effect\n(gradient x {by})"),
     )
     for name, each in results.outputs.items():
         unit, scale = results.shown_unit(each.unit)

@@ -63,8 +63,10 @@ def axle_of(folder, template, capsys, motion):
     return replace(case, mechanism=mechanism, rig=Rig(tire_stiffness=2e5))
 
 
+CHEAP = ("mcpherson", "five_link", "semi_trailing_arm")
+"""Templates whose axles are solved by day: by a strut, by rods and by an arm."""
 MOTIONS = [
-    (name, motion)
+    pytest.param(name, motion, marks=() if name in CHEAP else pytest.mark.nightly)
     for name, template in TEMPLATES.items()
     for motion in ("heave", "roll", "steer")
     if motion != "steer" or template.steered

@@ -138,7 +138,9 @@ def test_page_gradients_equal_json(shown):
 
 
 def test_page_effects_equal_json(tmp_path):
-    found, _, html = study(tmp_path, "one_at_a_time")
+    found, text, html = study(tmp_path, "one_at_a_time")
+    assert "(gradient x offset)" in text
+    assert all(each["deviation"] == each["scale"] for each in found["gradients"])
     rows = html.rows("One at a time")
     for (name, offset, *cells), each in zip(rows, found["effects"], strict=True):
         assert_row([name, *offset.split()], [each["coordinate"], MM * each["offset"], "mm"])
