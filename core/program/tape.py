@@ -282,10 +282,8 @@ Gradient: TypeAlias = dict[int, Scalar]
 """Derivatives by position of the input; zero derivatives are left out."""
 
 
-def _weights(
-    smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0, *_: Scalar
-) -> tuple[Scalar, ...]:
-    """Return the derivatives of an operation by its operands a, b, ...; y is its value."""
+def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
+    """Return the derivatives of an operation by its operands a and b; y is its value."""
     match op:
         case "+":
             return 1.0, 1.0
@@ -307,11 +305,8 @@ def _weights(
             sign = 1.0 if op == "max" else -1.0
             first = where_larger(a - b + 1.0, a - b - 1.0, 0.5 + 0.5 * sign, 0.5 - 0.5 * sign)
             return first, 1.0 - first
-        case "larger" if smooth:
+        case "larger" if smooth:  # it selects coefficients, which are constants of a piece
             return 0.0, 0.0
-        case "where" if smooth and isinstance(a, Traced):
-            first = y.tape.node("where", a.number, y.tape.number(1.0), y.tape.number(0.0))
-            return 0.0, first, 1.0 - first
         case _:
             raise TypeError(
                 f"operation {op!r} has a kink and no derivative; leave it out of equations to be"
@@ -325,9 +320,9 @@ def jacobian(
     """Return the derivatives of each value by the inputs, without zeros.
 
     Args:
-        smooth: "min", "max" and choices are parts of smooth functions, such as the pieces of a
-            curve; at the kink itself, where they need a derivative of one side, it is that of the
-            second operand.
+        smooth: "min" and "max" are parts of smooth functions, such as the pieces of a curve, and
+            "larger" selects a piece; at the kink itself, where they need a derivative of one side,
+            it is that of the second operand.
 
     Raises:
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",
