@@ -45,6 +45,13 @@ class ListRuns(Command):
     remove: tuple[int, ...] = option(
         "remove these runs, for example damaged ones", whole(1), "RUN", several="once"
     )
+    accept: tuple[str, ...] = option(
+        "accept what is worse in the last run of a case in an engine, which becomes their"
+        " baseline; needs --reason",
+        metavar="CASE:ENGINE",
+        several="once",
+    )
+    reason: str | None = option("why it is accepted, for the next report", metavar="TEXT")
     plot: Path | None = destination(
         "draw errors and times over the runs as an HTML page", Path, "FILE.html"
     )
@@ -52,18 +59,28 @@ class ListRuns(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
+        from ..history.judging import accept
         from ..history.queries import read
         from ..history.store import Store
+        from ..report.regressions import accepted_says
 
         if self.history is None:
             raise KincheckError(
                 f"history: no file is given. Give --history FILE, or set {HISTORY}."
             )
         refuse(self.unwritable())
-        with Store(Path(self.history), writable=bool(self.remove)) as store:
+        reason = (self.reason or "").strip()
+        if bool(self.accept) != bool(reason):
+            raise KincheckError(
+                "history: --accept and --reason belong together. Give both, for example --accept"
+                ' crank:mujoco --reason "MuJoCo 4 sums in another order".'
+            )
+        with Store(Path(self.history), writable=bool(self.remove or self.accept)) as store:
             for run in self.remove:
                 store.remove(run)
                 print(f"run {run} is removed")
+            for found in accept(store, self.accept, reason):
+                print(accepted_says(found))
             chosen: dict[str, Any] = {"cases": self.case, "engines": self.engine}
             plans = [pair for row in store.runs() for pair in row.plan]
             for place, (what, names) in enumerate((("case", self.case), ("engine", self.engine))):
@@ -191,9 +208,9 @@ class ReportChanges(Command):
         "?",
     )
     against: str = option(
-        "run to compare with: a number or file, last-green (an earlier run without faults and"
-        " with the most of the run's comparisons, the latest of several) or BRANCH-baseline"
-        " (likewise, on that branch without uncommitted changes); default %(default)s",
+        "run to compare with: a number or file, last-green (of each pair the last run that was no"
+        " worse than the one before, or was accepted) or BRANCH-baseline (the run of that branch,"
+        " without uncommitted changes, with most of its pairs); default %(default)s",
         metavar="RUN",
         default="last-green",
     )

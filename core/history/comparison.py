@@ -17,9 +17,19 @@ from ..harness.labels import UNMADE, motion_unit, number
 from ..harness.record import Deviation, Facts, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
-from .findings import Finding, Kind, Loose, Regressions, Step, changes, same_machine
+from .findings import (
+    Accepted,
+    Change,
+    Finding,
+    Kind,
+    Loose,
+    Regressions,
+    Step,
+    changes,
+    same_machine,
+)
 from .queries import IDLE, NIGHTS, NOTHING, Entry, History, calibration, read, same_task
-from .runs import Subject
+from .states import RECENT, State, accepted_in
 from .steps import (
     ENOUGH,
     HEADROOM,
@@ -32,18 +42,17 @@ from .steps import (
     TIME,
     TIME_FLOOR,
     UNJUDGED,
-    crept,
     drift,
     has_drifted,
     slowest,
     standing_steps,
     steps,
+    with_crept,
 )
-from .store import Store
+from .store import Pair, Store
+from .subjects import Subject
 
 PHASES = ("build", "first", "warm", "compare")
-RECENT = 20
-"""Number of latest runs that give the spread of times on the machine."""
 NO_REASON = "no reason is given"
 
 Values: TypeAlias = Sequence[float | None]
@@ -69,10 +78,11 @@ def regressions(
         HistoryError: the history cannot be read.
     """
     around = _around(subject, store)
-    limit = slowest(_on_machine(subject, around, before=subject.before))
+    limit = time_limit(subject)
     every = steps(around)
     standing, over = standing_steps(every), [each for each in every if each.worse and each.repaired]
     records, why = subject.results.records, subject.results.unread
+    accepted, told = _accepted(subject, store)
     found = [
         Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE))
         for case, engine, mode in subject.results.missing
@@ -80,8 +90,12 @@ def regressions(
     if against is not None:
         number = -math.inf if against.number is None else against.number
         found += compare(subject, against, _on_machine(subject, around, before=number + 1), limit)
-        found += crept(subject, around, found)
+        found = with_crept(subject, found)
     found += _find_missing(subject, store, found)
+    if against is not None and against.bases and store is not None:
+        found = [_of_state(finding, subject, against, store) for finding in found]
+    else:
+        found = [_since(finding, standing) for finding in found]
     return Regressions(
         run=subject.label,
         against=against.label if against else None,
@@ -94,11 +108,33 @@ def regressions(
         passed_by=[*subject.passed_by],
         time_limit=limit,
         missing_is_failure=missing_is_failure,
-        findings=[_since(finding, standing) for finding in found],
+        findings=[each for each in found if each.pair not in accepted or not each.kind.regression],
         changes=changes(subject.facts, against.facts) if against else [],
         steps=standing + over,
         loose=loose(around, subject.facts.get("cases", {})),
+        accepted=[*accepted.values(), *told],
     )
+
+
+def time_limit(subject: Subject) -> float:
+    """Return the smallest ratio of times that is slower, by the latest runs on the machine."""
+    series = [[time.seconds for time in state.times] for state in subject.states.values()]
+    return slowest(series, max(map(len, series), default=0))
+
+
+def _of_state(finding: Finding, subject: Subject, against: Subject, store: Store) -> Finding:
+    """Return the finding with its first run, the run compared with, and the changes between the
+    runs where it began.
+    """
+    base, state = against.bases.get(finding.pair), subject.states.get(finding.pair)
+    finding = msgspec.structs.replace(finding, against=base)
+    if not finding.kind.regression:
+        return finding
+    since = (state and state.since(finding)) or subject.number
+    other = list[Change]()
+    if base is not None and since not in (None, subject.number):
+        other = changes(*(store.run(run).circumstances for run in (since, base)))
+    return msgspec.structs.replace(finding, since=since, changes=other)
 
 
 def _around(subject: Subject, store: Store | None) -> History:
@@ -125,6 +161,21 @@ def _on_machine(subject: Subject, around: History, *, before: float) -> History:
         for pair, entries in around.pairs.items()
     }
     return History(latest, pairs)
+
+
+def _accepted(subject: Subject, store: Store | None) -> tuple[dict[Pair, Accepted], list[Accepted]]:
+    """Return what was accepted in the run, by pair, and in the last runs of its pairs before it."""
+    if store is None:
+        return {}, []
+    now = accepted_in(store, subject.number) if subject.number is not None else {}
+    last = {state.run for state in subject.states.values()}
+    earlier = {run: accepted_in(store, run) for run in sorted(last)}
+    told = [
+        found
+        for pair, state in subject.states.items()
+        if pair not in now and (found := earlier[state.run].get(pair)) is not None
+    ]
+    return now, told
 
 
 def _since(finding: Finding, standing: list[Step]) -> Finding:
@@ -174,7 +225,9 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
     for record in {record.pair: record for record in now.results.records}.values():
         old = earlier.pop(record.pair, None)
         if old is None:
-            kind = Kind.FAILURE if record.outcome.bad else Kind.ADDED
+            known = record.pair in now.states and record.outcome is Outcome.PASS
+            kind = Kind.FIXED if known else Kind.ADDED
+            kind = Kind.FAILURE if record.outcome.bad else kind
             findings.append(Finding.of(kind, record, _result(record)))
             continue
         findings += _outcomes(record, old)
@@ -182,8 +235,12 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
         findings += _find_moved(record, old)
         findings += _errors(record, old)
         findings += _references(record, *references)
-        usual = _usual_times(before, old, history.pairs.get(record.pair, ()), history)
-        findings += _slower(record, *usual if alike else (None, usual[1]), now, slowest)
+        state = now.states.get(record.pair)
+        if before.bases and state is not None:
+            findings += _slower_on_machine(record, state, now, slowest)
+        else:
+            usual = _usual_times(before, old, history.pairs.get(record.pair, ()), history)
+            findings += _slower(record, *usual if alike else (None, usual[1]), now, slowest)
         if old.solved and record.solved:
             solutions += _numbers(record, old)
             solutions += _residual(record, old)
@@ -423,6 +480,29 @@ def _slower(
         message = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
         about = {"before": should, "now": seconds, "ratio": ratio, "limit": limit}
         yield Finding.of(Kind.SLOWER, now, message, **about)
+
+
+def _slower_on_machine(
+    now: Record, state: State, subject: Subject, limit: float
+) -> Iterator[Finding]:
+    """Yield a finding if a solve is slower than the latest good ones of the pair on the machine.
+
+    On a machine without any, a pair that was slower before still is.
+    """
+    good = [time for time in state.times if not time.slower][-ENOUGH:]
+    open_since = [each.since for each in state.open if each.kind is Kind.SLOWER]
+    if not good or now.seconds is None or now.seconds.own is None:
+        if open_since and now.solved:
+            message = f"slower in run {state.run}, and no good time on this machine to compare with"
+            yield Finding.of(Kind.SLOWER, now, message)
+        return
+    in_loops = [time.seconds / time.loop for time in good if time.loop]
+    usual = statistics.median(time.seconds for time in good)
+    # the spread of so few times is unknown
+    limit = limit if len(good) >= ENOUGH else limit**2
+    yield from _slower(
+        now, usual, statistics.median(in_loops) if in_loops else None, subject, limit
+    )
 
 
 def _numbers(now: Record, before: Record) -> Iterator[Finding]:

@@ -105,6 +105,34 @@ MIGRATIONS = (
     FROM records JOIN facts ON facts.id = records.run_id LEFT JOIN json_each(records.errors) AS error CROSS JOIN motions
     ORDER BY run, "case", engine, mode, output;
     """,
+    """
+    CREATE TABLE states (              -- of each pair after a run; see states.State
+        run_id INTEGER NOT NULL REFERENCES runs (id),
+        case_name TEXT NOT NULL,       -- empty, as engine and mode: a run without readable records
+        engine TEXT NOT NULL,
+        mode TEXT NOT NULL,
+        options TEXT NOT NULL,         -- JSON: as Results.run, selection.options; empty if not told
+        machine TEXT NOT NULL,         -- the processor
+        loop REAL,                     -- seconds of the calibration loop
+        begun INTEGER NOT NULL,        -- the first run of the series, or the last accepted one
+        base_run INTEGER,              -- the baseline of the next run; null: none was good yet
+        open TEXT NOT NULL,            -- JSON: [[kind, output, motion, since], ...], what is worse
+        levels TEXT NOT NULL,          -- JSON: the least lasting error by output and motion
+        PRIMARY KEY (run_id, case_name, engine, mode)
+    );
+    CREATE INDEX states_of_a_pair ON states (case_name, engine, mode, run_id);
+    CREATE TABLE accepted (
+        run_id INTEGER NOT NULL REFERENCES runs (id),
+        case_name TEXT NOT NULL,
+        engine TEXT NOT NULL,
+        mode TEXT NOT NULL,
+        who TEXT NOT NULL,
+        made TEXT NOT NULL,            -- ISO 8601, UTC
+        what TEXT NOT NULL,            -- JSON: as states.open at that time
+        reason TEXT NOT NULL,
+        PRIMARY KEY (run_id, case_name, engine, mode)
+    );
+    """,
 )
 """One text for each version of the schema, which migrates the tables of the previous version.
 Published texts never change.

@@ -42,13 +42,13 @@ class Kind(StrEnum):
 
 
 WHY: Mapping[Kind, str] = {
-    Kind.FAILURE: "these results were right, or at least not wrong, and are no longer reliable",
+    Kind.FAILURE: "these results are not reliable: they were before, or never have been",
     Kind.LOST: (
         "results that are no longer reached or compared are not checked: a fault there goes unseen"
     ),
     Kind.UNJUDGED: "solved, but no longer compared: a fault there goes unseen",
     Kind.GONE: "values that were numbers are null now: readers of the results lose data",
-    Kind.MOVED: "the case has changed, or its solution belongs to another assembly",
+    Kind.MOVED: "the values differ: the case, its solution or its assembly has changed",
     Kind.FREEDOM: (
         "the mechanism has other degrees of freedom: it has changed, or the count is wrong"
     ),
@@ -56,7 +56,7 @@ WHY: Mapping[Kind, str] = {
     Kind.DRIFTED: "within tolerance, but a decimal digit worse: a computation has changed",
     Kind.RESIDUAL: "the constraints are met three digits worse: the solution is less converged",
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
-    Kind.FIXED: "they failed in the run compared with",
+    Kind.FIXED: "they failed in the run compared with, or in all earlier ones",
     Kind.JUDGED: "nothing was compared in the run compared with",
     Kind.TOLERANCE: "a result may pass now that failed before, or the reverse",
     Kind.REFERENCE: (
@@ -68,44 +68,6 @@ WHY: Mapping[Kind, str] = {
     Kind.ABSENT: "not requested, or removed from the library: nothing is known of them",
 }
 """Why a kind matters."""
-
-
-class Finding(msgspec.Struct, frozen=True, kw_only=True):
-    """One difference between the runs.
-
-    Attributes:
-        output, motion: the subject; null for a finding on the whole pair.
-        before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null
-            without a number.
-        ratio: ratio of now to before, for a time corrected for the speed of the machine; null
-            without one.
-        limit: the smallest ratio that is reported.
-        since: the first run with the finding, if the history has it.
-    """
-
-    kind: Kind
-    case: str
-    engine: str
-    mode: str
-    message: str
-    output: str | None = None
-    motion: str | None = None
-    before: float | None = None
-    now: float | None = None
-    ratio: float | None = None
-    limit: float | None = None
-    since: int | None = None
-
-    @staticmethod
-    def of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
-        """Return a finding about the pair of a record."""
-        about |= {"case": record.case, "engine": record.engine, "mode": record.mode}
-        return Finding(kind=kind, message=message, **about)
-
-    @property
-    def pair(self) -> tuple[str, str, str]:
-        """Case, engine and mode."""
-        return self.case, self.engine, self.mode
 
 
 class Change(msgspec.Struct, frozen=True, kw_only=True):
@@ -123,6 +85,48 @@ def _short(value: Any) -> str:
     """Return a value as short text: a commit by its first digits."""
     text = "none" if value is None else str(value)
     return text[:10] if len(text) == 40 and text.isalnum() else text
+
+
+class Finding(msgspec.Struct, frozen=True, kw_only=True):
+    """One difference between the runs.
+
+    Attributes:
+        output, motion: the subject; null for a finding on the whole pair.
+        before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null
+            without a number.
+        ratio: ratio of now to before, for a time corrected for the speed of the machine; null
+            without one.
+        limit: the smallest ratio that is reported.
+        since: the first run with the finding, if the history has it.
+        against: the run compared with, if the history has it.
+        changes: other differences between the first run with the finding and the run before it.
+    """
+
+    kind: Kind
+    case: str
+    engine: str
+    mode: str
+    message: str
+    output: str | None = None
+    motion: str | None = None
+    before: float | None = None
+    now: float | None = None
+    ratio: float | None = None
+    limit: float | None = None
+    since: int | None = None
+    against: int | None = None
+    changes: list[Change] = []
+
+    @staticmethod
+    def of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
+        """Return a finding about the pair of a record."""
+        about |= {"case": record.case, "engine": record.engine, "mode": record.mode}
+        return Finding(kind=kind, message=message, **about)
+
+    @property
+    def pair(self) -> tuple[str, str, str]:
+        """Case, engine and mode."""
+        return self.case, self.engine, self.mode
 
 
 class Step(msgspec.Struct, frozen=True, kw_only=True):
@@ -178,6 +182,23 @@ class Loose(msgspec.Struct, frozen=True, kw_only=True):
     why: str
 
 
+class Accepted(msgspec.Struct, frozen=True, kw_only=True):
+    """A pair of a run that a person has accepted: the new baseline of the pair.
+
+    Attributes:
+        what: what was worse.
+    """
+
+    case: str
+    engine: str
+    mode: str
+    run: int
+    who: str
+    made: str
+    what: list[Kind]
+    reason: str
+
+
 class RunName(msgspec.Struct, frozen=True, kw_only=True):
     """The displayed name of a run, its number in the history if it has one, and the time of its
     start.
@@ -204,6 +225,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         steps: first the standing ones, then the repaired ones (`Step.repaired`).
         time_limit: the smallest ratio of times that is reported as slower.
         missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
+        accepted: pairs accepted in this run, or in their last run before it.
     """
 
     schema: Literal["kincheck-regression/1"] = "kincheck-regression/1"
@@ -222,6 +244,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     changes: list[Change]
     steps: list[Step]
     loose: list[Loose]
+    accepted: list[Accepted] = []
 
     def fails(self, kind: Kind) -> bool:
         """Return whether findings of a kind are regressions in this report."""

@@ -229,41 +229,6 @@ def faultless(store: Store) -> set[int]:
     }
 
 
-def compared_quantities(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
-    """Return the compared outputs and motions of a run's pairs whose engine was installed and able.
-
-    Raises:
-        HistoryError: the file cannot be read.
-    """
-    return {
-        pair: {
-            (output, motion) for output, each in entry.errors.items() for motion, _ in each.items()
-        }
-        for pair, entry in entries_of(store, run)
-        if entry.outcome not in IDLE
-    }
-
-
-def most_compared(store: Store, pairs: Collection[Pair]) -> dict[int, int]:
-    """Return how many of these pairs each run compared, plus their outputs and motions, without
-    reading its records: pairs of idle engines count, too.
-
-    Raises:
-        HistoryError: the file cannot be read.
-    """
-    # no text in a JSON string looks like this key: its quotation marks are escaped
-    key = '"max_abs":'
-    keys = f"(length(errors) - length(replace(errors, '{key}', ''))) / {len(key)}"
-    columns = ", ".join(f"json_extract(value, '$[{k}]')" for k in range(3))
-    query = (
-        f"SELECT run_id, sum(1 + {keys}) FROM records WHERE (case_name, engine, mode) IN (SELECT"
-        f" {columns} FROM json_each(?)) GROUP BY run_id"
-    )
-    with store.explained("read"):
-        text = msgspec.json.encode([*pairs]).decode()
-        return dict(store.connection.execute(query, (text,)).fetchall())
-
-
 def calibration(facts: Facts) -> float | None:
     """Return the seconds of the calibration loop in a run; None if it was not measured."""
     seconds = facts.get("calibration_seconds")

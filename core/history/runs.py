@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from datetime import UTC, datetime
 from os.path import exists
@@ -20,53 +20,18 @@ from ..harness.provenance import circumstances, conditions, plain, references
 from ..harness.record import Facts, Record, Results
 from ..harness.results_file import read_results
 from ..harness.run import plan_pairs
-from .findings import RunName
+from .judging import judge_runs
 from .queries import (
     NIGHTS,
     choose_state_run,
-    compared_quantities,
     faultless,
-    most_compared,
     same_options,
 )
-from .store import HistoryError, Pair, RunRow, Store
+from .store import HistoryError, RunRow, Store
+from .subjects import Subject, last_good, with_states
 
 LAST_GREEN = "last-green"
 BASELINE = "-baseline"
-
-
-@dataclass(frozen=True)
-class Subject:
-    """A run to be compared.
-
-    Attributes:
-        number: number in the history; None for a run outside it.
-        before: runs with smaller numbers are earlier; infinite if all runs are.
-        passed_by: numbers of later runs of something else, which do not change the judgement.
-    """
-
-    name: str
-    number: int | None
-    results: Results
-    before: float
-    passed_by: Sequence[int] = ()
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """The circumstances of the run."""
-        return self.results.run
-
-    @property
-    def pairs(self) -> set[Pair]:
-        """The planned pairs of the run."""
-        return {record.pair for record in self.results.records} | {*self.results.missing}
-
-    @property
-    def label(self) -> RunName:
-        """The run's name in a report."""
-        git: dict[str, Any] = self.facts.get("git") or {}
-        known = {key: str(self.facts.get(key, "unknown")) for key in ("started", "host")}
-        return RunName(name=self.name, number=self.number, commit=git.get("commit"), **known)
 
 
 def find(name: str | None, store: Store | None) -> Subject:
@@ -78,6 +43,8 @@ def find(name: str | None, store: Store | None) -> Subject:
     Raises:
         KincheckError: there is none, or it cannot be read.
     """
+    if store is not None:
+        judge_runs(store)
     if name is not None and not name.isdecimal():
         return _in_file(Path(name), store)
     if store is None:
@@ -113,13 +80,16 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
     if name == LAST_GREEN or (name.endswith(BASELINE) and not exists(name)):
         if store is None:
             return None, f"{name} needs a history, and none is given"
-        row = _last_green(store, subject) if name == LAST_GREEN else _baseline(store, name, subject)
+        if name == LAST_GREEN:
+            found = last_good(subject, store)
+            return (
+                (found, "") if found.bases else (None, "no earlier green run of any of its pairs")
+            )
+        row = _baseline(store, name, subject)
         if row is not None:
             with store.sparing():
                 return _stored_run(store, row, name.replace("-", " ")), ""
             return find_against(name, subject, store)  # the next best
-        if name == LAST_GREEN:
-            return None, "no earlier green run has any of its pairs"
         known = sorted({str(row.git["branch"]) for row in store.runs() if row.git.get("branch")})
         return None, (
             f"no earlier run of branch {name.removesuffix(BASELINE)!r}, without changes to its"
@@ -144,37 +114,15 @@ def _in_file(file: Path, store: Store | None) -> Subject:
     same = [row.id for row in rows if (row.started, row.key["host"], row.command) == known]
     later = [row.id for row in rows if row.started > str(facts.get("started", "~"))]
     number = max(same, default=None)
-    return Subject(str(file), number, results, number or min(later, default=math.inf))
+    subject = Subject(str(file), number, results, number or min(later, default=math.inf))
+    return with_states(subject, store) if store else subject
 
 
 def _stored_run(store: Store, row: RunRow, rule: str = "") -> Subject:
     name = f"run {row.id}" + (f" ({rule})" if rule else "")
     if row.status != "finished":
         name += ", without an end" if row.status == "killed" else f", {row.status}"
-    return Subject(name, row.id, store.results(row.id), row.id)
-
-
-def _last_green(store: Store, subject: Subject) -> RunRow | None:
-    """Return the green run with the most comparisons of the subject's plan.
-
-    The subject's own comparisons are no measure: a lost one would be reported once, and never
-    again.
-    """
-    outputs = {record.pair: {*record.errors} for record in subject.results.records}
-    good = faultless(store)
-
-    def shared_count(row: RunRow) -> int:
-        """Return the number of comparisons; outputs removed from a case do not count."""
-        there = compared_quantities(store, row.id)
-        count = 0
-        for pair in subject.pairs & there.keys():
-            still = outputs.get(pair)  # empty if the comparison is missing
-            count += 1 + sum(not still or output in still for output, _ in there[pair])
-        return count
-
-    most = most_compared(store, subject.pairs)
-    rows = [row for row in store.runs() if row.id in good and row.id < subject.before]
-    return _best(store, rows, subject, most, shared_count)
+    return with_states(Subject(name, row.id, store.results(row.id), row.id), store)
 
 
 def _baseline(store: Store, name: str, subject: Subject) -> RunRow | None:
@@ -189,38 +137,12 @@ def _baseline(store: Store, name: str, subject: Subject) -> RunRow | None:
         and row.git.get("branch") == name.removesuffix(BASELINE)
         and not row.git.get("changed")
     ]
-    shared_count = {row.id: len(subject.pairs.intersection(row.plan)) for row in rows}
-    return _best(store, rows, subject, shared_count, lambda row: shared_count[row.id])
-
-
-def _best(
-    store: Store,
-    rows: Sequence[RunRow],
-    subject: Subject,
-    most: Mapping[int, int],
-    shared_count: Callable[[RunRow], int],
-) -> RunRow | None:
-    """Return the run that shares the most, the latest of several; None without any.
-
-    Runs with the subject's options come first.
-
-    Args:
-        most: bounds of what each run shares; they spare reading most runs.
-    """
-
-    def key(row: RunRow, amount: int) -> tuple[bool, int, int]:
-        return same_options(row.key, subject.facts), amount, row.id
-
-    best: tuple[tuple[bool, int, int], RunRow] | None = None
-    sharing = [(key(row, most[row.id]), row) for row in rows if most.get(row.id)]
-    for bound, row in sorted(sharing, key=lambda each: each[0], reverse=True):
-        if best and bound < best[0]:
-            break
-        with store.sparing():
-            amount = shared_count(row)
-            if amount and (best is None or key(row, amount) > best[0]):
-                best = key(row, amount), row
-    return best and best[1]
+    shared = {row.id: len(subject.pairs.intersection(row.plan)) for row in rows}
+    return max(
+        (row for row in rows if shared[row.id]),
+        key=lambda row: (same_options(row.key, subject.facts), shared[row.id], row.id),
+        default=None,
+    )
 
 
 def digest(*things: Any) -> str:
@@ -302,7 +224,15 @@ class Keeping:
                     f"{error}; all records are stored, but run {self.run} has no end; --resume"
                     " gives it one"
                 )
+            else:
+                self._judge()
         self.store.close()
+
+    def _judge(self) -> None:
+        try:
+            judge_runs(self.store)
+        except HistoryError as error:
+            self.problems.append(f"{error}; run {self.run} is stored, and its report judges it")
 
 
 def keep(

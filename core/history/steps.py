@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise, product
+from itertools import combinations, pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,8 +29,8 @@ from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Change, Finding, Kind, Step, changes
 from .queries import IDLE, Entry, History, calibration, unit_of
-from .runs import Subject
 from .store import Pair
+from .subjects import Subject
 
 DRIFT = 10.0
 """Ratio of errors: a decimal digit. Another order of summation changes round-off by a factor of 3
@@ -102,18 +102,19 @@ def has_drifted(before: float, now: float, tolerance: float) -> bool:
     return now > max(DRIFT_FLOOR * tolerance, DRIFT * before)
 
 
-def slowest(history: History) -> float:
+def slowest(series: Iterable[Sequence[float]], runs: int) -> float:
     """Return the largest ratio of times that is not slower, by the spread of all pairs from run to
     run.
 
     The spread is that of ratios of successive runs, so a true change of speed counts once; about a
     median it would count in every later run.
+
+    Args:
+        series: times of each pair in the order of the runs.
+        runs: number of these runs.
     """
-    series = (
-        [entry.seconds for entry in entries if entry.seconds] for entries in history.pairs.values()
-    )
     ratios = [max(a, b) / min(a, b) for times in series for a, b in pairwise(times)]
-    if len(history.runs) < ENOUGH or len(ratios) < 2:
+    if runs < ENOUGH or len(ratios) < 2:
         return TIME_RATIO
     usual = statistics.quantiles(ratios, n=10)[-1]
     return max(TIME_RATIO, math.exp(WIDE * math.log(max(usual, 1.0))))
@@ -390,37 +391,34 @@ def _step(history: History, pair: Pair, last: Entry, first: Entry, **about: Any)
     )
 
 
-def crept(subject: Subject, around: History, findings: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the subject's errors that grew by less than a digit per night, but are a digit above
-    the least error since their last step, with the same tolerance and standard. Neither steps nor
-    the comparison with the last night show them.
-
-    Args:
-        findings: the findings on the subject so far.
+def with_crept(subject: Subject, findings: Sequence[Finding]) -> list[Finding]:
+    """Return the findings on a run with the errors that grew by less than a digit per night, but
+    are a digit above the least error since their baseline was accepted, with the same tolerance and
+    standard. Neither steps nor the comparison with one night show them in full.
     """
-    known = {
-        (*each.pair, each.output, each.motion) for each in findings if each.kind is Kind.DRIFTED
+    found = {
+        (*each.pair, each.kind, each.output, each.motion, each.message): each for each in findings
+    }
+    drifted = {
+        (*each.pair, each.output, each.motion): (key, each.before or 0.0)
+        for key, each in found.items()
+        if each.kind is Kind.DRIFTED
     }
     for record in subject.results.records:
-        pairs = around.pairs.get(record.pair, ())
-        entries = [entry for entry in pairs if entry.run != subject.number]
-        for output, motion in product(record.errors, QUANTITIES):
-            now = getattr(record.errors[output], motion)
-            if now is None or not now.within or (*record.pair, output, motion) in known:
-                continue
-            errors = [
-                (entry, each)
-                for entry, each in errors_of(entries, output, motion)
-                if (each.tolerance, each.against) == (now.tolerance, now.against)
-            ]
-            if not errors:
-                continue
-            logs = np.log(above_floor(errors))
-            *_, start = 0, *change_points(logs, least=math.log(DRIFT), lasting=1)
-            entry, least = min(errors[start:], key=lambda each: (each[1].max_abs, -each[0].run))
-            if has_drifted(least.max_abs, now.max_abs, now.tolerance):
-                words = f", gradually since run {entry.run} (tolerance {number(now.tolerance)})"
-                yield drift(record, output, motion, least.max_abs, now, words)
+        state = subject.states.get(record.pair)
+        for output, levels in state.levels.items() if state else ():
+            for motion, least in levels.items():
+                now = getattr(record.errors.get(output), motion, None)
+                if now is None or not now.within:
+                    continue
+                key, before = drifted.get((*record.pair, output, motion), (None, math.inf))
+                alike = (least.tolerance, least.against) == (now.tolerance, now.against)
+                grown = has_drifted(least.error, now.max_abs, now.tolerance)
+                if alike and grown and least.error < before:
+                    words = f", gradually since run {least.run} (tolerance {number(now.tolerance)})"
+                    each = drift(record, output, motion, least.error, now, words)
+                    found[key or (*each.pair, each.kind, output, motion, each.message)] = each
+    return [*found.values()]
 
 
 def drift(

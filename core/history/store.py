@@ -101,7 +101,7 @@ class Store:
     """A history file. Every method raises HistoryError if the file cannot be read or written."""
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
-        self.path = path
+        self.path, self.writable = path, writable
         self.passed_over: dict[int, str] = {}  # reasons of unreadable runs
         self._runs: list[RunRow] | None = None
         with self.explained("opened"):
@@ -135,7 +135,7 @@ class Store:
             circumstances: as `Results.run`, with the start time and the command.
             references: as `Results.references`, for readers of an unfinished run.
         """
-        with self._transaction():
+        with self.transaction():
             row = {name: circumstances[name] for name in ("started", "command")}
             row |= {"status": "running", "identity": identity, "owner": owner()}
             row |= {"plan": _json(plan), "circumstances": _json(circumstances)}
@@ -148,7 +148,7 @@ class Store:
 
         From then on, this process owns it.
         """
-        with self._transaction():
+        with self.transaction():
             query = (
                 "SELECT id, owner FROM runs WHERE identity = ? AND status != 'finished' ORDER BY id"
                 " DESC"
@@ -172,7 +172,7 @@ class Store:
         row |= {f"{phase}_seconds": time for phase, time in seconds.items()}
         row |= {"errors": _json(record.errors)}
         row |= {"record": zlib.compress(msgspec.json.encode(record), QUICK)}
-        with self._transaction():
+        with self.transaction():
             self._insert("OR IGNORE INTO records", row)
 
     def _insert(self, where: str, row: Mapping[str, Any]) -> int:
@@ -182,7 +182,7 @@ class Store:
 
     def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
         """End the run, and store the other parts of the results, such as references."""
-        with self._transaction():
+        with self.transaction():
             for kind in ("references", "scenes", "suspects") if results is not None else ():
                 self._attach(run, kind, getattr(results, kind))
             self.connection.execute(
@@ -191,11 +191,12 @@ class Store:
 
     def remove(self, run: int) -> None:
         """Remove a run with its records and with texts that no other run uses."""
-        with self._transaction():
-            for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
-                removed = self.connection.execute(
-                    f"DELETE FROM {table} WHERE {column} = ?", (run,)
-                ).rowcount
+        with self.transaction():
+            self.connection.execute("DELETE FROM states WHERE run_id >= ?", (run,))
+            for table in ("accepted", "attachments", "records"):
+                self.connection.execute(f"DELETE FROM {table} WHERE run_id = ?", (run,))
+            query = "DELETE FROM runs WHERE id = ?"
+            removed = self.connection.execute(query, (run,)).rowcount
             self.connection.execute(
                 "DELETE FROM documents WHERE digest NOT IN (SELECT digest FROM attachments)"
             )
@@ -297,10 +298,11 @@ class Store:
             )
 
     @contextmanager
-    def _transaction(self) -> Generator[None]:
+    def transaction(self) -> Generator[None]:
+        """Do all changes of a block, or none."""
         self._runs = None
         with self.explained("written"):
-            self.connection.execute("BEGIN IMMEDIATE")
+            self.connection.execute("BEGIN IMMEDIATE" if self.writable else "BEGIN")
             try:
                 yield
                 self.connection.execute("COMMIT")

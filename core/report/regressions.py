@@ -16,7 +16,7 @@ from rich.text import Text
 from ..case.io.escape import visible
 from ..errors import number_of, shortened
 from ..harness.labels import motion_unit, number, product, unread_count
-from ..history.findings import WHY, Finding, Kind, Loose, Regressions, Step
+from ..history.findings import WHY, Accepted, Finding, Kind, Loose, Regressions, Step
 from ..unit_text import value_text
 from . import terminal
 from .sections import environment
@@ -172,6 +172,14 @@ def step_lines(steps: Iterable[Step], *, over: bool) -> list[str]:
     ]
 
 
+def accepted_says(each: Accepted) -> str:
+    """Return an acceptance as a sentence."""
+    return (
+        f"{each.case} in {product(each.engine, each.mode)} is accepted in run {each.run} by"
+        f" {each.who}, {each.made[:10]} ({', '.join(each.what)}): {each.reason}"
+    )
+
+
 STEPS = {False: "Steps in the history that still stand", True: "Steps that came and went"}
 """Titles of the lists of `step_lines`."""
 
@@ -238,6 +246,7 @@ def to_markup(found: Regressions) -> Markup:
                 (over, title, step_lines(found.steps, over=over)) for over, title in STEPS.items()
             ],
             passed_by=passed_by_says(found),
+            accepted=[accepted_says(each) for each in found.accepted],
             loose=loose_says(found.loose),
             longest=LONGEST,
         )
@@ -251,6 +260,8 @@ def _lines(found: Regressions) -> Iterator[str]:
         yield "Neither versions nor machine nor commit changed."
     yield ""
     yield from [passed_by_says(found), ""] if found.passed_by else []
+    for each in found.accepted:
+        yield from (escape_markdown(accepted_says(each)), "")
     for kind in Kind:
         group = rows(each for each in found.findings if each.kind is kind)
         if not group:
@@ -299,6 +310,8 @@ def print_regressions(found: Regressions, file: TextIO) -> None:
         _print_line(console, "neither versions nor machine nor commit changed")
     if passed_by := passed_by_says(found):
         _print_line(console, passed_by)
+    for each in found.accepted:
+        _print_line(console, accepted_says(each))
     for kind in Kind:
         group = rows(each for each in found.findings if each.kind is kind)
         if not group:

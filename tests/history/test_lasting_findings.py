@@ -110,10 +110,11 @@ def test_lost_results_stay_reported(path, gone):
         keep_changed(path, **gone)
     for run in ("2", "3", "63"):
         found = reported(path, run)
-        assert (found.against.number, told(found)) == (1, {(Kind.LOST, *FIRST)})
+        assert told(found) == {(Kind.LOST, *FIRST)}
+        assert {(each.against, each.since) for each in found.regressions} == {(1, 2)}
 
 
-def test_removed_output_is_reported_once(path):
+def test_removed_output_stays_until_accepted(path):
     nights(path, 1)
     fewer = {
         "errors": lambda errors: {"x": errors["x"]},
@@ -122,6 +123,8 @@ def test_removed_output_is_reported_once(path):
     for _ in range(2):
         keep_changed(path, **fewer)
     assert told(reported(path, "2")) == {(Kind.LOST, *FIRST)}
+    assert told(reported(path, "3")) == {(Kind.LOST, *FIRST)}
+    assert history(path, "--accept", "first:mujoco", "--reason", "y is of no use") == 0
     assert told(reported(path, "3")) == set()
 
 
@@ -145,17 +148,19 @@ def test_slow_drift_is_reported(path):
     assert finding.now == pytest.approx(125.0 * finding.before)
 
 
-def test_step_is_reported_once(path):
+def test_step_stays_until_repaired(path):
     nights(path, 3)
     for _ in range(3):
         keep_changed(path, **worse(100.0))
     assert [told(reported(path, run)) for run in ("4", "5", "6")] == [
         {(Kind.DRIFTED, *FIRST)},
-        set(),
-        set(),
+        {(Kind.DRIFTED, *FIRST)},
+        {(Kind.DRIFTED, *FIRST)},
     ]
     assert [(step.first, step.last) for step in reported(path).steps] == [(4, 3)]
-    assert [each.since for each in reported(path, "4").regressions] == [4]
+    assert [(each.since, each.against) for each in reported(path).regressions] == [(4, 3)]
+    nights(path, 1)
+    assert told(reported(path)) == set()
 
 
 def test_widened_tolerance_keeps_step(path):

@@ -145,7 +145,7 @@ def test_missing_pairs_are_failures_on_request(path, tmp_path, capsys):
     assert report(path) == 0
     said = capsys.readouterr().out
     assert "nothing regressed; 3 not in this run" in said
-    assert "| mujoco | first, second | pass there |" in said
+    assert "| mujoco | first, second | in run 2, by the same command |" in said
     assert report(path, "--missing-is-failure", "--out", tmp_path) == 1
     said = capsys.readouterr().out
     assert said.startswith("## run 3 against run 2 (last green): 3 not in this run")
@@ -163,7 +163,7 @@ def test_pair_of_last_run_is_missing(path, capsys):
     keep_changed(path, case="second", outcome=Outcome.FAIL)
     keep(path, records()[:2])
     found = reported(path)
-    assert found.against.number == 1
+    assert found.against.number == 2
     assert [(each.kind, each.case, each.message) for each in found.findings] == [
         (Kind.ABSENT, "second", "in run 2, by the same command")
     ] * 2
@@ -188,5 +188,5 @@ def test_missing_pairs_without_baseline(path, capsys):
     keep_changed(path, outcome=Outcome.FAIL)
     keep(path, records()[:2])
     assert report(path) == 0
-    assert "2 not in this run; nothing to compare with" in capsys.readouterr().out
+    assert "nothing regressed; 1 fixed; 2 not in this run" in capsys.readouterr().out
     assert report(path, "--missing-is-failure") == 1

@@ -1,0 +1,157 @@
+"""States over synthetic nights: what is worse stays red until it is good again or accepted, since
+the right run, and quiet nights are never red.
+"""
+
+import random
+
+import pytest
+from kincheck.core.harness.record import Outcome
+from kincheck.core.history.findings import Kind
+from msgspec.structs import replace
+
+from ..support.history_runs import (
+    FIRST,
+    changed,
+    history,
+    keep,
+    keep_changed,
+    nights,
+    records,
+    report,
+    reported,
+    times,
+    worse,
+)
+
+NIGHTS = 30
+
+
+def noisy(noise):
+    """Records of a night: times about 8 % and errors about 30 % off 2.5e-14 m."""
+    found = records(noise=noise)
+    for each in found:
+        for output in ("x", "y"):
+            factor = 0.05 * 2.0 ** noise.uniform(-0.5, 0.5)
+            about = {"case": each.case, "engine": each.engine}
+            found = changed(found, **about, **worse(factor, output))
+    return found
+
+
+def circumstances(noise, upgrade):
+    """Circumstances of a night: the loop's noise, and a version that may change."""
+    return {
+        "calibration_seconds": 0.02 * noise.uniform(0.9, 1.1),
+        "numpy": "2.1.0" if upgrade else "2.0.0",
+    }
+
+
+PLANTED = {
+    "drift": (worse(30000.0), Kind.DRIFTED),
+    "time": (times(2.6), Kind.SLOWER),
+    "failure": ({"outcome": Outcome.FAIL, "message": "x is off"}, Kind.FAILURE),
+    "lost": ({"solved": 7}, Kind.LOST),
+}
+
+
+def seeds(count):
+    """One seed by day, and the others at night."""
+    return [1, *(pytest.param(k, marks=pytest.mark.nightly) for k in range(2, count + 1))]
+
+
+@pytest.mark.parametrize("seed", seeds(40))
+def test_quiet_nights_are_never_red(path, seed):
+    noise = random.Random(seed)
+    upgrade = noise.randrange(5, NIGHTS)
+    for night in range(NIGHTS):
+        if noise.random() < 0.1:
+            continue  # a missing night
+        keep(path, noisy(noise), **circumstances(noise, night >= upgrade))
+        if night % 10 == 9 or night == NIGHTS - 1:
+            found = reported(path)
+            assert (found.regressions, found.steps) == ([], [])
+
+
+@pytest.mark.parametrize("what", PLANTED)
+@pytest.mark.parametrize("seed", seeds(8))
+def test_planted_step_stays_until_repaired(path, what, seed):
+    changes, kind = PLANTED[what]
+    noise = random.Random(seed)
+    begin = noise.randrange(7, 20)
+    lasting = 3 if what == "time" else noise.randrange(2, 9)
+    upgrade = noise.choice((begin, begin + 1, NIGHTS))
+    first = None
+    for night in range(begin + lasting + 2):
+        bad = begin <= night < begin + lasting
+        made = noisy(noise)
+        made = changed(made, **changes) if bad else made
+        run = keep(path, made, **circumstances(noise, night >= upgrade))
+        first = first or (run if bad else None)
+        if night < begin - 1:
+            continue
+        found = reported(path)
+        assert found.regressed is bad
+        if bad:
+            about = {(each.kind, each.case, each.engine, each.since) for each in found.regressions}
+            assert about == {(kind, *FIRST, first)}
+
+
+def test_accepted_step_is_told_once(path, capsys):
+    nights(path, 6)
+    for _ in range(2):
+        keep_changed(path, **worse(20.0), **times(2.6))
+    assert {each.since for each in reported(path).regressions} == {7}
+    assert history(path, "--accept", "first:mujoco", "--reason", "the new version") == 0
+    assert "first in mujoco is accepted in run 8 by " in capsys.readouterr().out
+    told = []
+    for _ in range(3):
+        found = reported(path)
+        assert found.regressions == []
+        told.append([each.reason for each in found.accepted])
+        keep_changed(path, **worse(20.0), **times(2.6))
+    assert told == [["the new version"], ["the new version"], []]
+    keep_changed(path, **worse(400.0), **times(2.6))
+    assert [(each.kind, each.since, each.against) for each in reported(path).regressions] == [
+        (Kind.DRIFTED, 12, 11)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--accept", "first:mujoco"], "--accept and --reason belong together"),
+        (["--reason", "so"], "--accept and --reason belong together"),
+        (["--accept", "frist:mujoco", "--reason", "so"], "did you mean 'first:mujoco'?"),
+        (["--accept", "first:mujoco", "--reason", "so"], "nothing to accept"),
+    ],
+)
+def test_wrong_acceptance_is_refused(path, capsys, words, said):
+    nights(path, 2)
+    assert history(path, *words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_other_machine_hides_no_slowdown(path):
+    nights(path, 6)
+    keep_changed(path, **times(2.6))
+    keep(path, changed(records(), **times(2.6)), processor="another")
+    (finding,) = reported(path).regressions
+    assert (finding.kind, finding.since, finding.against) == (Kind.SLOWER, 7, 6)
+    nights(path, 1)
+    assert report(path) == 0
+
+
+def test_other_failure_keeps_first_step(path):
+    nights(path, 3)
+    keep_changed(path, **worse(20.0))
+    keep_changed(path, outcome=Outcome.ERROR, errors={})
+    keep_changed(path, **worse(20.0))
+    assert [(each.kind, each.since) for each in reported(path).regressions] == [(Kind.DRIFTED, 4)]
+
+
+def test_pair_wrong_from_first_run(path):
+    bad = changed(records(), outcome=Outcome.FAIL)
+    for _ in range(2):
+        keep(path, bad)
+    assert [(each.kind, each.since) for each in reported(path).regressions] == [(Kind.FAILURE, 1)]
+    keep(path, [replace(each) for each in records()])
+    assert report(path) == 0
