@@ -299,6 +299,7 @@ class Case:
         balance: None unless its samples are equilibria.
         ranges: of joints of a model with a lower and an upper limit, by joint and freedom, from
             the model's zero [m or rad].
+        formerly: earlier names, whose history the case goes on with.
     """
 
     name: str
@@ -322,6 +323,7 @@ class Case:
     ranges: Mapping[tuple[str, str], tuple[float, float]] = field(
         default_factory=dict[tuple[str, str], tuple[float, float]]
     )
+    formerly: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

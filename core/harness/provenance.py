@@ -223,6 +223,7 @@ def case_facts(case: Case) -> dict[str, Any]:
         "signs": case.signs,
         "notes": notes(case),
         "outputs": {output.name: dict(output.facts) for output in case.outputs},
+        **({"formerly": list(case.formerly)} if case.formerly else {}),
         **(
             {"units": {"length": case.length_unit, "angle": case.angle_unit}}
             if case.hardpoints

@@ -28,8 +28,18 @@ from .findings import (
     changes,
     same_machine,
 )
-from .queries import IDLE, NIGHTS, NOTHING, Entry, History, calibration, read, same_task
-from .states import RECENT, State, accepted_in
+from .queries import (
+    IDLE,
+    NIGHTS,
+    NOTHING,
+    Entry,
+    History,
+    calibration,
+    present_names,
+    read,
+    same_task,
+)
+from .states import RECENT, State, accepted_in, base_record, state_before
 from .steps import (
     ENOUGH,
     HEADROOM,
@@ -94,6 +104,7 @@ def regressions(
     found += _find_missing(subject, store, found)
     if against is not None and against.bases and store is not None:
         found = [_of_state(finding, subject, against, store) for finding in found]
+        found = [_renamed(finding, subject, store, found) for finding in found]
     else:
         found = [_since(finding, standing) for finding in found]
     return Regressions(
@@ -189,6 +200,43 @@ def _since(finding: Finding, standing: list[Step]) -> Finding:
     return finding
 
 
+def _renamed(finding: Finding, subject: Subject, store: Store, found: Sequence[Finding]) -> Finding:
+    """Return the finding of a new pair with the missing pair of equal outputs, if there is one: the
+    case may have another name.
+    """
+    new = next((each for each in subject.results.records if each.pair == finding.pair), None)
+    if finding.kind is not Kind.ADDED or new is None or not new.solved:
+        return finding
+    for gone in found:
+        pair = (gone.case, *finding.pair[1:])
+        if gone.kind is not Kind.ABSENT or gone.pair != pair:
+            continue
+        state = state_before(store, pair, subject.before, subject.facts)
+        with store.sparing():
+            old = state and base_record(store, state.run, pair, subject.facts)
+            if state and old and old.solved and _alike(new, old):
+                message = (
+                    f"{finding.message}; looks like {gone.case} of run {state.run}: write"
+                    f' formerly = ["{gone.case}"] in the case file to go on with its history'
+                )
+                return msgspec.structs.replace(finding, message=message)
+    return finding
+
+
+def _alike(a: Record, b: Record) -> bool:
+    """Return whether two records have equal samples and outputs, up to last digits."""
+    return (
+        bool(a.outputs)
+        and same_samples(a, b)
+        and a.outputs.keys() == b.outputs.keys()
+        and all(
+            len(each.old) == len(each.new)
+            and _largest_difference(each.old, each.new) <= UNJUDGED * _largest(each.old)
+            for each in _quantities(a, b)
+        )
+    )
+
+
 def _find_missing(
     subject: Subject, store: Store | None, findings: Sequence[Finding]
 ) -> Iterator[Finding]:
@@ -205,7 +253,9 @@ def _find_missing(
         return
     known = subject.pairs | {each.pair for each in findings if each.kind is Kind.ABSENT}
     why = f"in run {last.id}, by the same command"
-    for case, engine, mode in last.plan:
+    present = present_names(subject.facts)
+    for name, engine, mode in last.plan:
+        case = present.get(name, name)
         if (case, engine, mode) not in known:
             yield Finding(kind=Kind.ABSENT, case=case, engine=engine, mode=mode, message=why)
 

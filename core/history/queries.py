@@ -118,6 +118,7 @@ class Entry:
         seconds: time of a warm solve without waiting for the processor [s]; None if it was not
             reached.
         us_per_step: see `Record`.
+        case: its name in that run.
     """
 
     run: int
@@ -126,6 +127,7 @@ class Entry:
     errors: Mapping[str, Deviations]
     seconds: float | None
     us_per_step: float | None
+    case: str
 
 
 @dataclass(frozen=True)
@@ -161,8 +163,15 @@ def read(
         HistoryError: the file cannot be read.
     """
 
+    if like is not None:
+        present = present_names(like)
+    else:
+        latest = next(iter(store.runs()), None)
+        present = present_names(latest.circumstances if latest else {})
+
     def wanted(pair: Pair) -> bool:
-        return (not cases or pair[0] in cases) and (not engines or pair[1] in engines)
+        name = present.get(pair[0], pair[0])
+        return (not cases or name in cases) and (not engines or pair[1] in engines)
 
     rows = (
         row
@@ -178,7 +187,8 @@ def read(
         with store.sparing():
             for pair, entry in entries_of(store, run):
                 if wanted(pair):
-                    pairs.setdefault(pair, []).append(entry)
+                    case, engine, mode = pair
+                    pairs.setdefault((present.get(case, case), engine, mode), []).append(entry)
     return History({run: row for run, row in runs.items() if run not in store.passed_over}, pairs)
 
 
@@ -203,7 +213,7 @@ def entries_of(store: Store, run: int) -> list[tuple[Pair, Entry]]:
             own = Seconds(warm=warm, waited=waited).own
             # runs of older versions keep a time per sample that includes waiting
             per_step = 1e6 * own / samples if own is not None and samples else None
-            entry = Entry(run, Outcome(outcome), version, errors, own, per_step)
+            entry = Entry(run, Outcome(outcome), version, errors, own, per_step, pair[0])
             found.append(((*pair,), entry))
     return found
 
@@ -227,6 +237,21 @@ def faultless(store: Store) -> set[int]:
         for row in store.runs()
         if row.status == "finished" and good.get(row.id) == len(row.plan)
     }
+
+
+def former_names(facts: Facts, case: str) -> tuple[str, ...]:
+    """Return the name of a case and its former names, as its file has them; a name that another
+    case of the run has now is left out.
+    """
+    cases: dict[str, Any] = facts.get("cases") or {}
+    former: Sequence[str] = cases.get(case, {}).get("formerly", ())
+    return (case, *(name for name in former if name not in cases))
+
+
+def present_names(facts: Facts) -> dict[str, str]:
+    """Return the present name of a case by each of its former names."""
+    cases: dict[str, Any] = facts.get("cases") or {}
+    return {name: case for case in cases for name in former_names(facts, case)[1:]}
 
 
 def calibration(facts: Facts) -> float | None:

@@ -25,7 +25,7 @@ from ..harness.record import (
     update_outcome,
 )
 from .findings import Accepted, Finding, Kind
-from .queries import calibration
+from .queries import calibration, former_names
 from .store import Pair, Store
 
 RECENT = 20
@@ -99,15 +99,6 @@ def options_of(facts: Facts) -> str:
     """Return the options of solution and judgement of a run as a text; empty if it has none."""
     selection = facts.get("selection")
     return msgspec.json.encode(selection["options"], order="sorted").decode() if selection else ""
-
-
-def former_names(facts: Facts, case: str) -> tuple[str, ...]:
-    """Return the name of a case and its former names, as its file has them; a name that another
-    case of the run has now is left out.
-    """
-    cases: dict[str, Any] = facts.get("cases") or {}
-    former: Sequence[str] = cases.get(case, {}).get("formerly", ())
-    return (case, *(name for name in former if name not in cases))
 
 
 def state_before(store: Store, pair: Pair, run: float, facts: Facts) -> State | None:

@@ -320,7 +320,7 @@ def _errors(history: History, pair: Pair, entries: Sequence[Entry], motion: str)
                 float(np.median([errors[k][1].max_abs for k in part]))
                 for part in (level.earlier, level.later)
             )
-            unit = unit_of(history.runs[level.first.run], pair[0], output)
+            unit = unit_of(history.runs[level.first.run], level.first.case, output)
             about = {"quantity": motion, "output": output, "unit": unit}
             step = _new_level(history, pair, level, before, now, **about)
             key, size = (step.first, step.worse, step.repaired), abs(level.now - level.before)

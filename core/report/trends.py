@@ -57,12 +57,12 @@ def run_name(row: RunRow) -> str:
     return f"{row.started[:16].replace('T', ' ')} #{row.id}"
 
 
-def largest_errors(entry: Entry, case: str, row: RunRow) -> dict[str, float]:
+def largest_errors(entry: Entry, row: RunRow) -> dict[str, float]:
     """Return the largest errors of the outputs by unit: of values, velocities and accelerations."""
     found: dict[str, float] = {}
     for name, deviations in entry.errors.items():
         for quantity, deviation in deviations.items():
-            unit = motion_unit(unit_of(row, case, name), quantity) or "1"
+            unit = motion_unit(unit_of(row, entry.case, name), quantity) or "1"
             found[unit] = max(found.get(unit, 0.0), deviation.max_abs)
     return found
 

@@ -2,15 +2,20 @@
 the right run, and quiet nights are never red.
 """
 
+import dataclasses
 import random
 
 import pytest
+from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.harness.provenance import case_facts
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.findings import Kind
 from msgspec.structs import replace
 
+from ..support.fakes import crank
 from ..support.history_runs import (
     FIRST,
+    RESULTS,
     changed,
     history,
     keep,
@@ -155,3 +160,53 @@ def test_pair_wrong_from_first_run(path):
     assert [(each.kind, each.since) for each in reported(path).regressions] == [(Kind.FAILURE, 1)]
     keep(path, [replace(each) for each in records()])
     assert report(path) == 0
+
+
+def under(name, found):
+    return [replace(each, case=name) if each.case == "first" else each for each in found]
+
+
+def named(*former):
+    """Facts of the cases after the new name."""
+    facts = dict(RESULTS.run["cases"])
+    about = {"formerly": list(former)} if former else {}
+    return {"cases": {"gate": facts.pop("first") | about, **facts}}
+
+
+def test_renamed_case_keeps_series(path, capsys):
+    nights(path, 6)
+    keep_changed(path, **worse(20.0))
+    for _ in range(2):
+        keep(path, under("gate", changed(records(), **worse(20.0))), **named("door", "first"))
+        found = reported(path)
+        about = [(each.kind, each.case, each.since, each.against) for each in found.regressions]
+        assert about == [(Kind.DRIFTED, "gate", 7, 6)]
+        assert [(each.case, each.first) for each in found.steps] == [("gate", 7)]
+        assert not {Kind.ADDED, Kind.ABSENT} & {each.kind for each in found.findings}
+    assert history(path, "--case", "gate", "--engine", "mujoco") == 0
+    assert capsys.readouterr().out.count("2026-11-0") >= 9
+    keep(path, under("gate", records()), **named("first"))
+    assert report(path) == 0
+
+
+def test_new_name_is_proposed_by_content(path):
+    nights(path, 3)
+    keep(path, under("gate", records()), **named())
+    said = {
+        each.engine: each.message for each in reported(path).findings if each.kind is Kind.ADDED
+    }
+    assert said.keys() == {"native", "mujoco"}
+    for message in said.values():
+        assert 'looks like first of run 3: write formerly = ["first"]' in message
+    other = changed(under("door", records()), case="door", engine="native", outputs={})
+    keep(path, [each for each in other if each.engine == "native"], **named())
+    assert "looks like" not in str(reported(path).findings)
+
+
+def test_case_file_keeps_former_names(tmp_path):
+    file = tmp_path / "crank.toml"
+    renamed = dataclasses.replace(crank("gate"), formerly=("door", "flap"))
+    file.write_text(case_text(renamed), "utf-8")
+    case = load_case(file)
+    assert case.formerly == ("door", "flap")
+    assert case_facts(case)["formerly"] == ["door", "flap"]

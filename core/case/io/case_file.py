@@ -72,6 +72,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
         length_unit=units.length.name,
         angle_unit=units.angle.name,
         free=free,
+        formerly=tuple(keys.formerly),
     )
     resting = None
     if keys.equilibrium is not None:
@@ -181,6 +182,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     if len(source) > LONGEST_TEXT:
         source = f"{source[: LONGEST_TEXT - 6]} [...]"
     top = {"schema": SCHEMA, "name": case.name, "source": source}
+    top |= {"formerly": [*case.formerly]} if case.formerly else {}
     top |= {"truth": str(case.truth)} if reference else {}
     lines += toml_table(top)
     if any(case.mechanism.gravity):

@@ -10,6 +10,7 @@ left out. `kincheck list --joints` prints all types with their keys.
 
     schema = "kincheck-case/1"
     name, source         name of the case, and source of its numbers
+    (formerly)           list of its earlier names, whose history it goes on with
     (gravity), [forces.NAME]   see masses and loads below
     (truth)              kind of the reference, with a reference only: closed_form,
                          third_party_data or in_house_oracle
@@ -263,6 +264,9 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     ]
     bodies: Table
     drivers: Table
+    formerly: Annotated[
+        list[Text], Meta(description="earlier names of the case, whose history it goes on with")
+    ] = []
     sweep: Table | None = None
     truth: Annotated[Truth, _one_of(Truth)] | None = None
     units: Table = {}
