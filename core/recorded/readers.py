@@ -88,7 +88,7 @@ def column_of(file: Path, where: str, head: Head, cells: Iterable[str]) -> Colum
             raise fault(file, f"{where} {k}", f"found {shown(cell)}, {expected}") from None
         printed.add(cell)
     found = np.array(values)
-    return Column(head, np.where(np.isfinite(found), found, np.nan), printed.half(found))
+    return Column(head, np.where(np.isfinite(found), found, np.nan), printed.half(np.nan_to_num(found), alone=True))
 
 
 _UNIT = re.compile(r"\[([^\]|]*)")
@@ -288,7 +288,7 @@ def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
         chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
         head = Head(*unit_of_head(file, layout.where, text))  # with the unit of a row of units
-        columns[k] = Column(head, values, printed.half(np.nan_to_num(values)))
+        columns[k] = Column(head, values, printed.half(np.nan_to_num(values), alone=True))
     rows = shortened(samples.left_out, MOST_NAMED)
     notes = [f"{file}: left out the rows without numbers: {rows}"] if rows else []
     if not opensim:

@@ -4,7 +4,6 @@ bodies, with what their printed digits allow.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..algebra import ZERO, Vec3, cross, quat, vec
 from ..case.case import TIME, Case, Quantity
-from ..case.curves import are_even_steps, have_common_factor
+from ..case.curves import is_set
 from ..case.io.document import fault, shown
 from ..case.measures import coordinate_of
 from ..case.quantity import point_jets, still_jets, with_markers
@@ -30,11 +29,6 @@ from ..primitives.base import Twist
 from ..trajectory import Array, BodyMotion, PointMotion
 from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
 from .readers import Column, Recording
-
-# Two steps may be equal by chance.
-FEWEST = 3
-# As many whole numbers have no common factor by chance.
-MANY = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,24 +182,11 @@ def _columns_of_samples(
             notes.append(f"{file}: merged {number_of(again.size, 'row')} at the time of another")
     if not len(rows):
         raise fault(file, "", "found no samples, expected rows of numbers; record the motion anew")
-    exact = {k for k in leading if _is_set(columns[k])}
+    exact = {k for k in leading if is_set(columns[k].values, columns[k].half)}
     return {
         k: Column(c.head, c.values[rows], c.half[rows] * (k not in exact))
         for k, c in columns.items()
     }
-
-
-def _is_set(column: Column) -> bool:
-    """Return whether somebody set the values of time or a driver, so that they are not rounded: an
-    even grid, forth or back, or multiples of one number.
-    """
-    steps = np.abs(np.diff(column.values))
-    steps = steps[steps > 0.0]
-    if len(steps) >= FEWEST and are_even_steps(steps):
-        return True
-    known, half = column.values[np.isfinite(column.values)], column.half[column.half > 0.0]
-    decimals = round(-math.log10(2.0 * half.min())) if half.size else 0
-    return len(known) >= MANY and have_common_factor(known, decimals)
 
 
 def _require_equal(
