@@ -102,8 +102,8 @@ def _are_equal(steps: Array) -> bool:
 
 
 def is_set(values: Array, half: Array) -> bool:
-    """Return whether somebody set values of time or a driver, so that they are not rounded: an even
-    grid, forth or back, or multiples of one number.
+    """Return whether somebody set values of time or a driver, so that they are not rounded: numbers
+    of one or two digits, an even grid, forth or back, or multiples of one number.
 
     Rounded values may be even too: 5.73, 11.46 and 17.19 are tenths of a radian. So a step of three
     digits or more must end with 0, 25, 50 or 75.
@@ -115,6 +115,8 @@ def is_set(values: Array, half: Array) -> bool:
     if not units.size or float(np.abs(known).max(initial=0.0)) >= 10.0**EXACT * units.min():
         return False
     finest, coarsest = float(units.min()), float(units.max())
+    if float(np.abs(known).max()) <= 100.5 * finest:
+        return True
     steps = np.abs(np.diff(known))
     steps = steps[steps > 0.0]
     if len(steps) >= FEWEST_STEPS and _are_equal(steps):

@@ -88,7 +88,7 @@ def samples_of(
     notes = [*recording.notes]
     kept = recording
     if not whole:
-        notes += _notes_on_units(recording, meaning)
+        notes += _notes_on_columns(recording, meaning)
         kept = replace(recording, columns=_columns_of_samples(case, recording, meaning, notes))
     numbers = {name: si_values(kept, use) for name, use in meaning.numbers.items()}
     motions = dict[str, BodyMotion]()
@@ -120,8 +120,10 @@ def samples_of(
     return samples_of(case, rest, meaning, digits=digits)
 
 
-def _notes_on_units(recording: Recording, meaning: Meaning) -> Iterator[str]:
-    """Yield a note on columns whose unit neither the file nor --map states."""
+def _notes_on_columns(recording: Recording, meaning: Meaning) -> Iterator[str]:
+    """Yield notes on columns of unknown names, and on those whose unit neither the file nor --map
+    states.
+    """
     bare = {
         recording.columns[use.column].head.name: use.si
         for use in meaning.uses
@@ -134,6 +136,9 @@ def _notes_on_units(recording: Recording, meaning: Meaning) -> Iterator[str]:
         if head.unit and unit != head.unit:
             text = f"column {head.name} is taken in {unit}, as stated, and not in {head.unit}"
             yield f"{recording.file}: {text}"
+    if meaning.unknown:
+        listed = shortened([*meaning.unknown], MOST_NAMED)
+        yield f"{recording.file}: columns of no known name are left out: {listed}"
     if bare:
         units = " and ".join(dict.fromkeys(bare.values()))
         names = shortened([*bare], MOST_NAMED)
@@ -217,18 +222,23 @@ def motion_of(
         first: those whose first sample is the design pose, if the frame is known by it.
     """
 
+    r_0, p_0 = body.origin, body.euler_parameters
+    if pose.frame:
+        e = np.array(pose.frame[3:])
+        r_0, p_0 = pose.frame[:3], tuple((e / np.linalg.norm(e)).tolist())
+
     def frame_pose(numbers: Mapping[str, Sequence[Array]]) -> tuple[Array, Array]:
-        return np.stack(numbers["position"], axis=-1), pose.reading.parameters(numbers["attitude"])
+        place = numbers["position"]
+        if len(place) == 2:  # a planar pose
+            place = [*place, np.full_like(place[0], r_0[2])]
+        r = np.stack(place, axis=-1)
+        return r, pose.reading.parameters(numbers["attitude"])
 
     r, p = frame_pose(given)
-    r_0, p_0 = body.origin, body.euler_parameters
     if pose.frame is None:
         r_all, p_all = frame_pose(first or given)
         k = int(np.argmax(np.isfinite(r_all).all(axis=1) & np.isfinite(p_all).all(axis=1)))
         r_0, p_0 = r_all[k].tolist(), p_all[k].tolist()
-    elif pose.frame:
-        e = np.array(pose.frame[3:])
-        r_0, p_0 = pose.frame[:3], tuple((e / np.linalg.norm(e)).tolist())
     back = quat(p_0).conjugate()
     frame = Placed.of(ZERO, quat(p.T))
     arm = frame.turn(Placed.of(ZERO, back).turn(vec(body.origin) - vec(r_0)))

@@ -425,7 +425,7 @@ def test_half_units_of_single_numbers():
         ("-80 -65 -5 0 10 15 20 35 40 50", True),
         ("0.25 0.5 1.75 2 3 3.25 3.5 4 5 5.25", True),
         ("-79.9 -65.2 -5.1 1.1 2.2 3.4 5.6 7.8 9.9 10.1", False),
-        ("1e60 3e60 4e60", False),
+        ("1.2345e60 3.5e60 4e60", False),
     ],
 )
 def test_driver_values_that_somebody_set(texts, expected):
