@@ -131,7 +131,7 @@ class Store:
         if found != "ok":
             why = found.splitlines()[-1]
             raise HistoryError(
-                f"history {self.path}: cannot be written: it is damaged ({why}); restore a copy of it"
+                f"history {self.path}: cannot be written: it is damaged ({why}); restore a copy"
             )
         for row in self.runs()[:latest]:
             with self.sparing(), self.explained("read", row.id):
