@@ -78,11 +78,10 @@ def test_check_joint_passes_user_joints(few, in_folder, module):
         )
 
 
-def test_check_joint_locked_loops_unjudged(loops_only, in_folder):
-    """A tube far smaller than any motion of the loops: the joint is right, and none can move."""
-    torus = load_joint("torus:Torus")
-    one = torus("t", "a", "b", (0.2, -0.1, 0.2), (2.0, -1.0, 2.0), 1e-5, 4e-6)
-    report = check_joint(torus, specimens=[one])
+def test_check_joint_locked_loops_unjudged(loops_only, in_folder, monkeypatch):
+    """All loops with the torus lock up before their sweep ends."""
+    monkeypatch.setattr("kincheck.core.studies.checks.joint_loops.HALVINGS", 0)
+    report = check_joint(load_joint("torus:Torus"))
     assert report.passed, report
     assert report["loop"].verdict is Verdict.SKIP
     assert report["loop"].message.startswith("not judged, the loop of this check fails: ")

@@ -32,7 +32,7 @@ HELPERS = """
   const until = async (found) => { while (!found()) await pause(20); };
   // after two frames, sizes are observed and drawn
   const painted = async () => { for (const _ of [0, 1]) await new Promise(requestAnimationFrame); };
-  const isSeen = (box) => { const { top, bottom } = box.getBoundingClientRect(); return bottom > top && bottom > 0 && top < innerHeight; };
+  const isSeen = (box) => { const { top, bottom } = box.getBoundingClientRect(); return bottom > top && bottom > 0 && top < innerHeight && !box.closest("details:not([open])"); };
   const settled = async () => { await painted(); await until(() => !all(".plot:not([data-drawn])").some(isSeen)); await painted(); };
 """  # noqa: E501
 
