@@ -186,7 +186,7 @@ class MeasureCompliance(Isolated):
                     resume=False,
                 )
             except HistoryError as error:
-                from .destinations import not_in_history
+                from ...cli.destinations import not_in_history
 
                 problems.append(not_in_history(self, error))
 
