@@ -140,7 +140,7 @@ def _rows(value: Any) -> list[dict[str, Any]] | None:
     if _is_head(table.get("columns")) and isinstance(rows := table.get("data"), list):
         return _rows([table["columns"], *cast("list[Any]", rows)])
     # of data frames: rows by their index, or columns
-    if not all(isinstance(each, dict) and each for each in table.values()) or not table:
+    if not table or not all(each and isinstance(each, dict) for each in table.values()):
         return None
     inner: list[dict[str, Any]] = [*table.values()]
     if all(key.isdecimal() for key in table):
