@@ -505,7 +505,9 @@ def _open_history(
             return None, [f"{names}: {why}; the run is not in the history"]
         found = keep(Path(options.history), cases, engines, **about)
     except HistoryError as error:
-        return None, [f"{error}; the run is not in the history"]
+        from .destinations import not_in_history
+
+        return None, [not_in_history(options, error)]
     if options.resume:
         print(
             f"kincheck: run {found.run} is resumed after {len(found.made)} records"

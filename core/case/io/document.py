@@ -14,10 +14,10 @@ import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
@@ -256,16 +256,7 @@ def parse(file: Path, text: str) -> dict[str, Any]:
             f"line {line}",
             f"found a key nested more than {DEEPEST} deep, expected two or three parts; correct it",
         )
-    try:
-        data = json.loads(text, object_pairs_hook=_once) if is_json else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        problem = f"not valid {'JSON' if is_json else 'TOML'}: {what}; correct the syntax"
-        if what.startswith(_TOO_MANY_DIGITS):
-            problem = (
-                "found an integer of thousands of digits, expected numbers of a size; correct it"
-            )
-        raise fault(file, "", problem) from None
+    data = parse_json(file, text) if is_json else _loaded(file, "TOML", tomllib.loads, text)
     if not isinstance(data, dict):
         raise fault(
             file, "", f"found {shown(data)}, expected the keys of a case; write an object {{...}}"
@@ -273,6 +264,31 @@ def parse(file: Path, text: str) -> dict[str, Any]:
     tables = cast("dict[str, Any]", data)
     check_values(file, tables)
     return tables
+
+
+def parse_json(file: Path, text: str, **hooks: Callable[[str], object]) -> Any:
+    """Return the value of a JSON text.
+
+    Args:
+        hooks: of `json.loads`, to read numbers in another way.
+
+    Raises:
+        CaseError: the syntax is wrong, or a key is given twice.
+    """
+    return _loaded(file, "JSON", partial(json.loads, object_pairs_hook=_once, **hooks), text)
+
+
+def _loaded(file: Path, kind: str, load: Callable[[str], Any], text: str) -> Any:
+    try:
+        return load(text)
+    except (ValueError, RecursionError) as error:
+        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"not valid {kind}: {what}; correct the syntax"
+        if what.startswith(_TOO_MANY_DIGITS):
+            problem = (
+                "found an integer of thousands of digits, expected numbers of a size; correct it"
+            )
+        raise fault(file, "", problem) from None
 
 
 def _blank(found: re.Match[str]) -> str:

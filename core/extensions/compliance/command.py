@@ -186,7 +186,9 @@ class MeasureCompliance(Isolated):
                     resume=False,
                 )
             except HistoryError as error:
-                problems.append(f"{error}; the run is not in the history")
+                from ...cli.destinations import not_in_history
+
+                problems.append(not_in_history(self, error))
 
         def add(record: Record, done: int, total: int) -> None:
             if keeping is not None:
