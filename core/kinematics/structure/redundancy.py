@@ -202,11 +202,13 @@ class _Held:
     Attributes:
         axes: on the first and the second body, at right angles, if their condition is the only one
             of turns: its direction moves with both bodies.
+        axis: common axis of both bodies, if there are two conditions of turns.
     """
 
     places: Array
     turns: Array
     axes: tuple[Vector, Vector] | None
+    axis: Vec3 | None
 
     def rows(self, joint: Joint, frame: Frames, formulation: Cartesian) -> Array:
         """Return the rows of both, shape (directions, unknowns)."""
@@ -232,8 +234,12 @@ class _Held:
         turning = int((sizes > TURNS).sum())
         straight = np.linalg.qr((left[:, turning:].T @ sums[:, :n]).T)[0].T
         return (
-            _Held(_complement(straight) @ self.places, right[turning:] @ self.turns, self.axes),
-            _Held(straight @ self.places, right[:turning] @ self.turns, self.axes),
+            replace(
+                self,
+                places=_complement(straight) @ self.places,
+                turns=right[turning:] @ self.turns,
+            ),
+            replace(self, places=straight @ self.places, turns=right[:turning] @ self.turns),
         )
 
     def joints(self, joint: Joint) -> list[Joint]:
@@ -253,8 +259,7 @@ class _Held:
         name = f"{name}: axes" if found else name
         match len(turns):
             case 1:
-                f, g, _ = triad(_vector(turns[0]))
-                found.append(PerpendicularAxes(name, *ends, self.axes or ((*f,), (*g,))))
+                found.append(PerpendicularAxes(name, *ends, self.axes or self._crossed(turns[0])))
             case 2:
                 found.append(ParallelAxes(name, *ends, _normal(turns)))
             case 3:
@@ -262,6 +267,17 @@ class _Held:
             case _:
                 pass
         return found
+
+    def _crossed(self, turn: Array) -> tuple[Vector, Vector]:
+        """Return the axes of one condition, about a direction, of several conditions of turns.
+
+        Bodies that turn about a common axis keep only this one, on the first, perpendicular to what
+        is so on the second; other axes would be a condition that the joint does not have.
+        """
+        f, g, h = triad(_vector(turn))
+        if self.axis is not None:
+            f, g = self.axis, cross(h, self.axis)
+        return (*f,), (*g,)
 
 
 def reduce_rows(
@@ -407,7 +423,8 @@ def _held(joint: Joint) -> _Held | None:
     if places and len(joint.points_on()) != 1:
         return None
     axes = crossed[0] if len(turns) == 1 and crossed else None
-    return _Held(_orthonormal(places), _orthonormal(turns), axes)
+    axis = cross(*turns) if len(turns) == 2 else None
+    return _Held(_orthonormal(places), _orthonormal(turns), axes, axis)
 
 
 def _orthonormal(vectors: Sequence[Vec3]) -> Array:
