@@ -174,8 +174,10 @@ def _without(left: Array, basis: Array) -> Array:
 
 # Gaps of several joints add up, and arms lengthen them.
 ADDED_UP = 10.0
-# A vanishing sum of rows with a smaller part of orientations is ended by a direction of the point.
-TURNS = 0.1
+# A vanishing sum of rows, of size one, is ended where the larger part of it is: by a direction of
+# the point if its part of orientations is smaller than this. Of 48 loops of hinges in eight families
+# a tenth of it leaves 8 that keep no closing joint's rows, or lock, along 0.6 rad; this leaves none.
+TURNS = 0.7
 
 
 @dataclass(frozen=True)
@@ -185,12 +187,10 @@ class Reduction:
     Attributes:
         mechanism: its `reduced` joints are those with rows left out.
         unit: the mechanism's size [m].
-        limit: largest residual that the joints as given may keep along a motion [m].
     """
 
     mechanism: Mechanism
     unit: float
-    limit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,7 +299,7 @@ def reduce_rows(
     tree = spanning_tree(mechanism, {*carrying, *keeping})
     held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}
     if not any(held.values()):  # no loop, or none whose rows can be left out
-        return Reduction(mechanism, frame.unit, ADDED_UP * tolerance)
+        return Reduction(mechanism, frame.unit)
     formulation = Cartesian.of(core, frame)
     matrix, named = jacobian(formulation), dict[str, list[int]]()
     for k, (owner, _) in enumerate(formulation.owners):
@@ -339,9 +339,7 @@ def reduce_rows(
         span[part] = _extend_span(span[part], rows)
     joints = [each for joint in mechanism.joints for each in changed.get(joint.name, [joint])]
     return Reduction(
-        replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism,
-        frame.unit,
-        ADDED_UP * tolerance,
+        replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism, frame.unit
     )
 
 
