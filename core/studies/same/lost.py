@@ -5,18 +5,14 @@ coordinates, masses, gravity.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from ...algebra import triple, vec
-from ...case.models.trees.tree import Mass, sum_of_masses
 from ...case.models.undriven import Coordinate, Undriven
-from ...joints import Fixed
 from ...kinematics import Poses
 from ...mechanism.body import Body, inertia_matrix
-from ...mechanism.mechanism import GROUND
 from ...trajectory import Array
 from .links import Match
 from .motion import SIDES, Placement, joints_of_both, measurable, rotate_vectors, times, values
@@ -129,7 +125,7 @@ def _masses(
     """Yield the links whose masses differ."""
     lost: dict[str, list[str]] = {}
     for x, y in match.partner.items():
-        body, other = _whole(a, x, match.partner), _whole(b, y, match.partner.values())
+        body, other = a.mechanism.body(x), b.mechanism.body(y)
         if not body.mass or not other.mass:
             if body.mass != other.mass:
                 lost.setdefault((a, b)[bool(body.mass)].name, []).append(x)
@@ -147,25 +143,6 @@ def _masses(
             yield f"inertia of {x}: {off:.2g} kg m^2 apart"
     for file, names in lost.items():
         yield f"lost in {file}: masses of {', '.join(names)}"
-
-
-def _whole(file: Undriven, link: str, matched: Collection[str]) -> Body:
-    """Return a link with the masses of others that are fixed to it, and are links of no other file:
-    some models close a loop between two halves of a body.
-    """
-    mechanism, found = file.mechanism, [file.mechanism.body(link)]
-    for joint in mechanism.joints:
-        for one, other in (joint.bodies, joint.bodies[::-1]):
-            if isinstance(joint, Fixed) and one == link and other not in (GROUND, *matched):
-                found.append(mechanism.body(other))
-    if len(found) == 1 or not all(body.mass for body in found):
-        return found[0]
-    whole = sum_of_masses(
-        [Mass(body.mass, vec(body.center_of_mass or body.origin), _inertia(body)) for body in found]
-    )
-    xx, yy, zz, xy, xz, yz = whole.inertia[np.triu_indices(3)][[0, 3, 5, 1, 2, 4]].tolist()
-    six = (xx, yy, zz, xy, yz, xz)
-    return replace(found[0], mass=whole.mass, center_of_mass=triple(whole.center), inertia=six)
 
 
 def _arm(body: Body) -> float:
