@@ -18,14 +18,8 @@ from .usd_texts import EXCLUDED, body, joint, stage
 BASE = "base"
 LAWS = ("stiffness", "reference", "damping", "armature", "friction", "lower", "upper")
 """Numbers of a joint, beside its motion."""
-SAID = {
-    "MJCF": {*LAWS},
-    "URDF": {"damping", "friction", "lower", "upper"},
-    "SDF": {*LAWS} - {"armature"},
-    "USD": {*LAWS},
-    "OpenSim": {"stiffness", "reference", "damping", "lower", "upper"},
-}
-"""What a file of each format says of a joint of its tree."""
+NAMES = {"reference": "spring reference", "lower": "limits", "upper": "limits"}
+"""What `kincheck same` calls them, unless it is the same."""
 
 
 @dataclass(frozen=True)
@@ -150,10 +144,21 @@ def random_closed(seed, laws=()):
 
 @dataclass(frozen=True)
 class Writer:
-    """Numbers as texts, and the choices of a file."""
+    """Numbers as texts, and the choices of a file.
+
+    Attributes:
+        said: names of the laws that the file has, by joint.
+    """
 
     rng: np.random.Generator
     digits: int | None = None
+    said: dict = field(default_factory=dict)
+
+    def say(self, pair, *laws):
+        """Note that the file has such laws of a joint, as far as the joint has them."""
+        found = {*laws} & {*pair.laws}
+        found -= {"reference"} if "stiffness" not in found else set()
+        self.said[pair.name] = {NAMES.get(law, law) for law in found}
 
     def __call__(self, *numbers):
         flat = np.ravel(np.concatenate([np.ravel(x) for x in numbers])).tolist()
@@ -185,7 +190,7 @@ def _inertia(solid, of):
 def mjcf(robot, write):
     """Loops as halves of bodies that are welded, or as common points."""
     tree, loops = robot.cut(write.rng)
-    halves, equalities, parts = {}, [], {name: 1 for name in robot.solids}
+    halves, equalities, parts = {}, [], dict.fromkeys(robot.solids, 1)
     hung = {name: [] for name in (BASE, *robot.solids)}
     for pair in tree:
         hung[pair.bodies[0]].append((pair.bodies[1], pair))
@@ -219,6 +224,7 @@ def mjcf(robot, write):
             r, R = robot.place(halves.get(name, name))
             turn = R.T @ solid.turn
             share = 1.0 / parts[whole]
+            write.say(pair, *LAWS)
             spring = {
                 "stiffness": pair.laws.get("stiffness", 0.0),
                 "springref": pair.laws.get("reference", 0.0),
@@ -272,6 +278,7 @@ def urdf(robot, write):
         if kind == "prismatic" and not limit:
             limit = '<limit lower="-1e20" upper="1e20"/>'
         laws = {key: pair.laws[key] for key in ("damping", "friction") if key in pair.laws}
+        write.say(pair, *laws, "lower", "upper")
         more = "".join(f' {key}="{value!r}"' for key, value in laws.items())
         parts.append(
             f'<link name="{j}"><inertial><mass value="{solid.mass!r}"/>'
@@ -288,9 +295,7 @@ def urdf(robot, write):
         ends = []
         for name in pair.bodies:
             r, R = frames[name]
-            angles = (
-                "" if np.array_equal(R, np.eye(3)) else f' rpy="{write(write.rpy(R.T))}"'
-            )
+            angles = "" if np.array_equal(R, np.eye(3)) else f' rpy="{write(write.rpy(R.T))}"'
             ends.append(f'xyz="{write(R.T @ (pair.at - r))}"{angles}')
         kind = {"hinge": "continuous", "slide": "prismatic", "ball": "spherical"}[pair.kind]
         along = "" if pair.kind == "ball" else f'<parent_axis xyz="{write(pair.axis)}"/>'
@@ -320,6 +325,7 @@ def sdf(robot, write):
         i, j = pair.bodies
         kind = {"hinge": "revolute", "slide": "prismatic", "ball": "ball"}[pair.kind]
         keys = ("damping", "friction", "stiffness", "reference")
+        write.say(pair, *keys, "lower", "upper")
         tags = ("damping", "friction", "spring_stiffness", "spring_reference")
         inside = "".join(
             f"<{tag}>{pair.laws[key]!r}</{tag}>"
@@ -379,6 +385,7 @@ def usd(robot, write):
         ]
         if pair.name in closing and write.rng.random() < 0.7:
             lines.append(EXCLUDED)
+        write.say(pair, *LAWS)
         apis, per, laws = "", 1.0 if pair.kind == "slide" else degrees, pair.laws
         if "lower" in laws:
             lines += [f"float physics:{k}Limit = {per * laws[k]!r}" for k in ("lower", "upper")]
@@ -386,6 +393,7 @@ def usd(robot, write):
         gains = {"stiffness": 1.0 / per, "damping": 1.0 / per, "reference": per}
         if {"stiffness", "damping"} & {*laws}:
             apis += f" PhysicsDriveAPI:{key}"
+            write.said[pair.name].add("motor")
             names = {"reference": "targetPosition"}
             lines += [
                 f"float drive:{key}:physics:{names.get(k, k)} = {factor * laws[k]!r}"
@@ -414,12 +422,11 @@ def osim(robot, write):
         pair = write.any_way(raw)
         i, j = ("" if name == BASE else name for name in pair.bodies)
         laws, more = pair.laws, ""
+        write.say(pair, "stiffness", "reference", "damping", "lower", "upper")
         if "lower" in laws:
             more = texts(range=(laws["lower"], laws["upper"]), clamped="true")
         own = coordinate(pair.name, inside=more)
-        straight = all(
-            np.array_equal(robot.place(name)[1], np.eye(3)) for name in pair.bodies
-        )
+        straight = all(np.array_equal(robot.place(name)[1], np.eye(3)) for name in pair.bodies)
         if pair.kind == "ball":
             own = "".join(coordinate(f"{pair.name}_{k}") for k in range(3))
             ends = [
@@ -432,9 +439,7 @@ def osim(robot, write):
             name = "rotation1" if pair.kind == "hinge" else "translation1"
             space = tagged("SpatialTransform", osim_axis(name, along, line(1.0, 0.0), pair.name))
             at = [[float(x) for x in write(pair.at).split()]]
-            joints.append(
-                osim_joint("CustomJoint", pair.name, i, j, own, p=at, c=at, inside=space)
-            )
+            joints.append(osim_joint("CustomJoint", pair.name, i, j, own, p=at, c=at, inside=space))
         else:
             kind = "PinJoint"
             frames = _frames(robot, pair)
@@ -472,8 +477,8 @@ FORMATS = {
 
 
 def written(form, robot, folder, rng, digits=None, name="model"):
-    """Write a robot in a format by choices of a generator, and return its file."""
+    """Write a robot in a format by choices of a generator; return its file and what is in it."""
     write, ending = FORMATS[form]
-    file = folder / f"{name}.{ending}"
-    file.write_text(write(robot, Writer(rng, digits)))
-    return file
+    file, writer = folder / f"{name}.{ending}", Writer(rng, digits)
+    file.write_text(write(robot, writer))
+    return file, writer.said

@@ -5,7 +5,7 @@ of a file, and poses of their links by least squares over the closure of the who
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 
@@ -171,7 +171,10 @@ def sarrus(rng):
     turn, lean = rng.uniform(0.5, 0.9), rng.uniform(0.9, 1.4)
     across = np.array([np.cos(lean), np.sin(lean), 0.0])
     points, axes = [], []
-    for out, axis in ((np.array([1.0, 0, 0]), [0.0, 1, 0]), (across, np.cross([0, 0, 1.0], across))):
+    for out, axis in (
+        (np.array([1.0, 0, 0]), [0.0, 1, 0]),
+        (across, np.cross([0, 0, 1.0], across)),
+    ):
         knee = out * (0.4 + 0.5 * np.cos(turn)) + np.array([0, 0, 0.5 * np.sin(turn)])
         group = [0.4 * out, knee, 0.4 * out + np.array([0, 0, np.sin(turn)])]
         points.append(group)

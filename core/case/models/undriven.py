@@ -16,7 +16,8 @@ from .files import MODEL, kind_of, load, read_tree, root_of
 from .trees.case import undriven_mechanism
 from .trees.element import Element, printed_digits
 from .trees.gluing import glue
-from .trees.tree import NO_LIMIT, Limit
+from .trees.laws import Laws, laws_of, tendons_of
+from .trees.tree import NO_LIMIT, Limit, Strut
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12
@@ -57,6 +58,10 @@ class Undriven:
         is_model: whether the file is a model, with limits, motors and frames of links.
         says_gravity: whether the file can say it.
         parts: names of the bodies of the file that are one, by the name of the whole.
+        root: tag of the first element of a model, which tells its format.
+        laws: numbers of joints beside motion; see `laws_of`.
+        struts: springs and bushings between links.
+        tendons: what is said of the forces and limits of tendons.
         notes: of its reader.
         without: names by which the user leaves out elements of the file.
     """
@@ -71,6 +76,10 @@ class Undriven:
     is_model: bool = False
     says_gravity: bool = True
     parts: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
+    root: str = ""
+    laws: Mapping[str, Laws] = field(default_factory=dict[str, Laws])
+    struts: Sequence[Strut] = ()
+    tendons: Mapping[str, Mapping[str, str]] = field(default_factory=dict[str, Mapping[str, str]])
     notes: Sequence[str] = ()
     without: Collection[str] = ()
 
@@ -140,6 +149,10 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
         says_gravity=root.tag == "mujoco"
         or any(each.tag in _SCENES for each in root.descendants()),
         parts=parts,
+        root=root.tag,
+        laws=laws_of(tree, root),
+        struts=tree.struts,
+        tendons=tendons_of(tree),
         notes=[f"{file.name}: {note}" for note in tree.notes],
         without=tree.without,
     )

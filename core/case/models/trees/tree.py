@@ -317,6 +317,7 @@ class Tree:
             one.
         unweighed: moving links whose masses cannot be read.
         springs: by move; others are of no move of the tree.
+        tendons: of MJCF, with their default classes, by name.
         actuated: moves with a motor.
         motors: numbers of parts of motors and of limits of their moves, by their names in
             `left_out`, where they are unless they say what drives the model.
@@ -345,6 +346,7 @@ class Tree:
     ties: list[Tie] = field(default_factory=list[Tie])
     springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
     struts: list[Strut] = field(default_factory=list[Strut])
+    tendons: dict[str, Element] = field(default_factory=dict[str, Element])
     actuated: set[str] = field(default_factory=set[str])
     motors: Counter[str] = field(default_factory=Counter[str])
     starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
