@@ -5,6 +5,7 @@ Bodies and joints are given globally, at a closed pose. What a format says of a 
 joint like others (SDF, USD, OpenSim), a constraint (URDF), halves of a body or points (MJCF).
 """
 
+import json
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -467,6 +468,61 @@ def _plain(end):
     return [tuple(map(float, each)) for each in end]
 
 
+def adams(robot, write):
+    """A dataset of Adams: markers by points, whose z axis is the joint's."""
+    numbers = {name: 2 + k for k, name in enumerate(robot.solids)} | {BASE: 1}
+    lines = [
+        "a closed chain",
+        "UNITS/FORCE = NEWTON, MASS = KILOGRAM, LENGTH = METER, TIME = SECOND",
+    ]
+    lines.append("PART/1, GROUND")
+    for name in robot.solids:
+        k = numbers[name]
+        lines += [f"PART/{k}, MASS = 1, CM = {100 * k}, IP = 0.01, 0.01, 0.01"]
+        lines += [f"MARKER/{100 * k}, PART = {k}"]
+    for k, pair in enumerate(robot.pairs):
+        i, j = pair.bodies
+        at = write(pair.at).replace(" ", ", ")
+        along = write(pair.at + pair.axis).replace(" ", ", ")
+        for marker, name in ((10 * k + 1, i), (10 * k + 2, j)):
+            lines.append(f"MARKER/{marker}, PART = {numbers[name]}, QP = {at}, ZP = {along}")
+        lines.append(f"JOINT/{k}, REVOLUTE, I = {10 * k + 2}, J = {10 * k + 1}")
+    return "\n".join([*lines, "ACCGRAV/KGRAV = -9.80665", "END", ""])
+
+
+def case_file(robot, write):
+    """A case whose first joint is driven."""
+
+    def numbers(x):
+        return [float(each) for each in write(x).split()]
+
+    def named(name):
+        return "ground" if name == BASE else name
+
+    joints = {
+        pair.name: {
+            "type": "revolute",
+            "bodies": [*map(named, pair.bodies)],
+            "point": numbers(pair.at),
+            "axis": numbers(pair.axis),
+        }
+        for pair in robot.pairs
+    }
+    last = [*robot.solids][-1]
+    return json.dumps(
+        {
+            "schema": "kincheck-case/1",
+            "name": "chain",
+            "source": "made up",
+            "bodies": {name: {} for name in robot.solids},
+            "joints": joints,
+            "points": {"tip": {"body": last, "position": [0.1, 0.2, 0.3]}},
+            "drivers": {"turn": {"type": "joint_angle", "joint": robot.pairs[0].name}},
+            "sweep": {"driver": "turn", "start": 0.0, "stop": 0.6, "steps": 7},
+        }
+    )
+
+
 FORMATS = {
     "MJCF": (mjcf, "xml"),
     "URDF": (urdf, "urdf"),
@@ -474,11 +530,14 @@ FORMATS = {
     "USD": (usd, "usda"),
     "OpenSim": (osim, "osim"),
 }
+"""Of models that `kincheck same` compares."""
+CHAINS = FORMATS | {"Adams": (adams, "adm"), "case": (case_file, "json")}
+"""Of chains of hinges."""
 
 
 def written(form, robot, folder, rng, digits=None, name="model"):
     """Write a robot in a format by choices of a generator; return its file and what is in it."""
-    write, ending = FORMATS[form]
+    write, ending = CHAINS[form]
     file, writer = folder / f"{name}.{ending}", Writer(rng, digits)
     file.write_text(write(robot, writer))
     return file, writer.said

@@ -3,6 +3,7 @@ of a file, and poses of their links by least squares over the closure of the who
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -287,6 +288,7 @@ FAMILIES = {
 }
 
 
+@cache
 def random_loop(family, seed):
     """Return a loop of a family, somewhere in space; a seed makes the same one anywhere."""
     rng = np.random.default_rng([seed, [*FAMILIES].index(family)])

@@ -174,9 +174,9 @@ def _without(left: Array, basis: Array) -> Array:
 
 # Gaps of several joints add up, and arms lengthen them.
 ADDED_UP = 10.0
-# A vanishing sum of rows, of size one, is ended where the larger part of it is: by a direction of
-# the point if its part of orientations is smaller than this. Of 48 loops of hinges in eight families
-# a tenth of it leaves 8 that keep no closing joint's rows, or lock, along 0.6 rad; this leaves none.
+# A vanishing sum of rows, of size one, is ended where its larger part is: by a direction of the
+# point if its part of orientations is smaller than this. Of 48 loops of hinges in eight families, a
+# seventh of it leaves 8 whose motion along 0.6 rad is another one, or locks; this leaves none.
 TURNS = 0.7
 
 
@@ -317,7 +317,7 @@ def reduce_rows(
     span: dict[int, Array] = {}
     enough, changed = ADDED_UP * tolerance / frame.unit, dict[str, list[Joint]]()
     reduced = list[Reduced]()
-    for joint in tree.cut:
+    for joint in sorted(tree.cut, key=lambda joint: joint.name not in {*carrying}):
         if (holds := held.get(joint.name)) is None:
             continue
         body = next(name for name in joint.bodies if name in formulation.columns)

@@ -147,15 +147,20 @@ def joints_by_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, l
 
 
 def joints_of_both(a: Undriven, b: Undriven, match: Match) -> list[tuple[Joint, Joint]]:
-    """Return joints of the same freedoms between partners, the only ones between them."""
+    """Return joints of the same freedoms between partners: those of one name, or the only ones
+    between them.
+    """
     second = joints_by_links(b, {y: y for y in match.partner.values()})
-    return [
-        (joints[0], second[links][0])
-        for links, joints in joints_by_links(a, match.partner).items()
-        if "" not in links
-        and len(joints) == len(second.get(links, ())) == 1
-        and joints[0].freedoms == second[links][0].freedoms
-    ]
+    found: list[tuple[Joint, Joint]] = []
+    for links, joints in joints_by_links(a, match.partner).items():
+        others = second.get(links, [])
+        if "" in links:
+            continue
+        for joint in joints:
+            named = [each for each in others if each.name == joint.name]
+            alone = others if len(joints) == len(others) == 1 else []
+            found += [(joint, k) for k in (named or alone) if k.freedoms == joint.freedoms]
+    return found
 
 
 def tied_links(file: Undriven, partner: Mapping[str, str]) -> dict[Links, str]:
