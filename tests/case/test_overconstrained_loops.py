@@ -107,7 +107,7 @@ def test_six_hinges_in_second_engine(family, tmp_path):
     pytest.importorskip("mujoco")
     case, tolerance = case_of("case", random_loop(family, 1), 6, tmp_path, 1)
     tips = [
-        engine.solve(engine.build(case), case, 1e-12).outputs["tip_x"].position
+        engine.solve(engine.build(case), case, 1e-12).points["tip"].position
         for engine in map(adapters.engine, ("native", "mujoco"))
     ]
     assert np.ptp(tips[0]) > 1e-3

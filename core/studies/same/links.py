@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...case.models.trees.tree import COPY
 from ...case.models.undriven import Undriven, plain_name
 from ...errors import KincheckError, UnknownNameError
 from ...mechanism.mechanism import GROUND
@@ -68,11 +69,15 @@ def match_links(a: Undriven, b: Undriven, given: Mapping[str, str]) -> Match:
 
 
 def _by_name(a: Undriven, b: Undriven, found: dict[str, str]) -> bool:
-    """Add partners with a name of a part in common; return whether there is one."""
+    """Add partners of the same name, or with a part of the same name; return whether there is one."""
     before = len(found)
-    for same in (str, plain_name):
+    for same, parts in ((str, 1), (plain_name, 1), (str, None), (plain_name, None)):
         first, second = (
-            {x: {*map(same, file.parts.get(x, (x,)))} for x in file.links if x not in done}
+            {
+                x: {same(part) for part in file.parts.get(x, (x,))[:parts] if COPY not in part}
+                for x in file.links
+                if x not in done
+            }
             for file, done in ((a, {*found}), (b, {*found.values()}))
         )
         for x, names in first.items():

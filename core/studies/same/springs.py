@@ -53,8 +53,9 @@ def between_links(
     for links in dict.fromkeys((*first, *second)):
         for x, y in zip_longest(first.get(links, ()), second.get(links, ())):
             if x is None or y is None:
-                file, strut = (b, x) if y is None else (a, y)
-                yield lost_in(file, strut.described, [strut.name], SPRINGS)
+                for file, strut in ((b, x), (a, y)):
+                    if strut is not None:
+                        yield lost_in(file, strut.described, [strut.name], SPRINGS)
                 continue
             for (what, p), (_, q) in zip(_numbers(x), _numbers(y), strict=True):
                 if not equal(p, q):

@@ -13,7 +13,7 @@ from ....algebra import triple, vec
 from ....joints import Fixed
 from ....mechanism.body import Body, Inertia, inertia_matrix
 from ....mechanism.mechanism import GROUND, Mechanism
-from .tree import Mass, sum_of_masses
+from .tree import COPY, Mass, sum_of_masses
 
 
 def glue(mechanism: Mechanism, links: Collection[str]) -> tuple[Mechanism, Mapping[str, list[str]]]:
@@ -34,7 +34,10 @@ def glue(mechanism: Mechanism, links: Collection[str]) -> tuple[Mechanism, Mappi
     for joint in mechanism.joints:
         one, other = sorted(
             (owner[name] for name in joint.bodies),
-            key=lambda name: (name not in fixed, name not in links, len(name), order.get(name, 0)),
+            key=lambda name: (
+                *(name not in fixed, COPY in name, name not in links),
+                *(len(name), order.get(name, 0)),
+            ),
         )
         if not isinstance(joint, Fixed) or one == other:
             continue
@@ -56,7 +59,7 @@ def glue(mechanism: Mechanism, links: Collection[str]) -> tuple[Mechanism, Mappi
         mechanism, bodies=bodies, joints=joints, reduced=(), points=(), drivers=(), forces=()
     )
     return whole, {
-        name: sorted(each, key=order.__getitem__)
+        name: sorted(each, key=lambda part: (part != name, order[part]))
         for name, each in sets.items()
         if name not in fixed
     }

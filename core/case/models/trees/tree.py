@@ -38,6 +38,9 @@ BETWEEN = 1e-9, 1e-12
 in the motion of what it carries.
 """
 
+COPY = ".copy"
+"""End of the name of a link that the joint of a loop moves, and that is held to another link."""
+
 Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
 UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}
 """Unknowns of a move, by its kind."""
