@@ -69,7 +69,7 @@ def match_links(a: Undriven, b: Undriven, given: Mapping[str, str]) -> Match:
 
 
 def _by_name(a: Undriven, b: Undriven, found: dict[str, str]) -> bool:
-    """Add partners of the same name, or with a part of the same name; return whether there is one."""
+    """Add partners of one name, or with parts of one name; return whether there is one."""
     before = len(found)
     for same, parts in ((str, 1), (plain_name, 1), (str, None), (plain_name, None)):
         first, second = (
