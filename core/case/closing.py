@@ -13,7 +13,6 @@ import numpy as np
 
 from ..errors import MOST_NAMED, CaseError, MechanismError, shortened
 from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
-from ..kinematics.structure.redundancy import ADDED_UP
 from ..mechanism.motions import Motion, Path, Waypoints
 from ..trajectory import Array
 from .case import HELD_BUT, TIME, Case, Closure, Sweep, size
@@ -22,6 +21,8 @@ from .case import HELD_BUT, TIME, Case, Closure, Sweep, size
 _TOL = 1e-12
 # Other joints that are tried to close the loops, each by a solved motion.
 MOST_TRIED = 12
+# A residual of so many tolerances is no sum of digits: the motion is another one.
+OTHER = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +94,8 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
 
 
 def _worth(tolerance: float, trial: _Trial) -> tuple[bool, int, float]:
-    """Return what the best of trials has most of: residuals far beyond are of another motion."""
-    return trial.left <= ADDED_UP * tolerance, trial.reached, -trial.left
+    """Return the order of trials, the best one last."""
+    return trial.left <= OTHER * tolerance, trial.reached, -trial.left
 
 
 def _others(case: Case, tolerance: float, first: _Trial) -> Iterator[_Trial]:

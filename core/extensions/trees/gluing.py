@@ -1,5 +1,5 @@
-"""Bodies that are fixed to one another as one: files close a loop at any joint, or between halves
-of a body, and are the same mechanism.
+"""Bodies fixed to one another as one: a file closes a loop at any joint, or between halves of a
+body, and is the same mechanism.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from .tree import COPY, Mass, sum_of_masses
 
 
 def glue(mechanism: Mechanism, links: Collection[str]) -> tuple[Mechanism, Mapping[str, list[str]]]:
-    """Return the mechanism with each set of bodies that are fixed to one another as one, and the
-    names in each such set, by its own name.
+    """Return the mechanism with each set of bodies fixed to one another as one, and the names in
+    each such set, by its own name.
 
     A joint between two of them is left out with its freedoms, unless it is coupled: then they stay
     apart. Points, drivers and forces are left out.

@@ -23,7 +23,7 @@ UNSAID = {
     "usd": ("USD", {SPRINGS, TENDONS}),
     "OpenSimDocument": ("OpenSim", {ARMATURE, FRICTION, CONE, SPEED, EFFORT, TENDONS}),
 }
-"""By root of a file: its format, and laws that it has no words for."""
+"""By root of a file: its format, and laws without words in it."""
 _OF_TENDON = (
     *("stiffness", "damping", "springlength", "armature", "frictionloss", "range"),
     "actuatorfrcrange",
@@ -31,7 +31,7 @@ _OF_TENDON = (
 
 
 def laws_of(tree: Tree, root: Element) -> Mapping[str, Laws]:
-    """Return the laws of each move that has some; those that are zero are none."""
+    """Return the laws of moves; zero is none."""
     found: dict[str, Laws] = {}
     for name, move in tree.moves.items():
         laws = dict(_of_move(move, root))
@@ -47,7 +47,7 @@ def laws_of(tree: Tree, root: Element) -> Mapping[str, Laws]:
 
 
 def _of_move(move: Move, root: Element) -> Iterator[tuple[str, float]]:
-    """Yield the laws of a move in its element, beyond springs that are read."""
+    """Yield the laws of a move in its element, beyond its spring."""
     element = move.element
     match root.tag:
         case "mujoco":
@@ -99,7 +99,7 @@ _DRIVE = ("stiffness", "damping", "targetPosition")
 
 
 def tendons_of(tree: Tree) -> Mapping[str, Mapping[str, str]]:
-    """Return what is said of the forces and limits of each tendon, as written, without the law of a
+    """Return the numbers of forces and limits of each tendon, as written, without the law of a
     spring between two points.
     """
     springs = {strut.name for strut in tree.struts}

@@ -39,7 +39,7 @@ in the motion of what it carries.
 """
 
 COPY = ".copy"
-"""End of the name of a link that the joint of a loop moves, and that is held to another link."""
+"""End of the name of a link moved by the joint of a loop, and held to another link."""
 
 Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
 UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}

@@ -271,8 +271,8 @@ class _Held:
     def _crossed(self, turn: Array) -> tuple[Vector, Vector]:
         """Return the axes of one condition, about a direction, of several conditions of turns.
 
-        Bodies that turn about a common axis keep only this one, on the first, perpendicular to what
-        is so on the second; other axes would be a condition that the joint does not have.
+        The first body has the common axis, and the second one a normal of it: any other pair is a
+        condition beyond those of the joint.
         """
         f, g, h = triad(_vector(turn))
         if self.axis is not None:

@@ -16,8 +16,7 @@ from kincheck import adapters
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.errors import KincheckError, MechanismError
-from kincheck.core.kinematics import NativeSolver, largest_residual
-from kincheck.core.kinematics.structure.redundancy import reduce_rows
+from kincheck.core.kinematics import NativeSolver, largest_residual, reduce_rows
 from scipy.spatial.transform import Rotation
 
 from ...support.cut_models import CHAINS, closed_chain, written
