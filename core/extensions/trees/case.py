@@ -49,6 +49,7 @@ from .driving import (
     read_start,
 )
 from .element import Names
+from .gluing import glue
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 
@@ -75,19 +76,22 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
     return _Parts(*model_of(tree, supplied)).case()
 
 
-def undriven_mechanism(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
-    """Return the mechanism of a tree without drivers, the tree in its closed start, and its links
-    with a free turn about themselves.
+def undriven_mechanism(
+    tree: Tree,
+) -> tuple[Mechanism, Tree, set[str], Mapping[str, Sequence[str]]]:
+    """Return the mechanism of a tree without drivers, its loops closed and its halves glued, the
+    tree in its closed start, its links with a free turn about themselves, and the names of the
+    parts of each link.
 
     Raises:
         CaseError: its start does not close, or there is no joint for one of its ties.
     """
     model = assemble(read_start(tree, ()), None)
     spins = find_spins(model.tree, ())
-    whole = _Parts(model, Driving({}, (), ()), spins).mechanism()
+    whole, parts = glue(_Parts(model, Driving({}, (), ()), spins).mechanism(), tree.places)
     if not model.is_exact:
         whole = reduce_rows(whole, model.closing.tolerance, [*tree.joints]).mechanism
-    return whole, model.tree, {spin.move.inner for spin in spins.values()}
+    return whole, model.tree, {spin.move.inner for spin in spins.values()}, parts
 
 
 def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:

@@ -22,7 +22,7 @@ from ...case.io.document import SMALLEST
 from ...mechanism.mechanism import GROUND
 from .element import Element, significant_digits
 from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .tree import NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
+from .tree import COPY, NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
 
 FIXED = (WORLD, GROUND)
 """Names of a fixed link at the origin, which is the world."""
@@ -267,7 +267,7 @@ class _Hanging:
             moves = moves[:-1]
         if moves:
             closure = f"{joint.name}.closure"
-            copy = self.tree.names.new(f"{joint.name}.copy")
+            copy = self.tree.names.new(f"{joint.name}{COPY}")
             self._add(_Part(copy, outer, at, joint.element, moves))
             outer = copy
         if joint.frames:

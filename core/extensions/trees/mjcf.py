@@ -286,8 +286,9 @@ class _Reader:
         point = given.point(vec(element.numbers("pos", 3, default=ZEROS)))
         limit = self._limit(element)
         if kind == "hinge":
+            reference = self.compiler.angle(reference)
+        if kind != "slide":
             angle = self.compiler.angle
-            reference = angle(reference)
             limit = replace(limit, lower=angle(limit.lower), upper=angle(limit.upper))
         axis = element.direction(element.numbers("axis", 3, default=(0.0, 0.0, 1.0)), "axis")
         return Move(name, kind, point, given.direction(axis), element, reference, limit)
@@ -466,7 +467,9 @@ class _Reader:
                         tree.count(f"{what} of joints")
         for section in self.root.findall("tendon"):
             for tendon in section.children:
-                self._limit(self.classes.complete(tendon, "tendon"))
+                whole = self.classes.complete(tendon, "tendon")
+                tree.tendons[whole.attributes.get("name", f"tendon {len(tree.tendons)}")] = whole
+                self._limit(whole)
                 try:
                     strut = self._strut(tendon)
                 except CaseError:

@@ -39,6 +39,9 @@ BETWEEN = 1e-9, 1e-12
 in the motion of what it carries.
 """
 
+COPY = ".copy"
+"""End of the name of a link moved by the joint of a loop, and held to another link."""
+
 Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
 UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}
 """Unknowns of a move, by its kind."""
@@ -326,6 +329,7 @@ class Tree:
             one.
         unweighed: moving links whose masses cannot be read.
         springs: by move; others are of no move of the tree.
+        tendons: of MJCF, with their default classes, by name.
         actuated: moves with a motor.
         motors: numbers of parts of motors and of limits of their moves, by their names in
             `left_out`, where they are unless they say what drives the model.
@@ -354,6 +358,7 @@ class Tree:
     ties: list[Tie] = field(default_factory=list[Tie])
     springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
     struts: list[Strut] = field(default_factory=list[Strut])
+    tendons: dict[str, Element] = field(default_factory=dict[str, Element])
     actuated: set[str] = field(default_factory=set[str])
     motors: Counter[str] = field(default_factory=Counter[str])
     starts: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
