@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ....algebra import Vec3, X, Y, cross, vec
-from ....errors import MechanismError, shortened
+from ....errors import CaseError, MechanismError, shortened
 from ....joints import (
     Coupler,
     Distance,
@@ -108,12 +109,37 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
             driving, used = own, used + tree.motors
             model = replace(model, notes=(*model.notes, note))
     model = replace(model, tree=replace(model.tree, left_out=tree.left_out - used))
-    chosen = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
+    chosen, spins = _choose_held(model, driving, spins, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:
         note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
+
+
+def _choose_held(
+    model: Assembled, driving: Driving, spins: Mapping[str, Spin], *, hold_rest: bool
+) -> tuple[Driving, Mapping[str, Spin]]:
+    """Return the driven and held moves, and the links that spin beside them.
+
+    A link between balls that spins is a rod, whose spin is no freedom. Where --hold-rest cannot
+    hold the rest so, it holds the ball of such a link too, which is then no rod.
+
+    Raises:
+        CaseError: see `choose_held`.
+    """
+    axes = {name: spin.axis for name, spin in spins.items()}
+    try:
+        return choose_held(model, driving, axes, hold_rest=hold_rest), spins
+    except CaseError:
+        balls = [name for name, spin in spins.items() if spin.move.kind == "ball"]
+        if not (hold_rest and balls):
+            raise
+        tried = replace(driving, fixed=(*driving.fixed, balls[0]))
+        with suppress(CaseError):
+            left = find_spins(model.tree, tried.fixed)
+            return _choose_held(model, tried, left, hold_rest=True)
+        raise
 
 
 class _Parts:
