@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import Supplied
-from ..errors import KincheckError, collect_errors, refuse
+from ..errors import KincheckError, collect_errors, labelled, refuse
 from ..options import (
     argument,
     destination,
@@ -94,7 +94,7 @@ class Compare(Command):
             refuse(unsolved)
         if self.command:
             tell_left_out(cases)
-            complain(f"note: {case.name}: {note}" for case in cases for note in case.assembly)
+            complain(labelled(note, case.name) for case in cases for note in case.assembly)
         accepted = _tolerances_of(self.tolerance, Path(_name_of(self.cases[0])), designs)
         return designs, views.exceeded(designs, accepted), unsolved
 

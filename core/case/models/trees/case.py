@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ....algebra import Vec3, X, Y, cross, vec
-from ....errors import CaseError, MechanismError, shortened
+from ....errors import WARNING, CaseError, MechanismError, shortened
 from ....joints import (
     Coupler,
     Distance,
@@ -42,6 +42,7 @@ from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,
+    MOST_HELD,
     Driving,
     UndrivenMotions,
     choose_held,
@@ -112,7 +113,10 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
     chosen, spins = _choose_held(model, driving, spins, hold_rest=supplied.hold_rest)
     rest = [name for name in chosen.held + chosen.fixed if name not in supplied.hold]
     if passive := [name for name in rest if name not in model.tree.actuated]:
-        note = f"held by --hold-rest, without a motor: {shortened(passive, MOST_NAMED)}"
+        note = (
+            f"{WARNING}held by --hold-rest, without a motor:"
+            f" {shortened(passive, MOST_NAMED)}; a loop that the file lacks would move them"
+        )
         model = replace(model, notes=(*model.notes, note))
     return model, chosen, spins
 
@@ -133,7 +137,7 @@ def _choose_held(
         return choose_held(model, driving, axes, hold_rest=hold_rest), spins
     except CaseError:
         balls = [name for name, spin in spins.items() if spin.move.kind == "ball"]
-        if not (hold_rest and balls):
+        if not (hold_rest and 0 < len(balls) <= MOST_HELD):
             raise
         tried = replace(driving, fixed=(*driving.fixed, balls[0]))
         with suppress(CaseError):

@@ -18,7 +18,7 @@ from ....algebra import Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
-from .element import ZEROS, Element, words
+from .element import ZEROS, Apart, Element, words
 from .graph import Freedom, Graph, Joint
 from .loop_files import read_loop_files
 from .masses import mass_in
@@ -74,6 +74,20 @@ DRAKE_TYPES = ("ball", "planar", "screw", "universal")
 # Of the axes of SDF in <gazebo>: those in the joint's own frame.
 SDF_VERSION = (1, 7)
 
+APART = Apart(
+    "URDF",
+    {
+        "robot": ("version",),
+        "link": ("type",),
+        "limit": IN_LIMIT,
+        "dynamics": FRICTION,
+        "mass": ("value",),
+        "inertia": ENTRIES,
+        "origin": POSE,
+    },
+)
+"""What URDF has without meaning for kinematics."""
+
 _AXES = {"x": X, "y": Y, "z": Z}
 
 
@@ -87,7 +101,7 @@ def read_urdf(root: Element) -> Tree:
     robot.read()
     tree = robot.graph.hang()
     robot.beside.place(tree)
-    return tree
+    return tree.settled(root, APART)
 
 
 class _Robot:
@@ -110,7 +124,7 @@ class _Robot:
                     "is a macro, expected plain URDF; expand the file: xacro FILE > robot.urdf"
                 )
             if child.tag not in READ and not any(_joints_of_sdf(child)):
-                graph.tree.count(child.tag)
+                graph.tree.leave(child, child.tag)
         root.require_known(("name", "version"), "URDF", closed=False)
         root.require_children(IN_ROBOT)
         self._links()
@@ -154,11 +168,11 @@ class _Robot:
             graph.elements[name] = element
             element.require_known(("name", "type"), "URDF", closed=False)
             element.require_children((*IN_LINK, *LOOKS))
-            for each in [*element.findall("inertial")][:1]:
-                graph.masses[name] = _mass(each)
+            if (inertial := element.child("inertial")) is not None:
+                graph.masses[name] = _mass(inertial)
             for child in element.children:
                 if child.tag != "inertial":
-                    graph.tree.count(child.tag)
+                    graph.tree.leave(child, child.tag)
         parents = [each for joint in root.findall(*JOINTS) for each in joint.findall("parent")]
         if any(each.attributes.get("link") == WORLD for each in parents):
             graph.elements.setdefault(WORLD, root)  # as in Drake, which has it without a link
@@ -187,9 +201,10 @@ class _Robot:
             self._damper(name, element)
             for limit in element.findall("limit"):
                 limit.require_known(IN_LIMIT, "URDF")
-            for each in ("limit", "calibration", "safety_controller", "joint_properties"):
-                if any(element.findall(each)):
-                    graph.tree.count(f"{each} of joints")
+            for each in element.findall("limit"):
+                graph.tree.count("limit of joints")
+            for each in element.findall("calibration", "safety_controller", "joint_properties"):
+                graph.tree.leave(each, f"{each.tag} of joints")
         roots = [name for name in graph.elements if name not in above]
         if len(roots) != 1:
             listed = ", ".join(roots[:5]) or "none"
@@ -217,7 +232,7 @@ class _Robot:
             if element.attributes.get("type") in ("revolute", "continuous", "prismatic"):
                 add_spring(self.graph, name, dynamics.attributes)
             else:
-                self.graph.tree.count("dynamics of joints")
+                self.graph.tree.leave(dynamics, "dynamics of joints")
 
     def _require_link(self, element: Element, name: str, key: str = "name") -> str:
         """Return a name of a link."""
@@ -238,7 +253,11 @@ class _Robot:
         links = self._link(element, "parent"), self._link(element, "child")
         place = graph.places[links[1]]
         types = DRAKE_TYPES if element.tag == DRAKE_JOINT else TYPES
-        kind = self.beside.types.get(name) or element.choice("type", types, "")
+        said = element.choice("type", types, "") if name not in self.beside.types else ""
+        kind = self.beside.types.get(name, said)
+        element.take("type")
+        for each in element.findall("axis"):
+            each.asked.add("xyz")  # of a joint without an axis too
 
         def axis() -> Vec3:
             return _axis(element, "axis", place)
@@ -334,6 +353,9 @@ class _Robot:
                 raise element.fault("is of SDF, expected links of URDF; write it as <link>")
             if any(_joints_of_sdf(gazebo)):
                 frames.read(gazebo, "")
+                for element in gazebo.children:
+                    if element.tag not in IN_GAZEBO:
+                        graph.tree.leave(element, element.tag)
         still = {*graph.fixed}
         graph.loops += joints_of(graph, frames, SDF_VERSION)
         for full, framed in frames.joints.items():
@@ -369,6 +391,7 @@ def _limit(element: Element) -> Limit:
     found = element.child("limit")
     if found is None:
         return NO_LIMIT
+    found.take("lower", "upper", "effort", "velocity")
     texts = {"lower": "0", "upper": "0", **found.attributes}
     if element.attributes.get("type") == "continuous":
         texts |= {"lower": "", "upper": ""}
@@ -383,9 +406,9 @@ def _mass(element: Element) -> Mass | None:
         child.require_known({"mass": ("value",), "inertia": ENTRIES}.get(child.tag, POSE), "URDF")
     try:
         mass, matrix = element.child("mass"), element.child("inertia")
+        entries = [0.0 if matrix is None else matrix.number(name, 0.0) for name in ENTRIES]
         if mass is None:
             return None
-        entries = [0.0 if matrix is None else matrix.number(name, 0.0) for name in ENTRIES]
         return mass_in(_origin(element.child("origin")), mass.number("value"), entries)
     except CaseError:
         return None
