@@ -371,13 +371,18 @@ def choose_held(
 
 
 def _candidates(tree: Tree, driving: Driving) -> list[Move]:
-    """Return the moves to hold, the first ones first."""
+    """Return the moves to hold, the first ones first; of joints that no motor is known of, those
+    nearer to the base first, where most robots with loops have their motors.
+    """
     named = {*driving.moves, *driving.fixed}
+    depths: dict[str, int] = {}
+    for move in tree.moves.values():  # outer ones first
+        depths[move.inner] = 1 + depths.get(move.outer, 0)
 
-    def order(move: Move) -> int:
+    def order(move: Move) -> tuple[int, int]:
         if move.is_axial:
-            return 1 if move.name in tree.actuated else 2
-        return 0 if move.kind == "free" else 3
+            return (1, 0) if move.name in tree.actuated else (2, depths[move.inner])
+        return (0, 0) if move.kind == "free" else (3, 0)
 
     loose = [move for move in tree.moves.values() if not {move.name, move.inner} & named]
     return sorted(loose, key=order)

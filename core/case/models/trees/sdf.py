@@ -248,6 +248,7 @@ def read_sdf(root: Element) -> Tree:
         if framed.element.tag == "frame" and (link := frames.link(framed.element, framed.attached)):
             place = frames.place(framed.element, full)
             graph.frames[frames.short_name(full)] = frames.short_name(link), place
+    graph.close_named_pairs()
     return graph.hang().settled(root, APART)
 
 

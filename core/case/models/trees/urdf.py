@@ -112,7 +112,7 @@ class _Robot:
         name, beside = root.attributes.get("name", root.file.stem), self.beside.names
         others = f" with {', '.join(beside)}" if beside else ""
         described = f"URDF robot {name!r} of {root.file.name}{others}"
-        self.graph = Graph.of(root, described, closes=self.beside.pairs is None)
+        self.graph = Graph.of(root, described, closes=not self.beside.pairs)
         self.joints: dict[str, Element] = {}
 
     def read(self) -> None:
@@ -148,6 +148,7 @@ class _Robot:
 
         add_ties(graph, ((each, self._require_link, framed) for each in root.children))
         self.beside.add(graph)
+        graph.close_named_pairs()
         self._require_apart(frames)
         for motor in root.findall("transmission", "ros2_control"):
             names = {
