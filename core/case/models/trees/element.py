@@ -79,6 +79,11 @@ class Element:
         """The attributes that are asked for."""
         return cast("Asked", self.attributes).asked
 
+    @property
+    def unasked(self) -> list[str]:
+        """The attributes that nobody has asked for."""
+        return cast("Asked", self.attributes).unasked
+
     def take(self, *attributes: str) -> Element:
         """Mark the element, and attributes of it, as read; return it."""
         self.marks.add(TAKEN)
@@ -386,7 +391,7 @@ def settle(root: Element, apart: Apart) -> Account:
         own = apart.names.get(f"{around} {element.tag}") or apart.names.get(element.tag, ())
         known = {*apart.names.get("", ()), *own}
         extended = element.tag in apart.extended
-        unasked = cast("Asked", element.attributes).unasked
+        unasked = element.unasked
         read += len(element.attributes) - len(unasked)
         left += len(unasked)
         for name in unasked:

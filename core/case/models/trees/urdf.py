@@ -55,9 +55,13 @@ IN_ROBOT = (
 )
 """Elements of a robot, of its planners and simulators; others without a prefix are unknown."""
 IN_LINK = ("inertial", "visual", "collision")
-LOOKS = words("material sensor contact audio_source self_collision_checking")
+LOOKS = words(
+    "material sensor contact audio_source self_collision_checking collision_checking self_filter"
+)
 """Elements of links without a meaning for motion."""
-IN_LIMIT = words("lower upper effort velocity acceleration deceleration jerk drake:acceleration")
+IN_LIMIT = words(
+    "lower upper effort velocity acceleration deceleration jerk drake:acceleration command_effort"
+)
 IN_GAZEBO = ("joint", "frame")
 IN_JOINT = (
     *words("origin parent child axis mimic limit"),
@@ -78,6 +82,7 @@ APART = Apart(
     "URDF",
     {
         "robot": ("version",),
+        "joint": ("dont_collapse",),
         "link": ("type",),
         "limit": IN_LIMIT,
         "dynamics": FRICTION,
@@ -186,7 +191,7 @@ class _Robot:
         above: dict[str, str] = {}
         below: dict[str, list[tuple[str, Element]]] = {}
         for element in self.root.findall(*JOINTS):
-            element.require_known(("name", "type"), "URDF")
+            element.require_known(("name", "type", "dont_collapse"), "URDF")
             name = element.require("name")
             if name in self.joints:
                 raise element.repeated_name(name, "the joints")
