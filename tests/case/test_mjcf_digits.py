@@ -34,4 +34,4 @@ def test_joint_moved_by_digits_stays_free(tmp_path):
     across = '<joint name="across" axis="1 0 0"/><joint name="pin"'
     file.write_text(FIVE_BAR.format(tilt="0.00001", gap="0").replace('<joint name="pin"', across))
     case = load(file, driven("crank:0:0.1:3", hold_rest=True))
-    assert [driver.name for driver in case.mechanism.drivers] == ["crank", "other"]
+    assert [driver.name for driver in case.mechanism.drivers] == ["crank", "pin"]

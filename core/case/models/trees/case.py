@@ -373,6 +373,13 @@ class _Parts:
             try:
                 if len({*strut.links} & {GROUND, *self.bodies}) < 2:
                     raise MechanismError("it joins no two bodies of the mechanism")
+                if turned := _turn_of_bushing(strut):
+                    self.tree.notes.append(
+                        f"{strut.element} is left out of the forces: its frames are turned against"
+                        f" each other by {turned:.3g} rad in the start, and there is no preload of"
+                        " its torques"
+                    )
+                    raise MechanismError("it has a preload of torques")
                 yield _force_element(strut, names.new(strut.name))
             except MechanismError:
                 self.tree.count(strut.described)
@@ -414,27 +421,25 @@ class _Parts:
 
 
 def _force_element(strut: Strut, name: str) -> ForceElement:
-    """Return the force element between two links.
-
-    Raises:
-        CaseError: the frames of a bushing that resists turns are not parallel.
-    """
+    """Return the force element between two links."""
     law, (first, second) = strut.spring, strut.places
     p, q = coordinates(first.at), coordinates(second.at)
     if isinstance(law, Spring):
         stiffness = law.stiffness, law.damping
         return SpringDamper(name, *strut.links, (p, q), *stiffness, free_length=law.rest)
     apart = second.relative_to(first)
-    turned = float(np.linalg.norm([*rotation_vector(apart.turn)]))
-    if turned > PARALLEL and any((*law.turning_stiffness, *law.turning_damping)):
-        raise strut.element.fault(
-            f"its frames are turned against each other by {turned:.3g} rad in the start, expected"
-            " parallel ones; there is no preload of its torques: turn one of them, or leave it out"
-            f" by --without {strut.element.tag}"
-        )
     x, y = (coordinates(first.direction(axis)) for axis in (X, Y))
     preload = coordinates(vec([k * r for k, r in zip(law.stiffness, apart.at, strict=True)]))
     return Bushing(name, *strut.links, q, (x, y), **vars(law), preload=preload)
+
+
+def _turn_of_bushing(strut: Strut) -> float:
+    """Return the angle between the frames of a bushing that resists turns [rad]; zero of others."""
+    law, (first, second) = strut.spring, strut.places
+    if isinstance(law, Spring) or not any((*law.turning_stiffness, *law.turning_damping)):
+        return 0.0
+    turned = float(np.linalg.norm([*rotation_vector(second.relative_to(first).turn)]))
+    return turned if turned > PARALLEL else 0.0
 
 
 def _locked_moves(tree: Tree) -> set[str]:

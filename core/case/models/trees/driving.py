@@ -371,13 +371,15 @@ def choose_held(
 
 
 def _candidates(tree: Tree, driving: Driving) -> list[Move]:
-    """Return the moves to hold, the first ones first; of joints that no motor is known of, those
-    nearer to the base first, where most robots with loops have their motors.
+    """Return the moves to hold, the first ones first.
+
+    Of a robot that files beside it or names of frames close, whose joints no motor is known of,
+    those nearer to the base come first, where most such robots have their motors.
     """
     named = {*driving.moves, *driving.fixed}
     depths: dict[str, int] = {}
     for move in tree.moves.values():  # outer ones first
-        depths[move.inner] = 1 + depths.get(move.outer, 0)
+        depths[move.inner] = 0 if tree.closes else 1 + depths.get(move.outer, 0)
 
     def order(move: Move) -> tuple[int, int]:
         if move.is_axial:

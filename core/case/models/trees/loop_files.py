@@ -277,7 +277,9 @@ def _others(file: Path) -> list[str]:
     except OSError:
         return []
     stem = re.escape(file.stem)
-    other = re.compile(rf"(?:{stem}[._-])?(?:loop|closure|closed|constraint)\w*\.(?:ya?ml|json|toml)")
+    other = re.compile(
+        rf"(?:{stem}[._-])?(?:loop|closure|closed|constraint)\w*\.(?:ya?ml|json|toml)"
+    )
     return sorted(name for name in names if other.fullmatch(name))
 
 
