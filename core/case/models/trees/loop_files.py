@@ -35,7 +35,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
@@ -277,9 +277,8 @@ def _others(file: Path) -> list[str]:
     except OSError:
         return []
     stem = re.escape(file.stem)
-    other = re.compile(
-        rf"(?:{stem}[._-])?(?:loop|closure|closed|constraint)\w*\.(?:ya?ml|json|toml)"
-    )
+    word = r"(?:loop|closure|closed|constraint)\w*"
+    other = re.compile(rf"(?:{stem}[._-])?{word}\.(?:ya?ml|json|toml)")
     return sorted(name for name in names if other.fullmatch(name))
 
 
@@ -308,9 +307,10 @@ def _pairs(file: Path) -> tuple[PairsFile, list[str]]:
     Raises:
         CaseError: it is no such file, or one of those keys may close loops.
     """
-    data = parse_yaml(file, _text(file))
+    data: object = parse_yaml(file, _text(file))
     known = PairsFile.__struct_fields__
-    unread = [name for name in data if name not in known] if isinstance(data, dict) else []
+    keys = cast("dict[str, Any]", data) if isinstance(data, dict) else {}
+    unread = [name for name in keys if name not in known]
     for name in unread:
         if similar(name, known) or _CLOSES.search(name.lower()):
             raise unknown_name(file, name, name, known, f"a key of {', '.join(known)}")

@@ -365,13 +365,14 @@ class _Reader:
         own = coordinate.child_number("default_value", 0.0)
         if (motion := _prescribed(coordinate)) is None:
             return own
-        powers = _function(motion).powers
-        if len(powers) > 1 or len(powers[0]) > 1:
+        first, *more = _function(motion).powers
+        value, *slopes = first
+        if more or slopes:
             raise coordinate.fault(
                 f"is prescribed by a {motion.tag} of time, expected a Constant: a model says no"
                 " time; say <prescribed>false</prescribed>, and how it moves by --drive"
             )
-        return powers[0][0]
+        return value
 
     def _freedom(self, coordinate: Element, kind: Kind, axis: Vec3) -> FramedFreedom:
         """Return the move of a coordinate; lock it if the file does."""

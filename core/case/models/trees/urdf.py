@@ -207,7 +207,6 @@ class _Robot:
             self._damper(name, element)
             for limit in element.findall("limit"):
                 limit.require_known(IN_LIMIT, "URDF")
-            for each in element.findall("limit"):
                 graph.tree.count("limit of joints")
             for each in element.findall("calibration", "safety_controller", "joint_properties"):
                 graph.tree.leave(each, f"{each.tag} of joints")
