@@ -666,7 +666,10 @@ def _prescribed(coordinate: Element) -> Element | None:
         CaseError: it has several.
     """
     around = coordinate.child("prescribed_function")
-    if not _flag(coordinate, "prescribed") or around is None or not around.children:
+    if around is None:
+        return None
+    if not _flag(coordinate, "prescribed") or not around.children:
+        around.leave()
         return None
     if len(around.children) > 1:
         raise around.fault("found several functions, expected one; remove the others")
