@@ -160,11 +160,11 @@ def shortened(texts: Sequence[str], most: int, between: str = ", ") -> str:
 
 
 WARNING = "warning: "
-"""Begin of a note on what is more likely wrong than meant."""
+"""Begin of a note on input more likely wrong than meant."""
 
 
 def labelled(note: str, case: str = "") -> str:
-    """Return a note on a case for a line of its own: what it is, the case, the note."""
+    """Return a note on a case for a line of its own, with its kind and the case."""
     own = f"{case}: " if case else ""
     if note.startswith(WARNING):
         return f"{WARNING}{own}{note.removeprefix(WARNING)}"

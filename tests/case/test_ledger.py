@@ -222,7 +222,7 @@ WRONG_BUSHINGS = {
 
 
 @pytest.mark.parametrize("fault", WRONG_BUSHINGS)
-def test_unknown_name_in_bushings_is_named(fault, tmp_path):
+def test_unknown_name_of_bushings_is_named(fault, tmp_path):
     table = write(tmp_path, sample_table(TEMPLATES["double_wishbone"]), "car.csv")
     right = write(tmp_path, BUSHINGS, "right.toml")
     assert load(table, Supplied(bushings=right)).mechanism.bushings
@@ -240,7 +240,7 @@ def test_bushings_of_case_have_no_roles(tmp_path):
         with_bushings(case, file)
 
 
-def test_unknown_name_in_side_files_is_named(tmp_path):
+def test_unknown_name_beside_is_named(tmp_path):
     case = load(write(tmp_path, BASE + INLINE))
     head = 'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n'
     tip = '[hardpoints.tip]\nat = "tip"\n'

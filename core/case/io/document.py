@@ -413,7 +413,7 @@ class Section:
         require_known(self.file, self.key, name, known, expected)
 
     def require_keys(self, known: Iterable[str]) -> None:
-        """Refuse the keys of this table that nobody reads: almost always misspelt ones.
+        """Refuse unread keys of this table: almost always misspelt ones.
 
         Raises:
             CaseError: the value is no table, or has such a key.

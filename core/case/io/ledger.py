@@ -1,8 +1,8 @@
-"""The ledger of a reader: names in a file note that they are asked for.
+"""The ledger of a reader: the names of a file note which of them it asks for.
 
-What no reader asked for is dropped, whatever the reader was written to know. So at the end of the
-reading each such name is one that means nothing for kinematics, in a table of its format, or it
-stops the run.
+A name without a question is dropped in silence, whatever the reader was written to know. At the end
+of the reading each such name is in its format's table of names without meaning for kinematics, or
+it stops the run.
 """
 
 from __future__ import annotations
@@ -45,5 +45,5 @@ class Asked(dict[str, str]):
 
     @property
     def unasked(self) -> list[str]:
-        """The names that nobody has asked for."""
+        """The names without a question."""
         return [name for name in self.keys() if name not in self.asked]

@@ -480,7 +480,7 @@ def bushings_in(file: Path, *tables: str) -> Section:
     """Return the tables of a file of bushings.
 
     Args:
-        tables: what it may have.
+        tables: names of its tables.
 
     Raises:
         CaseError: the file cannot be read, or has other tables or keys.
@@ -504,7 +504,7 @@ def with_bushings(case: Case, file: Path, *tables: str) -> Case:
     beside its own: tables of hardpoints have none.
 
     Args:
-        tables: what the file may have beside.
+        tables: names of other tables of the file.
 
     Raises:
         CaseError: the file cannot be read, or names an unknown joint.

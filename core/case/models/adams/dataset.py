@@ -49,7 +49,7 @@ APART: Mapping[str, str] = {
     "SPRINGDAMPER": "ANGLE LENGTH FORCE TORQUE K C KT CT",
     "GCON": "I",
 }
-"""Arguments of read statements that mean nothing for kinematics, or for statements of some types:
+"""Arguments of read statements without meaning for kinematics, or for statements of some types:
 initial velocities, markers on no part, the mass of the ground.
 """
 FORCING = (
@@ -233,7 +233,7 @@ class Dataset:
         return [each for kind in kinds for each in self.statements.get(kind, {}).values()]
 
     def unread(self) -> Counter[str]:
-        """Return the arguments that nobody asked for, by name and kind.
+        """Return the unread arguments, by name and kind.
 
         Raises:
             CaseError: one of them may mean something for kinematics.

@@ -354,7 +354,7 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
 
 
 def _require_bushing_keys(data: Section) -> None:
-    """Refuse keys of the data of a bushing that Chrono does not have (ChVehicleJoint.cpp)."""
+    """Refuse keys of a bushing unknown to Chrono (ChVehicleJoint.cpp)."""
     data.require_keys((*_BUSHING_KEYS, "DOF"))
     if data.at("DOF").value is not None:
         data.at("DOF").require_keys(_BUSHING_KEYS)

@@ -124,10 +124,10 @@ def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mappin
 def _choose_held(
     model: Assembled, driving: Driving, spins: Mapping[str, Spin], *, hold_rest: bool
 ) -> tuple[Driving, Mapping[str, Spin]]:
-    """Return the driven and held moves, and the links that spin beside them.
+    """Return the driven and held moves, and the links with a spin beside them.
 
-    A link between balls that spins is a rod, whose spin is no freedom. Where --hold-rest cannot
-    hold the rest so, it holds the ball of such a link too, which is then no rod.
+    A link between two balls is a rod, whose spin is no freedom. If --hold-rest cannot hold the rest
+    so, it holds the ball of such a link too, which is then no rod.
 
     Raises:
         CaseError: see `choose_held`.
@@ -434,7 +434,7 @@ def _force_element(strut: Strut, name: str) -> ForceElement:
 
 
 def _turn_of_bushing(strut: Strut) -> float:
-    """Return the angle between the frames of a bushing that resists turns [rad]; zero of others."""
+    """Return the angle between the frames of a bushing with a torque [rad]; zero of others."""
     law, (first, second) = strut.spring, strut.places
     if isinstance(law, Spring) or not any((*law.turning_stiffness, *law.turning_damping)):
         return 0.0

@@ -373,8 +373,8 @@ def choose_held(
 def _candidates(tree: Tree, driving: Driving) -> list[Move]:
     """Return the moves to hold, the first ones first.
 
-    Of a robot that files beside it or names of frames close, whose joints no motor is known of,
-    those nearer to the base come first, where most such robots have their motors.
+    Joints without a motor come in the order of the file. If files beside a robot or names of its
+    frames close it, those nearer to the base come first: most such robots have their motors there.
     """
     named = {*driving.moves, *driving.fixed}
     depths: dict[str, int] = {}

@@ -1,8 +1,8 @@
 """Elements of an XML file of any origin: attributes, texts and lines, no entities, no
 document types, a bounded depth.
 
-Elements note what is asked of them. `settle` refuses what nobody asked for, unless it means nothing
-for kinematics: a mistyped attribute or element would silently fall back to its default.
+Elements note the questions of their reader. `settle` refuses the rest, unless it means nothing for
+kinematics: a mistyped attribute or element would silently fall back to its default.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ USD = "usd"
 EXTENDED = ("robot", "link", "model", "world", "sdf")
 """Elements in which programs put their own ones."""
 TAKEN, LEFT, TEXT = "taken", "left", "text"
-"""Marks of an element that is read, of one that is listed with all in it, and of a read text."""
+"""Marks of a read element, of one listed with all in it, and of a read text."""
 
 
 def words(text: str) -> tuple[str, ...]:
@@ -76,12 +76,12 @@ class Element:
 
     @property
     def asked(self) -> set[str]:
-        """The attributes that are asked for."""
+        """The attributes with a question."""
         return cast("Asked", self.attributes).asked
 
     @property
     def unasked(self) -> list[str]:
-        """The attributes that nobody has asked for."""
+        """The attributes without a question."""
         return cast("Asked", self.attributes).unasked
 
     def take(self, *attributes: str) -> Element:
@@ -223,14 +223,14 @@ class Element:
                 raise self.unknown_child(child, alike)
 
     def unknown_child(self, child: Element, known: Sequence[str]) -> CaseError:
-        """Return the error of an element in it that is none of the known ones."""
+        """Return the error of an unknown element in it."""
         name = child.tag.rpartition(":")[2]
         foreign = ":" in child.tag or (self.tag in EXTENDED and not similar(name, known, ALIKE))
         leave = f" (--without {child.tag} leaves it out)" * foreign
         return child.fault(f"unknown in <{self.tag}>{leave}; {remedy(name, known)}")
 
     def unknown_attribute(self, name: str, known: Collection[str], format_name: str) -> CaseError:
-        """Return the error of an attribute that is none of the known ones."""
+        """Return the error of an unknown attribute."""
         return self.fault(
             f"found the attribute {shown(name)}, which {format_name} does not have here;"
             f" {remedy(name, known)}"
@@ -347,13 +347,13 @@ class Element:
 
 @dataclass(frozen=True)
 class Apart:
-    """What a format has that means nothing for kinematics.
+    """The names of a format without meaning for kinematics.
 
     Attributes:
         format_name: for messages.
         names: attributes, and tags of elements in pointed brackets, by the tag of the element they
             are in, or by two tags, "equality joint"; those of "" are anywhere.
-        components: tags in pointed brackets whose elements are counted where they stand; others
+        components: tags in pointed brackets whose elements are counted by name; others
             are settings, of which a format has many.
         extended: elements in which programs put their own attributes and elements, which are
             counted.

@@ -127,7 +127,7 @@ class Graph:
         return name
 
     def close_named_pairs(self) -> None:
-        """Hold each two frames together at one point that are named closing_X_1 and closing_X_2, as
+        """Hold each two frames named closing_X_1 and closing_X_2 together at one point, as
         onshape-to-robot (github.com/Rhoban/onshape-to-robot) names the ends of a loop.
         """
         ends: dict[str, dict[str, str]] = {}
@@ -154,7 +154,7 @@ class Graph:
             self.tree.notes.append(f"{names[0]} and {names[1]} are one point, as their names say")
 
     def _rigid_bodies(self) -> dict[str, str]:
-        """Return by link the first of the links that fixed joints hold together with it."""
+        """Return by link the first of all links rigidly joined with it."""
         found = {name: WORLD if name in self.fixed else name for name in self.places}
         fixed = [joint.links for joint in self.joints if not joint.moves and not joint.is_free]
         for a, b in fixed:

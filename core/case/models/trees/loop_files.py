@@ -9,7 +9,7 @@ name_mot: [joint, ...]                 joints with a motor
 joint_name: [joint, ...]               joints of another type than the URDF can say
 joint_type: [SPHERICAL, UJOINT_XY, FIXED, ...]
 
-Of scikit-robot (github.com/iory/scikit-robot) and converters of CAD that take its file, in the axes
+Of scikit-robot (github.com/iory/scikit-robot) and converters of CAD with the same file, in the axes
 of the base in the zero pose:
 
 closures: [{link_a: link, link_b: link, point: [x, y, z], axis: [x, y, z]}, ...]
@@ -20,7 +20,7 @@ Of RoboNex (github.com/Humanoid-Project/robonex-description), in the axes of bot
 
 ball_loops: [{name: ..., parent: link, child: link, parent_xyz: [...], child_xyz: [...]}, ...]
 pin_loops: the same with axis: [x, y, z]
-ball_upgrades: [joint, ...]            joints that are balls
+ball_upgrades: [joint, ...]            joints as balls
 
 All conditions of a joint in NAME.constraints.json together give its freedoms: `offset` leaves
 slides across its direction, and pairs of `directions` leave turns. The joint is a chain of slides
@@ -115,7 +115,7 @@ class ConstraintsFile(msgspec.Struct, frozen=True):
 
 
 class HingeOfBase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A hinge that closes a loop, in the axes of the base; a ball without an axis."""
+    """A closing hinge, in the axes of the base; a ball without an axis."""
 
     link_a: str
     link_b: str
@@ -152,7 +152,7 @@ class PairsFile(msgspec.Struct, frozen=True):
 
     @property
     def links(self) -> set[str]:
-        """The links and frames that it joins."""
+        """The links and frames it joins."""
         found = {name for pair in self.closed_loop for name in pair}
         found |= {name for each in self.closures for name in (each.link_a, each.link_b)}
         rows = (*self.ball_loops, *self.pin_loops)
@@ -166,7 +166,7 @@ class LoopFiles:
     Attributes:
         pairs: pairs of frames, which the zero pose need not bring together.
         types: types of joints in place of those of the URDF; letters for a universal joint.
-        notes: on what is not read.
+        notes: on unread files and keys.
     """
 
     constraints: tuple[Path, ConstraintsFile] | None = None
@@ -262,7 +262,7 @@ def read_loop_files(root: Element) -> LoopFiles:
 
 
 def _paired(file: Path) -> list[Path]:
-    """Return the YAML beside a URDF, in its folder or where packages of ROS have it."""
+    """Return the YAML beside a URDF, in its folder or in those of packages of ROS."""
     folder, stem = file.parent, file.stem
     own = [file.with_suffix(each) for each in YAML]
     named = [f"{stem}{mark}{LOOPS}" for mark in "._-"] + [LOOPS]
@@ -271,7 +271,7 @@ def _paired(file: Path) -> list[Path]:
 
 
 def _others(file: Path) -> list[str]:
-    """Return the names of other files beside a URDF that may hold its loops."""
+    """Return the names of other files beside a URDF, by which they may hold its loops."""
     try:
         names = [each.name for each in os.scandir(file.parent)]
     except OSError:
@@ -302,7 +302,7 @@ def _constraints(file: Path) -> ConstraintsFile:
 
 
 def _pairs(file: Path) -> tuple[PairsFile, list[str]]:
-    """Return the content of a file, and the keys that are not read.
+    """Return the content of a file, and its unread keys.
 
     Raises:
         CaseError: it is no such file, or one of those keys may close loops.

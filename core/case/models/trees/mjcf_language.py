@@ -144,7 +144,7 @@ APART = Apart(
     },
     extended=("option", "flag"),
 )
-"""What MJCF has without meaning for kinematics."""
+"""Names of MJCF without meaning for kinematics."""
 
 DYNAMIC = {
     "range": "ranges",
@@ -218,7 +218,7 @@ class Classes:
         return replace(element, attributes=Asked(found, element.asked))
 
     def take(self) -> None:
-        """Mark what is asked of elements of a kind as asked of its defaults; those of no element
+        """Mark the questions to elements of a kind in its defaults; those of no element
         have no meaning.
         """
         for default in self._defaults:

@@ -69,19 +69,6 @@ FUNCTIONS = (
     *words("Constant LinearFunction PolynomialFunction MultiplierFunction"),
     *words("SimmSpline PiecewiseLinearFunction"),
 )
-IN_JOINT = words(
-    "socket_parent_frame socket_child_frame coordinates frames components SpatialTransform reverse"
-)
-IN_COORDINATE = words(
-    "motion_type default_value default_speed_value range clamped locked prescribed_function"
-    " prescribed is_free_to_satisfy_constraints"
-)
-IN_FRAME = words("socket_parent translation orientation components FrameGeometry attached_geometry")
-IN_CONSTRAINT = (
-    *words("isEnforced socket_body_1 socket_body_2 location_body_1 location_body_2"),
-    *words("constant_distance socket_frame1 socket_frame2 frames components scale_factor"),
-    *words("coupled_coordinates_function independent_coordinate_names dependent_coordinate_name"),
-)
 APART = Apart(
     "OpenSim",
     {
@@ -114,9 +101,9 @@ APART = Apart(
         "TransformAxis": ("<coordinates>", "<axis>"),
     },
     components=("<PhysicalOffsetFrame>",),
-    extended=(),
+    extended=("Model",),
 )
-"""What OpenSim has without meaning for kinematics."""
+"""Names of OpenSim without meaning for kinematics."""
 _NAMED = re.compile(r"\w*(?:Joint|Constraint|Body|Force|Spring|Actuator|Damper)")
 _INSIDE = ("objects", "components", "frames", "coordinates", "Model")
 _TIED = (*words("BodySet JointSet ConstraintSet ForceSet MarkerSet CoordinateSet FrameSet"),)
@@ -297,7 +284,7 @@ class _Reader:
             return self.graph.add_world(), ORIGIN
         if depth > DEEPEST_FRAME:
             raise frame.fault("hangs on itself by a ring of frames; correct socket_parent")
-        frame.take().require_children(IN_FRAME)
+        frame.take()
         link, place = self._frame(frame, "socket_parent", depth + 1)
         angles = frame.value("orientation", 3, ZEROS)
         return link, place * Place(frame.child_vector("translation"), _turn(angles))
@@ -307,7 +294,6 @@ class _Reader:
         graph, name = self.graph, element.require("name")
         if element.tag not in (*CHAINS, CUSTOM):
             raise element.unknown_name("type", element.tag, (*CHAINS, CUSTOM), "a joint")
-        element.require_children(IN_JOINT)
         if _flag(element, "reverse"):
             raise element.fault("reverse: is not read, expected false; exchange its frames")
         (a, f), (b, g) = (
@@ -333,8 +319,6 @@ class _Reader:
             for around in element.findall("coordinates")
             for each in around.findall("Coordinate")
         ]
-        for each in given:
-            each.require_children(IN_COORDINATE)
         for k in range(len(given), count):
             named = {"name": f"{name}_coord_{k}"}
             given.append(Element(element.file, "Coordinate", named, element.line))
@@ -357,7 +341,7 @@ class _Reader:
         return [*slides, FramedFreedom(name, "ball", X, element, turn=turn)]
 
     def _default(self, coordinate: Element) -> float:
-        """Return the value of a coordinate in the pose, that of its motion if it is prescribed.
+        """Return the value of a coordinate in the pose; of a prescribed one, by its function.
 
         Raises:
             CaseError: the motion is no rest.
@@ -461,7 +445,6 @@ class _Reader:
                 f"is a {element.tag}, expected one of {', '.join(CONSTRAINTS)}; leave it out by"
                 f" --without {name}"
             )
-        element.require_children(IN_CONSTRAINT)
         if not _flag(element, "isEnforced", default=True):
             graph.tree.leave(element, "constraints that are not enforced")
             return

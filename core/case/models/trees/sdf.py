@@ -102,7 +102,7 @@ APART = Apart(
     },
     extended=(*EXTENDED, "inertial"),
 )
-"""What SDF has without meaning for kinematics."""
+"""Names of SDF without meaning for kinematics."""
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link unless given, of 1 kg [kg m^2]."""
 # Axes were in the model's frame before this version.
@@ -433,7 +433,7 @@ class _Joint:
         return replace(joint, moves=moves)
 
     def _leave_rest(self) -> None:
-        """List what a joint of its type does not need, such as the axis of a ball."""
+        """List parts without use for a joint of its type, such as the axis of a ball."""
         axes = [*self.element.findall("axis", "axis2")]
         limits = [limit for axis in axes for limit in axis.findall("limit")]
         for around in (self.element, *axes, *limits):

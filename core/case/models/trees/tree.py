@@ -375,10 +375,10 @@ class Tree:
         self.count(what)
 
     def settled(self, root: Element, apart: Apart) -> Tree:
-        """Return the tree with what its reader did not ask for among what is left out.
+        """Return the tree, with the unread names of its file among the parts left out.
 
         Raises:
-            CaseError: that may mean something for kinematics; see `settle`.
+            CaseError: one of them may mean something for kinematics; see `settle`.
         """
         self.account = settle(root, apart)
         self.left_out.update(self.account.left_out)

@@ -91,7 +91,7 @@ APART = Apart(
         "origin": POSE,
     },
 )
-"""What URDF has without meaning for kinematics."""
+"""Names of URDF without meaning for kinematics."""
 
 _AXES = {"x": X, "y": Y, "z": Z}
 

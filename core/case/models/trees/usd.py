@@ -74,9 +74,7 @@ APART = (
     *words("axis lowerLimit upperLimit coneAngle0Limit coneAngle1Limit gravityDirection"),
     *words("gravityMagnitude minDistance maxDistance breakForce breakTorque"),
 )
-"""Properties of UsdPhysics that mean nothing for kinematics, or nothing on the prims that have
-them.
-"""
+"""Properties of UsdPhysics without meaning for kinematics, or for some prims with them."""
 PHYSICS = (*TYPES, GENERIC, ROD, "PhysicsScene", "PhysicsCollisionGroup")
 SCHEMAS = words(
     "PhysicsRigidBodyAPI PhysicsMassAPI PhysicsCollisionAPI PhysicsMeshCollisionAPI"
@@ -170,7 +168,7 @@ class _Reader:
         return tree.settled(root, Apart("USD", {"": self._unread()}))
 
     def _unread(self) -> set[str]:
-        """Return the properties that are not read and mean nothing for kinematics; count prims, and
+        """Return the unread properties without meaning for kinematics; count prims, and
         properties and schemas of other programs on bodies and joints.
 
         Raises:
@@ -205,7 +203,6 @@ class _Reader:
 
     def _add_body(self, name: str, element: Element) -> None:
         graph, (place, _) = self.graph, self._frame(element)
-        _require_spelt(element, IN_BODY)
         graph.places[name], graph.elements[name] = place, element
         if element.flag("physics:kinematicEnabled", default=False):
             graph.fixed.add(name)
@@ -285,7 +282,6 @@ class _Reader:
 
     def _add_joint(self, element: Element) -> None:
         graph = self.graph
-        _require_spelt(element, IN_JOINT)
         if not element.flag("physics:jointEnabled", default=True):
             element.leave()
             graph.tree.notes.append(f"{element} is switched off and joins nothing (jointEnabled)")
@@ -549,7 +545,7 @@ class _Reader:
 
 
 def _require_of_physics(element: Element, name: str, known: Sequence[str]) -> None:
-    """Refuse a type or schema that is almost one of UsdPhysics, and others of that name."""
+    """Refuse a type or schema with almost a name of UsdPhysics."""
     alike = similar(name, known, CLOSE)
     if name.startswith("Physics") or (alike and not name.startswith(_VENDORS)):
         raise element.fault(f"found {name}, which UsdPhysics does not have; {remedy(name, known)}")
@@ -565,7 +561,7 @@ def _equality(element: Element, unit: float) -> list[float]:
     give the first two.
 
     Args:
-        unit: of the constant of Newton, in that of the others.
+        unit: of the constant of Newton, in the unit of the others.
     """
     found: list[float] = []
     for k, default in enumerate((0.0, 1.0, 0.0, 0.0, 0.0)):
@@ -587,14 +583,6 @@ def _short_names(paths: Sequence[str]) -> dict[str, str]:
         left = [path for path in left if path not in found]
         length += 1
     return {path: found[path] for path in paths}
-
-
-def _require_spelt(element: Element, known: Sequence[str]) -> None:
-    """Refuse misspelt properties of UsdPhysics, which has many of similar names."""
-    for key in element.attributes:
-        name = key.removeprefix("physics:")
-        if name != key and name not in known and similar(name, known, CLOSE):
-            raise element.fault(f"found the property {key!r}; {remedy(name, known)}")
 
 
 def freedoms_of(element: Element, name: str) -> list[FramedFreedom]:
