@@ -64,6 +64,9 @@ _INERTIAL = (*words("pos mass diaginertia fullinertia"), *ORIENTATION)
 _OF_AXIS = words("pos axis ref range limited actuatorfrcrange actuatorfrclimited springref")
 """Attributes without effect on a free joint."""
 _ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
+_TRANSMISSIONS = words(
+    "joint jointinparent tendon site refsite body slidersite cranksite name class"
+)
 RANGES = f"{DYNAMIC['range']} of joints"
 
 
@@ -172,6 +175,7 @@ class _Reader:
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
         for section in root.findall("actuator"):
             for motor in section.findall(*_ACTUATORS):
+                motor.require_known(_TRANSMISSIONS, closed=False)
                 tendon = self.tendons.get(motor.attributes.get("tendon", ""))
                 moved = motor
                 if tendon is not None and tendon.tag == "fixed":  # of joints that move as one

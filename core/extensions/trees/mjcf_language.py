@@ -42,7 +42,7 @@ KNOWN = {
     "body": (*_FRAME, *words("mocap gravcomp user sleep fuse simple")),
     "frame": _FRAME,
     "replicate": words("count sep offset euler childclass"),
-    "key": words("name time qpos qvel act mpos mquat ctrl"),
+    "key": words("name time qpos qvel act mpos mquat ctrl plastic"),
     "joint": ("name", "class", *_JOINT),
     "freejoint": ("name", "group", "align"),
     "site": (*ORIENTATION, *words("name class type group pos material mesh size fromto rgba user")),

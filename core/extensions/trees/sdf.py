@@ -263,7 +263,7 @@ def _add_links(graph: Graph, frames: Frames) -> None:
         if (inertial := framed.element.child("inertial")) is not None:
             graph.masses[name] = _mass(inertial)
         for child in framed.element.children:
-            if child.tag not in ("inertial", "pose", "frame"):
+            if child.tag not in ("inertial", "pose"):
                 graph.tree.leave(child, child.tag)
     if not graph.places:
         raise graph.root.fault("has no link, expected a mechanism; give a model that moves")

@@ -164,6 +164,8 @@ class _Reader:
         self._keyframes()
         for each in filter(None, (each.attributes["variants"] for each in root.descendants())):
             tree.notes.append(f"variants that are read: {each}")
+        if off := root.attributes["off"].split():
+            tree.notes.append(f"not active: {shortened(off, MOST_NAMED)}")
         root.take(*UNITS, "said")
         return tree.settled(root, Apart("USD", {"": self._unread()}))
 
