@@ -12,9 +12,10 @@ from typing import TypeAlias, cast
 
 from ...algebra import X, quat, vec
 from ...case.io.document import shown
-from ...errors import MOST_NAMED, CaseError, remedy, shortened
+from ...errors import MOST_NAMED, WARNING, CaseError, remedy, shortened
 from ...mechanism.mechanism import GROUND, Vector
 from .element import ZEROS, Element, significant_digits, words
+from .graph import CLOSING
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     APART,
@@ -184,6 +185,12 @@ class _Reader:
                 tree.add_motor(f"actuator: {motor.tag}", named & tree.moves.keys())
         ranges = ["range" in tree.moves[name].element.attributes for name in tree.actuated]
         tree.motors[RANGES] = sum(ranges)
+        tied = {tie.element.attributes.get("site1") for tie in tree.ties}
+        for site in tree.sites:
+            other = f"{site[:-1]}2"
+            ends = {site, other} <= tree.sites.keys() and not {site, other} & tied
+            if CLOSING.fullmatch(site) and site.endswith("1") and ends:
+                tree.notes.append(f"{WARNING}no equality holds {site} and {other} together")
         gravity = self._gravity()
         if tree.masses:
             tree.gravity = gravity

@@ -319,6 +319,10 @@ class _Reader:
             for around in element.findall("coordinates")
             for each in around.findall("Coordinate")
         ]
+        for k, each in enumerate(given):
+            if not each.attributes.get("name"):
+                own = {**each.attributes, "name": f"{name}_coord_{k}"}
+                given[k] = replace(each, attributes=own)
         for k in range(len(given), count):
             named = {"name": f"{name}_coord_{k}"}
             given.append(Element(element.file, "Coordinate", named, element.line))
