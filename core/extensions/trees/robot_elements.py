@@ -132,7 +132,7 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf, FrameOf]]) 
     found: dict[tuple[str, str], list[tuple[Element, Vec3, Vec3]]] = {}
     for element, link_of, frame_of in elements:
         if element.tag in (BALL, STRUT, BUSHING):
-            element.take()
+            element.take("name")  # several ties of a frame have one name
         if element.tag == BALL:
             links, points = _ends(element, link_of)
             found.setdefault(links, []).append((element, *points))
