@@ -404,8 +404,13 @@ class Section:
         return Section(self.file, join(self.key, name), self._entries.get(name), self.units)
 
     def each(self) -> Iterator[tuple[str, Section]]:
-        """Yield names and values of this table; nothing without it."""
-        return ((name, self.at(name)) for name in self._entries)
+        """Yield names and values of this table; nothing without it.
+
+        Raises:
+            CaseError: the value is no table.
+        """
+        if self.value is not None:
+            yield from ((name, self.at(name)) for name in self.table)
 
     def fault(self, problem: str) -> CaseError:
         """Return the error of this value; see `fault`."""
@@ -422,6 +427,22 @@ class Section:
     def require(self, name: str | None, known: Iterable[str], expected: str) -> None:
         """Refuse a name here that is none of the known ones; see `require_known`."""
         require_known(self.file, self.key, name, known, expected)
+
+    def require_keys(self, known: Iterable[str]) -> None:
+        """Refuse unread keys of this table: almost always misspelt ones.
+
+        Raises:
+            CaseError: the value is no table, or has such a key.
+        """
+        known = [*known]
+        for name in self.table:
+            if name not in known:
+                close = similar(name, known)
+                advice = f"did you mean {close!r}?" if close else "remove it"
+                raise self.at(name).fault(
+                    f"unknown key, expected {'one of ' * (len(known) > 1)}{', '.join(known)};"
+                    f" {advice}"
+                )
 
     @property
     def table(self) -> dict[str, Any]:
@@ -468,14 +489,9 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
         CaseError: not a table, an unknown key, a missing key, or a value of another type or shape
             than described.
     """
-    table = Section(file, key, value).table
-    fields = _fields(struct)
-    for name in table:
-        if name not in fields:
-            close = similar(name, fields)
-            advice = f"did you mean {close!r}?" if close else "remove it"
-            problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
-            raise fault(file, join(key, name), problem)
+    section, fields = Section(file, key, value), _fields(struct)
+    section.require_keys(fields)
+    table = section.table
     for name, field in fields.items():
         if field.required and name not in table:
             raise fault(

@@ -24,7 +24,7 @@ from ...joints import PiecewisePolynomial, Spline
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import GROUND, Vector
 from ...trajectory import Array
-from .element import Element, Names
+from .element import Account, Apart, Element, Names, settle
 from .place import ORIGIN, Place
 
 WORLD = "world"
@@ -338,6 +338,7 @@ class Tree:
         left_out: numbers of parts without a meaning for kinematics, by name.
         notes: of its reader, beside every verdict.
         without: names by which the user leaves out elements.
+        account: of the whole file, when it is read.
     """
 
     file: Path
@@ -367,6 +368,7 @@ class Tree:
     notes: list[str] = field(default_factory=list[str])
     without: set[str] = field(default_factory=set[str])
     names: Names = field(default_factory=Names)
+    account: Account | None = None
 
     @cached_property
     def joints(self) -> Mapping[str, Move]:
@@ -380,6 +382,21 @@ class Tree:
     def count(self, what: str) -> None:
         """Count one more omitted item."""
         self.left_out[what] += 1
+
+    def leave(self, element: Element, what: str) -> None:
+        """Count one more omitted element, with all in it."""
+        element.leave()
+        self.count(what)
+
+    def settled(self, root: Element, apart: Apart) -> Tree:
+        """Return the tree, with the unread names of its file among the parts left out.
+
+        Raises:
+            CaseError: one of them may mean something for kinematics; see `settle`.
+        """
+        self.account = settle(root, apart)
+        self.left_out.update(self.account.left_out)
+        return self
 
     def add_motor(self, part: str, moves: Collection[str]) -> None:
         """Add a motor of moves, which is a part that is left out."""
