@@ -22,7 +22,7 @@ from ..harness.provenance import circumstances
 from ..harness.record import Outcome
 from ..harness.run import run
 from ..program import disk_cache
-from ..program.llvm import compiler
+from ..program.llvm import compiler, machine_code
 
 SCHEMA = "kincheck-doctor/1"
 # Extras of the package and their purposes, except engines. Requirements without an extra are
@@ -133,7 +133,7 @@ def examine(
     Args:
         apart: requirements of steppers that have environments of their own, by engine.
     """
-    problem = _cache_problem()
+    problem, compiled = _cache_problem(), machine_code.available()
     (record,) = run([case], [native], tol=tol).records
     found = [each.position for each in record.errors.values() if each.position is not None]
     worst = max(found, key=lambda each: each.ratio, default=None)
@@ -154,10 +154,10 @@ def examine(
         os.cpu_count() or 1,
         (
             "machine code"
-            if compiler.available()
-            else "numpy: with llvmlite it is some fifty times faster"
+            if compiled
+            else "numpy: with llvmlite that works it is some fifty times faster"
         ),
-        compiler.vector_width() if compiler.available() else None,
+        compiler.vector_width() if compiled else None,
         str(disk_cache.folder() or "nowhere"),
         0 if problem else disk_cache.size(),
         problem,
@@ -184,12 +184,17 @@ def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
             if group in engines:
                 modules.setdefault(name, group)
             version = _version(name)
+            bound = re.search(r">=([\d.]+)", requirement)
             remedy = (
                 how_to_install(group)
                 if group
                 else f"pip install '{requirement.split(';')[0].strip()}'"
             )
-            problem = "not installed" if version is None else ""
+            if version is None:
+                problem = "not installed"
+            else:
+                old = bound and _release(version) < _release(bound[1])
+                problem = f"older than {bound[1]}" if bound and old else ""
             found.append(
                 Part(
                     name,
@@ -212,6 +217,11 @@ def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
         *_with_import_problems(found, modules, pythons),
         Part("chromium", browser, "tests of the report", False, *missing),
     ]
+
+
+def _release(version: str) -> list[int]:
+    """Return the numbers of a version before any letter."""
+    return [int(part) for part in re.findall(r"\d+", re.split(r"[^\d.]", version)[0])]
 
 
 def _version(name: str, python: str = sys.executable) -> str | None:
@@ -251,7 +261,10 @@ def _with_import_problems(
     }
     result: list[Part] = []
     for part in found:
-        problem = _import_problem(running[part.name]) if part.name in running else part.problem
+        unusable = _import_problem(running[part.name]) if part.name in running else ""
+        problem = unusable or part.problem
+        if part.name == "llvmlite" and part.version and not problem:
+            problem = machine_code.problem()
         remedy = part.remedy or (_repair(part.name, problem) if problem else "")
         result.append(msgspec.structs.replace(part, problem=problem, remedy=remedy))
     return result

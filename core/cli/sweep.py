@@ -274,7 +274,7 @@ def _part(options: Sweep, folder: Path) -> Part:
     import numpy as np
 
     from ..harness.provenance import processor
-    from ..program.llvm.compiler import available
+    from ..program.llvm.machine_code import available
     from ..studies.tolerance.chunk_files import Part
     from .joint_loading import sources
 

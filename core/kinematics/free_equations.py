@@ -22,9 +22,9 @@ from ..mechanism.mechanism import Mechanism, coordinates
 from ..mechanism.motions import Driver
 from ..primitives.base import GROUND_POSE, GROUND_TWIST, Drive
 from ..program import Plan, Tape
-from ..program.llvm.compiler import available
 from ..program.llvm.executor import bind
 from ..program.llvm.jit import LlvmCode
+from ..program.llvm.machine_code import available
 from ..trajectory import Array, BodyMotion, PointMotion, Trajectory
 from .compiled.request import Layout, slots_of
 from .compiled.traced_forces import angles

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from ...caches import cache_last
-from ...program.llvm.compiler import available
 from ...program.llvm.fixed_order import LANES, FixedOrder
+from ...program.llvm.machine_code import available
 from ...trajectory import Array
 from .degrees_of_freedom import NARROW, Indices
 
