@@ -184,17 +184,12 @@ def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
             if group in engines:
                 modules.setdefault(name, group)
             version = _version(name)
-            bound = re.search(r">=([\d.]+)", requirement)
             remedy = (
                 how_to_install(group)
                 if group
                 else f"pip install '{requirement.split(';')[0].strip()}'"
             )
-            if version is None:
-                problem = "not installed"
-            else:
-                old = bound and _release(version) < _release(bound[1])
-                problem = f"older than {bound[1]}" if bound and old else ""
+            problem = "not installed" if version is None else _age(version, requirement)
             found.append(
                 Part(
                     name,
@@ -217,6 +212,13 @@ def parts(engines: Collection[str], apart: Mapping[str, str]) -> list[Part]:
         *_with_import_problems(found, modules, pythons),
         Part("chromium", browser, "tests of the report", False, *missing),
     ]
+
+
+def _age(version: str, requirement: str) -> str:
+    """Return that a version is older than a requirement allows; empty if it is not."""
+    bound = re.search(r">=([\d.]+)", requirement)
+    old = bound and _release(version) < _release(bound[1])
+    return f"older than {bound[1]}" if bound and old else ""
 
 
 def _release(version: str) -> list[int]:

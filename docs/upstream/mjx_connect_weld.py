@@ -29,6 +29,7 @@ EXPECTED = -(2.0**2) * 0.5
 
 
 def show(program, tie, found):
+    """Print the acceleration of the mass beside the expected one."""
     print(f"{program}, {tie}: acceleration to the axle: expected {EXPECTED:g}, found {found:.4g}")
 
 

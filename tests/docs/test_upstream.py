@@ -55,6 +55,14 @@ def test_mujoco_full_inertia_compiled_exactly():
     assert line.endswith("above 1e-12: 0")
 
 
+def test_dart_reads_no_tensor_of_mjcf():
+    _, *lines = printed("dart_mjcf_inertia", "dartpy")
+    assert len(lines) == 4
+    for line in lines:
+        kept = "mass 2, centre 0.3" if "with geom" in line else "mass 1, centre 0"
+        assert line.endswith(f"found {kept}, moments [1.0, 1.0, 1.0]")
+
+
 def test_pinocchio_acceleration_error_grows_with_mu():
     _, *lines = printed("pinocchio_proximal", "pinocchio")
     found = {float(mu): float(error) for mu, error in map(numbers, lines)}

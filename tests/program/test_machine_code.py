@@ -63,7 +63,7 @@ def test_numpy_solves_where_compiler_fails(step, unknown_compiler, monkeypatch, 
     assert note.endswith(": pip install 'llvmlite>=0.45'")
 
 
-def test_program_that_cannot_be_compiled_stays_interpreted(no_programs_kept, monkeypatch, capfd):
+def test_uncompilable_program_stays_interpreted(no_programs_kept, monkeypatch, capfd):
     expected = wheel()
     load = jit.load
 
