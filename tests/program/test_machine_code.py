@@ -5,7 +5,7 @@ import pytest
 from kincheck.core import solve
 from kincheck.core.caches import clear_caches
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.program.llvm import compiler, fixed_order, jit, machine_code
+from kincheck.core.program.llvm import compiler, jit, machine_code
 
 from ..support.mechanisms import mcpherson
 
@@ -22,7 +22,7 @@ def unknown_compiler(cache_folder):
 
     def forget():
         clear_caches()
-        for each in (machine_code.problem, machine_code._noted, fixed_order.load_loops):
+        for each in (machine_code.problem, machine_code._noted):
             each.cache_clear()
 
     forget()
@@ -50,7 +50,7 @@ def test_numpy_solves_where_compiler_fails(step, unknown_compiler, monkeypatch, 
     monkeypatch.setattr(owner, name, fail)
     monkeypatch.setenv("XDG_CACHE_HOME", "none")  # void, as it is not absolute
     monkeypatch.setenv("HOME", "none")
-    for each in (machine_code.problem, machine_code._noted, fixed_order.load_loops):
+    for each in (machine_code.problem, machine_code._noted):
         each.cache_clear()
     clear_caches()
     for _ in range(2):

@@ -11,7 +11,6 @@ import copy
 import dataclasses
 import enum
 import html
-import json
 import re
 import zlib
 from collections import Counter
@@ -78,9 +77,7 @@ def changed(value: Any, path: tuple[Any, ...], new: Any) -> Any:
 
 def pattern(path: tuple[Any, ...], keys: Sequence[str]) -> str:
     """Return a path without the places in lists, and without the names of cases and outputs."""
-    return ".".join(
-        str(each) for each in path if not isinstance(each, int) and (each not in keys)
-    )
+    return ".".join(str(each) for each in path if not isinstance(each, int) and (each not in keys))
 
 
 def text_of_page(page: str) -> str:
@@ -126,9 +123,7 @@ def holes(
 
 def _appears(value: float, text: str, before: Counter[str]) -> bool:
     fresh = Counter(NUMBER.findall(text)) - before
-    return any(
-        _rounds_to(size * value, each) for each in fresh for size in FACTORS
-    )
+    return any(_rounds_to(size * value, each) for each in fresh for size in FACTORS)
 
 
 def _rounds_to(value: float, text: str) -> bool:
