@@ -100,7 +100,9 @@ def account(record: Record) -> str:
         said += [f"{name} {number(value)} s" for name, value in times if value is not None]
     if (own := record.evidence) is not None:
         given = own.citation, own.signs, own.grid, *own.limits.values()
-        said += [f"reference {', '.join(filter(None, given)) or 'uncited'} ({own.of} {own.sha256})"]
+        said += [
+            f"reference {', '.join(filter(None, given)) or 'uncited'} ({own.of} {own.sha256[:12]})"
+        ]
     return "; ".join(said)
 
 

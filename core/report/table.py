@@ -101,7 +101,7 @@ def print_table(results: Results, file: IO[str], *, reactions: bool = False) -> 
 
 def print_outputs(results: Results, file: TextIO) -> None:
     """Print a line for each output of each record with its largest errors and their tolerances, the
-    reasons for missing errors, a line of facts for each record, then the messages of
+    reasons for missing errors, a line of facts for each record with an answer, then the messages of
     `print_table`.
 
     If the console is too narrow, the outputs stand below their case and engine.
@@ -131,8 +131,9 @@ def print_outputs(results: Results, file: TextIO) -> None:
             line = f"–: {record.case} · {record.engine}: {shorten_names(outputs)}: {reason}"
             console.print(Text(visible(line)), soft_wrap=True)
     for record in results.records:
-        line = f"{record.case} · {record.engine}: {account(record)}"
-        console.print(Text(visible(line), "dim"), soft_wrap=True)
+        if record.samples is not None:
+            line = f"{record.case} · {record.engine}: {account(record)}"
+            console.print(Text(visible(line), "dim"))
     print_table(results, file)
 
 

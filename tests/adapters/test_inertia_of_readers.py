@@ -7,11 +7,11 @@ import importlib
 
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.core import Body, Mechanism, Point, Revolute
-from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.models.files import read_tree
-from kincheck.core.case.models.trees.tree import sum_of_masses
+from kincheck.core.extensions.exports.command import writer_of
+from kincheck.core.extensions.exports.model_writer import written
+from kincheck.core.extensions.trees.tree import sum_of_masses
 
 from ..support.engine_motion import motion_case
 from ..support.mechanisms import ORIGIN
@@ -150,7 +150,7 @@ def exported(format, tensor):
     body = Body("body", mass=MASS, center_of_mass=CENTER, inertia=(xx, yy, zz, xy, yz, xz))
     hinge = Revolute("hinge", "ground", "body", ORIGIN, (0.0, 0.0, 1.0))
     mechanism = Mechanism("m", [body], [hinge], [Point("P", "body", CENTER)], [])
-    return written(motion_case(mechanism, [0.0, 1.0]), adapters.writer(format))[ENDINGS[format]]
+    return written(motion_case(mechanism, [0.0, 1.0]), writer_of(format))[ENDINGS[format]]
 
 
 WRITERS = {"by hand": text_of, "export": exported}

@@ -64,6 +64,19 @@ strut · one
 –: strut · native: half_track_change, wheelbase_change: acceleration: none
 –: strut · one: half_track_change, wheelbase_change: acceleration: none
 –: strut · one: bare: no reference
+strut · native: 1.2.3, projection, loop:
+python; 21 of 21 samples; residual
+3.21e-14; rank 17; dof 1; iterations
+321; us/sample 12.5; build 0.125 s;
+first 0.25 s; warm 0.0625 s; reference
+A. Uthor: Struts (strut.csv
+aaaaaaaaaaaa)
+strut · one: 1.2.3, projection, loop:
+python; 20 of 21 samples; rank 19; dof
+2; iterations 654; us/sample 1.23e5;
+build 0.5 s; first 1.5 s; warm 0.75 s;
+reference A. Uthor: Struts (strut.csv
+aaaaaaaaaaaa)
 strut  native: closed form (validated);
 one, two: closed form
   native
