@@ -1,7 +1,7 @@
 """Whether everything that a result says is in every form of it.
 
 Each word and each number of a result is changed in turn, and every form is written again: the new
-word, or the new number to the digits that the form has, must stand there, and must not have before.
+word, or the new number to the digits that the form has, must stand there, and stood not before.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import copy
 import dataclasses
 import enum
 import html
+import math
 import re
 import zlib
 from collections import Counter
@@ -19,47 +20,99 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from jinja2 import UndefinedError
 
 MARK = "qvx7"
 """A word that stands nowhere."""
 TIMES = 1.7
-"""What numbers are changed by: far beyond the single digit of some tables."""
-FACTORS = 1.0, 1e3, 1e-3, 1e2, 1e6, 180.0 / np.pi, 1e3 * 180.0 / np.pi, 1e-3 * 180.0 / np.pi
-"""Units of tables and pages, of numbers in SI."""
+"""What numbers are changed by: beyond the one digit of some tables."""
+DEGREE = math.degrees(1.0)
+UNITS = 1.0, 1e3, 1e-3, 1e2, 1e6, DEGREE, 1e3 * DEGREE, 1e-3 * DEGREE, 1e2 * DEGREE, 1.0 / DEGREE
+"""Of tables and pages: mm, deg, kN, %, deg/kN and the like, of numbers in SI."""
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+Path = tuple[Any, ...]
+Forms = Mapping[str, Callable[[Any], str]]
 
 
-def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
-    """Yield the path and value of every word and number; of lists and tables, all entries."""
-    if isinstance(value, enum.Enum | bool) or value is None:
+def missing(
+    result: Any, forms: Forms, ours: Sequence[str] = (), of: str = ".*"
+) -> dict[str, list[str]]:
+    """Return the forms that do not say something, by its place in the result.
+
+    Args:
+        ours: keys that are no part of a place: names of cases and outputs.
+        of: pattern of the places that are looked at.
+    """
+    before = {name: Counter(NUMBER.findall(form(result))) for name, form in forms.items()}
+    found: dict[str, list[str]] = {}
+    for place, (path, value) in _places(result, ours).items():
+        if not re.fullmatch(of, place):
+            continue
+        new = f"{value} {MARK}" if isinstance(value, str) else _other(value)
+        changed = _changed(result, path, new)
+        for name, write in forms.items():
+            try:
+                text = write(changed)
+            except (ValueError, LookupError, UndefinedError):  # a name that the form looks up
+                continue
+            said = MARK in text if isinstance(value, str) else _appears(new, text, before[name])
+            if not said:
+                found.setdefault(place, []).append(name)
+    return found
+
+
+def text_of_page(page: str) -> str:
+    """Return a page as text, with the packed data of its figures."""
+    packed = re.findall(r">([A-Za-z0-9+/=]{200,})<", page)
+    data = [zlib.decompress(base64.b64decode(each)).decode() for each in packed]
+    return "\n".join([html.unescape(page), *data])
+
+
+def _places(result: Any, ours: Sequence[str]) -> dict[str, tuple[Path, Any]]:
+    """Return the first word or number of each place: without the places in lists, records apart."""
+    found: dict[str, tuple[Path, Any]] = {}
+    for path, names, value in _leaves(result):
+        place = ".".join(name for name in names if name not in ours)
+        found.setdefault(place, (path, value))
+    return found
+
+
+def _leaves(value: Any, path: Path = (), names: Path = ()) -> Iterator[tuple[Path, Path, Any]]:
+    if value is None or isinstance(value, enum.Enum | bool):
         return
     if isinstance(value, str | int | float):
-        yield path, value
+        yield path, names, value
         return
-    for key, each in _parts(value):
-        yield from leaves(each, (*path, key))
+    for key, each in _parts(value).items():
+        said = () if isinstance(key, int) else (str(key),)
+        if isinstance(key, int) and hasattr(each, "engine"):
+            said = (f"<{each.engine}>",)
+        yield from _leaves(each, (*path, key), (*names, *said))
 
 
-def _parts(value: Any) -> Iterator[tuple[Any, Any]]:
+def _parts(value: Any) -> dict[Any, Any]:
     if isinstance(value, msgspec.Struct):
-        yield from ((name, getattr(value, name)) for name in value.__struct_fields__)
-    elif dataclasses.is_dataclass(value):
-        yield from ((each.name, getattr(value, each.name)) for each in dataclasses.fields(value))
-    elif isinstance(value, Mapping):
-        yield from value.items()
-    elif isinstance(value, np.ndarray):
-        yield from enumerate(value.tolist())
-    elif isinstance(value, Sequence):
-        yield from enumerate(value)
+        return msgspec.structs.asdict(value)
+    if dataclasses.is_dataclass(value):
+        return {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.ndarray):
+        return dict(enumerate(value.tolist()))
+    return dict(enumerate(value)) if isinstance(value, Sequence) else {}
 
 
-def changed(value: Any, path: tuple[Any, ...], new: Any) -> Any:
+def _other(value: float) -> float:
+    new = type(value)(TIMES * value)
+    return new + 1 if new == value else new
+
+
+def _changed(value: Any, path: Path, new: Any) -> Any:
     """Return a copy with one part changed."""
     if not path:
         return new
     key, *rest = path
-    old = dict(_parts(value))[key]
-    new = changed(old, tuple(rest), new)
+    new = _changed(_parts(value)[key], tuple(rest), new)
     if isinstance(value, msgspec.Struct):
         return msgspec.structs.replace(value, **{key: new})
     if dataclasses.is_dataclass(value):
@@ -75,60 +128,13 @@ def changed(value: Any, path: tuple[Any, ...], new: Any) -> Any:
     return type(value)([*value[:key], new, *value[key + 1 :]])
 
 
-def pattern(path: tuple[Any, ...], keys: Sequence[str]) -> str:
-    """Return a path without the places in lists, and without the names of cases and outputs."""
-    return ".".join(str(each) for each in path if not isinstance(each, int) and (each not in keys))
-
-
-def text_of_page(page: str) -> str:
-    """Return a page with the data of its scripts as text."""
-    packed = re.findall(r">([A-Za-z0-9+/=]{200,})<", page)
-    data = [zlib.decompress(base64.b64decode(each)).decode() for each in packed]
-    return "\n".join([html.unescape(page), *data])
-
-
-def holes(
-    result: Any, forms: Mapping[str, Callable[[Any], str]], keys: Sequence[str] = ()
-) -> dict[str, list[str]]:
-    """Return the words and numbers that a form lacks: forms by pattern."""
-    before = {name: form(result) for name, form in forms.items()}
-    counts = {name: Counter(NUMBER.findall(text)) for name, text in before.items()}
-    found: dict[str, list[str]] = {}
-    seen: set[str] = set()
-    for path, value in leaves(result):
-        name = pattern(path, keys)
-        if name in seen:
-            continue
-        seen.add(name)
-        word = isinstance(value, str)
-        new = f"{value} {MARK}" if word else type(value)(TIMES * value) or type(value)(1)
-        if new == value:
-            new += 1
-        try:
-            other = changed(result, path, new)
-        except Exception as error:
-            print("cannot change", name, error)
-            continue
-        for form, write in forms.items():
-            try:
-                text = write(other)
-            except Exception as error:
-                found.setdefault(name, []).append(f"{form}: {type(error).__name__} {error}"[:100])
-                continue
-            there = MARK in text if word else _appears(new, text, counts[form])
-            if not there:
-                found.setdefault(name, []).append(form)
-    return found
-
-
 def _appears(value: float, text: str, before: Counter[str]) -> bool:
     fresh = Counter(NUMBER.findall(text)) - before
-    return any(_rounds_to(size * value, each) for each in fresh for size in FACTORS)
+    return any(_rounds(size * value, each) for each in fresh for size in UNITS)
 
 
-def _rounds_to(value: float, text: str) -> bool:
-    digits = re.sub(r"[eE].*", "", text)
-    _, _, decimals = digits.partition(".")
-    exponent = int(re.search(r"[eE]([-+]?\d+)$", text)[1]) if re.search(r"[eE]", text) else 0
-    last = 10.0 ** (exponent - len(decimals))
-    return abs(abs(float(text)) - abs(value)) <= 0.51 * last and float(text) != 0.0
+def _rounds(value: float, text: str) -> bool:
+    """Return whether a text is a number rounded to its digits, of either sign."""
+    digits, _, exponent = text.lower().partition("e")
+    last = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
+    return float(text) != 0.0 and abs(abs(float(text)) - abs(value)) <= 0.51 * last
