@@ -250,7 +250,7 @@ def _of_points(cases: Sequence[Case]) -> Section:
         listed = bool(first.hardpoints and other.hardpoints)
         axes = first.hardpoints[0].axes if listed else [(0, 1.0), (1, 1.0), (2, 1.0)]
         old, new = (_points(each, axes, listed=listed) for each in (first, other))
-        moved = 0
+        moved = False
         for key, (name, before) in old.items():
             called, after = new.get(key, (name, before))
             if np.abs(after - before).max() < SAME:
@@ -259,7 +259,7 @@ def _of_points(cases: Sequence[Case]) -> Section:
             numbers = (_point_text(each / size) for each in (before, after, after - before))
             title = name if called == name else f"{name} ({called})"
             rows.append([title, other.name, *numbers])
-            moved += 1
+            moved = True
         if not moved:
             pair = f"{first.name} and {other.name}"
             verdict.append(f"No point that both have differs between {pair}.")
