@@ -8,6 +8,7 @@ Nothing here compares or branches on a value: a traced scalar has none.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
@@ -43,11 +44,22 @@ def is_literal_zero(a: Scalar) -> bool:
 
 
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
-    """Return p if |a| > |b|, else q; a traced number decides at run time."""
+    """Return p if |a| > |b|, else q; a traced number decides at run time, lanes each by their own
+    values in double precision.
+    """
     later = next((x for x in (a, b) if hasattr(x, "where_larger")), None)
     if later is not None:
         return later.where_larger(a, b, p, q)
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        sizes = (np.abs(np.asarray(x).astype(np.float64)) for x in (a, b))
+        return np.where(operator.gt(*sizes), p, q)
     return p if abs(a) > abs(b) else q
+
+
+def arc_tangent(y: Scalar, x: Scalar) -> Scalar:
+    """Return the angle of the direction (x, y) [rad], in -pi..pi, of numbers or of lanes."""
+    later = next((each for each in (y, x) if hasattr(each, "arc_tangent")), None)
+    return np.arctan2(y, x) if later is None else later.arc_tangent(y, x)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ sweeps from the way there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,29 +25,40 @@ from ..mechanism.motions import Path
 from ..trajectory import Array
 from .measures import JointAngle, Orientation
 from .pose_measures import angular_velocity, floats, with_signs
-from .quantity import Quantity
+from .quantity import Quantity, where_moving
 
 
-def count_output_turns(
+def over_sweep(
+    mechanism: Mechanism,
+    path: Path,
+    output: Quantity,
+    terms: Sequence[Jet],
+    speeds: tuple[Array, Array] | None,
+) -> Jet:
+    """Return an output over the samples of a path: an angle or an orientation with its turns since
+    design, a quotient by a speed without the samples at rest, any other output as it is.
+
+    Args:
+        terms, speeds: of the output, see `Quantity`; samples along the first axis.
+    """
+    if isinstance(output, Orientation):
+        return orient_from_design(mechanism, path, output, terms)
+    value = where_moving(terms[0], speeds)
+    if not output.period:
+        return value
+    return value + output.period * turns_of(mechanism, path, output, value.x, value.v)
+
+
+def output_over_sweep(
     mechanism: Mechanism,
     path: Path,
     output: Quantity,
     at: Mapping[str, Vec3],
     design: Mapping[str, Vec3],
 ) -> Jet:
-    """Return an output over the samples of a path: an angle or an orientation with its turns since
-    design, any other output as it is.
-
-    Args:
-        at, design: see `Quantity.of`; samples along the first axis.
-    """
-    if isinstance(output, Orientation):
-        return orient_from_design(mechanism, path, output, at, design)
-    angle = output.of(at, design)
-    if not output.period:
-        return angle
-    count = turns_of(mechanism, path, output, angle.x, angle.v)
-    return Jet(angle.x + output.period * count, angle.v, angle.a)
+    """Return an output over the samples of a path, from its points; see `Quantity.of`."""
+    terms, speeds = output.terms(at, design), output.resting(at)
+    return over_sweep(mechanism, path, output, terms, speeds)
 
 
 def turns_of(
@@ -84,8 +95,7 @@ def orient_from_design(
     mechanism: Mechanism,
     path: Path,
     output: Orientation,
-    at: Mapping[str, Vec3],
-    design: Mapping[str, Vec3],
+    e: Sequence[Jet],
     samples: NDArray[np.intp] | slice = slice(None),
 ) -> Jet:
     """Return the orientation of a body, the sign of its Euler parameters continuous from design.
@@ -94,10 +104,9 @@ def orient_from_design(
     the body on the way from the design, and the sign is the one nearer to that.
 
     Args:
-        at, design: see `Quantity.of`; samples along the first axis.
+        e: its terms; samples along the first axis.
         samples: indices of these among the samples of the path.
     """
-    e = output.parameters(at, design)
     part = _at(path, samples)
     values = floats(e)
     sign, doubt = signs(values, angular_velocity(e), part)

@@ -23,7 +23,7 @@ from ..case.models.hardpoints.read import case_of_hardpoints
 from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
 from ..case.models.saving import free_name, save_table
 from ..case.quantity import Output, Quantity, still_jets
-from ..case.turns import count_output_turns
+from ..case.turns import output_over_sweep
 from ..errors import KincheckError, unknown
 from ..harness.labels import output_label
 from ..harness.provenance import case_facts
@@ -357,7 +357,7 @@ class LiveTable(LiveFile):
                 }
                 for each in (each for each, by in computed if by == alone):
                     moved = {name: at[name] for name in each.points}
-                    jet = count_output_turns(case.mechanism, case.sweep.path, each, moved, design)
+                    jet = output_over_sweep(case.mechanism, case.sweep.path, each, moved, design)
                     values[each.name] = np.where(known, jet.x, np.nan)
         return values
 

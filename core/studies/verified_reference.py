@@ -18,6 +18,7 @@ import numpy as np
 
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, Case, Quantity
+from ..case.quantity import known_at
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..case.measures import Orientation
 from ..case.turns import orient_from_design, turns_of
@@ -366,9 +367,9 @@ def _output_jet(
     """Return an output, an angle or an orientation with its turns along the path."""
     if isinstance(output, Orientation):
         return orient_from_design(
-            case.mechanism, case.sweep.path, output, at, design, np.array(proved)
+            case.mechanism, case.sweep.path, output, output.terms(at, design), np.array(proved)
         )
-    jet = output.of(at, design)
+    jet = known_at(output, at, design)
     if not output.period:
         return jet
     x, v = (np.asarray(each).astype(np.float64) for each in (jet.x, jet.v))

@@ -11,20 +11,15 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any, ClassVar
 
-import numpy as np
-
-from ...algebra import Vec3
-from ...jet import Jet, where
+from ...algebra import Scalar, Vec3, where_larger
+from ...jet import Jet
 from ...mechanism.mechanism import Mechanism, Point
 from ..case import HELD_BUT, PER_TRAVEL
 from ..quantity import HIDDEN, PoseQuantity, TypedQuantity
 from .corner import Corner, Vehicle
-
-# Samples with a wheel speed below this fraction of the fastest point's speed are left out: a
-# quotient by the travel speed has lost three digits of its rates there, and more at lower speeds.
-STILL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -151,9 +146,12 @@ class Rate(_OfCorner):
         return {**super().facts, **held(self.vehicle)}
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the quotient, NaN while the wheel is at rest."""
-        corner = Corner(self.vehicle, at)
-        return where_moving(self.value(corner), corner, at)
+        """Return the quotient; it has no value while the wheel is at rest."""
+        return self.value(Corner(self.vehicle, at))
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+        """Return the squares of the speeds of travel and of the fastest point."""
+        return speeds(self.vehicle, at)
 
 
 def held(vehicle: Vehicle) -> Mapping[str, Any]:
@@ -163,18 +161,15 @@ def held(vehicle: Vehicle) -> Mapping[str, Any]:
     return {HELD_BUT: list(vehicle.travel)} if vehicle.travel else {}
 
 
-def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
-    """Return a quotient by the travel speed, NaN at samples with a negligible travel speed relative
-    to the fastest point.
-    """
-    travel = np.abs(corner.center.z.v)
-    speeds = [
-        np.sqrt(sum(component.v * component.v for component in point)) for point in at.values()
-    ]
-    # The maximum is over points and samples, not over lanes: lanes may hold variants of a design,
-    # which must not be judged by one another.
-    fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
-    return where(travel > STILL * fastest, quotient)
+def speeds(wheel: Vehicle, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+    """Return the squares of the wheel's speed of travel and of the speed of the fastest point."""
+    found = [sum(x.v * x.v for x in point) for point in at.values()]
+    travel = Corner(wheel, at).center.z.v
+    return travel * travel, reduce(_larger, found)
+
+
+def _larger(a: Scalar, b: Scalar) -> Scalar:
+    return where_larger(a, b, a, b)
 
 
 @dataclass(frozen=True)
@@ -253,6 +248,9 @@ class PerTravel(PoseQuantity):
         }
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the slope, NaN while the wheel is at rest."""
-        corner = Corner(self.vehicle, at)
-        return where_moving(self.of_output.of(at, design).dot / corner.center.z.dot, corner, at)
+        """Return the slope; it has no value while the wheel is at rest."""
+        return self.of_output.of(at, design).dot / Corner(self.vehicle, at).center.z.dot
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar]:
+        """Return the squares of the speeds of travel and of the fastest point."""
+        return speeds(self.vehicle, at)

@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...algebra import Vec3, cross
-from ...jet import Jet, arctan2, doubles, norm, sqrt
+from ...jet import Jet, arctan2, norm, sqrt
 from ...trajectory import Array
 from .base import Attitude, Change, Rate, WheelOutput
 from .corner import Axle, Convention, Corner, Reaction, angle_in_view, distance, velocity
@@ -222,7 +222,7 @@ class Caster(_Inclination):
     def value(self, corner: Corner) -> Jet:
         """Return the caster angle [rad]."""
         _, axis = corner.kingpin
-        return angle_in_view(-axis.x, axis.z, doubles(norm(axis, 0.0)))
+        return angle_in_view(-axis.x, axis.z, norm(axis, 0.0).x)
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ class KingpinInclination(_Inclination):
     def value(self, corner: Corner) -> Jet:
         """Return the kingpin inclination [rad]."""
         _, axis = corner.kingpin
-        return angle_in_view(-axis.y, axis.z, doubles(norm(axis, 0.0)))
+        return angle_in_view(-axis.y, axis.z, norm(axis, 0.0).x)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 
 from ...case.case import TIME, Balance, Case, Load, Rig, Sweep, Truth
 from ...case.measures import DriverEffort
-from ...case.quantity import ORDERS, Output, Quantity, point_jets, still_jets, with_markers
+from ...case.quantity import (
+    ORDERS,
+    Output,
+    Quantity,
+    known_at,
+    point_jets,
+    still_jets,
+    with_markers,
+)
 from ...case.suspension import PerTravel
 from ...errors import KincheckError, SolveError, number_of, shortened
 from ...harness.record import Results
@@ -384,7 +392,7 @@ class _Study:
         """Return an output of n samples by places of points and their rates, shape (n, 3)."""
         moving = {name: point_jets(PointMotion(*at(name), None)) for name in output.points}
         design = {name: still_jets(self.mechanism.point(name).position) for name in output.points}
-        jet = output.of(moving, design)
+        jet = known_at(output, moving, design)
         x, v, a = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (jet.x, jet.v, jet.a))
         return Jet(x, v, a)
 

@@ -20,7 +20,7 @@ from ...case.case import Case, Quantity, size, without_forces
 from ...case.closing import require_no_held
 from ...case.measures import ForceMeasure
 from ...case.quantity import still_jets
-from ...case.turns import count_output_turns
+from ...case.turns import output_over_sweep
 from ...errors import KincheckError
 from ...jet import Jet
 from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed
@@ -324,7 +324,7 @@ class Ready:
         with np.errstate(all="ignore"):
             case, path = self.study.case, self.path
             moved = without_forces(case).outputs
-            jets = {o.name: count_output_turns(case.mechanism, path, o, at, design) for o in moved}
+            jets = {o.name: output_over_sweep(case.mechanism, path, o, at, design) for o in moved}
             for k, row in enumerate(self.study.rows):
                 if isinstance(row.output, ForceMeasure):
                     assert forces is not None  # the case asks for them
