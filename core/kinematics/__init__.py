@@ -58,7 +58,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .assembly.assemble import Assembled, assemble
     from .assembly.assembly_modes import Assemblies, Assembly, find_assemblies
-    from .compiled.request import LAST_ITERATION
+    from .compiled.request import LAST_ITERATION, WantedOutput
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
     from .continuation.trace import Curve, Event, trace
     from .design_batch import Designs, Variants, solve_designs
@@ -124,7 +124,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "assembly.assemble": "Assembled assemble",
     "assembly.assembly_modes": "Assemblies Assembly find_assemblies",
-    "compiled.request": "LAST_ITERATION",
+    "compiled.request": "LAST_ITERATION WantedOutput",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
     "continuation.trace": "Curve Event trace",
     "design_batch": "Designs Variants solve_designs",

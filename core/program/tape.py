@@ -28,8 +28,8 @@ else:  # as msgspec reads it from the cache
 `LEAVES`.
 
 "+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "atan2", "abs", "min", "max" act on numbers ("min"
-and "max" propagate NaN); "larger" a b is true if |a| > |b|; "where" m p q is p if m is true, else q; "before"
-x a is x of the previous lane, and a in the first lane.
+and "max" propagate NaN); "larger" a b is true if |a| > |b|; "where" m p q is p if m is true, else
+q; "before" x a is x of the previous lane, and a in the first lane.
 """
 LEAVES = frozenset({"input", "const", "node"})
 """Operations without operands. "node" s k is the value of slot s in lane k of the `NODES`, the same

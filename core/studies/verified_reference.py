@@ -18,9 +18,9 @@ import numpy as np
 
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, Case, Quantity
-from ..case.quantity import known_at
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..case.measures import Orientation
+from ..case.quantity import known_at
 from ..case.turns import orient_from_design, turns_of
 from ..forces import DETERMINED, Forces, Reaction
 from ..harness.compare import output_series
