@@ -6,31 +6,42 @@ added here: turns of angles, signs of Euler parameters, and samples at rest.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..jet import Jet
-from ..kinematics import NativeSolver, PreparedDesigns, Variants, WantedOutput
+from ..kinematics import (
+    ForcesOfDesigns,
+    NativeSolver,
+    PreparedDesigns,
+    Variants,
+    WantedOutput,
+)
 from ..mechanism.motions import Path
 from ..trajectory import Array
 from .case import HELD_BUT, Case, Quantity
+from .measures import ForceMeasure
 from .quantity import ORDERS
 from .turns import over_sweep
 
 TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
+# Designs solved at once: enough to make the cost of the calls for their outputs negligible.
+# `solve_designs` has no outputs, and is as fast with a quarter of them.
+TOGETHER = 1024
 
 
 @dataclass(frozen=True, eq=False)
 class DesignOutputs:
-    """The outputs of a case made ready for many designs, as one program.
+    """A case made ready for many designs, as one program with its outputs.
 
     Attributes:
-        outputs: outputs of motion by name.
-        derivatives: highest kept time derivative of each.
-        designs: the mechanism with its outputs.
+        outputs: of the case, by name.
+        derivatives: highest kept time derivative of each output.
     """
 
     case: Case
@@ -43,44 +54,47 @@ class DesignOutputs:
     def of(
         cls,
         case: Case,
-        varied: Sequence[str],
+        varied: Collection[str],
         *,
         derivative: int = 0,
-        slopes: bool = False,
-        forces: Collection[str] = (),
+        slopes: Collection[str] = (),
         bodies: Sequence[str] = (),
     ) -> DesignOutputs:
-        """Return the outputs of motion of a case, with a compiled model.
+        """Return a case with a compiled model.
 
         Args:
             varied: varied places, see `NativeSolver.prepare_designs`.
             derivative: highest wanted time derivative; outputs have theirs as far as it is known.
-            slopes: whether slopes by the varied places are wanted.
-            forces, bodies: names of those whose forces or poses are wanted.
+            slopes: names of outputs whose slopes by the varied places are wanted.
+            bodies: names of those whose poses are wanted.
 
         Raises:
             SolveError: drivers and degrees of freedom do not match, or the mechanism does not close
                 at the design position.
         """
-        outputs = {each.name: each for each in case.outputs if not each.forces}
+        outputs = {each.name: each for each in case.outputs}
         derivatives = {name: min(derivative, each.orders - 1) for name, each in outputs.items()}
         wanted = [
-            WantedOutput(each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())))
+            WantedOutput(
+                each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), name in slopes
+            )
             for name, each in outputs.items()
+            if not each.forces
         ]
         # an output with one derivative less is a quotient of velocities; with two less it contains
-        # derivatives of velocities. Rates of drivers that move alone are solved beside.
+        # derivatives of velocities. Rates by drivers that move alone are solved beside.
         orders = [
-            ORDERS - each.equation.orders + each.derivative for each in wanted if not each.alone
+            ORDERS - outputs[each.equation.name].orders + each.derivative
+            for each in wanted
+            if not each.alone
         ]
         designs = NativeSolver(order=max(orders, default=0)).prepare_designs(
             case.mechanism,
             case.sweep.path,
-            varied,
-            forces=forces,
+            tuple(varied),
+            forces=case.forces,
             bodies=bodies,
             outputs=wanted,
-            slopes=slopes,
         )
         return cls(case, outputs, derivatives, designs, case.sweep.path)
 
@@ -88,34 +102,83 @@ class DesignOutputs:
         """Return the same program on another path of the same drivers."""
         return replace(self, designs=self.designs.on_path(path), path=path)
 
-    def jets(self, found: Variants, name: str) -> Jet:
-        """Return an output of solved designs with its kept derivatives, shape (n, V); NaN where it
-        has none.
-        """
-        orders = range(self.derivatives[name] + 1)
-        known = [self.designs.output(found, name, order) for order in orders]
-        terms = [
-            Jet(*each, *(np.nan,) * (2 - len(orders) + 1)) for each in zip(*known, strict=True)
-        ]
-        return self._completed(found, name, terms)
+    @property
+    def at_once(self) -> int:
+        """The number of designs to solve together."""
+        return self.designs.at_once(TOGETHER)
 
-    def slopes(self, found: Variants, geometry: Array, towards: Array) -> dict[str, Array]:
-        """Return the derivatives of all outputs of solved designs by motions of the geometry,
-        drivers held, shape (motions, n, V); see `PreparedDesigns.slopes`.
-        """
-        result = dict[str, Array]()
-        for name, by_motion in self.designs.slopes(found, geometry, towards).items():
-            values = self.designs.output(found, name)
-            slopes = [
-                self._completed(
-                    found, name, [Jet(x, v, np.nan) for x, v in zip(values, each, strict=True)]
-                ).v
-                for each in by_motion
-            ]
-            result[name] = np.stack(slopes) if slopes else np.empty((0, *found.solved.shape))
-        return result
+    def solve(self, geometry: Array, tol: float = TOL, *, alone: bool = True) -> SolvedDesigns:
+        """Solve designs at all samples.
 
-    def _completed(self, found: Variants, name: str, terms: Sequence[Jet]) -> Jet:
-        resting = self.designs.resting(found, name)
+        Args:
+            geometry: numbers of the varied places in their order, shape (numbers, V).
+            tol, alone: see `PreparedDesigns.solve`.
+        """
+        return SolvedDesigns(self, geometry, tol, self.designs.solve(geometry, tol, alone=alone))
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedDesigns:
+    """The outputs of V designs over n samples.
+
+    Attributes:
+        geometry: of the designs.
+        found: their motion.
+    """
+
+    ready: DesignOutputs
+    geometry: Array
+    tol: float
+    found: Variants
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Whether each sample of each design was reached, shape (n, V)."""
+        return self.found.solved
+
+    @cached_property
+    def _forces(self) -> ForcesOfDesigns | None:
+        return self.ready.designs.forces(self.found, self.geometry, self.tol)
+
+    def values(self, name: str, derivative: int = 0) -> Array:
+        """Return an output, or a kept time derivative of it, shape (n, V); NaN where it has no
+        value.
+        """
+        output = self.ready.outputs[name]
+        if isinstance(output, ForceMeasure):
+            assert self._forces is not None  # the case asks for them
+            return self._forces.read(output.values)
+        jet = self._jet(name)
+        values = np.asarray((jet.x, jet.v, jet.a)[derivative])
+        known = np.isfinite(values)
+        return values if known.all() else np.where(known, values, np.nan)
+
+    def slopes(self, towards: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the outputs whose slopes are wanted with their derivatives by motions of the
+        geometry, drivers held, shape (motions, n, V); NaN where an output has no value.
+
+        Args:
+            towards: motions of the varied numbers, shape (numbers, motions).
+        """
+        if not self.ready.designs.route.model.request.slopes:
+            return
+        for name, moves in self.ready.designs.slopes(self.found, self.geometry, towards).items():
+            known, x = np.isfinite(self.values(name)), self.ready.designs.output(self.found, name)
+            slopes = np.empty((towards.shape[1], *known.shape))
+            for slope, moved in zip(slopes, moves, strict=True):
+                # by a motion in place of time
+                jets = [Jet(*each, np.nan) for each in zip(x, moved, strict=True)]
+                slope[:] = np.where(known, self._completed(name, jets).v, np.nan)
+            yield name, slopes
+
+    def _jet(self, name: str) -> Jet:
+        designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)
+        known = [designs.output(self.found, name, order) for order in orders]
+        unknown = (np.nan,) * (ORDERS - len(known))
+        return self._completed(name, [Jet(*each, *unknown) for each in zip(*known, strict=True)])
+
+    def _completed(self, name: str, terms: Sequence[Jet]) -> Jet:
+        ready, resting = self.ready, self.ready.designs.resting(self.found, name)
+        mechanism, output = ready.case.mechanism, ready.outputs[name]
         with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
-            return over_sweep(self.case.mechanism, self.path, self.outputs[name], terms, resting)
+            return over_sweep(mechanism, ready.path, output, terms, resting)

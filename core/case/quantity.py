@@ -51,6 +51,7 @@ class Quantity(Protocol):
         why: reason for the tolerance.
         sense: meaning of a positive value; empty if name and unit state it.
         signs: convention of signs and axes; empty if only the case's own axes apply.
+        undefined: reason why solved samples have no value; empty if all have.
         facts: properties for readers of results.
     """
 
@@ -76,6 +77,8 @@ class Quantity(Protocol):
     def signs(self) -> str: ...
     @property
     def facts(self) -> Mapping[str, Any]: ...
+    @property
+    def undefined(self) -> str: ...
 
     @property
     def period(self) -> float: ...
@@ -169,6 +172,11 @@ class PoseQuantity(ABC):
     def orders(self) -> int:
         """Value, rate and second rate."""
         return ORDERS
+
+    @property
+    def undefined(self) -> str:
+        """Empty: it has a value at every pose."""
+        return ""
 
     @property
     def period(self) -> float:

@@ -1,6 +1,6 @@
 """Functions on cases and engines by name, as on the command line."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar
@@ -20,8 +20,11 @@ from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
 from kincheck.core.options import function_of, several
 from kincheck.core.report.report import write_report
+from kincheck.core.studies import curves as studied
 from kincheck.core.studies.compliance import study
 from kincheck.core.studies.compliance.study import ComplianceResults
+from kincheck.core.studies.curves import DesignCurves
+from numpy.typing import ArrayLike
 
 _Options = ParamSpec("_Options")
 _Answer = TypeVar("_Answer")
@@ -95,6 +98,63 @@ def compliance(
     if not (team := several(engines)):
         return found
     return replace(found, checked=run(found.cases, ("native", *team), jobs=jobs))
+
+
+def curves(
+    case: str | Path | Case,
+    places: Sequence[str],
+    offsets: ArrayLike,
+    outputs: Sequence[str] | None = None,
+    slopes: Sequence[str] = (),
+    *,
+    tol: float = 1e-12,
+) -> DesignCurves:
+    """Return outputs of many designs over the sweep of a case, and their slopes by the places.
+
+    The outputs are part of the compiled program, which is made at the first call for a case; the
+    last few are kept: give the case itself, not its name, to ask again and again. Slopes are exact
+    derivatives at each design, not differences.
+
+    Args:
+        case: name, path or case; the nominal design.
+        places: numbers of the geometry as `kincheck explain` names them: row and axis of a table of
+            hardpoints ("tierod_inner z"), else the place of a case file and its axis
+            ("joints.tie_rod.points.0 z"), or a length ("joints.tie_rod.length").
+        offsets: of the places from the nominal design, shape (designs, places) [m or rad], along
+            the axes of the table; of the axis of a joint, the angle by which it turns.
+        outputs: names of outputs; all by default.
+        slopes: names of those outputs whose slopes are wanted.
+        tol: largest accepted residual, relative to the mechanism's size.
+
+    Raises:
+        CaseError: there is no such place or output, or the case drives the absolute position of a
+            point that varies.
+        SolveError: offsets are no numbers, or the nominal design cannot be solved.
+    """
+    known = case if isinstance(case, Case) else load(case)
+    return studied.curves(known, places, offsets, outputs, slopes, tol=tol)
+
+
+def curves_by_chunk(
+    case: str | Path | Case,
+    places: Sequence[str],
+    offsets: Iterable[ArrayLike],
+    outputs: Sequence[str] | None = None,
+    slopes: Sequence[str] = (),
+    *,
+    tol: float = 1e-12,
+) -> Iterator[DesignCurves]:
+    """Yield the curves of one chunk of designs after the other: the memory of millions of designs
+    is that of one chunk.
+
+    Args:
+        offsets: of each chunk; all other arguments are those of `curves`.
+
+    Raises:
+        CaseError, SolveError: as `curves`.
+    """
+    known = case if isinstance(case, Case) else load(case)
+    return studied.curves_by_chunk(known, places, offsets, outputs, slopes, tol=tol)
 
 
 def report(results: Results, file: str | Path) -> None:

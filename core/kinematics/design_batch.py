@@ -218,7 +218,7 @@ def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray
         variant, request = variant_of(model, numbers), model.request
         read = [name for each in request.outputs for name in each.equation.points]
         points = tuple(dict.fromkeys((*request.points, *read)))
-        alone = replace(request, varied=(), points=points, outputs=(), slopes=False)
+        alone = replace(request, varied=(), points=points, outputs=())
         found = prepare(variant, alone, route.path)(tol)
     except SolveError as error:
         return kept, np.zeros(n, dtype=np.bool_), str(error)

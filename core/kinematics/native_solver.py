@@ -100,8 +100,6 @@ class NativeSolver:
         forces: Collection[str] = (),
         bodies: Sequence[str] = (),
         outputs: Sequence[WantedOutput] = (),
-        *,
-        slopes: bool = False,
     ) -> PreparedDesigns:
         """Return the mechanism made ready for many designs, as one program.
 
@@ -115,13 +113,12 @@ class NativeSolver:
                 order 2.
             bodies: names of the bodies whose poses are wanted.
             outputs: wanted outputs, part of the programs.
-            slopes: whether their slopes by the varied places are wanted too.
 
         Raises:
             SolveError: as `prepare`.
         """
         request = self._request(mechanism, path, points, bodies, forces, varied)
-        request = replace(request, outputs=tuple(outputs), slopes=slopes)
+        request = replace(request, outputs=tuple(outputs))
         wanted = request.forces
         if wanted is not None:
             from .compiled.traced_forces import can_trace  # most studies are without

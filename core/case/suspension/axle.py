@@ -121,6 +121,7 @@ class SteeringRatio(AxleOutput):
     """
 
     type = "steering_ratio"
+    nowhere = "the wheels hardly steer there"
     measure = "1"
     needs = ("rack_per_turn",)
     reads = ("wheel_center", "spin_marker")
@@ -154,6 +155,7 @@ class _WhileSteering(AxleOutput):
     """
 
     needs = ("wheel_radius", "wheelbase")
+    nowhere = "a wheel is straight there, to 0.01 rad, or the wheels toe against each other"
 
     @property
     def orders(self) -> int:
@@ -247,6 +249,7 @@ class _AxleRollCenter(AxleOutput):
     """
 
     reads = _CARRIER
+    nowhere = "the lines from the contact centres to the instant centres are parallel there"
 
     @property
     def orders(self) -> int:

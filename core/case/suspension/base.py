@@ -29,11 +29,13 @@ class SuspensionOutput(TypedQuantity):
     Attributes:
         needs: vehicle attributes that are optional in general, but required here.
         reads: vehicle attributes with the names of the points it reads.
+        nowhere: reason why it has no value at some poses; empty if it has one at all.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
     reads: ClassVar[tuple[str, ...]]
+    nowhere: ClassVar[str] = ""
     registry: ClassVar[dict[str, type[SuspensionOutput]]] = {}
 
     name: str
@@ -76,6 +78,11 @@ class SuspensionOutput(TypedQuantity):
     def problem(self) -> str:
         """Reason why this wheel has no such output: found, expected, remedy. Otherwise empty."""
         return ""
+
+    @property
+    def undefined(self) -> str:
+        """Reason why solved samples have no value; empty if all have."""
+        return self.nowhere
 
     @property
     def signs(self) -> str:
@@ -132,6 +139,8 @@ class Rate(_OfCorner):
 
     It is a property of the position: other drivers are held, see `Vehicle.travel`.
     """
+
+    nowhere = "the wheel hardly travels there"
 
     @property
     def orders(self) -> int:
@@ -230,6 +239,11 @@ class PerTravel(PoseQuantity):
     def vehicle(self) -> Vehicle:
         """Vehicle of the output."""
         return self.of_output.vehicle
+
+    @property
+    def undefined(self) -> str:
+        """Reason why it has no value at some poses."""
+        return self.of_output.undefined or Rate.nowhere
 
     @property
     def signs(self) -> str:

@@ -50,6 +50,7 @@ class Toe(Attitude):
     """
 
     type = "toe"
+    nowhere = "the wheel lies on its side there"
     positive = "toe-in"
 
     def value(self, corner: Corner) -> Jet:
@@ -210,6 +211,7 @@ class _Inclination(Attitude):
 
     needs = ("kingpin",)
     reads = ("wheel_center", "kingpin_points")
+    nowhere = "the steering axis lies along the view there"
 
 
 @dataclass(frozen=True)
@@ -247,6 +249,7 @@ class _GroundOffset(Attitude):
     measure = "m"
     needs = ("wheel_radius", "kingpin")
     reads = ("wheel_center", "spin_marker", "wheel_contact", "kingpin_points")
+    nowhere = "the steering axis is parallel to the road there"
 
 
 @dataclass(frozen=True)

@@ -44,13 +44,19 @@ class Equation(Protocol):
 
 @dataclass(frozen=True)
 class WantedOutput:
-    """An output, its highest time derivative that is wanted, and the drivers that alone move for
-    it at each sample, at a rate of one; none of them for the rates of the motion itself.
+    """An output that is part of the programs.
+
+    Attributes:
+        derivative: highest wanted time derivative.
+        alone: drivers that alone move for it at each sample, at a rate of one; none of them for the
+            rates of the motion itself.
+        slopes: whether its slopes by the varied geometry are wanted.
     """
 
     equation: Equation
     derivative: int = 0
     alone: tuple[str, ...] = ()
+    slopes: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,7 +78,6 @@ class Request:
         rows: solved rows of the formulation; by default those independent at the design position.
         forces: wanted forces; they take order 2.
         outputs: wanted outputs; the order is the one that they take.
-        slopes: whether slopes of the outputs by the varied geometry are wanted.
     """
 
     drivers: tuple[str, ...]
@@ -87,7 +92,11 @@ class Request:
     rows: tuple[int, ...] = ()
     forces: WantedForces | None = None
     outputs: tuple[WantedOutput, ...] = ()
-    slopes: bool = False
+
+    @property
+    def slopes(self) -> bool:
+        """Whether slopes of any output are wanted."""
+        return any(each.slopes for each in self.outputs)
 
 
 RATE, RATE_T = "rate", "rate_t"

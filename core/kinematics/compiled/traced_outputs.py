@@ -51,13 +51,13 @@ class TracedOutputs:
         speeds below which an output has no value.
         """
         tracer, speeds = self._tracer, dict[tuple[int, ...], str]()
-        for alone in self._groups():
+        for alone in _groups(self._wanted):
             rates = (v, a)
             if alone:
                 rates = self._solve_alone(alone)
                 if tracer.request.slopes:
                     self._store_rates(out, alone, rates)
-            for each, terms, resting in self._evaluate(alone, *rates):
+            for each, terms, resting in self._evaluate(self._wanted, alone, *rates):
                 name = each.equation.name
                 for label, order in zip(QUANTITIES[: each.derivative + 1], "xva", strict=False):
                     values = [getattr(term, order) for term in terms]
@@ -93,26 +93,25 @@ class TracedOutputs:
         for name, derivatives in carried.items():
             add(tracer.vector(name, len(derivatives)), list(derivatives))
         rows = formulation.rows(tracer.at)
-        for alone in self._groups():
+        wanted = [each for each in self._wanted if each.slopes]
+        for alone in _groups(wanted):
             own = self._formulation(alone) if alone else formulation
             v, a = self._read_rates(alone)
             if alone or tracer.request.order > 0:
                 add(v, solve(_residuals(rows, v, own.nu(tracer.at))))
             if alone or tracer.request.order > 1:
                 add(a, solve(_residuals(rows, a, own.gamma(tracer.at, v))))
-            for each, terms, _ in self._evaluate(alone, v, a):
+            for each, terms, _ in self._evaluate(wanted, alone, v, a):
                 values = follow([term.x for term in terms])
                 tracer.store(out, f"{SLOPE_OF}{each.equation.name}", values)
         return program("slopes", tracer.tape, out, tracer.prepared)
 
-    def _groups(self) -> list[tuple[str, ...]]:
-        """Return the drivers that move alone for some outputs, each set once; empty for outputs of
-        the motion itself.
-        """
-        return [*dict.fromkeys(each.alone for each in self._wanted)]
-
     def _evaluate(
-        self, alone: tuple[str, ...], v: Sequence[Scalar], a: Sequence[Scalar]
+        self,
+        wanted: Sequence[WantedOutput],
+        alone: tuple[str, ...],
+        v: Sequence[Scalar],
+        a: Sequence[Scalar],
     ) -> Iterator[tuple[WantedOutput, Sequence[Jet], tuple[Scalar, Scalar] | None]]:
         """Yield the outputs of a group, with their terms and the speeds at which they rest."""
         tracer, moving = self._tracer, self._tracer.moving(v, a)
@@ -128,7 +127,7 @@ class TracedOutputs:
             return Vec3(x, y, z)
 
         with np.errstate(all="ignore"):  # of points that stand still
-            for each in self._wanted:
+            for each in wanted:
                 if each.alone == alone:
                     equation = each.equation
                     now = {name: at(name) for name in equation.points}
@@ -164,6 +163,13 @@ class TracedOutputs:
     def _read_rates(self, alone: tuple[str, ...]) -> Sequence[list[Scalar]]:
         tracer = self._tracer
         return [tracer.vector(name, tracer.unknowns) for name in self._names_of_rates(alone)]
+
+
+def _groups(wanted: Sequence[WantedOutput]) -> list[tuple[str, ...]]:
+    """Return the drivers that move alone for some outputs, each set once; none for outputs of the
+    motion itself.
+    """
+    return [*dict.fromkeys(each.alone for each in wanted)]
 
 
 def _residuals(rows: Rows, x: Sequence[Scalar], right: Sequence[Scalar]) -> list[Scalar]:
