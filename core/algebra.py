@@ -11,9 +11,10 @@ import math
 import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
 Scalar: TypeAlias = Any
 """A number of any kind with + - * / and unary minus."""
@@ -43,6 +44,11 @@ def is_literal_zero(a: Scalar) -> bool:
     return isinstance(a, int | float) and a == 0
 
 
+def is_array(a: Any) -> TypeGuard[NDArray[Any]]:
+    """Return whether a scalar is an array of lanes."""
+    return isinstance(a, np.ndarray)
+
+
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     """Return p if |a| > |b|, else q; a traced number decides at run time, lanes each by their own
     values in double precision.
@@ -50,8 +56,8 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     later = next((x for x in (a, b) if hasattr(x, "where_larger")), None)
     if later is not None:
         return later.where_larger(a, b, p, q)
-    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        sizes = (np.abs(np.asarray(x).astype(np.float64)) for x in (a, b))
+    if is_array(a) or is_array(b):
+        sizes = (np.abs(np.asarray(x, dtype=np.float64)) for x in (a, b))
         return np.where(operator.gt(*sizes), p, q)
     return p if abs(a) > abs(b) else q
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .algebra import Scalar, Vec3, arc_tangent, root, where_larger
+from .algebra import Scalar, Vec3, arc_tangent, is_array, root, where_larger
 
 VANISHING = 2.0**-20
 """A length below this part of the numbers it is made of has lost six digits of its direction, and
@@ -36,7 +36,7 @@ class Jet:
     @property
     def dot(self) -> Jet:
         """The time derivative as a jet; its second derivative is unknown (NaN)."""
-        unknown = np.full_like(self.a, np.nan) if isinstance(self.a, np.ndarray) else math.nan
+        unknown = np.full_like(self.a, np.nan) if is_array(self.a) else math.nan
         return Jet(self.v, self.a, unknown)
 
     def __add__(self, b: Jet | Scalar) -> Jet:

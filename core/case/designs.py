@@ -140,6 +140,10 @@ class SolvedDesigns:
     def _forces(self) -> ForcesOfDesigns | None:
         return self.ready.designs.forces(self.found, self.geometry, self.tol)
 
+    def pose(self, body: str) -> Array:
+        """Return origin [m] and Euler parameters of a body that was asked for, shape (7, n, V)."""
+        return self.ready.designs.pose(self.found, body)
+
     def values(self, name: str, derivative: int = 0) -> Array:
         """Return an output, or a kept time derivative of it, shape (n, V); NaN where it has no
         value.
@@ -165,10 +169,10 @@ class SolvedDesigns:
         for name, moves in self.ready.designs.slopes(self.found, self.geometry, towards).items():
             known, x = np.isfinite(self.values(name)), self.ready.designs.output(self.found, name)
             slopes = np.empty((towards.shape[1], *known.shape))
-            for slope, moved in zip(slopes, moves, strict=True):
+            for k, moved in enumerate(moves):
                 # by a motion in place of time
                 jets = [Jet(*each, np.nan) for each in zip(x, moved, strict=True)]
-                slope[:] = np.where(known, self._completed(name, jets).v, np.nan)
+                slopes[k] = np.where(known, self._completed(name, jets).v, np.nan)
             yield name, slopes
 
     def _jet(self, name: str) -> Jet:

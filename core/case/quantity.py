@@ -128,8 +128,8 @@ def where_moving(quotient: Jet, speeds: tuple[Any, Any] | None) -> Jet:
     if speeds is None:
         return quotient
     own, fastest = (np.asarray(each).astype(np.float64) for each in speeds)
-    limit = STILL**2 * np.nan_to_num(fastest).max(axis=0, initial=0.0)
-    return known(own, np.broadcast_to(limit, own.shape), quotient)
+    limit = np.broadcast_to(STILL**2 * np.fmax.reduce(fastest, axis=0, initial=0.0), own.shape)
+    return quotient if (own > limit).all() else known(own, limit, quotient)
 
 
 def known_at(output: Quantity, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, cast
 
 import numpy as np
 
-from ..algebra import Scalar, arc_tangent, power, root
+from ..algebra import Scalar, arc_tangent, is_array, power, root
 from ..trajectory import Array
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ def _scale(op: str, a: Scalar, b: Scalar) -> Scalar:
 
 def _lanes(*scalars: Scalar) -> bool:
     """Return whether any scalar is an array of lanes."""
-    return any(isinstance(x, np.ndarray) for x in scalars)
+    return any(map(is_array, scalars))
 
 
 def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
@@ -372,8 +372,9 @@ def changes(
         if number in gradients or not any(gradients.get(k) for k in read):
             continue
         if smooth and op == "where":
-            sizes = (tape.scalars[k] for k in operands(tape.nodes[read[0]]))
-            gradients[number] = _chosen(*sizes, *(gradients.get(k, {}) for k in read[1:]))
+            a, b = (tape.scalars[k] for k in operands(tape.nodes[read[0]]))
+            p, q = (gradients.get(k, {}) for k in read[1:])
+            gradients[number] = _chosen(a, b, p, q)
         elif not (smooth and op == "larger"):  # which "where" reads itself
             weights = _weights(smooth, op, tape.scalars[number], *(tape.scalars[k] for k in read))
             gradients[number] = _sum(

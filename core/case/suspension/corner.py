@@ -19,9 +19,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TypeAlias
 
-import numpy as np
-
-from ...algebra import Scalar, Vec3, cross, vec
+from ...algebra import Scalar, Vec3, cross, is_array, vec
 from ...jet import Jet, arctan2, choose, each, known, norm, sqrt
 from ...mechanism.mechanism import Mechanism, Vector
 from ..case import MARKER
@@ -325,7 +323,7 @@ def angle_in_view(y: Jet, x: Jet, size: Scalar = 1.0) -> Jet:
         size: length of the direction, its component along the view included.
     """
     angle, limit = arctan2(y, x), PARALLEL * size
-    if not (isinstance(angle.x, np.ndarray) and angle.x.dtype == object):  # proofs end here
+    if not (is_array(angle.x) and angle.x.dtype == object):  # proofs end here
         # minus half a turn, but for a margin, is farther from a quarter than any other angle
         beyond = angle.x - 0.5 * math.pi
         angle = choose(beyond, 1.5 * math.pi - HALF_TURN, angle + 2.0 * math.pi, angle)
