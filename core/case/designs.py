@@ -7,7 +7,7 @@ added here: turns of angles, signs of Euler parameters, and samples at rest.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,9 +24,9 @@ from ..kinematics import (
 from ..mechanism.motions import Path
 from ..trajectory import Array
 from .case import HELD_BUT, Case, Quantity
-from .measures import ForceMeasure
+from .measures import ForceMeasure, JointAngle, Orientation
 from .quantity import ORDERS
-from .turns import over_sweep
+from .turns import Completion, over_sweep
 
 TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size, as in `kincheck run`."""
@@ -73,7 +73,13 @@ class DesignOutputs:
                 at the design position.
         """
         outputs = {each.name: each for each in case.outputs}
-        derivatives = {name: min(derivative, each.orders - 1) for name, each in outputs.items()}
+        derivatives = {
+            # turns and signs are told by rates
+            name: max(derivative, 1)
+            if isinstance(each, JointAngle | Orientation)
+            else min(derivative, each.orders - 1)
+            for name, each in outputs.items()
+        }
         wanted = [
             WantedOutput(
                 each, derivatives[name], tuple(each.facts.get(HELD_BUT, ())), name in slopes
@@ -130,6 +136,7 @@ class SolvedDesigns:
     geometry: Array
     tol: float
     found: Variants
+    _completions: dict[str, Completion] = field(default_factory=dict[str, Completion])
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -152,7 +159,8 @@ class SolvedDesigns:
         if isinstance(output, ForceMeasure):
             assert self._forces is not None  # the case asks for them
             return self._forces.read(output.values)
-        jet = self._jet(name)
+        with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
+            jet = self._completed(name)(self._terms(name))
         values = np.asarray((jet.x, jet.v, jet.a)[derivative])
         known = np.isfinite(values)
         return values if known.all() else np.where(known, values, np.nan)
@@ -172,17 +180,20 @@ class SolvedDesigns:
             for k, moved in enumerate(moves):
                 # by a motion in place of time
                 jets = [Jet(*each, np.nan) for each in zip(x, moved, strict=True)]
-                slopes[k] = np.where(known, self._completed(name, jets).v, np.nan)
+                slopes[k] = np.where(known, self._completed(name)(jets).v, np.nan)
             yield name, slopes
 
-    def _jet(self, name: str) -> Jet:
+    def _terms(self, name: str) -> list[Jet]:
         designs, orders = self.ready.designs, range(self.ready.derivatives[name] + 1)
         known = [designs.output(self.found, name, order) for order in orders]
-        unknown = (np.nan,) * (ORDERS - len(known))
-        return self._completed(name, [Jet(*each, *unknown) for each in zip(*known, strict=True)])
+        unknown = [np.full(known[0].shape, np.nan)] * (ORDERS - len(known))
+        return [Jet(*each) for each in zip(*known, *unknown, strict=True)]
 
-    def _completed(self, name: str, terms: Sequence[Jet]) -> Jet:
-        ready, resting = self.ready, self.ready.designs.resting(self.found, name)
-        mechanism, output = ready.case.mechanism, ready.outputs[name]
-        with np.errstate(all="ignore"):  # unknown numbers are NaN, and so is all they give
-            return over_sweep(mechanism, ready.path, output, terms, resting)
+    def _completed(self, name: str) -> Completion:
+        if name not in self._completions:
+            ready, resting = self.ready, self.ready.designs.resting(self.found, name)
+            mechanism, output = ready.case.mechanism, ready.outputs[name]
+            self._completions[name] = over_sweep(
+                mechanism, ready.path, output, self._terms(name), resting
+            )
+        return self._completions[name]

@@ -229,7 +229,8 @@ def _ready(
     if not names:
         raise CaseError("curves: places names nothing to vary, expected 'lca_front z' or the like")
     geometry = Geometry(case)
-    moves = [_moves(geometry, name) for name in names]
+    found = [_number(geometry, name) for name in names]
+    moves = [moved for moved, _ in found]
     varied = dict.fromkeys(place for moved in moves for place in moved)
     for driver in case.mechanism.drivers:
         if not isinstance(driver, PointCoordinate) or driver.relative:
@@ -242,7 +243,7 @@ def _ready(
     still = {place: np.zeros(len(geometry.values[place])) for place in varied}
     matrix = [np.concatenate([*(still | moved).values()]) for moved in moves]
     nominal = [x for place in varied for x in geometry.values[place]]
-    units = {name: _unit(geometry, moved) for name, moved in zip(names, moves, strict=True)}
+    units = {name: unit for name, (_, unit) in zip(names, found, strict=True)}
     return ReadyCurves(
         DesignOutputs.of(case, varied, slopes=slopes),
         np.array(nominal, dtype=float),
@@ -252,8 +253,9 @@ def _ready(
     )
 
 
-def _moves(geometry: Geometry, name: str) -> dict[str, Array]:
-    """Return the derivatives of the numbers of each place that follows a named number.
+def _number(geometry: Geometry, name: str) -> tuple[dict[str, Array], str]:
+    """Return the derivatives of the numbers of each place that follows a named number, and its
+    unit.
 
     Raises:
         CaseError: there is none of the name, or it is three numbers.
@@ -270,16 +272,10 @@ def _moves(geometry: Geometry, name: str) -> dict[str, Array]:
         remedy = f"give {variable.name!r}" if alone else f"give {f'{variable.name} x'!r}, y or z"
         raise CaseError(f"curves: place {name!r} is one of {what}; {remedy}")
     column = 0 if alone else "xyz".index(axis)
-    return {place: slopes[:, column] for place, slopes in variable.moves.items()}
-
-
-def _unit(geometry: Geometry, moved: Mapping[str, Array]) -> str:
-    """Return the SI unit of an offset."""
-    place = next(iter(moved))
-    kind = geometry.kinds[place]
-    if kind is Kind.NUMBER:
-        return geometry.dimensions[place].of("m", "rad")
-    return "rad" if kind is Kind.DIRECTION else "m"
+    number = variable.kind is Kind.NUMBER
+    unit = geometry.dimensions[variable.name].of("m", "rad") if number else "m"
+    moved = {place: slopes[:, column] for place, slopes in variable.moves.items()}
+    return moved, "rad" if variable.kind is Kind.DIRECTION else unit
 
 
 def _offsets(ready: ReadyCurves, given: ArrayLike) -> Array:
