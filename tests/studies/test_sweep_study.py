@@ -153,7 +153,7 @@ def test_sweep_order_adds_derivatives(tmp_path):
 
 def test_large_chunks_are_solved_in_parts(tmp_path):
     case = crank(reference=False)
-    case = swept(case, np.linspace(-1.0, 1.0, 6001))
+    case = swept(case, np.linspace(-1.0, 1.0, 9001))
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     ready = Ready.of(Study(case, variation, 300, 4))
     assert 8 < ready.lanes < 64
