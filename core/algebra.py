@@ -58,7 +58,8 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
         return later.where_larger(a, b, p, q)
     if is_array(a) or is_array(b):
         sizes = (np.abs(np.asarray(x, dtype=np.float64)) for x in (a, b))
-        return np.where(operator.gt(*sizes), p, q)
+        chosen: Scalar = np.where(operator.gt(*sizes), p, q)
+        return chosen
     return p if abs(a) > abs(b) else q
 
 

@@ -277,8 +277,8 @@ class Ready:
         """
         solved = self.outputs.solve(self.study.variation.geometry(offsets), self.study.tol)
         rows = np.empty((len(self.study.rows), *solved.solved.shape))
-        for values, row in zip(rows, self.study.rows, strict=True):
-            values[:] = solved.values(row.output.name, row.derivative)
+        for k, row in enumerate(self.study.rows):
+            rows[k] = solved.values(row.output.name, row.derivative)
         return rows, solved.solved, solved.found.retried, solved.found.messages
 
     def chunk(self, index: int) -> Chunk:
