@@ -38,14 +38,11 @@ if TYPE_CHECKING:
     )
     from .kinematics import (
         Assembled,
-        Assemblies,
-        Assembly,
         Curve,
         Designs,
         Event,
         Residuals,
         assemble,
-        find_assemblies,
         residuals,
         solve,
         solve_designs,
@@ -61,8 +58,6 @@ __version__ = VERSION
 __all__ = [
     "GROUND",
     "Assembled",
-    "Assemblies",
-    "Assembly",
     "Body",
     "BodyMotion",
     "Case",
@@ -116,7 +111,6 @@ __all__ = [
     "assemble",
     "check_joint",
     "clear_caches",
-    "find_assemblies",
     "residuals",
     "solve",
     "solve_designs",
@@ -137,8 +131,7 @@ _NAMES = {
     "case.case": "Case",
     "case.io.reader_options": "Supplied",
     "kinematics": (
-        "Assembled Assemblies Assembly Curve Designs Event Residuals "
-        "assemble find_assemblies residuals solve solve_designs trace"
+        "Assembled Curve Designs Event Residuals assemble residuals solve solve_designs trace"
     ),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
@@ -154,10 +147,18 @@ if not TYPE_CHECKING:  # type checkers would take any name for one of these
         """Import a name on first use: pytest loads its plugins at every start and must not wait for
         numpy.
         """
-        if name not in _MODULES:
+        if name in _MODULES:
+            found = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        elif not name.startswith("_") and (offer := _offered(name)):
+            found = offer.load()
+        else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        found = globals()[name] = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        globals()[name] = found
         return found
+
+    def _offered(name: str) -> Any:
+        """Return what an extension offers under a public name; see `doors`."""
+        return import_module(".doors", __name__).offers("public").get(name)
 
 
 def __dir__() -> list[str]:

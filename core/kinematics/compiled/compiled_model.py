@@ -147,6 +147,7 @@ def source_files() -> list[str]:
 
 def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: int) -> Tracing:
     from .programs import Tracer  # with all that tracing takes: who finds it done does without
+    from .traced_outputs import TracedOutputs
 
     tracer = Tracer(mechanism, request, alike)
     programs = [tracer.newton(), step_programs.predict(tracer)]
@@ -155,9 +156,10 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         programs.append(tracer.tangent())
     if not request.state:
         programs.append(step_programs.extrapolate(tracer, lanes))
-    programs.append(tracer.outputs())
+    outputs = TracedOutputs(tracer)
+    programs.append(tracer.outputs(outputs.store))
     if request.slopes:
-        programs.append(tracer.traced_outputs.slopes())
+        programs.append(outputs.slopes())
     programs += step_programs.tests(tracer, neighbours=False)
     if not request.state:  # parts of a mechanism are attempted lane by lane
         programs += step_programs.tests(tracer, neighbours=True)
@@ -195,7 +197,7 @@ def _trace(mechanism: Mechanism, request: Request, alike: Alike | None, lanes: i
         most=MAX_ITERATIONS,
     )
     rows = row_ranges({name: len(vectors[name]) for name in motions}, tests)
-    rows |= {RESTING + name: rows[of] for name, of in tracer.traced_outputs.resting.items()}
+    rows |= {RESTING + name: rows[of] for name, of in outputs.resting.items()}
     return Tracing(
         plan,
         vectors,

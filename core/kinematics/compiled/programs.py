@@ -52,10 +52,11 @@ from .request import (
     by_block,
 )
 from .traced_forces import Rows, TracedForces, angles, native_rows
-from .traced_outputs import TracedOutputs
 
 Moving: TypeAlias = Callable[[str], tuple[Pose, Twist, Acceleration]]
 """Pose, twist and acceleration of a body by its name."""
+Further: TypeAlias = Callable[[dict[int, Scalar], Sequence[Scalar], Sequence[Scalar]], None]
+"""Adds to the outputs of a program, from rates of the unknowns and their accelerations."""
 
 
 class Tracer:
@@ -126,7 +127,6 @@ class Tracer:
             {name: self.vector(name, len(value)) for name, value in design.items()}
         )
         self.unknowns = self.formulation.unknowns
-        self.traced_outputs = TracedOutputs(self)
 
     def formulate(
         self, mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive]
@@ -241,7 +241,7 @@ class Tracer:
             for label, value in values.items()
         }
 
-    def outputs(self) -> Program:
+    def outputs(self, further: Further = lambda *_: None) -> Program:
         """Return the program of the wanted motions with their rates, and the tests of a solution:
         closure, redundant rows, branch.
 
@@ -252,7 +252,7 @@ class Tracer:
         phi = self.formulation.phi(self.at)
         out[self.layout.scalar("closure")] = largest(self.chosen(phi))
         out[self.layout.scalar("leftover")] = largest([phi[k] for k in self.selection.dropped])
-        return self._outputs(v, a, out)
+        return self._outputs(v, a, out, further)
 
     def outputs_of_rates(self) -> Program:
         """Return the program of the wanted motions and of the branch for given rates."""
@@ -261,7 +261,11 @@ class Tracer:
         )
 
     def _outputs(
-        self, v: Sequence[Scalar], a: Sequence[Scalar], tests: Mapping[int, Scalar]
+        self,
+        v: Sequence[Scalar],
+        a: Sequence[Scalar],
+        tests: Mapping[int, Scalar],
+        further: Further = lambda *_: None,
     ) -> Program:
         out = {
             **tests,
@@ -277,8 +281,7 @@ class Tracer:
             self._store_motion(
                 out, ("p", "omega", "omega_t"), name, motion_of_frame(p, *moving(name))
             )
-        if self.request.outputs:
-            self.traced_outputs.store(out, v, a)
+        further(out, v, a)
         if self.request.forces:
             twists = self.formulation.twists(self.at, v)
             accelerations = self.formulation.accelerations(self.at, v, a)

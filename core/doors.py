@@ -1,0 +1,143 @@
+"""Doors: what an extension offers to kincheck, and the extensions that are there.
+
+An extension is a folder of `core/extensions` or `adapters`, or an installed package of someone
+else, with one `EXTENSION = Extension(__name__, ...)`. The kernel asks here and imports no extension
+by name, so a folder can be deleted without a change elsewhere.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import KincheckError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+FOLDERS = "kincheck.core.extensions", "kincheck.adapters"
+"""Packages whose subpackages may be extensions."""
+
+GROUP = "kincheck.extensions"
+"""Entry points of extensions in other packages: NAME = "module:EXTENSION"."""
+
+_Table = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What an extension offers. A value "module:name" is an object in a module of its folder, which
+    is imported on use.
+
+    Attributes:
+        package: `__name__` of the folder; its last part is the extension's name.
+        needs: names of the extensions that it imports; without one of them it is not there.
+        commands: class of each command of the command line; see `cli.parser.Command`.
+        public: object of each name in the package kincheck.
+        schemas: type, or function that returns the JSON Schema, of each kind of file.
+        keys: docstring whose part behind "Reference. " lists the keys of a kind of file.
+        completions: names that a shell offers as values of each option.
+        engines: class of each engine in projection mode.
+        simulations: function without arguments that returns each engine in simulate mode.
+        writers: function that writes a mechanism in each format; see `case.io.model_writer`.
+        formats: who reads each format, for the help.
+        converters: function from a model's file to the text that a simulator saves.
+        views: HTML of a result or a mechanism in a notebook.
+        steppers: script of each stepper of free motion; see `adapters.steppers.scripts`.
+    """
+
+    package: str
+    needs: Sequence[str] = ()
+    commands: _Table = field(default_factory=dict[str, str])
+    public: _Table = field(default_factory=dict[str, str])
+    schemas: _Table = field(default_factory=dict[str, str])
+    keys: _Table = field(default_factory=dict[str, str])
+    completions: _Table = field(default_factory=dict[str, str])
+    engines: _Table = field(default_factory=dict[str, str])
+    simulations: _Table = field(default_factory=dict[str, str])
+    writers: _Table = field(default_factory=dict[str, str])
+    formats: _Table = field(default_factory=dict[str, str])
+    converters: _Table = field(default_factory=dict[str, str])
+    views: _Table = field(default_factory=dict[str, str])
+    steppers: _Table = field(default_factory=dict[str, str])
+
+    @property
+    def name(self) -> str:
+        """The last part of the package's name."""
+        return self.package.rpartition(".")[2]
+
+
+@dataclass(frozen=True)
+class Offer:
+    """One object that an extension offers.
+
+    Attributes:
+        extension: the extension.
+        where: module and name of the object, as "module:name".
+    """
+
+    extension: Extension
+    where: str
+
+    def load(self) -> Any:
+        """Import the module, and return the object."""
+        module, _, name = self.where.partition(":")
+        return getattr(import_module(f".{module}", self.extension.package), name)
+
+
+@cache
+def extensions() -> Mapping[str, Extension]:
+    """Return the extensions whose needs are there, by name, in the order of their names.
+
+    Raises:
+        KincheckError: an installed package has an extension with the name of another.
+    """
+    found = {each.name: each for each in sorted(_of_folders(), key=lambda each: each.name)}
+    for point in entry_points(GROUP).values():
+        if point.name in found:
+            raise KincheckError(
+                f"Two extensions are named {point.name!r}. Rename the entry point of"
+                f" {point.dist.name if point.dist else point.value}, or uninstall it."
+            )
+        found[point.name] = point.load()
+    while lacking := [name for name, each in found.items() if not {*each.needs} <= {*found}]:
+        for name in lacking:
+            del found[name]
+    return found
+
+
+def offers(kind: str) -> dict[str, Offer]:
+    """Return what all extensions offer of a kind, a field of `Extension`, by name.
+
+    Raises:
+        KincheckError: two extensions offer the same name.
+    """
+    found: dict[str, Offer] = {}
+    for extension in extensions().values():
+        for name, where in getattr(extension, kind).items():
+            if name in found:
+                raise KincheckError(
+                    f"The extensions {found[name].extension.name} and {extension.name} both offer"
+                    f" {name!r} under {kind}. Remove one of them."
+                )
+            found[name] = Offer(extension, where)
+    return found
+
+
+@cache
+def entry_points(group: str) -> Mapping[str, EntryPoint]:
+    """Return the entry points of a group in the installed packages, by name."""
+    from importlib import metadata  # slow
+
+    return {each.name: each for each in metadata.entry_points(group=group)}
+
+
+def _of_folders() -> Iterator[Extension]:
+    for package in FOLDERS:
+        for _, name, is_folder in pkgutil.iter_modules(import_module(package).__path__):
+            if is_folder and hasattr(folder := import_module(f"{package}.{name}"), "EXTENSION"):
+                yield folder.EXTENSION

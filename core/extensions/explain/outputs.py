@@ -1,0 +1,181 @@
+"""Dependence of outputs on solvers' residuals, hence a sensible tolerance, and on hardpoints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+from ...algebra import Vec3, vec
+from ...case.case import ORDERS, Case, Quantity, without_forces
+from ...case.designs import DesignOutputs
+from ...case.quantity import still_jets
+from ...harness.compare import numbers as as_numbers
+from ...jet import Jet
+from ...joints import Kind
+from ...trajectory import Array
+from ..sweep.varied_places import Geometry, Variable
+from .conditioning import Conditioning, PoseConditioning
+
+# The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
+# accelerations, whose rows carry rates.
+MARGIN = 100.0
+# Derivatives are of size one; below this they are round-off, a hundred times of a condition of 1e5.
+NOTHING = 1e-9
+ROUND_OFF = float(np.finfo(np.float64).eps)
+
+
+class Budget(msgspec.Struct, frozen=True):
+    """Effect of residuals on an output, and the resulting tolerance.
+
+    Attributes:
+        shift: by residuals of the tolerance in every row, at most over the samples [unit].
+        round_off: by residuals and a result rounded to double precision [unit].
+        at: driver value of the largest shift.
+        row: the row with the largest share of the shift; share: its share.
+        suggested: tolerance by the house formula [unit].
+        atol: tolerance of the case.
+    """
+
+    output: str
+    unit: str
+    shift: float
+    round_off: float
+    at: float
+    row: str
+    share: float
+    suggested: float
+    why: str
+    atol: float
+
+
+class Sensitivity(msgspec.Struct, frozen=True):
+    """Derivative of an output by one number of the geometry, drivers held.
+
+    Attributes:
+        number: row and axis of a table, "lca_front x"; else the first place at a point, and the
+            axis, "joints.NAME.point x"; or "joints.NAME.length".
+        unit: the output's unit by m, or by rad for a direction.
+        by_sample: at the examined samples; null where the output has no value.
+    """
+
+    output: str
+    number: str
+    unit: str
+    by_sample: list[float | None]
+
+    @property
+    def largest(self) -> float:
+        """The largest over the samples, with its sign."""
+        return max((each for each in self.by_sample if each is not None), key=abs)
+
+
+def budgets(case: Case, found: Conditioning, tol: float) -> list[Budget]:
+    """Return the budget of every output of the pose alone."""
+    return [_budget(output, found, tol) for output in case.outputs if output.orders == ORDERS]
+
+
+def _budget(output: Quantity, found: Conditioning, tol: float) -> Budget:
+    by_rows = [np.abs(_derivative(output, pose)[1]) for pose in found.poses]
+    shifts = [float(rows.sum()) for rows in by_rows]
+    k = int(np.argmax(shifts))
+    row = int(by_rows[k].argmax())
+    size = max(float(np.abs(_derivative(output, pose)[0]).max()) for pose in found.poses)
+    shift = tol * shifts[k]
+    suggested = _two_digits(MARGIN * shift)
+    why = (
+        f"100 times what residuals of {tol:g} in every row shift it by, at most {shift:.3g}"
+        f" {output.unit}: 10 for rows scaled otherwise, 10 for accelerations"
+    )
+    share = float(by_rows[k][row]) / shifts[k] if shifts[k] else 0.0
+    name = "{}: {}".format(*found.poses[k].owners[row])
+    floor = ROUND_OFF * (shifts[k] + size)
+    return Budget(
+        output.name,
+        output.unit,
+        shift,
+        floor,
+        found.poses[k].value,
+        name,
+        share,
+        suggested,
+        why,
+        output.atol,
+    )
+
+
+def sensitivities(case: Case, found: Conditioning, geometry: Geometry) -> list[Sensitivity]:
+    """Return the nonzero derivatives of outputs of motion, the largest of each output first."""
+    numbers = [
+        (name, "rad" if each.kind is Kind.DIRECTION else "m")
+        for each in geometry.variables
+        for name in each.numbers
+    ]
+    moves = geometry.moves(geometry.variables)
+    moved = [name for name in moves if np.abs(moves[name]).any()]
+    names = [each.name for each in case.outputs if not each.forces]
+    if not moved or not names:
+        return []
+    ready = DesignOutputs.of(without_forces(case), moved, slopes=names)
+    nominal = np.concatenate([geometry.values[name] for name in moved])[:, None]
+    samples = [pose.sample for pose in found.poses]
+    result: list[Sensitivity] = []
+    solved = ready.solve(nominal)
+    for name, slopes in solved.slopes(np.concatenate([moves[each] for each in moved])):
+        own: list[Sensitivity] = []
+        for slope, (number, unit) in zip(slopes[:, samples, 0], numbers, strict=True):
+            if np.nanmax(np.abs(slope), initial=0.0) > NOTHING:
+                by = f"{ready.outputs[name].unit}/{unit}"
+                own.append(Sensitivity(name, number, by, as_numbers(slope)))
+        result += sorted(own, key=lambda each: -abs(each.largest))
+    return result
+
+
+def binding_numbers(found: Conditioning, variables: Sequence[Variable]) -> list[str]:
+    """Return the numbers of the geometry not to be changed alone: redundant rows would contradict
+    the others.
+    """
+    contradicted = np.max(
+        [np.abs(pose.contradicted).max(axis=0, initial=0.0) for pose in found.poses], axis=0
+    )
+    names = [name for each in variables for name in each.numbers]
+    return [name for name, rate in zip(names, contradicted, strict=True) if rate > NOTHING]
+
+
+def _derivative(output: Quantity, pose: PoseConditioning) -> tuple[Array, Array]:
+    """Return value and derivatives of an output by residuals, from those of its points; residuals
+    do not shift its points at design.
+    """
+    at = {name: _jets(each.position, each.by_residuals) for name, each in pose.points.items()}
+    still = {name: still_jets(each.design) for name, each in pose.points.items()}
+    jet = output.of(at, still)
+    return jet.x, np.broadcast_to(jet.v, next(iter(at.values())).x.v.shape)
+
+
+def _jets(position: Array, derivatives: Array) -> Vec3:
+    """Return a position as jets, with derivatives in place of time derivatives."""
+    return vec(
+        [
+            Jet(np.full_like(d, x), d, np.zeros_like(d))
+            for x, d in zip(position, derivatives, strict=True)
+        ]
+    )
+
+
+def _two_digits(x: float) -> float:
+    """Return a number rounded up to two digits."""
+    if not (x > 0.0 and math.isfinite(x)):
+        return x
+    digit = 10.0 ** (math.floor(math.log10(x)) - 1)
+    return float(f"{math.ceil(x / digit * (1.0 - 1e-12)) * digit:.1e}")
+
+
+def read_points(case: Case) -> Sequence[str]:
+    """Return the points read by outputs of the pose alone."""
+    return tuple(
+        dict.fromkeys(
+            point for output in case.outputs if output.orders == ORDERS for point in output.points
+        )
+    )
