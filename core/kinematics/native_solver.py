@@ -301,8 +301,8 @@ class PreparedDesigns:
         return found.kept[self.route.model.rows[f"{OUTPUT}{QUANTITIES[derivative]} {name}"]]
 
     def resting(self, found: Variants, name: str) -> tuple[Array, Array] | None:
-        """Return squares of the speeds of an output that has no value at rest, shape (n, V);
-        None for any other output.
+        """Return squares of the speeds of an output without a value at rest, shape (n, V); None for
+        any other output.
         """
         rows = self.route.model.rows.get(f"{RESTING}{name}")
         return None if rows is None else (found.kept[rows][0], found.kept[rows][1])
@@ -312,7 +312,7 @@ class PreparedDesigns:
         held, shape (motions, terms, n, V); NaN at samples not reached.
 
         Args:
-            found: what `solve` returns for the geometry.
+            found: result of `solve` for the geometry.
             towards: motions of the varied numbers, shape (numbers, motions).
         """
         return slopes_of(self.route, found, geometry, towards)
