@@ -127,7 +127,7 @@ def where_moving(quotient: Jet, speeds: tuple[Any, Any] | None) -> Jet:
     """
     if speeds is None:
         return quotient
-    own, fastest = (np.asarray(each).astype(np.float64) for each in speeds)
+    own, fastest = (np.asarray(each, dtype=np.float64) for each in speeds)
     limit = np.broadcast_to(STILL**2 * np.fmax.reduce(fastest, axis=0, initial=0.0), own.shape)
     return quotient if (own > limit).all() else known(own, limit, quotient)
 
