@@ -11,11 +11,11 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import MOST_NAMED, CaseError, MechanismError, shortened
+from ..errors import MechanismError
 from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
-from ..mechanism.motions import Motion, Path, Waypoints
+from ..mechanism.motions import Motion, Waypoints
 from ..trajectory import Array
-from .case import HELD_BUT, TIME, Case, Closure, Sweep, size
+from .case import TIME, Case, Closure, Sweep, size
 
 # Largest accepted residual of the rows that are solved, relative to the mechanism's size.
 _TOL = 1e-12
@@ -153,26 +153,3 @@ def held_case(case: Case, drivers: Sequence[str]) -> Case:
             tuple(times.tolist()), tuple(values.tolist()), rate if name in drivers else 0.0
         )
     return replace(case, sweep=Sweep(TIME, path.times, motions=motions))
-
-
-def moves_alone(path: Path, drivers: Sequence[str]) -> bool:
-    """Return whether these drivers move at one rate along a path, and all others rest."""
-    rates = {name: motion.at(path.times)[1] for name, motion in path.motions.items()}
-    first = rates.get(drivers[0], 0.0)
-    names = {*rates, *drivers}
-    return all(
-        np.all(rates.get(name, 0.0) == (first if name in drivers else 0.0)) for name in names
-    )
-
-
-def require_no_held(case: Case) -> None:
-    """Refuse outputs that are such derivatives.
-
-    Raises:
-        CaseError: there is one.
-    """
-    if held := [output.name for output in case.outputs if HELD_BUT in output.facts]:
-        raise CaseError(
-            f"case {case.name!r}: {shortened(held, MOST_NAMED)}: found derivatives with other"
-            " drivers held, expected outputs of poses; choose others by --output"
-        )

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 
-from ..algebra import Vec3
-from ..jet import Jet
+from ..algebra import Scalar, Vec3
+from ..jet import Jet, known
 from ..mechanism.mechanism import Mechanism, Point, Vector
 from ..trajectory import MARKER as MARKER
 from ..trajectory import PointMotion
@@ -51,6 +51,7 @@ class Quantity(Protocol):
         why: reason for the tolerance.
         sense: meaning of a positive value; empty if name and unit state it.
         signs: convention of signs and axes; empty if only the case's own axes apply.
+        undefined: reason why solved samples have no value; empty if all have.
         facts: properties for readers of results.
     """
 
@@ -76,6 +77,8 @@ class Quantity(Protocol):
     def signs(self) -> str: ...
     @property
     def facts(self) -> Mapping[str, Any]: ...
+    @property
+    def undefined(self) -> str: ...
 
     @property
     def period(self) -> float: ...
@@ -87,11 +90,51 @@ class Quantity(Protocol):
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the quantity over the samples; unknown values are NaN.
 
+        This is its equation, over scalars of any kind: lanes, balls, traced scalars.
+
         Args:
             at: global positions of its points as jets [m].
             design: the same at the design position, at rest.
         """
         ...
+
+    def terms(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Sequence[Jet]:
+        """Return what it follows from over a sweep: itself, or the Euler parameters of a body,
+        whose sign is known over a sweep only.
+        """
+        ...
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar] | None:
+        """Return squares of two speeds: samples have no value where the first is negligible
+        against the second over the sweep; see `where_moving`. None for an output of poses.
+        """
+        ...
+
+
+# Samples with a speed below this fraction of the fastest point's speed are left out: a quotient by
+# the speed has lost three digits of its rates there, and more at lower speeds.
+STILL = 1e-3
+
+
+def where_moving(quotient: Jet, speeds: tuple[Any, Any] | None) -> Jet:
+    """Return a quotient by a speed, NaN at samples where this speed is negligible.
+
+    The largest speed is over the samples, not over lanes: lanes may hold variants of a design,
+    which must not be judged by one another.
+
+    Args:
+        speeds: as `Quantity.resting` gives them; samples along the first axis.
+    """
+    if speeds is None:
+        return quotient
+    own, fastest = (np.asarray(each, dtype=np.float64) for each in speeds)
+    limit = np.broadcast_to(STILL**2 * np.fmax.reduce(fastest, axis=0, initial=0.0), own.shape)
+    return quotient if (own > limit).all() else known(own, limit, quotient)
+
+
+def known_at(output: Quantity, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+    """Return an output over the samples, its turns not counted, NaN where it has no value."""
+    return where_moving(output.of(at, design), output.resting(at))
 
 
 def point_jets(motion: PointMotion) -> Vec3:
@@ -117,7 +160,7 @@ output, or none.
 """
 
 
-class PoseQuantity:
+class PoseQuantity(ABC):
     """Properties of a quantity of the pose, see `Quantity`, unless its class has others."""
 
     @property
@@ -129,6 +172,11 @@ class PoseQuantity:
     def orders(self) -> int:
         """Value, rate and second rate."""
         return ORDERS
+
+    @property
+    def undefined(self) -> str:
+        """Empty: it has a value at every pose."""
+        return ""
 
     @property
     def period(self) -> float:
@@ -144,8 +192,20 @@ class PoseQuantity:
         """Return nothing: it reads points of the mechanism alone."""
         return ()
 
+    @abstractmethod
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the quantity over the samples; see `Quantity.of`."""
 
-class TypedQuantity(PoseQuantity, ABC):
+    def terms(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Sequence[Jet]:
+        """Return the quantity alone."""
+        return (self.of(at, design),)
+
+    def resting(self, at: Mapping[str, Vec3]) -> tuple[Scalar, Scalar] | None:
+        """Return None: it is an output of poses."""
+        return None
+
+
+class TypedQuantity(PoseQuantity):
     """A quantity with a type in case files; a subclass with a type registers itself.
 
     Attributes:
@@ -184,10 +244,6 @@ class TypedQuantity(PoseQuantity, ABC):
             if each.metadata.get("fact", not each.metadata.get("hidden"))
         }
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
-
-    @abstractmethod
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the quantity over the samples; see `Quantity.of`."""
 
 
 def own_keys(cls: type[Any]) -> list[Field[Any]]:

@@ -49,7 +49,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .assembly.assemble import Assembled, assemble
-    from .compiled.request import LAST_ITERATION
+    from .compiled.request import LAST_ITERATION, WantedOutput
     from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
     from .continuation.trace import Curve, Event, trace
     from .design_batch import Designs, Variants, solve_designs
@@ -96,7 +96,7 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "assembly.assemble": "Assembled assemble",
-    "compiled.request": "LAST_ITERATION",
+    "compiled.request": "LAST_ITERATION WantedOutput",
     "compiled.routes": "Start notes_on_start solve_from_start start_of",
     "continuation.trace": "Curve Event trace",
     "design_batch": "Designs Variants solve_designs",
