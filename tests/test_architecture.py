@@ -89,7 +89,7 @@ IMPORTS = {
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
-    "recorded": ". primitives mechanism kinematics case case/io case/models/trees harness",
+    "recorded": ". primitives mechanism kinematics case case/io harness",
     "history": ". case case/io harness",
     "report": ". joints mechanism kinematics case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",

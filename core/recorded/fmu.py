@@ -22,8 +22,8 @@ import numpy as np
 
 from ..case.case import TIME, Case
 from ..case.io.document import fault, read_bytes
+from ..case.io.element import Element, parse_xml
 from ..case.io.reference_samples import RATES
-from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, KincheckError, brief, shortened
 from ..extras import how_to_install, installed_version
 from ..harness.trajectory_check import Reported

@@ -15,8 +15,8 @@ from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_SEVERAL, WITHOUT, Sup
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
+    from ..io.element import Element
     from .hardpoints.table import HardpointTable
-    from .trees.element import Element
     from .trees.tree import Tree
 
 CASE, CHRONO, ADAMS, ASSETTO, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
@@ -198,7 +198,7 @@ def root_of(file: Path) -> Element:
         from .trees.usd_stage import root_of_usd
 
         return root_of_usd(file)
-    from .trees.element import parse_xml
+    from ..io.element import parse_xml
 
     return parse_xml(file, _text(file))
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from ...joints import Revolute, Translational
 from ...mechanism.mechanism import Mechanism
 from ..case import Case
+from ..io.element import Element, printed_digits
 from .files import MODEL, kind_of, load, read_tree, root_of
 from .trees.case import undriven_mechanism
-from .trees.element import Element, printed_digits
 from .trees.tree import NO_LIMIT, Limit
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.

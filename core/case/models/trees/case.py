@@ -36,6 +36,7 @@ from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
 from ...io.document import SMALLEST, explained, usable
+from ...io.element import Names
 from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
@@ -48,7 +49,6 @@ from .driving import (
     read_driving,
     read_start,
 )
-from .element import Names
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 

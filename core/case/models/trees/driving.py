@@ -17,11 +17,11 @@ from ....algebra import quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened, with_article
 from ....trajectory import Array
 from ...io.document import decimal, interval, measure, shown, unknown_name, usable
+from ...io.element import Element
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...units import ANGLES, LENGTHS
 from .assembly import AT_REST, Assembled, Pose, Start, Value
-from .element import Element
 from .place import Place, unit_quaternion
 from .tree import UNKNOWNS, Move, Tree
 

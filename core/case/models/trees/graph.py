@@ -20,7 +20,7 @@ from typing import TypeAlias
 from ....algebra import IDENTITY, ZERO, Quat, Vec3, X
 from ....mechanism.mechanism import GROUND
 from ...io.document import SMALLEST
-from .element import Element, significant_digits
+from ...io.element import Element, significant_digits
 from .place import ORIGIN, Place, turn_about, unit_quaternion
 from .tree import NO_LIMIT, WORLD, Closure, Coupling, Kind, Limit, Mass, Move, Strut, Tree
 

@@ -29,9 +29,9 @@ from ....joints.base import triad
 from ....joints.polynomial import HIGHEST
 from ....mechanism.mechanism import Vector
 from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name, usable
-from .element import Element
+from ...io.element import Element, unit_vector
 from .graph import Freedom, Graph, Joint
-from .place import Place, unit_quaternion, unit_vector
+from .place import Place, unit_quaternion
 from .tree import Closure, Coupling, Kind, Move, Tree, require_spline
 
 CONSTRAINTS = ".constraints.json"

@@ -17,7 +17,7 @@ from ....algebra import ZERO, X, Y, Z, quat, vec
 from ....errors import CaseError
 from ....trajectory import Array
 from ...io.document import usable
-from .element import ZEROS, Element
+from ...io.element import ZEROS, Element
 from .mjcf_language import Classes, Compiler
 from .place import Place, turn_to, unit_quaternion
 from .tree import Mass, sum_of_masses

@@ -14,7 +14,7 @@ from ....algebra import X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
 from ...io.document import shown
-from .element import ZEROS, Element, significant_digits, words
+from ...io.element import ZEROS, Element, significant_digits, words
 from .masses import STAND_INS, mass_of
 from .mjcf_language import (
     DYNAMIC,

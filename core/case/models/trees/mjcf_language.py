@@ -15,7 +15,7 @@ from pathlib import Path
 from ....algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
-from .element import MOST_ELEMENTS, ZEROS, Element, file_near, parse_xml, words
+from ...io.element import MOST_ELEMENTS, ZEROS, Element, file_near, parse_xml, words
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")

@@ -24,7 +24,7 @@ from ....extras import library
 from ....joints import PiecewisePolynomial, Spline
 from ...io.case_file import LARGEST_FILE
 from ...io.document import fault, read_text, shown
-from .element import ZEROS, Element, parse_xml, words
+from ...io.element import ZEROS, Element, parse_xml, words
 from .graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
 from .masses import mass_in
 from .place import ORIGIN, Place, turn_about, unit_quaternion

@@ -20,7 +20,7 @@ from typing import TypeAlias
 from ....algebra import Vec3, X, cross
 from ....errors import CaseError
 from ...io.document import decimal, shown, usable
-from .element import Element, Names, words
+from ...io.element import Element, Names, words
 from .graph import Freedom, Graph, Joint, global_frames
 from .place import Place, coordinates, turn_of_axes
 from .tree import BushingLaw, Coupling, Kind, Spring, Strut

@@ -9,7 +9,7 @@ from functools import cached_property
 from ....algebra import quat, vec
 from ....errors import remedy
 from ...io.document import shown
-from .element import DEEPEST, Element
+from ...io.element import DEEPEST, Element
 from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
 from .tree import WORLD
 

@@ -23,7 +23,7 @@ from ....joints import PiecewisePolynomial, Spline
 from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
 from ...io.document import LARGEST, decimal, fault, shown
-from .element import Element, Names
+from ...io.element import Element, Names
 from .place import ORIGIN, Place
 
 WORLD = "world"

@@ -18,7 +18,7 @@ from ....algebra import Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
-from .element import ZEROS, Element, words
+from ...io.element import ZEROS, Element, words
 from .graph import Freedom, Graph, Joint
 from .loop_files import read_loop_files
 from .masses import mass_in

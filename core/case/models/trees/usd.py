@@ -20,7 +20,7 @@ from typing import cast
 from ....algebra import X, Y, Z, cross, quat, vec
 from ....errors import remedy, shortened, similar
 from ....mechanism.mechanism import Vector
-from .element import ZEROS, Element, words
+from ...io.element import ZEROS, Element, words
 from .graph import FramedFreedom, FramedJoint, Graph, global_frames, join
 from .masses import COLLIDER, StageMasses
 from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion

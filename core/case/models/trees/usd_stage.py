@@ -18,7 +18,7 @@ import numpy as np
 from ....errors import CaseError, remedy, shortened, similar
 from ....extras import library
 from ...io.document import fault, require_file, shown
-from .element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
+from ...io.element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
 
 FLATTEN = "write all into one file: usdcat --flatten FILE -o flat.usda"
 UNITS = ("metersPerUnit", "kilogramsPerUnit", "upAxis")
