@@ -26,7 +26,6 @@ GROUP = "kincheck.extensions"
 """Entry points of extensions in other packages: NAME = "module:EXTENSION"."""
 
 _Table = Mapping[str, str]
-_NOTHING: Any = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True)
@@ -44,6 +43,7 @@ class Extension:
         completions: function that returns the values of each option that a shell completes.
         engines: class of each engine in projection mode.
         simulations: function without arguments that returns each engine in simulate mode.
+        readers: readers of files; see `case.io.readers.Reader`.
         writers: function that writes a mechanism in each format; see `case.io.model_writer`.
         formats: who reads each format, for the help.
         converters: function from a model's file to the text that a simulator saves.
@@ -51,16 +51,17 @@ class Extension:
 
     package: str
     needs: Sequence[str] = ()
-    commands: _Table = _NOTHING
-    public: _Table = _NOTHING
-    schemas: _Table = _NOTHING
-    keys: _Table = _NOTHING
-    completions: _Table = _NOTHING
-    engines: _Table = _NOTHING
-    simulations: _Table = _NOTHING
-    writers: _Table = _NOTHING
-    formats: _Table = _NOTHING
-    converters: _Table = _NOTHING
+    commands: _Table = field(default_factory=dict[str, str])
+    public: _Table = field(default_factory=dict[str, str])
+    schemas: _Table = field(default_factory=dict[str, str])
+    keys: _Table = field(default_factory=dict[str, str])
+    completions: _Table = field(default_factory=dict[str, str])
+    engines: _Table = field(default_factory=dict[str, str])
+    simulations: _Table = field(default_factory=dict[str, str])
+    readers: _Table = field(default_factory=dict[str, str])
+    writers: _Table = field(default_factory=dict[str, str])
+    formats: _Table = field(default_factory=dict[str, str])
+    converters: _Table = field(default_factory=dict[str, str])
 
     @property
     def name(self) -> str:

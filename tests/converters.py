@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kincheck import adapters
-from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.case.models.trees.undriven import undriven_file
 from kincheck.core.errors import KincheckError
 from kincheck.core.studies.same import compare
 

@@ -28,6 +28,7 @@ LAYERS = (
     ("studies",),
     ("live",),
     ("cli",),
+    ("extensions",),
     ("__init__",),
     ("kincheck",),
 )
@@ -80,12 +81,18 @@ IMPORTS = {
     "case": ". primitives joints mechanism kinematics",
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics case case/suspension",
-    "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
-    "case/models/trees": ". joints mechanism kinematics case case/io",
-    "case/models/adams": ". joints mechanism kinematics case case/io",
-    "case/models": (
-        ". joints mechanism case case/io case/models/adams case/models/hardpoints case/models/trees"
+    "case/models": ". case case/io",
+    "case/models/hardpoints": (
+        ". joints mechanism kinematics case case/suspension case/io case/models"
     ),
+    "case/models/trees": ". joints mechanism kinematics case case/io case/models",
+    "case/models/adams": ". joints mechanism kinematics case case/io case/models/trees",
+    "extensions": "",
+    "extensions/adams": ".",
+    "extensions/hardpoints": ".",
+    "extensions/trees": ".",
+    "extensions/usd": ". mechanism case/io case/models/trees",
+    "extensions/osim": ". joints case/io case/models/trees",
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
@@ -112,19 +119,19 @@ IMPORTS = {
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/compliance": (". mechanism kinematics case case/suspension harness report"),
     "studies/board": ". mechanism kinematics case case/io harness report",
-    "studies/same": ". joints mechanism kinematics case/models case/models/trees",
+    "studies/same": ". joints mechanism kinematics case/models/trees",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper studies/compliance"
     ),
     "live": (
-        ". program/llvm mechanism kinematics case case/io case/models case/models/hardpoints "
+        ". program/llvm mechanism kinematics case case/io case/models/hardpoints "
         "harness report studies/variation studies/tolerance studies/diagnosis"
     ),
     "cli": (
         ". program program/llvm joints kinematics case "
-        "case/io case/models/hardpoints case/models harness harness/workers history "
-        "recorded report studies/variation studies/stress/families studies "
+        "case/io case/models/hardpoints case/models/trees case/models harness harness/workers "
+        "history recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
         "studies/paper studies/same studies/diagnosis studies/bench studies/board "
         "studies/compliance live"

@@ -27,7 +27,7 @@ from .registry import Registry, Status, tell_left_out
 from .shared_options import OfCase, driver_value, return_cases
 
 if TYPE_CHECKING:
-    from ..case.models.undriven import Undriven
+    from ..case.models.trees.undriven import Undriven
 
 
 FORMATS = {
@@ -211,7 +211,7 @@ class Same(Command):
 
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
-        from ..case.models.files import require_used
+        from ..case.models.trees.reader import require_used
         from ..report.terminal import with_json
         from ..studies.same import compare
 
@@ -258,18 +258,18 @@ def _pair(text: str) -> tuple[str, str]:
 
 
 def _read(name: str, registry: Registry, without: Sequence[str]) -> Undriven:
-    from ..case.models.files import MODEL, kind_of
-    from ..case.models.undriven import undriven_case, undriven_file
+    from ..case.models.trees.reader import is_model
+    from ..case.models.trees.undriven import undriven_case, undriven_file
 
     file = Path(name)
-    if file.is_file() and kind_of(file) == MODEL:
+    if file.is_file() and is_model(file):
         return undriven_file(file, without)
     return undriven_case(registry.find_case(name, driven=False), name)
 
 
 def _convert(name: str, file: Path, registry: Registry) -> Undriven:
     """Return what a simulator saves of a model."""
-    from ..case.models.undriven import undriven_file
+    from ..case.models.trees.undriven import undriven_file
 
     assert registry.converter is not None
     text = registry.converter(name)(file)

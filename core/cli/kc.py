@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.io.reader_options import HARDPOINTS, Supplied
+from ..case.io.reader_options import Supplied
+from ..case.models.hardpoints.options import HARDPOINTS
 from ..errors import KincheckError, refuse
 from ..options import (
     argument,
@@ -93,7 +94,7 @@ class MeasureCompliance(Isolated):
     def run(self, registry: Registry) -> int:
         """Do the work of the command line."""
         from ..case.io.atomic_files import write
-        from ..case.models.files import is_table
+        from ..case.models.hardpoints.reader import is_table
         from ..case.units import LENGTHS
         from ..harness.engine import STANDARD
         from ..harness.record import to_json
@@ -107,7 +108,7 @@ class MeasureCompliance(Isolated):
         refuse(problems or shared_options.unreachable(self))
         typed, axle = self.supplied.travel, self.supplied.axle
         travel = None if typed is None else _values("--travel", typed, LENGTHS)
-        table = os.path.isfile(self.case) and is_table(Path(self.case))
+        table = os.path.isfile(self.case) and is_table(Path(self.case), self.supplied)
         # the sweep of a table's case; one sample is none
         swept = table and travel is not None and travel[0] != travel[-1]
         supplied = replace(

@@ -112,7 +112,7 @@ class Serve(Command):
 
     def _reader(self, registry: Registry) -> Callable[[], Live]:
         """Return the function that opens a table of hardpoints, or any other mechanism."""
-        from ..case.models.files import is_table
+        from ..case.models.hardpoints.reader import is_table
         from ..live.model import LiveModel
         from ..live.table import LiveTable
 

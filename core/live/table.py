@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, PER_TRAVEL, Case, size, without_forces
 from ..case.closing import held_case, moves_alone
-from ..case.io.reader_options import Supplied
-from ..case.models.files import read_hardpoints
+from ..case.models.hardpoints.options import WheelOptions
 from ..case.models.hardpoints.read import case_of_hardpoints
+from ..case.models.hardpoints.reader import read_hardpoints
+from ..case.models.hardpoints.saving import free_name, save_table
 from ..case.models.hardpoints.table import Hardpoint, axes_of, number, unit_of
-from ..case.models.saving import free_name, save_table
 from ..case.quantity import Output, Quantity, still_jets
 from ..case.turns import count_output_turns
 from ..errors import KincheckError, unknown
@@ -118,7 +118,7 @@ class LiveTable(LiveFile):
     def __init__(
         self,
         file: Path,
-        supplied: Supplied,
+        supplied: WheelOptions,
         referenced: Callable[[Case], Case] = lambda case: case,
         vary: Path | None = None,
     ) -> None:

@@ -10,7 +10,7 @@ from kincheck import adapters
 from kincheck.cases.jet import Jet, cos, sin, steady
 from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.models.undriven import undriven_case, undriven_file
+from kincheck.core.case.models.trees.undriven import undriven_case, undriven_file
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import (
     Cylindrical,

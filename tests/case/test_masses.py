@@ -8,7 +8,8 @@ import pytest
 from kincheck.adapters.writers import mjcf, sdf
 from kincheck.core.algebra import vec
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.trees.reader import read_tree
 from kincheck.core.case.models.trees.tree import Mass, sum_of_masses
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.core.case.io import model_writer
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.trees.reader import read_tree
+from kincheck.core.case.models.trees.undriven import undriven_file
 from kincheck.core.errors import CaseError
 from scipy.spatial.transform import Rotation
 

@@ -4,7 +4,8 @@ import re
 
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load, read_hardpoints
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.reader import read_hardpoints
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError
 

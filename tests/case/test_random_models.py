@@ -18,7 +18,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.programs import without_comments
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
-from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.case.models.trees.undriven import undriven_file
 from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.studies.same import compare

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.trees.reader import read_tree
+from kincheck.core.case.models.trees.undriven import undriven_file
 from kincheck.core.studies.same import compare
 
 from ..fuzz import sdf as seeds

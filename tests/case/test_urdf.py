@@ -8,9 +8,10 @@ from kincheck import adapters
 from kincheck.core.algebra import X, Y, Z
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.io.reader_options import LEFT_OUT
-from kincheck.core.case.models.files import load, read_tree
-from kincheck.core.case.models.undriven import undriven_case, undriven_file
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.trees.reader import read_tree
+from kincheck.core.case.models.trees.undriven import undriven_case, undriven_file
 from kincheck.core.joints import Polynomial, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism
 from kincheck.core.mechanism.motions import JointAngle

@@ -6,9 +6,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.files import load
 from kincheck.core.case.models.trees.driving import read_start
-from kincheck.core.case.models.undriven import undriven_file
+from kincheck.core.case.models.trees.reader import read_tree
+from kincheck.core.case.models.trees.undriven import undriven_file
 from kincheck.core.studies.same import compare
 
 from ..support.model_files import driven

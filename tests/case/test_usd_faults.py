@@ -6,7 +6,7 @@ import sys
 from functools import partial
 
 import pytest
-from kincheck.core.case.models.files import read_tree
+from kincheck.core.case.models.trees.reader import read_tree
 from kincheck.core.errors import CaseError, KincheckError
 
 from ..support.case_texts import refused

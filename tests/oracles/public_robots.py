@@ -18,11 +18,13 @@ from pathlib import Path
 
 import numpy as np
 from kincheck.core.case.case import Case
-from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
-from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.readers import LEFT_OUT
+from kincheck.core.case.models.files import load
 from kincheck.core.case.models.trees import case as trees
 from kincheck.core.case.models.trees.assembly import Assembled
 from kincheck.core.case.models.trees.driving import Driving
+from kincheck.core.case.models.trees.reader import read_tree
 from kincheck.core.errors import KincheckError
 from kincheck.core.kinematics import NativeSolver
 

@@ -8,7 +8,7 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core import Body, JointDisplacement, Mechanism, Translational
 from kincheck.core.case.io.model_writer import written
-from kincheck.core.case.models.undriven import undriven_case, undriven_file
+from kincheck.core.case.models.trees.undriven import undriven_case, undriven_file
 from kincheck.core.cli.main import main
 from kincheck.core.studies.same import compare
 

@@ -26,11 +26,11 @@ from .mechanism_sections import (
     values_in_file,
 )
 from .outputs import output_lines, read_output, with_all_coordinates, with_slopes
+from .readers import LARGEST_FILE
 from .reference import read_reference, reason_against, reference_lines
 from .schema import SCHEMA, CaseKeys, ClosureKeys, ReferenceKeys, UnitsKeys
 from .suspension_section import read_suspension, suspension_lines
 
-LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
 MOST_PARTS = 60_000
 _PARTS = ("bodies", "joints", "couplers", "points", "drivers", "forces", "outputs")

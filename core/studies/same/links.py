@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...case.models.undriven import Undriven, plain_name
+from ...case.models.trees.undriven import Undriven, plain_name
 from ...errors import KincheckError, UnknownNameError
 from ...mechanism.mechanism import GROUND
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...algebra import triple, vec
 from ...case.models.trees.tree import Mass, sum_of_masses
-from ...case.models.undriven import Coordinate, Undriven
+from ...case.models.trees.undriven import Coordinate, Undriven
 from ...joints import Fixed
 from ...kinematics import Poses
 from ...mechanism.body import Body, inertia_matrix

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...case.models.undriven import Coordinate, Undriven
+from ...case.models.trees.undriven import Coordinate, Undriven
 from ...joints.base import Joint, unit
 from ...kinematics import FreePoses, Poses, Residuals, residuals
 from ...mechanism.body import Body

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...case.models.undriven import Undriven
+from ...case.models.trees.undriven import Undriven
 from ...errors import shortened
 from ...kinematics import FreePoses, Poses, Residuals, Walked
 from ...trajectory import Array

@@ -28,8 +28,8 @@ from ....mechanism.motions import (
 )
 from ...case import TIME, Sweep
 from ...io.document import decimal, fault, shown, unknown_name
-from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
+from ..trees.options import DrivingOptions
 from .dataset import Statement
 from .model import Coordinate, Model, coordinates
 
@@ -307,7 +307,7 @@ def read_drives(
     mechanism: Mechanism,
     driven: Sequence[Coordinate],
     moved: Sequence[Drive],
-    supplied: Supplied,
+    supplied: DrivingOptions,
     weak: float,
 ) -> tuple[Mechanism, Sweep, list[str]]:
     """Return the mechanism with its drivers, the sweep, and the drivers without a force: those for

@@ -12,7 +12,8 @@ from ...case import Case, Truth
 from ...closing import within_digits
 from ...io.document import explained, fault
 from ...io.outputs import with_all_motions
-from ...io.reader_options import LEFT_OUT, WITHOUT, Supplied
+from ...io.readers import LEFT_OUT, WITHOUT
+from ..trees.options import DrivingOptions
 from .constraints import (
     ADDED_UP,
     CLOSED,
@@ -32,7 +33,7 @@ from .model import Model, Units, read_bodies, read_markers, read_places, read_un
 _LONGEST_TITLE, _MOST_NAMED = 80, 12
 
 
-def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
+def read_adams(file: Path, text: str, supplied: DrivingOptions) -> Case:
     """Return the case of a dataset; outputs are the coordinates of the parts' centres of mass,
     those of joints, and the rotations of parts.
 

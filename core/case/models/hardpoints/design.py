@@ -25,13 +25,13 @@ from ....trajectory import Array
 from ...case import Case, Hardpoint, Quantity, Sweep, size
 from ...io.document import decimal, fault, interval, measure, require_known, shown
 from ...io.outputs import default, with_all_coordinates, with_slopes
-from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...quantity import AXES, with_markers
 from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
 from ...units import LENGTHS
+from .options import WheelOptions
 from .table import Axes, HardpointTable
 from .templates import TIEROD_INNER, WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 
@@ -216,7 +216,7 @@ def vehicle_of(
     template: Template,
     named: Mapping[str, str],
     at: Mapping[str, Vector],
-    supplied: Supplied,
+    supplied: WheelOptions,
     side: Side,
 ) -> Vehicle:
     """Return the vehicle around the wheel; the wheel's radius and axis follow from points if

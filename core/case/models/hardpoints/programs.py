@@ -16,7 +16,7 @@ from typing import Any, cast
 
 from ....errors import MOST_NAMED, remedy, shortened
 from ...io.document import fault, parse, shown
-from ...io.reader_options import Supplied
+from .options import WheelOptions
 from .table import Hardpoint, HardpointTable, number, require_name, twice, wanted_corner
 
 _TOKEN = re.compile(
@@ -366,7 +366,7 @@ def is_assetto(text: str) -> bool:
     return re.search(rf"^\s*{_OF_ASSETTO.pattern}\s*=", text, re.MULTILINE) is not None
 
 
-def read_assetto(file: Path, text: str, supplied: Supplied) -> HardpointTable:
+def read_assetto(file: Path, text: str, supplied: WheelOptions) -> HardpointTable:
     """Return the points of an axle of Assetto Corsa (suspensions.ini), of its left wheel unless the
     corner is a right one.
 

@@ -18,7 +18,6 @@ from typing import TypeAlias
 
 from ....errors import MOST_NAMED, brief, shortened
 from ...io.document import fault, shown
-from ...io.reader_options import NOTHING, Supplied
 from ...io.table import (
     DELIMITERS,
     Cell,
@@ -33,6 +32,7 @@ from ...io.table import (
     trim,
 )
 from ...units import LENGTHS
+from .options import NOTHING, WheelOptions
 from .programs import plain_lines
 from .table import (
     Hardpoint,
@@ -96,7 +96,7 @@ _Parts: TypeAlias = tuple[Head, Sequence[Row], Sequence[Row]]
 """The head of a table, and the rows above and below it."""
 
 
-def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> HardpointTable:
+def read_plain(file: Path, text: str, supplied: WheelOptions = NOTHING) -> HardpointTable:
     """Return the points of a text by name.
 
     Args:
@@ -140,7 +140,7 @@ def read_plain(file: Path, text: str, supplied: Supplied = NOTHING) -> Hardpoint
     return read_rows(table, "Text" if table.delimiter == " " else "CSV", facts, supplied)
 
 
-def read_spreadsheet(file: Path, supplied: Supplied) -> HardpointTable:
+def read_spreadsheet(file: Path, supplied: WheelOptions) -> HardpointTable:
     """Return the points of a workbook by name.
 
     Args:
@@ -207,7 +207,9 @@ def _join_words(words: Sequence[Cell]) -> Sequence[Cell]:
     return words
 
 
-def read_rows(table: Table, tool: str, facts: dict[str, str], supplied: Supplied) -> HardpointTable:
+def read_rows(
+    table: Table, tool: str, facts: dict[str, str], supplied: WheelOptions
+) -> HardpointTable:
     """Return the points of a table by name.
 
     Args:

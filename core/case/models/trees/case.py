@@ -38,7 +38,7 @@ from ...closing import within_digits
 from ...io.document import SMALLEST, explained, usable
 from ...io.element import Names
 from ...io.outputs import with_all_motions
-from ...io.reader_options import LEFT_OUT, Supplied
+from ...io.readers import LEFT_OUT
 from .assembly import Assembled, assemble
 from .driving import (
     KEYFRAME,
@@ -49,6 +49,7 @@ from .driving import (
     read_driving,
     read_start,
 )
+from .options import ModelOptions
 from .place import Place, coordinates, rotation_vector
 from .tree import Closure, Coupling, Mass, Move, Spring, Strut, Tree, sum_of_masses
 
@@ -64,7 +65,7 @@ PARALLEL = 1e-9
 BEHIND = 100.0
 
 
-def case_of(tree: Tree, supplied: Supplied) -> Case:
+def case_of(tree: Tree, supplied: ModelOptions) -> Case:
     """Return the case of a tree; outputs are the coordinates of the origins of links and of sites,
     those of joints, and the rotations of links.
 
@@ -90,7 +91,7 @@ def undriven_mechanism(tree: Tree) -> tuple[Mechanism, Tree, set[str]]:
     return whole, model.tree, {spin.move.inner for spin in spins.values()}
 
 
-def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
+def model_of(tree: Tree, supplied: ModelOptions) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
     """Return a tree in its closed start, its driven and held moves, and its links that spin.
 
     Raises:

@@ -13,9 +13,9 @@ from os.path import isfile
 from pathlib import Path
 
 from ....algebra import IDENTITY, ZERO, Quat, X, Y, Z, cross, quat, vec
-from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from ...io.element import MOST_ELEMENTS, ZEROS, Element, file_near, parse_xml, words
+from ...io.readers import LARGEST_FILE
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion
 
 ORIENTATION = words("quat axisangle xyaxes zaxis euler")

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from ....algebra import Vec3, X, Y, Z
 from ....errors import CaseError
-from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from ...io.element import ZEROS, Element, file_near, parse_xml, words
+from ...io.readers import LARGEST_FILE
 from .graph import Freedom, Graph, Joint
 from .masses import mass_in
 from .place import ORIGIN, Place

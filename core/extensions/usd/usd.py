@@ -17,15 +17,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
-from ....algebra import X, Y, Z, cross, quat, vec
-from ....errors import remedy, shortened, similar
-from ....mechanism.mechanism import Vector
-from ...io.element import ZEROS, Element, words
-from .graph import FramedFreedom, FramedJoint, Graph, global_frames, join
-from .masses import COLLIDER, StageMasses
-from .place import Place, coordinates, rotation_vector, turn_of_axes, unit_quaternion
-from .robot_elements import mimic
-from .tree import (
+from ...algebra import X, Y, Z, cross, quat, vec
+from ...case.io.element import ZEROS, Element, words
+from ...case.models.trees.graph import FramedFreedom, FramedJoint, Graph, global_frames, join
+from ...case.models.trees.masses import COLLIDER, StageMasses
+from ...case.models.trees.place import (
+    Place,
+    coordinates,
+    rotation_vector,
+    turn_of_axes,
+    unit_quaternion,
+)
+from ...case.models.trees.robot_elements import mimic
+from ...case.models.trees.tree import (
     INFINITE,
     NO_LIMIT,
     UNKNOWNS,
@@ -36,6 +40,8 @@ from .tree import (
     Tree,
     limit_of,
 )
+from ...errors import remedy, shortened, similar
+from ...mechanism.mechanism import Vector
 from .usd_stage import UNITS
 
 AXES = {"X": X, "Y": Y, "Z": Z}

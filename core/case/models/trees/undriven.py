@@ -8,13 +8,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...joints import Revolute, Translational
-from ...mechanism.mechanism import Mechanism
-from ..case import Case
-from ..io.element import Element, printed_digits
-from .files import MODEL, kind_of, load, read_tree, root_of
-from .trees.case import undriven_mechanism
-from .trees.tree import NO_LIMIT, Limit
+from ....joints import Revolute, Translational
+from ....mechanism.mechanism import Mechanism
+from ...case import Case
+from ...io.element import Element, printed_digits
+from ..files import load
+from .case import undriven_mechanism
+from .reader import is_model, read_tree, root_of
+from .tree import NO_LIMIT, Limit
 
 # Parts of a half turn that people write in a few digits, as 3.1416 and -1.57.
 _PARTS = 12
@@ -109,7 +110,7 @@ def undriven_file(file: Path, without: Collection[str] = ()) -> Undriven:
     Raises:
         CaseError: it cannot be read.
     """
-    if kind_of(file) != MODEL:
+    if not is_model(file):
         return undriven_case(load(file), file.name)
     root = root_of(file)
     mechanism, tree, spinning = undriven_mechanism(read_tree(file, without))

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
 
-from ...errors import CaseError, KincheckError
-from ..io.reader_options import Supplied
-from .files import read_hardpoints
-from .hardpoints.table import HardpointTable, unit_of
+from ....errors import CaseError, KincheckError
+from .options import WheelOptions
+from .reader import read_hardpoints
+from .table import HardpointTable, unit_of
 
 NAME = re.compile(r"[^\W_][\w .+-]{0,80}\.csv")
 """A plain name: no folder, no hidden file."""
@@ -25,7 +25,7 @@ def free_name(file: Path) -> str:
 
 
 def save_table(
-    table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]], name: str
+    table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]], name: str
 ) -> Path:
     """Write a table with other numbers to a new file beside its own.
 
@@ -63,7 +63,7 @@ def save_table(
 
 
 def _reads_back(
-    path: Path, supplied: Supplied, table: HardpointTable, points: Sequence[Sequence[float]]
+    path: Path, supplied: WheelOptions, table: HardpointTable, points: Sequence[Sequence[float]]
 ) -> bool:
     """Return whether a file is read as these points."""
     try:
@@ -102,7 +102,9 @@ def _text_with_changes(table: HardpointTable, points: Sequence[Sequence[float]])
     return "".join(lines)
 
 
-def _new_text(table: HardpointTable, supplied: Supplied, points: Sequence[Sequence[float]]) -> str:
+def _new_text(
+    table: HardpointTable, supplied: WheelOptions, points: Sequence[Sequence[float]]
+) -> str:
     """Return a new table as CSV, with unit, axes and template."""
     known = {
         "template": table.template or supplied.template,

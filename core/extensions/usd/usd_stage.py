@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import CaseError, remedy, shortened, similar
-from ....extras import library
-from ...io.document import fault, require_file, shown
-from ...io.element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
+from ...case.io.document import fault, require_file, shown
+from ...case.io.element import DEEPEST, MOST_ELEMENTS, USD, Element, file_near, words
+from ...errors import CaseError, remedy, shortened, similar
+from ...extras import library
 
 FLATTEN = "write all into one file: usdcat --flatten FILE -o flat.usda"
 UNITS = ("metersPerUnit", "kilogramsPerUnit", "upAxis")

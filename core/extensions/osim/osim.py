@@ -1,6 +1,6 @@
 """OpenSim: models in its XML since version 4; older ones are brought up to date by its own library.
 
-Coordinates keep their names, and the pose is that of their default values. Custom joints turn and
+Coordinates keep their names, and their default values are the pose. Custom joints turn and
 slide by lines of their coordinates; other axes may follow by polynomials and splines. Angles of
 frames and of ball, gimbal and free joints are turns about x, y and z of the body, one after the
 other (OpenSim 4.6).
@@ -18,18 +18,15 @@ from posixpath import normpath
 
 from numpy.polynomial import Polynomial
 
-from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z
-from ....errors import KincheckError
-from ....extras import library
-from ....joints import PiecewisePolynomial, Spline
-from ...io.case_file import LARGEST_FILE
-from ...io.document import fault, read_text, shown
-from ...io.element import ZEROS, Element, parse_xml, words
-from .graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
-from .masses import mass_in
-from .place import ORIGIN, Place, turn_about, unit_quaternion
-from .robot_elements import HALFWAY
-from .tree import (
+from ...algebra import IDENTITY, Quat, Vec3, X, Y, Z
+from ...case.io.document import fault, read_text, shown
+from ...case.io.element import ZEROS, Element, parse_xml, words
+from ...case.io.readers import LARGEST_FILE
+from ...case.models.trees.graph import FramedFreedom, FramedJoint, Graph, Joint, global_frames, join
+from ...case.models.trees.masses import mass_in
+from ...case.models.trees.place import ORIGIN, Place, turn_about, unit_quaternion
+from ...case.models.trees.robot_elements import HALFWAY
+from ...case.models.trees.tree import (
     NO_LIMIT,
     BushingLaw,
     Closure,
@@ -42,6 +39,9 @@ from .tree import (
     Tree,
     require_spline,
 )
+from ...errors import KincheckError
+from ...extras import library
+from ...joints import PiecewisePolynomial, Spline
 
 VERSION_4 = 40_000
 """Oldest version of documents that are read as they are."""
@@ -246,7 +246,7 @@ class _Reader:
         return link, place * Place(frame.child_vector("translation"), _turn(angles))
 
     def _joint(self, element: Element, coupled: set[str]) -> FramedJoint | None:
-        """Return a joint; None of one that leaves its link free."""
+        """Return a joint; None if it leaves its link free."""
         graph, name = self.graph, element.require("name")
         if element.tag not in (*CHAINS, CUSTOM):
             raise element.unknown_name("type", element.tag, (*CHAINS, CUSTOM), "a joint")
